@@ -1,0 +1,43 @@
+# `make demo` and `make test` do all the set-up they need on Debian 12 and 13; elsewhere name a Python that has FEniCSx:
+#     make demo PYTHON=/path/to/python
+
+SIZE ?= small
+NP ?= 1
+PYTHON ?=
+
+ifeq ($(strip $(PYTHON)),)
+python := .venv/bin/python
+prepare := setup
+export PYTHONNOUSERSITE := 1
+else
+python := $(PYTHON)
+prepare :=
+endif
+launch := scripts/launch.sh
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test test-slow lint setup
+
+help: ## Show this list
+	@echo "Targets:"
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 20
+	@echo "Settings:"
+	@echo "  SIZE=small|paper     size of the demo (small)"
+	@echo "  NP=2                 MPI ranks of the demo (1)"
+	@echo "  PYTHON=/some/python  use this Python and its FEniCSx instead of setting up .venv"
+
+demo: $(prepare) ## Optimise the contact shape of two chain links; results in output/chain_links/
+	$(launch) $(NP) $(python) demos/demo_chain_links.py --size $(SIZE)
+
+test: lint ## Check style and types, run the quick tests
+	$(launch) 1 $(python) -m pytest -m "not slow"
+
+test-slow: $(prepare) ## Run the tests that take long
+	$(launch) 1 $(python) -m pytest -m slow
+
+lint: $(prepare) ## Check style (ruff) and types (mypy)
+	$(python) -m ruff check .
+	$(python) -m mypy
+
+setup: ## Install what is missing: Debian packages and .venv
+	@scripts/setup.sh

@@ -1,0 +1,354 @@
+"""The one module that knows which dolfinx runs; everything else takes FEniCSx through it.
+
+Forms are written once on a *template*, a `ufl.Mesh` without coordinates, compiled once, and then bound to any
+number of meshes: subdomain meshes of one body differ in their numbers, never in their code.
+
+Node numbers of meshes handed in are called *input nodes*; cells come in VTK vertex order.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import ufl
+from mpi4py import MPI
+from petsc4py import PETSc
+
+
+@contextmanager
+def _side_effects_undone() -> Iterator[None]:
+    """Undo what importing and compiling with old releases leaves behind in the process.
+
+    dolfinx 0.5 switches `sys.setdlopenflags` to RTLD_GLOBAL for good, after which VTK's own
+    libraries clash with the system's; ffcx 0.5 configures the root logger and captures warnings.
+    """
+    root = logging.getLogger()
+    handlers, level, setdlopenflags = list(root.handlers), root.level, sys.setdlopenflags
+    sys.setdlopenflags = lambda flags: None
+    try:
+        yield
+    finally:
+        sys.setdlopenflags = setdlopenflags
+        root.handlers[:] = handlers
+        root.setLevel(level)
+        logging.captureWarnings(False)
+
+
+with _side_effects_undone():
+    import dolfinx
+    import dolfinx.fem
+    import dolfinx.fem.petsc
+    import dolfinx.io
+    import dolfinx.mesh
+    from dolfinx import cpp, jit
+    from dolfinx.fem import Constant, Function
+
+__all__ = [
+    "VERSION",
+    "CompiledForm",
+    "Constant",
+    "Function",
+    "assemble_csr",
+    "assemble_scalar",
+    "assemble_vector",
+    "cell_nodes",
+    "cellwise_space",
+    "coefficient",
+    "create_mesh",
+    "displacement_space",
+    "match_facets",
+    "node_dofs",
+    "rank_mesh",
+    "scalar_space",
+    "template",
+    "update_coordinates",
+    "write_xdmf",
+]
+
+VERSION: tuple[int, ...] = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
+_OLD = VERSION < (0, 7)
+
+#: Vertex order of VTK -> tensor-product order of dolfinx; each permutation is its own inverse.
+_VERTEX_ORDER = {"hexahedron": [0, 1, 3, 2, 4, 5, 7, 6], "tetrahedron": [0, 1, 2, 3]}
+#: Vertices (tensor-product order) of the facets of the reference cell, in dolfinx's facet numbering.
+_FACET_VERTICES = {
+    "hexahedron": [[0, 1, 2, 3], [0, 1, 4, 5], [0, 2, 4, 6], [1, 3, 5, 7], [2, 3, 6, 7], [4, 5, 6, 7]],
+    "tetrahedron": [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]],
+}
+
+
+def _element(cell_type: str, shape: tuple[int, ...]) -> Any:
+    if not _OLD:
+        import basix.ufl
+
+        return basix.ufl.element("Lagrange", cell_type, 1, shape=shape)
+    # The variant is spelt out because ffcx 0.5 rewrites coordinate elements to it while compiling: without
+    # it the signature of the next process differs and misses the compilation cache.
+    cell = ufl.Cell(cell_type)
+    return (ufl.VectorElement if shape else ufl.FiniteElement)("Lagrange", cell, 1, variant="equispaced")
+
+
+@lru_cache(maxsize=8)
+def template(cell_type: str) -> Any:
+    """Return the mesh without coordinates on which forms for cells of this type are written."""
+    return ufl.Mesh(_element(cell_type, (3,)))
+
+
+@lru_cache(maxsize=8)
+def displacement_space(cell_type: str) -> Any:
+    """Return the template's space of vector fields, linear (tetrahedra) or trilinear (hexahedra)."""
+    return ufl.FunctionSpace(template(cell_type), _element(cell_type, (3,)))
+
+
+@lru_cache(maxsize=8)
+def cellwise_space(cell_type: str) -> Any:
+    """Return the template's space of scalars that are constant on each cell."""
+    return ufl.FunctionSpace(template(cell_type), _cellwise_element(cell_type))
+
+
+def _cellwise_element(cell_type: str) -> Any:
+    if _OLD:
+        return ufl.FiniteElement("DG", ufl.Cell(cell_type), 0)
+    import basix.ufl
+
+    return basix.ufl.element("DG", cell_type, 0)
+
+
+def _partitioner() -> Any:
+    """Leave every cell on the rank that hands it in."""
+    if _OLD:
+
+        def stay(comm: Any, parts: int, tdim: int, cells: Any, ghost_mode: Any) -> Any:
+            return cpp.graph.AdjacencyList_int32(np.full((cells.num_nodes, 1), comm.rank, dtype=np.int32))
+
+        return stay
+
+    def stay_new(comm: Any, parts: int, cell_types: Any, cells: Any) -> Any:
+        vertices = len(_VERTEX_ORDER[cell_types[0].name])
+        count = len(cells[0]) // vertices
+        return cpp.graph.AdjacencyList_int32(np.full((count, 1), comm.rank, dtype=np.int32))
+
+    return stay_new
+
+
+def create_mesh(comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, cell_type: str) -> Any:
+    """Build a dolfinx mesh whose cells stay on the rank that hands them in. Collective on ``comm``.
+
+    Args:
+        comm: Communicator of the mesh.
+        points: This rank's slice of the coordinates, shape (n, 3), [length]; the slices of all ranks,
+            concatenated, hold the input nodes in order.
+        cells: This rank's cells as input nodes, VTK order, shape (m, 8) or (m, 4).
+        cell_type: ``"hexahedron"`` or ``"tetrahedron"``.
+    """
+    ordered = np.ascontiguousarray(cells[:, _VERTEX_ORDER[cell_type]], dtype=np.int64)
+    points = np.ascontiguousarray(points, dtype=np.float64)
+    if _OLD:
+        domain = ufl.Mesh(_element(cell_type, (3,)))
+        adjacency = cpp.graph.AdjacencyList_int64(ordered)
+        ghost = cpp.mesh.GhostMode.none
+        return dolfinx.mesh.create_mesh(comm, adjacency, points, domain, ghost, _partitioner())
+    element = _element(cell_type, (3,))
+    return dolfinx.mesh.create_mesh(comm, cells=ordered, x=points, e=element, partitioner=_partitioner())
+
+
+def rank_mesh(comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, cell_type: str) -> Any:
+    """Build a distributed mesh from coordinates known to all ranks and cells known to their owners.
+
+    Collective on ``comm``.
+
+    Args:
+        comm: Communicator of the mesh.
+        points: All coordinates, shape (n_nodes, 3), the same on every rank.
+        cells: The cells that this rank owns, as rows of node numbers in VTK order.
+        cell_type: ``"hexahedron"`` or ``"tetrahedron"``.
+    """
+    bounds = np.linspace(0, len(points), comm.size + 1).astype(int)
+    return create_mesh(comm, points[bounds[comm.rank] : bounds[comm.rank + 1]], cells, cell_type)
+
+
+def _space(mesh: Any, shape: tuple[int, ...]) -> Any:
+    element = _element(mesh.topology.cell_name(), shape)
+    return dolfinx.fem.FunctionSpace(mesh, element) if _OLD else dolfinx.fem.functionspace(mesh, element)
+
+
+def coefficient(mesh: Any, name: str) -> Any:
+    """Return a vector field on ``mesh`` with the given name (a C identifier)."""
+    return Function(_space(mesh, (3,)), name=name)
+
+
+def scalar_space(mesh: Any, degree: int) -> Any:
+    """Return the space of scalar fields of degree 0 (one value a cell) or 1 on ``mesh``."""
+    if degree == 1:
+        return _space(mesh, ())
+    element = _cellwise_element(mesh.topology.cell_name())
+    return dolfinx.fem.FunctionSpace(mesh, element) if _OLD else dolfinx.fem.functionspace(mesh, element)
+
+
+def _table(adjacency: Any, rows: int) -> np.ndarray:
+    return np.asarray(getattr(adjacency, "array", adjacency)).reshape(rows, -1)
+
+
+def _cell_count(mesh: Any) -> int:
+    index_map = mesh.topology.index_map(mesh.topology.dim)
+    return int(index_map.size_local + index_map.num_ghosts)
+
+
+def cell_nodes(mesh: Any) -> np.ndarray:
+    """Return the input nodes of this rank's cells, tensor-product order, shape (n_cells, n_vertices)."""
+    dofmap = _table(mesh.geometry.dofmap, _cell_count(mesh))
+    return np.asarray(mesh.geometry.input_global_indices)[dofmap]
+
+
+def node_dofs(space: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return (input nodes, blocked dofs): dof ``dofs[i]`` of ``space`` sits on input node ``nodes[i]``.
+
+    Both arrays have one entry for each node of this rank, ghosts included, in ascending node order.
+    """
+    mesh = space.mesh
+    cells = _cell_count(mesh)
+    nodes = cell_nodes(mesh).ravel()
+    dofs = _table(space.dofmap.list, cells).ravel()
+    nodes, first = np.unique(nodes, return_index=True)
+    return nodes, dofs[first]
+
+
+def update_coordinates(mesh: Any, points: np.ndarray) -> None:
+    """Move the nodes of ``mesh`` to ``points``, shape (n_nodes, 3), indexed by input node."""
+    mesh.geometry.x[:] = points[np.asarray(mesh.geometry.input_global_indices)]
+
+
+def match_facets(mesh: Any, surface: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Find the facets of ``mesh`` whose nodes form a row of ``surface``.
+
+    Args:
+        mesh: A mesh on one rank.
+        surface: Facets as input nodes, shape (n_facets, 3 or 4), any vertex order.
+
+    Returns:
+        Cells and local facet numbers of those that lie on this mesh, one entry each.
+    """
+    cell_type = mesh.topology.cell_name()
+    local = np.array(_FACET_VERTICES[cell_type])
+    faces = np.sort(cell_nodes(mesh)[:, local].reshape(-1, local.shape[1]), axis=1)
+    wanted = np.unique(np.sort(surface, axis=1), axis=0) if len(surface) else np.empty((0, local.shape[1]), int)
+    # One integer key a facet: rows of both tables are numbered together.
+    _, key = np.unique(np.vstack([wanted, faces]), axis=0, return_inverse=True)
+    key = key.ravel()
+    found = np.flatnonzero(np.isin(key[len(wanted) :], key[: len(wanted)]))
+    return found // len(local), found % len(local)
+
+
+class CompiledForm:
+    """A UFL form on a template, compiled once, bound to many meshes."""
+
+    def __init__(self, comm: MPI.Comm, form: Any) -> None:
+        """Compile ``form``. Collective on ``comm``: one rank compiles, the others read its cache."""
+        self.form = form
+        with _side_effects_undone():
+            if _OLD:
+                self._compiled = jit.ffcx_jit(comm, form)
+            else:
+                self._compiled = dolfinx.fem.compile_form(comm, form, jit_options={}, form_compiler_options={})
+
+    def bind(
+        self,
+        mesh: Any,
+        spaces: Sequence[Any],
+        coefficients: Mapping[Any, Any],
+        constants: Mapping[Any, Any],
+        facets: Mapping[int, tuple[np.ndarray, np.ndarray]] | None = None,
+    ) -> Any:
+        """Return the form on one mesh.
+
+        Args:
+            mesh: The mesh.
+            spaces: dolfinx function spaces of the form's arguments, in their order.
+            coefficients: Template coefficient -> dolfinx Function on ``mesh``.
+            constants: Template constant -> dolfinx Constant.
+            facets: Tag of a surface integral -> (cells, local facets), as `match_facets` returns them.
+        """
+        if _OLD:
+            return self._bind_old(mesh, spaces, coefficients, constants, facets or {})
+        domains = {}
+        if facets:
+            pairs = [
+                (tag, np.column_stack(pair).astype(np.int32).ravel()) for tag, pair in sorted(facets.items())
+            ]
+            domains = {dolfinx.fem.IntegralType.exterior_facet: pairs}
+        # A symbol that dropped out of the form while UFL simplified it must not be handed over.
+        used = set(self.form.constants()), set(self.form.coefficients())
+        symbols = [{s: v for s, v in given.items() if s in u} for given, u in zip((constants, coefficients), used)]
+        return dolfinx.fem.create_form(self._compiled, list(spaces), mesh, domains, symbols[1], symbols[0])
+
+    def _bind_old(self, mesh: Any, spaces: Any, coefficients: Any, constants: Any, facets: Any) -> Any:
+        compiled, module, code = self._compiled
+        mine = self.form.coefficients()
+        order = [compiled.original_coefficient_position[i] for i in range(compiled.num_coefficients)]
+        kinds = cpp.fem.IntegralType
+        domains = dict.fromkeys((kinds.cell, kinds.exterior_facet, kinds.interior_facet, kinds.vertex))
+        if facets:
+            domains[kinds.exterior_facet] = _facet_tags(mesh, facets)
+        bound = type("Form", (dolfinx.fem.FormMetaClass, cpp.fem.Form_float64), {})
+        return bound(
+            compiled,
+            [space._cpp_object for space in spaces],
+            [coefficients[mine[i]]._cpp_object for i in order],
+            [constants[constant]._cpp_object for constant in self.form.constants()],
+            domains,
+            mesh._mesh,
+            module.ffi,
+            code,
+        )
+
+
+def _facet_tags(mesh: Any, facets: Mapping[int, tuple[np.ndarray, np.ndarray]]) -> Any:
+    """Facet tags of dolfinx 0.5 from (cell, local facet) pairs."""
+    tdim = mesh.topology.dim
+    mesh.topology.create_entities(tdim - 1)
+    mesh.topology.create_connectivity(tdim, tdim - 1)
+    mesh.topology.create_connectivity(tdim - 1, tdim)
+    table = _table(mesh.topology.connectivity(tdim, tdim - 1), _cell_count(mesh))
+    indices = np.concatenate([table[cells, local] for cells, local in facets.values()])
+    tags = np.concatenate([np.full(len(pair[0]), tag, np.int32) for tag, pair in facets.items()])
+    order = np.argsort(indices)
+    return dolfinx.mesh.meshtags(mesh, tdim - 1, indices[order].astype(np.int32), tags[order])
+
+
+def assemble_csr(form: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Assemble a bilinear form on one rank; return the matrix as CSR arrays (indptr, indices, data)."""
+    matrix = dolfinx.fem.petsc.assemble_matrix(form)
+    matrix.assemble()
+    indptr, indices, data = matrix.getValuesCSR()
+    matrix.destroy()
+    return indptr, indices, data
+
+
+def assemble_vector(form: Any) -> np.ndarray:
+    """Assemble a linear form on one rank; return its values, length block size x n_dofs."""
+    vector = dolfinx.fem.petsc.assemble_vector(form)
+    values = np.array(vector.array_r)
+    vector.destroy()
+    return values
+
+
+def assemble_scalar(form: Any) -> float:
+    """Assemble a functional on this rank's cells (no communication)."""
+    return float(dolfinx.fem.assemble_scalar(form))
+
+
+def write_xdmf(path: Any, mesh: Any, functions: Sequence[Any]) -> None:
+    """Write fields on one mesh to an XDMF file (with its HDF5 file). Collective on the mesh."""
+    with dolfinx.io.XDMFFile(mesh.comm, str(path), "w") as file:
+        file.write_mesh(mesh)
+        for function in functions:
+            file.write_function(function)
+
+
+_ = PETSc  # petsc4py must be initialised before dolfinx hands out PETSc objects

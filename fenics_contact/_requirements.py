@@ -1,0 +1,178 @@
+"""What the package stands on, checked by name before anything of it is used.
+
+dolfinx, petsc4py, mpi4py and gmsh come from the system and not from pip, so no installer has compared
+their versions with what the package needs.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import logging
+import re
+from dataclasses import dataclass
+from importlib import metadata
+from typing import Any
+
+from fenics_contact.errors import MissingRequirementError
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A library, the oldest version that will do, and where to get it.
+
+    Attributes:
+        module: Name by which it is imported.
+        oldest: Oldest version that the package runs with.
+        debian: How to install it on Debian.
+        conda: How to install it from conda-forge.
+        distribution: Name of its metadata where that is not ``module``.
+        tested: First two numbers of the versions that the tests run with; others get a warning. Empty: any.
+    """
+
+    module: str
+    oldest: str
+    debian: str
+    conda: str
+    distribution: str = ""
+    tested: tuple[str, ...] = ()
+
+    def version(self) -> str | None:
+        """Return the installed version without importing the library; None where it leaves no metadata."""
+        try:
+            return metadata.version(self.distribution or self.module)
+        except metadata.PackageNotFoundError:
+            return None
+
+    def error(self, found: str) -> MissingRequirementError:
+        """Return the error that says what is needed, what was found and how to install it."""
+        return MissingRequirementError(
+            f"fenics_contact needs {self.module} {self.oldest} or newer, found {found}. "
+            f"Debian: {self.debian}; conda-forge: {self.conda}",
+            name=self.module,
+        )
+
+
+_DEBIAN_FENICSX = "apt-get install --no-install-recommends python3-dolfinx-real"
+
+_FROM_SYSTEM = [
+    Requirement("mpi4py", "3.1", _DEBIAN_FENICSX, "conda install -c conda-forge mpi4py"),
+    Requirement("petsc4py", "3.18", _DEBIAN_FENICSX, 'conda install -c conda-forge petsc4py "petsc=*=real*"'),
+    Requirement(
+        "dolfinx",
+        "0.5",
+        _DEBIAN_FENICSX,
+        "conda install -c conda-forge fenics-dolfinx",
+        distribution="fenics-dolfinx",
+        tested=("0.5", "0.9"),
+    ),
+]
+_NUMERICAL = [
+    Requirement("numpy", "1.24", _DEBIAN_FENICSX, "conda install -c conda-forge numpy"),
+    Requirement("scipy", "1.10", _DEBIAN_FENICSX, "conda install -c conda-forge scipy"),
+    Requirement("clarabel", "0.11", "pip install clarabel", "conda install -c conda-forge clarabel"),
+]
+_GMSH = Requirement(
+    "gmsh",
+    "4.8",
+    "apt-get install --no-install-recommends python3-gmsh",
+    "conda install -c conda-forge python-gmsh",
+)
+
+
+def check() -> None:
+    """Check everything that every part of the package needs.
+
+    Raises:
+        MissingRequirementError: A library is missing, too old, cannot be loaded, or PETSc was built
+            with complex numbers or without a sparse Cholesky factorisation.
+    """
+    for requirement in _NUMERICAL + _FROM_SYSTEM:
+        _check_installed(requirement)
+    mpi4py, petsc4py, _ = _FROM_SYSTEM
+    _load(mpi4py, "mpi4py.MPI")
+    _check_petsc(petsc4py, _load(petsc4py, "petsc4py.PETSc"))
+
+
+def check_gmsh() -> None:
+    """Check gmsh, which only the construction of geometries needs.
+
+    Raises:
+        MissingRequirementError: gmsh is missing, too old or cannot be loaded.
+    """
+    _check_installed(_GMSH)
+    module = _load(_GMSH, "gmsh")
+    if _GMSH.version() is None:  # Debian 12 installs it without metadata
+        _check_version(_GMSH, module.__version__)
+
+
+def _check_installed(requirement: Requirement) -> None:
+    """Raise where a library is not there or too old, without importing it."""
+    if importlib.util.find_spec(requirement.module) is None:
+        raise requirement.error("none")
+    version = requirement.version()
+    if version is not None:
+        _check_version(requirement, version)
+
+
+def _check_version(requirement: Requirement, version: str) -> None:
+    """Raise where a version is too old, warn where it was never tested."""
+    if _numbers(version) < _numbers(requirement.oldest):
+        raise requirement.error(version)
+    if requirement.tested and ".".join(map(str, _numbers(version)[:2])) not in requirement.tested:
+        _log.warning(
+            "%s %s was never tested with fenics_contact, only %s were: first compare a case you know",
+            requirement.module,
+            version,
+            " and ".join(requirement.tested),
+        )
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    """Return the leading numbers of a version: (0, 10, 0) for "0.10.0.post2"."""
+    leading = re.match(r"\d+(\.\d+)*", version)
+    return tuple(map(int, leading.group().split("."))) if leading else ()
+
+
+def _load(requirement: Requirement, module: str) -> Any:
+    """Import a module of a library that is there, and name the library where that fails.
+
+    One that was built against another NumPy or MPI, for instance, is found but cannot be loaded.
+    """
+    try:
+        return importlib.import_module(module)
+    except (ImportError, OSError) as reason:
+        found = requirement.version() or "one"
+        raise requirement.error(
+            f"{found} that cannot be loaded ({reason}): a library under it is missing or of another version"
+        ) from reason
+
+
+def _check_petsc(requirement: Requirement, petsc: Any) -> None:
+    """Raise where PETSc computes with complex numbers or cannot factor a sparse matrix."""
+    found = requirement.version() or "one"
+    if petsc.ScalarType(0).dtype.kind != "f":
+        raise requirement.error(f"{found} with complex numbers, where real ones are needed")
+    if not (_factors(petsc, "cholmod") or _factors(petsc, "mumps")):
+        raise requirement.error(f"{found} with neither CHOLMOD nor MUMPS, where one is needed")
+
+
+def _factors(petsc: Any, package: str) -> bool:
+    """Try a package on a matrix of one entry: ``hasExternalPackage`` is wrong on some builds."""
+    matrix = petsc.Mat().createAIJ((1, 1), nnz=1, comm=petsc.COMM_SELF)
+    matrix.setValue(0, 0, 1.0)
+    matrix.assemble()
+    preconditioner = petsc.PC().create(petsc.COMM_SELF)
+    preconditioner.setOperators(matrix)
+    preconditioner.setType(petsc.PC.Type.CHOLESKY)
+    preconditioner.setFactorSolverType(package)
+    try:
+        preconditioner.setFactorSetUpSolverType()
+    except petsc.Error:
+        return False
+    finally:
+        preconditioner.destroy()
+        matrix.destroy()
+    return True

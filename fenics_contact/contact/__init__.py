@@ -1,0 +1,10 @@
+"""Equilibrium of scenes with contact and friction."""
+
+from fenics_contact.contact.coulomb import FixedPoint
+from fenics_contact.contact.energies import Energies
+from fenics_contact.contact.equilibrium import find_state, solve_scene
+from fenics_contact.contact.held import check_held
+from fenics_contact.contact.result import ContactResult, Status
+from fenics_contact.contact.state import State
+
+__all__ = ["ContactResult", "Energies", "FixedPoint", "State", "Status", "check_held", "find_state", "solve_scene"]

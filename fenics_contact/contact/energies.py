@@ -1,0 +1,65 @@
+"""Energies of a state, and the gap between the primal and the dual one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.feti import DualSystem
+
+
+@dataclass(frozen=True)
+class Energies:
+    """Energies of all bodies, [force · length].
+
+    Attributes:
+        strain: ½ uᵀK u.
+        load: Work of the loads, fᵀu.
+        friction: Σ Ψ ‖slip‖, what friction dissipates if the whole load acts at once.
+        dual: Value of the dual functional, −½ (f − Bᵀλ)ᵀK⁺(f − Bᵀλ) − λᵀc.
+    """
+
+    strain: float
+    load: float
+    friction: float
+    dual: float
+
+    @property
+    def total_potential(self) -> float:
+        """½ uᵀK u − fᵀu."""
+        return self.strain - self.load
+
+    @property
+    def primal(self) -> float:
+        """Functional that the displacement minimises at given slip bounds: total potential plus friction."""
+        return self.total_potential + self.friction
+
+
+def compute_energies(
+    dual: DualSystem, displacement: np.ndarray, multiplier: np.ndarray, friction: float
+) -> Energies:
+    """Compute all energies. Collective.
+
+    Args:
+        dual: The solved system.
+        displacement: Torn displacement of this rank, [length].
+        multiplier: λ, owned, [force].
+        friction: Σ Ψ ‖slip‖ of all ranks.
+    """
+    torn = dual.torn
+    strain, start = 0.0, 0
+    for subdomain in torn.subdomains:
+        u = displacement[start : start + subdomain.mesh.size]
+        strain += 0.5 * float(u @ (subdomain.stiffness @ u))
+        start += subdomain.mesh.size
+    internal = torn.load - dual.force(multiplier)
+    mine = np.array(
+        [
+            strain,
+            torn.load @ displacement,
+            -0.5 * (internal @ dual.inverse(internal)) - multiplier @ torn.right,
+        ]
+    )
+    total = torn.numbering.comm.allreduce(mine)
+    return Energies(float(total[0]), float(total[1]), friction, float(total[2]))

@@ -1,0 +1,118 @@
+"""From a scene to its state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_contact.contact.coulomb import FixedPoint
+from fenics_contact.contact.energies import compute_energies
+from fenics_contact.contact.held import check_held
+from fenics_contact.contact.result import ContactResult, Status
+from fenics_contact.contact.state import State
+from fenics_contact.contact.warm_start import carried_over
+from fenics_contact.errors import together
+from fenics_contact.feti import Decomposition, DualSystem, build_torn_system, decompose
+from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, contact_step, solve
+from fenics_contact.scene import Scene
+from fenics_contact.timing import PhaseTimer
+
+
+def solve_scene(
+    scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm, *, solver: DualSolver | None = None
+) -> State:
+    """Find the equilibrium of a scene. Collective on ``comm``.
+
+    Args:
+        scene: Bodies, supports, loads and contact pairs, the same on every rank.
+        partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
+        comm: Communicator over which the subdomains are spread.
+        solver: Dual solver with its tolerance, `FaceNewton()` by default.
+
+    Raises:
+        InvalidInputError: If scene or partition cannot be used.
+        InfeasibleError: If nothing holds some body against its load.
+        ConvergenceError: If the solver does not reach its tolerance.
+
+    Example:
+        >>> state = solve_scene(scene, {"block": box_partition(mesh, (2, 1, 1))}, MPI.COMM_WORLD)  # doctest: +SKIP
+    """
+    timer = PhaseTimer()
+    with timer.phase("decompose"):
+        decomposition = decompose(scene, partitions, comm)
+    return find_state(scene, decomposition, solver=solver, timer=timer)
+
+
+def find_state(
+    scene: Scene,
+    decomposition: Decomposition,
+    *,
+    solver: DualSolver | None = None,
+    previous: State | None = None,
+    start_geometry: bool = True,
+    timer: PhaseTimer | None = None,
+) -> State:
+    """Find the equilibrium of a decomposed scene, possibly moved since. Collective.
+
+    Args:
+        scene: The scene, with the coordinates to use.
+        decomposition: Its decomposition; only topology and numbering are taken from it.
+        solver: Dual solver with its tolerance, `FaceNewton()` by default.
+        previous: State of a neighbouring geometry to start from.
+        start_geometry: Refuse bodies that overlap before they are loaded.
+        timer: Collects the seconds.
+    """
+    solver, timer = solver or FaceNewton(), timer or PhaseTimer()
+    with timer.phase("assemble"):
+        torn = build_torn_system(scene, decomposition, start_geometry=start_geometry)
+        if previous is None:
+            check_held(torn)
+    system = DualSystem(torn, timer)
+    with timer.phase("solve"):
+        start = None if previous is None else carried_over(previous.system, previous.solution, system)
+        solution = solve_dual(system, solver, start)
+    with timer.phase("state"):
+        displacement = system.displacement(solution.multiplier, solution.alpha)
+        contact = contact_result(system, solution)
+        friction = float(np.sum(contact.slip_bound * np.linalg.norm(contact.slip, axis=1)))
+        energies = compute_energies(system, displacement, solution.multiplier, friction)
+    return State(system, solution, displacement, contact, energies, timer.seconds)
+
+
+def solve_dual(system: DualSystem, solver: DualSolver, start: np.ndarray | None = None) -> DualSolution:
+    """Solve the dual problem of a system with the friction laws of its scene. Collective."""
+    discs, torn = system.owned_discs(), system.torn
+    tresca, coefficient = torn.tresca_bound[discs], torn.friction_coefficient[discs]
+    if not np.any(torn.friction_coefficient > 0):
+        return solve(system.problem, tresca, solver, start)
+    if isinstance(solver, FaceNewton):
+        return solve(system.problem, None, solver, start, friction_coefficient=coefficient)
+    return FixedPoint(solver).run(system.problem, coefficient, tresca, start)
+
+
+def contact_result(system: DualSystem, solution: DualSolution) -> ContactResult:
+    """Gather forces, gaps and status of all contact points on every rank. Collective."""
+    torn, problem = system.torn, system.problem
+    rows = np.concatenate([torn.normal_rows, torn.tangential_rows.ravel()])
+    step = contact_step(problem.layout, problem.diagonal)
+    gathered = [torn.numbering.gather(x, rows) for x in (solution.multiplier, solution.residual, step)]
+    count, frictional = torn.points.count, torn.frictional
+    (normal, gap, _), (tau, minus_slip, _) = ([x[:count] for x in gathered], [x[count:].reshape(-1, 2) for x in gathered])
+    trial_normal = normal - gathered[2][:count] * gap
+    trial_tangential = tau - gathered[2][count:].reshape(-1, 2) * minus_slip
+    bound = torn.tresca_bound + torn.friction_coefficient * np.maximum(normal[frictional], 0)
+    status = np.where(trial_normal > 0, Status.SLIP, Status.OPEN).astype(int)
+    sticks = (np.linalg.norm(trial_tangential, axis=1) < bound) & (trial_normal[frictional] > 0)
+    status[frictional[sticks]] = Status.STICK
+
+    def spread(values: np.ndarray) -> np.ndarray:
+        full = np.zeros((count, *values.shape[1:]))
+        full[frictional] = values
+        return full
+
+    return ContactResult(torn.points, normal, spread(tau), spread(bound), gap, spread(-minus_slip), status)
+
+
+_ = together

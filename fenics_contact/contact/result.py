@@ -1,0 +1,62 @@
+"""What happens on the contact surfaces of a solved scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from fenics_contact.feti import ContactPoints
+
+
+class Status(IntEnum):
+    """What a contact point does."""
+
+    OPEN = 0
+    STICK = 1
+    SLIP = 2
+
+
+@dataclass(frozen=True)
+class ContactResult:
+    """Forces, distances and status of every contact point, replicated on all ranks.
+
+    Attributes:
+        points: Where the contact points are and how they are directed.
+        normal_force: λ_N ≥ 0, shape (n,), [force].
+        friction_force: τ in the points' tangents, zero without friction, shape (n, 2), [force]. It acts on the
+            master; the slave feels the opposite.
+        slip_bound: Largest friction force, shape (n,), [force].
+        gap: Distance after deformation, shape (n,), [length].
+        slip: Relative tangential displacement in the points' tangents, shape (n, 2), [length].
+        status: `Status` of each point, shape (n,). A closed point without friction slips.
+    """
+
+    points: ContactPoints
+    normal_force: np.ndarray
+    friction_force: np.ndarray
+    slip_bound: np.ndarray
+    gap: np.ndarray
+    slip: np.ndarray
+    status: np.ndarray
+
+    @property
+    def pressure(self) -> np.ndarray:
+        """Normal force by nodal area, shape (n,), [force / length²]."""
+        return self.normal_force / self.points.area
+
+    @property
+    def force(self) -> np.ndarray:
+        """Force on the slave at each point in space, n λ_N − t τ, shape (n, 3), [force]."""
+        points = self.points
+        sliding = np.einsum("na,nad->nd", self.friction_force, points.tangents)
+        return self.normal_force[:, None] * points.normal - sliding
+
+    def count(self, status: Status) -> int:
+        """Return how many points have a status."""
+        return int(np.count_nonzero(self.status == status))
+
+    def on_pair(self, pair: int) -> np.ndarray:
+        """Return the numbers of the points of one contact pair."""
+        return np.flatnonzero(self.points.pair == pair)

@@ -1,0 +1,83 @@
+"""The equilibrium of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fenics_contact.contact.energies import Energies
+from fenics_contact.contact.fields import body_mesh, displacement_function, nodal_displacement, von_mises
+from fenics_contact.contact.result import ContactResult
+from fenics_contact.feti import DualSystem
+from fenics_contact.qp import DualSolution
+from fenics_contact.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Displacements, contact forces and how they were found.
+
+    Fields on the bodies' own meshes are built when they are first asked for, by all ranks together.
+
+    Attributes:
+        system: The dual system that was solved.
+        solution: Multiplier, residuals and history of the dual solver.
+        torn_displacement: This rank's torn displacement, shape (torn_size,), [length].
+        contact: What happens on the contact surfaces, replicated.
+        energies: Energies of all bodies.
+        seconds: Wall time of this rank by phase.
+    """
+
+    system: DualSystem
+    solution: DualSolution
+    torn_displacement: np.ndarray
+    contact: ContactResult
+    energies: Energies
+    seconds: Mapping[str, float]
+
+    @property
+    def scene(self) -> Scene:
+        """The scene in the geometry of this state."""
+        return self.system.torn.scene
+
+    @cached_property
+    def displacement(self) -> dict[str, Any]:
+        """Displacement of each body as a Function on its own mesh, [length]. Collective on first use."""
+        decomposition = self.system.torn.decomposition
+        fields = {}
+        for name, body in self.scene.bodies.items():
+            values = nodal_displacement(decomposition, name, body, self.torn_displacement)
+            fields[name] = displacement_function(body_mesh(decomposition, name, body), values)
+        return fields
+
+    @cached_property
+    def von_mises(self) -> dict[str, Any]:
+        """Von Mises stress of each body, constant on cells, [force / length²]. Collective on first use."""
+        return {name: von_mises(self.displacement[name], body) for name, body in self.scene.bodies.items()}
+
+    def gather_displacement(self, body: str) -> np.ndarray:
+        """Return the displacement of every node of a body on every rank, (n_nodes, 3), [length]. Collective."""
+        decomposition = self.system.torn.decomposition
+        mine = nodal_displacement(decomposition, body, self.scene.bodies[body], self.torn_displacement)
+        known = ~np.isnan(mine[:, 0])
+        total = decomposition.comm.allreduce(np.where(known[:, None], mine, 0.0))
+        count = decomposition.comm.allreduce(known.astype(float))
+        return np.asarray(total / count[:, None])
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Sizes and work: torn unknowns, multipliers by kind, products, steps."""
+        torn = self.system.torn
+        return {
+            "torn_unknowns": torn.decomposition.torn_unknowns,
+            "subdomains": torn.decomposition.tearing.n_subdomains,
+            "equality_multipliers": torn.n_equality,
+            "normal_multipliers": torn.points.count,
+            "tangential_multipliers": 2 * len(torn.frictional),
+            "f_products": self.solution.products,
+            "solver_steps": self.solution.iterations,
+        }

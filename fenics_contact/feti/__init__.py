@@ -1,0 +1,8 @@
+"""Total FETI: torn systems, contact rows, the dual problem and its operators."""
+
+from fenics_contact.feti.contact_search import ContactPoints
+from fenics_contact.feti.decomposition import Decomposition, decompose
+from fenics_contact.feti.dual import DualSystem
+from fenics_contact.feti.torn import TornSystem, build_torn_system
+
+__all__ = ["ContactPoints", "Decomposition", "DualSystem", "TornSystem", "build_torn_system", "decompose"]

@@ -1,0 +1,95 @@
+"""Copies of nodes: where the torn system holds each node of the bodies, once for every subdomain around it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.scene import Scene
+
+
+@dataclass(frozen=True)
+class Tearing:
+    """How the bodies of a scene are cut into subdomains, and which rank owns which.
+
+    Replicated on all ranks. Nodes of all bodies are numbered together, body after body; so are the
+    subdomains. A *copy* is a pair (node, subdomain); copies are sorted by node, then by subdomain.
+
+    Attributes:
+        body_names: Names of the bodies, in numbering order.
+        node_offset: First node of each body and the total, shape (n_bodies + 1,).
+        subdomain_offset: First subdomain of each body and the total, shape (n_bodies + 1,).
+        subdomain_rank: Owner of each subdomain, shape (n_subdomains,).
+        first_copy: First copy of each node and the total, shape (n_nodes + 1,).
+        copy_subdomain: Subdomain of each copy, shape (n_copies,).
+    """
+
+    body_names: tuple[str, ...]
+    node_offset: np.ndarray
+    subdomain_offset: np.ndarray
+    subdomain_rank: np.ndarray
+    first_copy: np.ndarray
+    copy_subdomain: np.ndarray
+
+    @property
+    def multiplicity(self) -> np.ndarray:
+        """Number of copies of each node, shape (n_nodes,)."""
+        return np.diff(self.first_copy)
+
+    @property
+    def copy_node(self) -> np.ndarray:
+        """Node of each copy, shape (n_copies,)."""
+        return np.repeat(np.arange(len(self.first_copy) - 1), self.multiplicity)
+
+    @property
+    def n_subdomains(self) -> int:
+        """Number of subdomains of all bodies."""
+        return int(self.subdomain_offset[-1])
+
+    def global_nodes(self, body: str, nodes: np.ndarray) -> np.ndarray:
+        """Number nodes of one body among those of all bodies."""
+        return nodes + self.node_offset[self.body_names.index(body)]
+
+
+def tear(scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int) -> Tearing:
+    """Cut the bodies along a partition of their cells and deal the subdomains out to ranks.
+
+    Args:
+        scene: The scene.
+        partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
+        ranks: Number of ranks; each gets a run of consecutive subdomains with about equally many cells.
+    """
+    names = scene.body_names
+    counts = [int(partitions[name].max()) + 1 for name in names]
+    node_offset = np.cumsum([0] + [scene.bodies[name].mesh.n_nodes for name in names])
+    subdomain_offset = np.cumsum([0, *counts])
+    total = int(subdomain_offset[-1])
+    pairs, sizes = [], []
+    for index, name in enumerate(names):
+        cells = scene.bodies[name].mesh.cells
+        subdomain = partitions[name].astype(np.int64) + subdomain_offset[index]
+        keys = (cells + node_offset[index]) * total + subdomain[:, None]
+        pairs.append(np.unique(keys))
+        sizes.append(np.bincount(partitions[name], minlength=counts[index]))
+    keys = np.concatenate(pairs)
+    multiplicity = np.bincount(keys // total, minlength=int(node_offset[-1]))
+    return Tearing(
+        names,
+        node_offset,
+        subdomain_offset,
+        _spread_over_ranks(np.concatenate(sizes), ranks),
+        np.concatenate([[0], np.cumsum(multiplicity)]),
+        keys % total,
+    )
+
+
+def _spread_over_ranks(cost: np.ndarray, ranks: int) -> np.ndarray:
+    """Deal consecutive items to ranks so that the costs are about equal and no rank stays empty."""
+    middle = np.cumsum(cost) - 0.5 * cost
+    owner = np.minimum((middle * ranks / cost.sum()).astype(int), ranks - 1)
+    # Every rank gets at least one: no rank is skipped on the way up, and the last ones are kept for the rest.
+    index = np.arange(len(cost))
+    without_jumps = np.minimum.accumulate(np.minimum(owner, index) - index) + index
+    return np.maximum(without_jumps, ranks - (len(cost) - index))

@@ -1,0 +1,122 @@
+"""What a scene's decomposition into subdomains keeps when the geometry changes: meshes, numbering, compiled forms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.feti.copies import Tearing, tear
+from fenics_contact.feti.forms import FormLibrary
+from fenics_contact.feti.gluing import gluing_rows, prescribed_displacements
+from fenics_contact.feti.rows import Rows
+from fenics_contact.feti.subdomain import SubdomainMesh, cut_out
+from fenics_contact.geometry import check_face_connected
+from fenics_contact.scene import Scene
+
+
+@dataclass(frozen=True)
+class Decomposition:
+    """A scene cut into subdomains; each rank holds the meshes of its own.
+
+    Attributes:
+        comm: Communicator over which the subdomains are spread.
+        tearing: Numbering of nodes, copies and subdomains, replicated.
+        partitions: Body name -> subdomain of every cell within the body, replicated.
+        meshes: This rank's subdomain meshes, ascending by number.
+        block_offset: First block of three dofs of each of them in this rank's torn vector, and the total.
+        copy_block: Block of each copy in this rank's torn vector, −1 where another rank holds it.
+        gluing: Gluing and Dirichlet rows of all subdomains.
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, 3).
+        forms: Compiled forms.
+    """
+
+    comm: MPI.Comm
+    tearing: Tearing
+    partitions: Mapping[str, np.ndarray]
+    meshes: tuple[SubdomainMesh, ...]
+    block_offset: np.ndarray
+    copy_block: np.ndarray
+    gluing: Rows
+    fixed: np.ndarray
+    forms: FormLibrary
+
+    @property
+    def torn_size(self) -> int:
+        """Length of this rank's torn vectors."""
+        return 3 * int(self.block_offset[-1])
+
+    @property
+    def torn_unknowns(self) -> int:
+        """Number of displacement unknowns of all subdomains of all ranks."""
+        return 3 * len(self.tearing.copy_subdomain)
+
+
+def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm) -> Decomposition:
+    """Cut a scene into subdomains and spread them over ranks. Collective on ``comm``.
+
+    Args:
+        scene: The scene, the same on every rank.
+        partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
+        comm: Communicator.
+
+    Raises:
+        InvalidInputError: If a partition does not fit its body, a subdomain does not hang together, or
+            there are more ranks than subdomains.
+    """
+    with together(comm):
+        _check_partitions(scene, partitions)
+        tearing = tear(scene, partitions, comm.size)
+        if tearing.n_subdomains < comm.size:
+            raise InvalidInputError(
+                f"every rank needs a subdomain, but {comm.size} ranks share {tearing.n_subdomains} subdomains: "
+                "run on fewer ranks or cut the bodies finer"
+            )
+    forms = FormLibrary(comm)
+    forms.prepare(scene)
+    with together(comm):
+        meshes = tuple(
+            _cut(scene, partitions, tearing, int(number))
+            for number in np.flatnonzero(tearing.subdomain_rank == comm.rank)
+        )
+        gluing = gluing_rows(scene, tearing)
+        fixed, _ = prescribed_displacements(scene, tearing)
+    block_offset = np.cumsum([0] + [len(mesh.nodes) for mesh in meshes])
+    copy_block = _copy_blocks(tearing, meshes, block_offset)
+    return Decomposition(comm, tearing, dict(partitions), meshes, block_offset, copy_block, gluing, fixed, forms)
+
+
+def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> None:
+    for name, body in scene.bodies.items():
+        if name not in partitions:
+            raise InvalidInputError(
+                f"every body needs a partition, got them for {sorted(partitions)} but not for {name!r}: "
+                "pass the subdomain of each of its cells"
+            )
+        partition = partitions[name]
+        if partition.shape != (body.mesh.n_cells,):
+            raise InvalidInputError(
+                f"the partition of body {name!r} must have shape ({body.mesh.n_cells},), one subdomain a cell, "
+                f"got {partition.shape}"
+            )
+        check_face_connected(body.mesh, partition)
+
+
+def _cut(scene: Scene, partitions: Mapping[str, np.ndarray], tearing: Tearing, number: int) -> SubdomainMesh:
+    index = int(np.searchsorted(tearing.subdomain_offset, number, side="right")) - 1
+    name = tearing.body_names[index]
+    cells = np.flatnonzero(partitions[name] == number - tearing.subdomain_offset[index])
+    return cut_out(number, name, scene.bodies[name], cells, scene.loads)
+
+
+def _copy_blocks(tearing: Tearing, meshes: tuple[SubdomainMesh, ...], block_offset: np.ndarray) -> np.ndarray:
+    total = tearing.n_subdomains
+    keys = tearing.copy_node * total + tearing.copy_subdomain
+    blocks = np.full(len(keys), -1, dtype=np.int64)
+    for mesh, offset in zip(meshes, block_offset[:-1], strict=True):
+        wanted = tearing.global_nodes(mesh.body, mesh.nodes) * total + mesh.number
+        blocks[np.searchsorted(keys, wanted)] = offset + np.arange(len(mesh.nodes))
+    return blocks

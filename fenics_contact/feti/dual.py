@@ -1,0 +1,107 @@
+"""From the torn system to the dual problem and back: F, d, G, e, and the displacements of a multiplier."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from mpi4py import MPI
+
+from fenics_contact.feti.dirichlet import DirichletPreconditioner
+from fenics_contact.feti.inverse import GeneralizedInverse, kernel_matrix
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.qp.coarse import CoarseSpace
+from fenics_contact.qp.layout import ContactLayout
+from fenics_contact.qp.problem import DualProblem
+from fenics_contact.timing import PhaseTimer
+
+
+class DualSystem:
+    """The dual of a torn system: operators on multipliers, and the way back to displacements.
+
+    Attributes:
+        torn: The torn system.
+        inverse: K⁺.
+        kernel: This rank's R, shape (torn_size, n_modes).
+        problem: What the dual solvers see.
+        products: F-products so far.
+    """
+
+    def __init__(self, torn: TornSystem, timer: PhaseTimer | None = None) -> None:
+        """Factor the subdomains and assemble d, G, e. Collective."""
+        timer = timer or PhaseTimer()
+        comm = torn.numbering.comm
+        self.torn, self.products = torn, 0
+        self._B, self._Bt = torn.B, torn.B.T.tocsr()
+        with timer.phase("factor"):
+            self.inverse = GeneralizedInverse(torn.subdomains)
+        with timer.phase("coarse space"):
+            self.kernel = self._kernel(comm)
+            coarse = CoarseSpace(comm, self._coarse_columns(), comm.allreduce(self.kernel.T @ torn.load))
+        with timer.phase("preconditioner"):
+            preconditioner = DirichletPreconditioner(
+                torn.subdomains, torn.B, torn.numbering, torn.n_equality
+            )
+            diagonal = self._diagonal()
+        d = self.jump(self.inverse(torn.load)) - torn.right
+        self.problem = DualProblem(comm, self.apply, d, coarse, self._layout(), diagonal, preconditioner)
+
+    def apply(self, multiplier: np.ndarray) -> np.ndarray:
+        """Return F λ = B K⁺ Bᵀ λ for an owned vector. Collective."""
+        self.products += 1
+        return self.jump(self.inverse(self.force(multiplier)))
+
+    def force(self, multiplier: np.ndarray) -> np.ndarray:
+        """Return Bᵀλ on this rank's torn dofs, [force]. Collective."""
+        return self._Bt @ self.torn.numbering.to_local(multiplier)
+
+    def jump(self, displacement: np.ndarray) -> np.ndarray:
+        """Return B u, owned, [length]. Collective."""
+        return self.torn.numbering.to_owned(self._B @ displacement)
+
+    def displacement(self, multiplier: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+        """Return u = K⁺(f − Bᵀλ) + R α on this rank's torn dofs, [length]. Collective."""
+        return self.inverse(self.torn.load - self.force(multiplier)) + self.kernel @ alpha
+
+    def positions(self, rows: np.ndarray) -> np.ndarray:
+        """Return where owned rows lie in this rank's owned vector, −1 for rows of other ranks."""
+        numbering = self.torn.numbering
+        index = np.searchsorted(numbering.owned, rows)
+        index = np.minimum(index, max(len(numbering.owned) - 1, 0))
+        return np.where(numbering.owned[index] == rows, index, -1) if len(numbering.owned) else np.full(rows.shape, -1)
+
+    def _kernel(self, comm: MPI.Comm) -> sp.csr_matrix:
+        counts = np.zeros(self.torn.decomposition.tearing.n_subdomains, dtype=np.int64)
+        for subdomain in self.torn.subdomains:
+            counts[subdomain.mesh.number] = subdomain.kernel.shape[1]
+        offset = np.concatenate([[0], np.cumsum(comm.allreduce(counts))])
+        mine = offset[[subdomain.mesh.number for subdomain in self.torn.subdomains]]
+        return kernel_matrix(self.torn.subdomains, int(offset[-1]), mine)
+
+    def _coarse_columns(self) -> sp.csr_matrix:
+        """Return this rank's owned columns of G = Rᵀ Bᵀ, shape (n_modes, n_owned)."""
+        return self.torn.numbering.sum_rows(self._B @ self.kernel).T.tocsr()
+
+    def _layout(self) -> ContactLayout:
+        torn = self.torn
+        normal = self.positions(torn.normal_rows)
+        tangential = self.positions(torn.tangential_rows)
+        owned = normal >= 0
+        index = np.cumsum(owned) - 1
+        discs = tangential[:, 0] >= 0
+        return ContactLayout(
+            len(torn.numbering.owned), normal[owned], tangential[discs], index[torn.frictional[discs]]
+        )
+
+    def owned_discs(self) -> np.ndarray:
+        """Return which frictional points' discs this rank owns, positions in ``torn.frictional``."""
+        return np.flatnonzero(self.positions(self.torn.tangential_rows)[:, 0] >= 0)
+
+    def _diagonal(self) -> np.ndarray:
+        """Return the diagonal of F on contact rows, one elsewhere, owned. Collective."""
+        numbering = self.torn.numbering
+        local = np.zeros(self._B.shape[0])
+        contact = np.flatnonzero(numbering.local_rows >= self.torn.n_equality)
+        local[contact] = self.inverse.row_flexibility(self._B[contact])
+        diagonal = numbering.to_owned(local)
+        diagonal[numbering.owned < self.torn.n_equality] = 1.0
+        return diagonal

@@ -1,0 +1,118 @@
+"""Sparse Cholesky factors through PETSc, and the generalised inverse of a floating subdomain."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from petsc4py import PETSc
+
+#: Enough nodes to fix all rigid motions of a body that is not a line, few enough to keep the factor sparse.
+FIXING_NODES = 4
+
+
+class Factor:
+    """Cholesky factor of a sparse symmetric positive definite matrix on one rank.
+
+    CHOLMOD where PETSc has it, else MUMPS.
+    """
+
+    def __init__(self, matrix: sp.csr_matrix) -> None:
+        """Factor ``matrix``, shape (n, n)."""
+        self.size = matrix.shape[0]
+        csr = (matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data)
+        self._matrix = PETSc.Mat().createAIJ(matrix.shape, csr=csr, comm=PETSc.COMM_SELF)
+        self._matrix.setOption(PETSc.Mat.Option.SPD, True)
+        self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        self._pc = PETSc.PC().create(PETSc.COMM_SELF)
+        self._pc.setOperators(self._matrix)
+        self._pc.setType(PETSc.PC.Type.CHOLESKY)
+        self._pc.setFactorSolverType(_solver())
+        self._pc.setUp()
+        self._factor = self._pc.getFactorMatrix()
+        self._right, self._left = self._matrix.createVecs()
+
+    def solve(self, right: np.ndarray, out: np.ndarray) -> None:
+        """Write the solution for one right side, shape (n,), into ``out``."""
+        self._right.array_w[:] = right
+        self._factor.solve(self._right, self._left)
+        out[:] = self._left.array_r
+
+    def solve_many(self, right: np.ndarray) -> np.ndarray:
+        """Return the solutions for the columns of ``right``, shape (n, k)."""
+        columns = right.shape[1]
+        if columns == 0:
+            return np.zeros_like(right)
+        given = PETSc.Mat().createDense((self.size, columns), array=np.asfortranarray(right), comm=PETSc.COMM_SELF)
+        found = PETSc.Mat().createDense((self.size, columns), comm=PETSc.COMM_SELF)
+        found.setUp()
+        self._factor.matSolve(given, found)
+        solution = np.array(found.getDenseArray())
+        given.destroy()
+        found.destroy()
+        return solution
+
+
+def _solver() -> str:
+    """Name the factorisation library that this PETSc was built with.
+
+    PETSc's own answer about CHOLMOD is wrong in some distributions, so a 1 x 1 matrix is factored.
+    """
+    global _SOLVER
+    if _SOLVER is None:
+        one = PETSc.Mat().createAIJ((1, 1), csr=([0, 1], [0], [1.0]), comm=PETSc.COMM_SELF)
+        pc = PETSc.PC().create(PETSc.COMM_SELF)
+        pc.setOperators(one)
+        pc.setType(PETSc.PC.Type.CHOLESKY)
+        pc.setFactorSolverType("cholmod")
+        try:
+            pc.setUp()
+            _SOLVER = "cholmod"
+        except PETSc.Error:
+            _SOLVER = "mumps"
+    return _SOLVER
+
+
+_SOLVER: str | None = None
+
+
+def fixing_nodes(points: np.ndarray, count: int = FIXING_NODES) -> np.ndarray:
+    """Pick well-spread nodes: each next one is farthest from those already taken.
+
+    Args:
+        points: Coordinates, shape (n, 3).
+        count: How many to pick.
+
+    Returns:
+        Row numbers of ``points``, shape (min(count, n),).
+    """
+    distance = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    chosen = [int(np.argmax(distance))]
+    distance = np.linalg.norm(points - points[chosen[0]], axis=1)
+    while len(chosen) < min(count, len(points)):
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
+    return np.array(chosen)
+
+
+def regularised(stiffness: sp.csr_matrix, kernel: np.ndarray, points: np.ndarray) -> sp.csr_matrix:
+    """Return K + ρ R̂ R̂ᵀ, sparse and positive definite, whose inverse is a generalised inverse of K.
+
+    R̂ is the kernel restricted to a few fixing nodes and orthonormalised; ρ is the largest diagonal
+    entry of K.
+
+    Args:
+        stiffness: K, shape (3 n, 3 n), block b of three dofs at ``points[b]``.
+        kernel: Columns that span the kernel of K, shape (3 n, n_modes).
+        points: Coordinates by block, shape (n, 3).
+
+    References:
+        Brzobohatý, Dostál, Kozubek, Kovář, Markopoulos: Cholesky decomposition with fixing nodes to
+        stable computation of a generalized inverse of the stiffness matrix of a floating structure.
+        Int. J. Numer. Meth. Engng 88 (2011) 493-509.
+    """
+    nodes = np.sort(fixing_nodes(points))
+    dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
+    basis, _ = np.linalg.qr(kernel[dofs])
+    block = stiffness.diagonal().max() * (basis @ basis.T)
+    rows, columns = np.repeat(dofs, len(dofs)), np.tile(dofs, len(dofs))
+    return (stiffness + sp.coo_matrix((block.ravel(), (rows, columns)), shape=stiffness.shape)).tocsr()

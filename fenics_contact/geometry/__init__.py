@@ -1,0 +1,55 @@
+"""Meshes of bodies, built or moved, and their partition into subdomains. Knows no finite elements."""
+
+from __future__ import annotations
+
+from fenics_contact.geometry.block import block, box_lattice
+from fenics_contact.geometry.faces import boundary_faces, orient, vector_areas
+from fenics_contact.geometry.hemisphere import half_cylinder, hemisphere
+from fenics_contact.geometry.link import DesignSurface, Link, chain_link
+from fenics_contact.geometry.mesh import BodyMesh
+from fenics_contact.geometry.partition import (
+    bisection_partition,
+    box_partition,
+    check_face_connected,
+    combine,
+    merge_pieces,
+    torn_node_counts,
+)
+from fenics_contact.geometry.ring import LinkShape
+from fenics_contact.geometry.structured import split_hexahedra
+from fenics_contact.geometry.touch import (
+    PULL_AXIS,
+    TwoLinks,
+    axial_clearance,
+    check_penetration,
+    mutual_clearance,
+    two_links,
+)
+
+__all__ = [
+    "PULL_AXIS",
+    "BodyMesh",
+    "DesignSurface",
+    "Link",
+    "LinkShape",
+    "TwoLinks",
+    "axial_clearance",
+    "bisection_partition",
+    "block",
+    "boundary_faces",
+    "box_lattice",
+    "box_partition",
+    "chain_link",
+    "check_face_connected",
+    "check_penetration",
+    "combine",
+    "half_cylinder",
+    "hemisphere",
+    "merge_pieces",
+    "mutual_clearance",
+    "orient",
+    "split_hexahedra",
+    "torn_node_counts",
+    "two_links",
+    "vector_areas",
+]

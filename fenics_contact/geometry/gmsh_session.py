@@ -1,0 +1,113 @@
+"""A gmsh model of one's own that leaves the caller's gmsh, terminal and signal handlers as they were."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import ModuleType
+
+from fenics_contact._requirements import check_gmsh
+
+_OPTIONS = {
+    "General.Terminal": 0.0,
+    "Geometry.AutoCoherence": 1.0,
+    "Geometry.Tolerance": 1e-8,
+    "Mesh.ElementOrder": 1.0,
+    "Mesh.MeshOnlyVisible": 0.0,
+    "Mesh.SubdivisionAlgorithm": 0.0,
+}
+"""What the meshes of this package rely on: gmsh's defaults, silent."""
+
+
+@contextmanager
+def gmsh_model(name: str) -> Iterator[ModuleType]:
+    """Open an empty gmsh model and remove it afterwards.
+
+    Where gmsh is already initialised the caller's models, current model and options are put back; where it is
+    not, it is initialised without configuration files and finalised.
+
+    Args:
+        name: Name of the model.
+
+    Yields:
+        The module ``gmsh`` with the new model current.
+
+    Raises:
+        MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
+    """
+    with _interrupt_handler_kept():
+        gmsh = _import_gmsh()
+        foreign = _is_initialised(gmsh)
+        if not foreign:
+            _initialise(gmsh)
+        kept = {option: gmsh.option.getNumber(option) for option in _OPTIONS}
+        current = gmsh.model.getCurrent()
+        while name in gmsh.model.list():
+            name += "'"
+        try:
+            for option, value in _OPTIONS.items():
+                gmsh.option.setNumber(option, value)
+            gmsh.model.add(name)
+            yield gmsh
+        finally:
+            gmsh.model.setCurrent(name)
+            gmsh.model.remove()
+            gmsh.model.setCurrent(current)
+            for option, value in kept.items():
+                gmsh.option.setNumber(option, value)
+            if not foreign:
+                gmsh.finalize()
+
+
+def _initialise(gmsh: ModuleType) -> None:
+    known = inspect.signature(gmsh.initialize).parameters
+    gmsh.initialize(readConfigFiles=False, **({"interruptible": False} if "interruptible" in known else {}))
+
+
+def _import_gmsh() -> ModuleType:
+    check_gmsh()
+    return importlib.import_module("gmsh")
+
+
+@contextmanager
+def _interrupt_handler_kept() -> Iterator[None]:
+    """Put the handler of SIGINT back.
+
+    gmsh takes it at import, at initialisation or at finalisation, depending on the version.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    try:
+        yield
+    finally:
+        main = threading.current_thread() is threading.main_thread()
+        if main and handler is not None and signal.getsignal(signal.SIGINT) is not handler:
+            signal.signal(signal.SIGINT, handler)
+
+
+def _is_initialised(gmsh: ModuleType) -> bool:
+    if hasattr(gmsh, "isInitialized"):
+        return bool(gmsh.isInitialized())
+    # Older versions cannot be asked: a call fails once gmsh is finalised, and says so on the terminal.
+    with _standard_error_closed():
+        try:
+            return len(gmsh.model.list()) > 0
+        except Exception:
+            return False
+
+
+@contextmanager
+def _standard_error_closed() -> Iterator[None]:
+    kept = os.dup(2)
+    sink = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(sink, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(sink)
+        os.close(kept)

@@ -1,0 +1,151 @@
+"""Proportions of a chain link and the lattice that its section sweeps along the stadium-shaped ring.
+
+The ring lies in the x-z plane. Its contact crown is the half circle on the +x side, with the middle of the
+inner surface (the pole) at the origin; the far crown lies on the -x side. Lattice directions: around the ring
+(in the contact crown from -z to +z), a from the inner to the outer side of the section, b along +y. They are
+right-handed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry.section import WireSection
+from fenics_contact.geometry.structured import check_cell_type, check_count
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinkShape:
+    """Proportions and mesh size of one chain link.
+
+    The defaults are those of short-link chain with 16 mm wire (EN 818-2: pitch 48 mm, inner width at least
+    1.3 and outer width at most 3.7 wire diameters): inner width 22 mm, pitch 48 mm.
+
+    Attributes:
+        inner_radius: Radius of the inner side of the crowns; half the inner width of the link.
+        straight: Length of the straight legs; the pitch is ``straight + 2 * inner_radius``.
+        thickness: Size of the wire in the plane of the ring.
+        width: Size of the wire across the plane of the ring.
+        roundness: See `WireSection`; 0.9 keeps corner cells sound and the crown 1.13 times flatter than a
+            disc.
+        n_around: Cells around the ring, a multiple of 6 (four quarter turns and two legs) and at least 12.
+        n_a: Cells through the thickness.
+        n_b: Cells across the width.
+        cell: ``"hexahedron"`` or ``"tetrahedron"``.
+    """
+
+    inner_radius: float = 11.0
+    straight: float = 26.0
+    thickness: float = 16.0
+    width: float = 16.0
+    roundness: float = 0.9
+    n_around: int = 48
+    n_a: int = 8
+    n_b: int = 20
+    cell: str = "hexahedron"
+
+    def __post_init__(self) -> None:
+        """Refuse what is not a ring."""
+        for name in ("inner_radius", "straight"):
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise InvalidInputError(
+                    f"{name} must be positive, got {getattr(self, name)}: a link has two half circles and "
+                    "two legs"
+                )
+        check_count(self.n_around, "n_around", 12)
+        if self.n_around % 6:
+            raise InvalidInputError(
+                "n_around must be a multiple of 6 (four quarter turns and two legs with equally many "
+                f"cells), got {self.n_around}: take {6 * max(2, round(self.n_around / 6))}"
+            )
+        check_count(self.n_a, "n_a")
+        check_count(self.n_b, "n_b", 2)
+        check_cell_type(self.cell)
+        _ = self.section
+
+    @property
+    def section(self) -> WireSection:
+        """The wire's cross-section."""
+        return WireSection(self.thickness, self.width, self.roundness)
+
+    @property
+    def centre_radius(self) -> float:
+        """Radius of the wire's centre line in the crowns."""
+        return self.inner_radius + self.thickness / 2.0
+
+    @property
+    def opening(self) -> float:
+        """Inner length of the link (the chain's pitch)."""
+        return self.straight + 2.0 * self.inner_radius
+
+    @property
+    def volume(self) -> float:
+        """Volume of the smooth link: section times length of the centre line (Pappus)."""
+        return self.section.area * (2.0 * np.pi * self.centre_radius + 2.0 * self.straight)
+
+    @property
+    def faceting(self) -> float:
+        """How far the flat facets of the inner crown stand off the smooth surface."""
+        ring = self.inner_radius * (1.0 - np.cos(0.5 * np.pi / 2.0 / (self.n_around // 6)))
+        across = self.section.crown_radius * (1.0 - np.cos(self.section.half_angle / self.n_b))
+        return float(max(ring, across))
+
+
+def crown_start(shape: LinkShape) -> int:
+    """Index around the ring of the first node of the contact crown, counted back from the crown's middle.
+
+    The middle of the contact crown has the index ``n_around // 16``: half a subdomain when the ring is cut
+    into eight, so that no cut across the ring meets the spot where links touch.
+    """
+    return shape.n_around // 16 - shape.n_around // 6
+
+
+def stations(shape: LinkShape) -> tuple[np.ndarray, np.ndarray]:
+    """Place the section around the ring.
+
+    Args:
+        shape: The link.
+
+    Returns:
+        Points of the wire's centre line, (n_around, 3), and the unit direction a of the section there,
+        (n_around, 3).
+    """
+    n = shape.n_around // 6
+    quarter = np.linspace(0.0, np.pi / 2.0, n, endpoint=False)
+    turn = np.concatenate([quarter - np.pi / 2.0, quarter, np.full(n, np.pi / 2.0)])
+    turn = np.concatenate([turn, turn + np.pi])
+    centre = np.zeros((6 * n, 3))
+    leg = np.linspace(0.0, shape.straight, n, endpoint=False)
+    centre[2 * n : 3 * n, 0] = -leg
+    centre[3 * n : 5 * n, 0] = -shape.straight
+    centre[5 * n :, 0] = leg - shape.straight
+    centre[:, 0] -= shape.inner_radius
+    outward = np.column_stack([np.cos(turn), np.zeros(6 * n), np.sin(turn)])
+    shift = -crown_start(shape)
+    line = centre + shape.centre_radius * outward
+    return np.roll(line, -shift, axis=0), np.roll(outward, -shift, axis=0)
+
+
+def ring_lattice(shape: LinkShape) -> np.ndarray:
+    """Sweep the section's lattice around the ring.
+
+    Args:
+        shape: The link.
+
+    Returns:
+        Points, (n_around, n_a + 1, n_b + 1, 3).
+    """
+    line, outward = stations(shape)
+    section = shape.section.lattice(shape.n_a, shape.n_b)
+    across = np.array([0.0, 1.0, 0.0])
+    return np.asarray(
+        line[:, None, None] + section[..., :1] * outward[:, None, None] + section[..., 1:] * across
+    )
+
+
+def crown_indices(shape: LinkShape) -> np.ndarray:
+    """Indices around the ring of the contact crown's nodes, from -z to +z; (n_around // 3 + 1,)."""
+    return (crown_start(shape) + np.arange(shape.n_around // 3 + 1)) % shape.n_around

@@ -1,0 +1,2 @@
+"""x."""
+from fenics_contact.optimize.constraints import Bounds, LinearConstraints, nearest_feasible

@@ -1,0 +1,111 @@
+"""The bundle: what is known of the objective, as cutting planes seen from the current centre."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Bundle:
+    r"""Cutting planes of the objective, all expressed at the centre x of the model.
+
+    A subgradient g_i found at y_i gives the plane J(y_i) + g_i·(z - y_i). At the centre it lies
+    below J(x) by the linearisation error α_i = J(x) - J(y_i) - g_i·(x - y_i), which is not
+    negative for a convex J. For a nonconvex one a plane far away can lie above J(x); the
+    subgradient locality measure β_i = max(\|α_i\|, c s_i²), with the distance s_i travelled since
+    y_i, pushes it below again, the further the older it is. The model at x + y is
+    J(x) + max_i (g_i·y - β_i). Row 0 belongs to the centre itself: α_0 = s_0 = 0, which
+    makes the model exact there.
+
+    Attributes:
+        gradients: g_i in scaled variables, shape (m, n).
+        errors: α_i, shape (m,), units of J.
+        distances: s_i in scaled variables, shape (m,).
+        locality: c, units of J; 0 for a convex objective.
+
+    References:
+        K. C. Kiwiel, Methods of Descent for Nondifferentiable Optimization, Lecture Notes in
+        Mathematics 1133, Springer, 1985 (aggregation and locality measures, chapter 3).
+        H. Schramm and J. Zowe, SIAM J. Optim. 2 (1992) 121-152.
+    """
+
+    gradients: Array
+    errors: Array
+    distances: Array
+    locality: float
+
+    @property
+    def size(self) -> int:
+        """Number of cutting planes."""
+        return int(self.errors.size)
+
+    @property
+    def measures(self) -> Array:
+        """Subgradient locality measures β_i, shape (m,), not negative."""
+        return np.maximum(np.abs(self.errors), self.locality * self.distances**2)
+
+    def model(self, step: Array) -> float:
+        """Return the predicted change of J, max_i (g_i·y - β_i), for a step y of shape (n,)."""
+        return float(np.max(self.gradients @ step - self.measures))
+
+    def with_cut(self, gradient: Array, error: float, distance: float) -> Bundle:
+        """Return the bundle with one more plane at the end."""
+        return Bundle(
+            np.vstack([self.gradients, gradient]),
+            np.append(self.errors, error),
+            np.append(self.distances, distance),
+            self.locality,
+        )
+
+    def moved(self, step: Array, change: float, locality: float) -> Bundle:
+        """Return the bundle seen from a new centre, whose own plane is the last one.
+
+        Args:
+            step: Move of the centre, shape (n,), scaled variables.
+            change: Change of J.
+            locality: c at the new centre.
+
+        Returns:
+            The same planes with new errors and longer distances, the centre's plane first.
+        """
+        errors = self.errors + change - self.gradients @ step
+        distances = self.distances + np.linalg.norm(step)
+        errors[-1] = distances[-1] = 0.0
+        order = np.roll(np.arange(self.size), 1)
+        return Bundle(self.gradients[order], errors[order], distances[order], locality)
+
+    def reduced(self, weights: Array, room: int) -> Bundle:
+        """Return a bundle with at most ``room`` planes that has the same solution of the step's programme.
+
+        Planes that do not carry weight go first, those with the largest locality measure before the
+        others. Where even the carrying ones are too many, their convex combination with
+        ``weights``, the aggregate plane, replaces the lightest of them: it alone keeps the
+        predicted decrease, so that the method converges with any ``room`` of at least two.
+
+        Args:
+            weights: Multipliers of the planes, shape (m,), not negative, sum one.
+            room: Most planes to keep, at least two.
+
+        Returns:
+            The reduced bundle; row 0 stays where it is.
+        """
+        if self.size <= room:
+            return self
+        carrying = weights > 1e-8
+        order = 1 + np.lexsort((self.measures[1:], -weights[1:]))
+        if np.count_nonzero(carrying[1:]) < room:
+            return self.chosen(np.concatenate([[0], np.sort(order[: room - 1])]))
+        kept = self.chosen(np.concatenate([[0], np.sort(order[: room - 2])]))
+        share = weights / weights.sum()
+        return kept.with_cut(
+            share @ self.gradients, float(share @ self.errors), float(share @ self.distances)
+        )
+
+    def chosen(self, rows: NDArray[np.intp]) -> Bundle:
+        """Return the bundle of some planes, given by their numbers."""
+        return Bundle(self.gradients[rows], self.errors[rows], self.distances[rows], self.locality)

@@ -1,0 +1,254 @@
+"""Where a design may lie: a box and linear constraints, and how they look from a point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.optimize.quadratic_program import QuadraticProgram, solve
+
+Array = NDArray[np.float64]
+
+# A row counts as satisfied within this fraction of the size of its terms: rounding, not freedom.
+_FEASIBILITY = 1e-9
+
+
+def _frozen(values: ArrayLike, name: str, dimensions: int) -> Array:
+    array = np.array(values, dtype=float)
+    if array.ndim != dimensions:
+        raise InvalidInputError(f"{name} must have {dimensions} dimension(s), got shape {array.shape}")
+    if np.isnan(array).any():
+        raise InvalidInputError(f"{name} must hold numbers, got nan at {np.argwhere(np.isnan(array))[0]}")
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """The box lower ≤ x ≤ upper; ±inf where there is no bound.
+
+    Attributes:
+        lower: Shape (n,), or a number for all variables.
+        upper: Shape (n,), or a number for all variables.
+    """
+
+    lower: ArrayLike
+    upper: ArrayLike
+
+
+@dataclass(frozen=True)
+class LinearConstraints:
+    """Rows A x ≤ b and, where wanted, E x = e.
+
+    A nonlinear constraint (a volume) is given by its linearisation at the start.
+
+    Attributes:
+        matrix: A, shape (m, n).
+        limit: b, shape (m,), finite.
+        equality_matrix: E, shape (r, n), or None.
+        equality_value: e, shape (r,), or None.
+    """
+
+    matrix: ArrayLike
+    limit: ArrayLike
+    equality_matrix: ArrayLike | None = None
+    equality_value: ArrayLike | None = None
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """The feasible set seen from a point x, for a step y in scaled variables (x + scale·y).
+
+    Attributes:
+        rows: C of C y ≤ room, shape (m, n), every row of length one.
+        room: Distance to each row, shape (m,); negative where x violates it.
+        equality_rows: E of E y = miss, shape (r, n), every row of length one.
+        miss: Signed distance to each equality, shape (r,).
+    """
+
+    rows: Array
+    room: Array
+    equality_rows: Array
+    miss: Array
+
+
+@dataclass(frozen=True)
+class FeasibleSet:
+    """{x : lower ≤ x ≤ upper, A x ≤ b, E x = e}, checked and complete (empty where nothing is asked).
+
+    Attributes:
+        lower: Shape (n,), -inf where free.
+        upper: Shape (n,), inf where free.
+        matrix: A, shape (m, n).
+        limit: b, shape (m,).
+        equality_matrix: E, shape (r, n).
+        equality_value: e, shape (r,).
+    """
+
+    lower: Array
+    upper: Array
+    matrix: Array
+    limit: Array
+    equality_matrix: Array
+    equality_value: Array
+
+    def violations(self, x: Array) -> list[str]:
+        """Name every bound and row that x violates, with the amount.
+
+        Args:
+            x: Point, shape (n,).
+
+        Returns:
+            One phrase for each violation; empty where x is feasible.
+        """
+        found = []
+        margin = _FEASIBILITY * (1.0 + np.abs(x))
+        for k in np.flatnonzero(x < self.lower - margin):
+            found.append(f"x[{k}] = {x[k]:.6g} is below its lower bound {self.lower[k]:.6g}")
+        for k in np.flatnonzero(x > self.upper + margin):
+            found.append(f"x[{k}] = {x[k]:.6g} is above its upper bound {self.upper[k]:.6g}")
+        excess, margin = _residual(self.matrix, self.limit, x)
+        for k in np.flatnonzero(excess > margin):
+            found.append(f"row {k} of A x ≤ b is exceeded by {excess[k]:.3g}")
+        excess, margin = _residual(self.equality_matrix, self.equality_value, x)
+        for k in np.flatnonzero(np.abs(excess) > margin):
+            found.append(f"row {k} of E x = e is missed by {excess[k]:.3g}")
+        return found
+
+    def clip(self, x: Array) -> Array:
+        """Return x moved into the box (rounding only, for a point that is feasible to tolerance)."""
+        return np.minimum(np.maximum(x, self.lower), self.upper)
+
+    def project(self, x: Array) -> Array:
+        """Return the feasible point nearest to x, shape (n,); x clipped to the box where it is feasible."""
+        if not self.violations(x):
+            return self.clip(x)
+        ones = np.ones(x.size)
+        near = self.around(x, ones)
+        reach = max(-near.room.min(initial=0.0), np.abs(near.miss).max(initial=0.0))
+        program = QuadraticProgram(
+            ones, 0.0 * ones, near.equality_rows, near.miss / reach, near.rows, near.room / reach
+        )
+        return self.clip(x + reach * solve(program).point)
+
+    def around(self, x: Array, scale: Array) -> Surroundings:
+        """Return the constraints on a step y from x in scaled variables.
+
+        Args:
+            x: Point, shape (n,).
+            scale: Size of each variable, shape (n,), positive.
+
+        Returns:
+            Rows of length one and the distance to each.
+        """
+        unit = np.eye(x.size)
+        below, above = (x - self.lower) / scale, (self.upper - x) / scale
+        fixed = self.lower == self.upper
+        low, high = np.isfinite(below) & ~fixed, np.isfinite(above) & ~fixed
+        rows, room = _unit_rows(self.matrix * scale, self.limit - self.matrix @ x)
+        equality, miss = _unit_rows(self.equality_matrix * scale, self.equality_value - self.equality_matrix @ x)
+        return Surroundings(
+            rows=np.vstack([rows, -unit[low], unit[high]]),
+            room=np.concatenate([room, below[low], above[high]]),
+            equality_rows=np.vstack([equality, unit[fixed]]),
+            miss=np.concatenate([miss, above[fixed]]),
+        )
+
+
+def _unit_rows(rows: Array, distance: Array) -> tuple[Array, Array]:
+    length = np.sqrt((rows**2).sum(axis=1))
+    length = np.where(length > 0.0, length, 1.0)
+    return rows / length[:, None], distance / length
+
+
+def _residual(matrix: Array, limit: Array, x: Array) -> tuple[Array, Array]:
+    size = np.abs(matrix) @ np.abs(x) + np.abs(limit)
+    return matrix @ x - limit, _FEASIBILITY * np.where(size > 0.0, size, 1.0)
+
+
+def feasible_set(
+    n: int,
+    bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
+    constraints: LinearConstraints | None = None,
+) -> FeasibleSet:
+    """Check what the caller gave and fill in what was left out.
+
+    Args:
+        n: Number of variables.
+        bounds: Box, or None for none.
+        constraints: Rows, or None for none.
+
+    Returns:
+        The feasible set; the caller's arrays are copied.
+
+    Raises:
+        InvalidInputError: If a shape does not fit, a value is nan, or a lower bound lies above its upper one.
+    """
+    lower, upper = _box(n, bounds)
+    rows = constraints or LinearConstraints(np.zeros((0, n)), np.zeros(0))
+    matrix, limit = _rows(n, rows.matrix, rows.limit, "A", "b")
+    if (rows.equality_matrix is None) != (rows.equality_value is None):
+        raise InvalidInputError("an equality needs both equality_matrix and equality_value, got only one")
+    if rows.equality_matrix is None or rows.equality_value is None:
+        return FeasibleSet(lower, upper, matrix, limit, np.zeros((0, n)), np.zeros(0))
+    equality = _rows(n, rows.equality_matrix, rows.equality_value, "E", "e")
+    return FeasibleSet(lower, upper, matrix, limit, *equality)
+
+
+def _box(n: int, bounds: Bounds | tuple[ArrayLike, ArrayLike] | None) -> tuple[Array, Array]:
+    box = Bounds(-np.inf, np.inf) if bounds is None else bounds
+    pair = (box.lower, box.upper) if isinstance(box, Bounds) else box
+    if len(pair) != 2:
+        raise InvalidInputError(f"bounds must be a pair (lower, upper), got {len(pair)} entries")
+    for name, side in zip(("lower", "upper"), pair, strict=True):
+        if np.shape(side) not in ((), (n,)):
+            raise InvalidInputError(f"{name} bound must have shape ({n},) like x0, got {np.shape(side)}")
+    lower, upper = (
+        _frozen(np.broadcast_to(np.asarray(side, dtype=float), (n,)), f"{name} bound", 1)
+        for name, side in zip(("lower", "upper"), pair, strict=True)
+    )
+    crossed = np.flatnonzero(lower > upper)
+    if crossed.size:
+        k = crossed[0]
+        raise InvalidInputError(
+            f"lower bounds must not exceed upper ones, got {lower[k]:.6g} > {upper[k]:.6g} for x[{k}]"
+        )
+    return lower, upper
+
+
+def _rows(n: int, matrix: ArrayLike, limit: ArrayLike, name: str, right: str) -> tuple[Array, Array]:
+    a, b = _frozen(matrix, name, 2), _frozen(limit, right, 1)
+    if a.shape != (b.size, n):
+        raise InvalidInputError(
+            f"{name} must have shape ({b.size}, {n}): a row for each entry of {right}, a column for each "
+            f"variable; got {a.shape}"
+        )
+    if not (np.isfinite(a).all() and np.isfinite(b).all()):
+        raise InvalidInputError(f"{name} and {right} must be finite: leave out the rows that bind nothing")
+    return a, b
+
+
+def nearest_feasible(
+    x: ArrayLike,
+    bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
+    constraints: LinearConstraints | None = None,
+) -> Array:
+    """Return the feasible point nearest to x in the Euclidean norm.
+
+    Args:
+        x: Any point, shape (n,).
+        bounds: Box, or None.
+        constraints: Rows, or None.
+
+    Returns:
+        The projection, shape (n,), feasible to rounding.
+
+    Raises:
+        InvalidInputError: If the constraints contradict each other or their shapes do not fit.
+    """
+    point = _frozen(x, "x", 1)
+    allowed = feasible_set(point.size, bounds, constraints)
+    return allowed.project(point)

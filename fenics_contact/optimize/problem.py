@@ -1,0 +1,83 @@
+"""The door of the package: check the problem, hand it to the method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.optimize.constraints import Bounds, FeasibleSet, LinearConstraints, feasible_set
+from fenics_contact.optimize.objective import Fun
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """min J(x) over a feasible set, checked.
+
+    Attributes:
+        fun: Value and subgradient at a point.
+        start: Feasible starting point, shape (n,).
+        allowed: The feasible set.
+        scale: Size of each variable, shape (n,): the method sees x/scale.
+        length: Distance in scaled variables that the problem lives on.
+    """
+
+    fun: Fun
+    start: Array
+    allowed: FeasibleSet
+    scale: Array
+    length: float
+
+
+def pose(
+    fun: Fun,
+    x0: ArrayLike,
+    bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
+    constraints: LinearConstraints | None = None,
+    scale: ArrayLike | None = None,
+) -> Problem:
+    """Check a problem and choose its scales; see `minimize` for the arguments.
+
+    Returns:
+        The checked problem; the caller's arrays are copied.
+
+    Raises:
+        InvalidInputError: If a shape does not fit, x0 is not finite or not feasible.
+    """
+    start = np.array(x0, dtype=float)
+    if start.ndim != 1 or start.size == 0:
+        raise InvalidInputError(f"x0 must have shape (n,) with n ≥ 1, got {start.shape}")
+    if not np.isfinite(start).all():
+        raise InvalidInputError(f"x0 must be finite, got {start} (entry {np.flatnonzero(~np.isfinite(start))[0]})")
+    allowed = feasible_set(start.size, bounds, constraints)
+    violations = allowed.violations(start)
+    if violations:
+        more = f" and {len(violations) - 3} more" if len(violations) > 3 else ""
+        raise InvalidInputError(
+            f"x0 must be feasible, but {'; '.join(violations[:3])}{more}: start from "
+            "nearest_feasible(x0, bounds, constraints)"
+        )
+    start = allowed.clip(start)
+    size = _scale(start.size, allowed, scale)
+    return Problem(fun, start, allowed, size, _length(start, allowed, size))
+
+
+def _scale(n: int, allowed: FeasibleSet, scale: ArrayLike | None) -> Array:
+    if scale is None:
+        width = allowed.upper - allowed.lower
+        return np.where(width > 0.0, width, 1.0) if np.isfinite(width).all() else np.ones(n)
+    size = np.array(scale, dtype=float)
+    if size.shape not in ((), (n,)) or not (np.isfinite(size).all() and (size > 0.0).all()):
+        raise InvalidInputError(f"scale must be a positive number or have shape ({n},) and be positive, got {scale}")
+    return np.broadcast_to(size, (n,)).copy()
+
+
+def _length(start: Array, allowed: FeasibleSet, scale: Array) -> float:
+    diagonal = float(np.linalg.norm((allowed.upper - allowed.lower) / scale))
+    if np.isfinite(diagonal) and diagonal > 0.0:
+        return 0.5 * diagonal
+    return max(1.0, float(np.linalg.norm(start / scale)))

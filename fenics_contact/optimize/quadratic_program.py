@@ -1,0 +1,134 @@
+"""Small convex quadratic programmes, solved by Clarabel: min ½ yᵀ diag(h) y + qᵀy, E y = e, C y ≤ c."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import clarabel
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from fenics_contact.errors import ConvergenceError, InvalidInputError
+
+Array = NDArray[np.float64]
+
+# Tried in this order until one reports "Solved". One thread and one factorisation method, because
+# replicated ranks must get the same bits.
+_ATTEMPTS: tuple[Mapping[str, Any], ...] = (
+    MappingProxyType({"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}),
+    MappingProxyType({"tol_gap_abs": 1e-9, "tol_gap_rel": 1e-9, "tol_feas": 1e-9}),
+    MappingProxyType({"equilibrate_enable": False}),
+    MappingProxyType({"static_regularization_constant": 1e-10, "max_step_fraction": 0.9}),
+)
+_INFEASIBLE = (clarabel.SolverStatus.PrimalInfeasible, clarabel.SolverStatus.AlmostPrimalInfeasible)
+
+
+class SubproblemError(ConvergenceError):
+    """The quadratic programme of a step could not be solved with any of the settings tried."""
+
+
+@dataclass(frozen=True)
+class QuadraticProgram:
+    """The data of min ½ yᵀ diag(h) y + qᵀy subject to E y = e and C y ≤ c.
+
+    Attributes:
+        curvature: h, shape (n,), not negative.
+        slope: q, shape (n,).
+        equality_rows: E, shape (r, n).
+        equality_values: e, shape (r,).
+        rows: C, shape (m, n).
+        limits: c, shape (m,).
+    """
+
+    curvature: Array
+    slope: Array
+    equality_rows: Array
+    equality_values: Array
+    rows: Array
+    limits: Array
+
+
+@dataclass(frozen=True)
+class QuadraticSolution:
+    """Minimiser of a `QuadraticProgram` and the multipliers of its rows.
+
+    Attributes:
+        point: y, shape (n,).
+        multipliers: Multipliers of C y ≤ c, shape (m,), not negative.
+        status: What Clarabel said.
+        exact: False where only Clarabel's reduced tolerances were met.
+    """
+
+    point: Array
+    multipliers: Array
+    status: str
+    exact: bool
+
+
+def solve(program: QuadraticProgram) -> QuadraticSolution:
+    """Solve a small convex quadratic programme; the same input gives the same bits.
+
+    The tolerances are loosened, then the scaling and the regularisation changed, until Clarabel
+    reports "Solved"; an "AlmostSolved" serves only where no attempt does better.
+
+    Args:
+        program: The data, in units in which the solution is of order one.
+
+    Returns:
+        The minimiser, its multipliers and the status.
+
+    Raises:
+        InvalidInputError: If the constraints contradict each other.
+        SubproblemError: If every attempt failed; the message lists what Clarabel said each time.
+
+    References:
+        P. J. Goulart and Y. Chen, Clarabel: an interior-point solver for conic programs with
+        quadratic objectives, 2024.
+    """
+    statuses = []
+    almost = None
+    for changes in _ATTEMPTS:
+        answer = _run_clarabel(program, changes)
+        statuses.append(str(answer.status))
+        if answer.status in _INFEASIBLE:
+            raise InvalidInputError(
+                "the bounds and linear constraints must leave at least one point, but Clarabel reports "
+                f"{answer.status}: remove or relax the rows that contradict each other"
+            )
+        if answer.status == clarabel.SolverStatus.Solved:
+            return _solution(program, answer, exact=True)
+        if almost is None and answer.status == clarabel.SolverStatus.AlmostSolved:
+            almost = answer
+    if almost is None:
+        raise SubproblemError(
+            f"Clarabel must solve the quadratic programme of a step, but reported {', '.join(statuses)}: "
+            "rescale the variables with `scale`, or look for subgradients of very different size"
+        )
+    return _solution(program, almost, exact=False)
+
+
+def _solution(program: QuadraticProgram, answer: Any, *, exact: bool) -> QuadraticSolution:
+    first = program.equality_values.size
+    multipliers = np.maximum(np.array(answer.z, dtype=float)[first:], 0.0)
+    return QuadraticSolution(np.array(answer.x, dtype=float), multipliers, str(answer.status), exact)
+
+
+def _run_clarabel(program: QuadraticProgram, changes: Mapping[str, Any]) -> Any:
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.max_threads = 1
+    settings.direct_solve_method = "qdldl"
+    settings.presolve_enable = False
+    for name, value in changes.items():
+        setattr(settings, name, value)
+    equal, unequal = program.equality_values.size, program.limits.size
+    kinds = [(clarabel.ZeroConeT, equal), (clarabel.NonnegativeConeT, unequal)]
+    rows = sparse.csc_matrix(np.vstack([program.equality_rows, program.rows]))
+    limits = np.concatenate([program.equality_values, program.limits])
+    hessian = sparse.csc_matrix(sparse.diags(program.curvature))
+    cones = [kind(size) for kind, size in kinds if size]
+    return clarabel.DefaultSolver(hessian, program.slope, rows, limits, cones, settings).solve()

@@ -1,0 +1,124 @@
+"""What a minimisation returns, records and raises."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenics_contact.errors import ConvergenceError, InvalidInputError
+
+Array = NDArray[np.float64]
+
+
+class InvalidDesignError(InvalidInputError):
+    """The objective does not exist at this design (a cell is inverted, bodies penetrate): try a shorter step."""
+
+
+class Reason(Enum):
+    """Why a minimisation stopped; the value says what happened and, where it failed, what to try."""
+
+    CONVERGED = "the model predicts no decrease above the tolerance"
+    STATIONARY = "the aggregate subgradient and its error vanish within the tolerance"
+    ITERATION_LIMIT = (
+        "max_iterations serious steps were taken before the tolerance was met: raise max_iterations, "
+        "loosen tolerance, or start again from the best point"
+    )
+    EVALUATION_LIMIT = (
+        "max_evaluations evaluations were spent before the tolerance was met: raise max_evaluations, "
+        "loosen tolerance, or start again from the best point"
+    )
+    NO_DESCENT = (
+        "even the shortest step along the aggregate subgradient does not lower the objective as predicted: "
+        "compare the subgradient with a difference quotient (a wrong sign, a missing term or a wrong "
+        "scale shows there), or solve the state more accurately"
+    )
+    INVALID_DESIGNS = (
+        "every trial design was invalid, down to the shortest step: bound the design away from the "
+        "invalid region by bounds or linear constraints"
+    )
+
+    @property
+    def success(self) -> bool:
+        """Whether a stopping test was met."""
+        return self in (Reason.CONVERGED, Reason.STATIONARY)
+
+
+class Kind(Enum):
+    """What became of a trial point."""
+
+    START = "start"
+    SERIOUS = "serious"
+    NULL = "null"
+    REJECTED = "rejected"
+
+
+@dataclass(frozen=True)
+class Record:
+    """One evaluation and the step that led to it.
+
+    Attributes:
+        iteration: Serious steps up to and with this one.
+        kind: What became of the trial point.
+        value: J at the trial point; nan where it was rejected as invalid.
+        best: J at the centre after this evaluation.
+        predicted_decrease: Decrease of J that the model promised.
+        t: Proximal parameter of the step.
+        step_length: Length of the step in scaled variables.
+        aggregate_norm: Length of the aggregate subgradient in scaled variables.
+        aggregate_error: Linearisation error of the aggregate subgradient.
+        bundle_size: Cutting planes in the model that made the step.
+        evaluations: Evaluations up to and with this one.
+    """
+
+    iteration: int
+    kind: Kind
+    value: float
+    best: float
+    predicted_decrease: float
+    t: float
+    step_length: float
+    aggregate_norm: float
+    aggregate_error: float
+    bundle_size: int
+    evaluations: int
+
+
+@dataclass(frozen=True)
+class Result:
+    """The best point found and how it was reached.
+
+    Attributes:
+        x: Point, shape (n,).
+        value: J there.
+        subgradient: One subgradient there, shape (n,).
+        reason: Why the method stopped.
+        iterations: Serious steps.
+        evaluations: Evaluations of the objective, failed ones included.
+        history: One record for each evaluation, oldest first.
+    """
+
+    x: Array
+    value: float
+    subgradient: Array
+    reason: Reason
+    iterations: int
+    evaluations: int
+    history: tuple[Record, ...]
+
+
+class NotConvergedError(ConvergenceError):
+    """The minimisation stopped before its tolerance was met.
+
+    Attributes:
+        history: One record for each evaluation, oldest first.
+        best: The result so far, with the reason; None on a rank that only heard of the error.
+    """
+
+    def __init__(self, message: str, history: Sequence[Record] = (), best: Result | None = None) -> None:
+        """Keep the history and the best point beside the message."""
+        super().__init__(message, history)
+        self.best = best

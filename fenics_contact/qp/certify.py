@@ -1,0 +1,77 @@
+"""Post-conditions: no answer leaves this package before its residuals were recomputed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fenics_contact.qp.problem import DualProblem, Operator
+from fenics_contact.qp.reductions import Vector
+from fenics_contact.qp.residual import Residuals, measure
+from fenics_contact.qp.slip_law import SlipLaw
+from fenics_contact.qp.solution import DualSolution, SmalseMemory, SolverStep
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """A multiplier whose product, α and residuals were recomputed from it alone.
+
+    Attributes:
+        multiplier: λ, owned.
+        product: F λ, owned.
+        residual: r = F λ − d − Gᵀα, owned.
+        alpha: α, shape (m,), replicated.
+        slip_bound: Ψ, shape (n_friction,), owned.
+        residuals: All residuals of λ.
+    """
+
+    multiplier: Vector
+    product: Vector
+    residual: Vector
+    alpha: Vector
+    slip_bound: Vector
+    residuals: Residuals
+
+    def solution(
+        self,
+        problem: DualProblem,
+        history: Sequence[SolverStep],
+        products: int,
+        memory: SmalseMemory | None,
+    ) -> DualSolution:
+        """Return the answer of a solve that took ``products`` products."""
+        return DualSolution(
+            problem=problem,
+            multiplier=self.multiplier,
+            residual=self.residual,
+            product=self.product,
+            alpha=self.alpha,
+            slip_bound=self.slip_bound,
+            residuals=self.residuals,
+            iterations=len(history),
+            products=products,
+            history=tuple(history),
+            reason="every residual is below the tolerance",
+            memory=memory,
+        )
+
+
+def certify(
+    problem: DualProblem, operator: Operator, law: SlipLaw, multiplier: Vector, residual: Vector
+) -> Certificate:
+    """Recompute everything that can be said about a multiplier. Collective; one product.
+
+    Args:
+        problem: The dual problem.
+        operator: F, counted.
+        law: Where the slip bound comes from.
+        multiplier: λ, owned.
+        residual: A solver's own r, owned; of it only the choice of α is kept.
+    """
+    product = operator(multiplier)
+    flexed = product - problem.rhs
+    alpha = problem.coarse.coefficients(flexed - residual)
+    exact = flexed - problem.coarse.transpose(alpha)
+    feasible = law.feasible(multiplier)
+    residuals = measure(problem, feasible, multiplier, product, exact)
+    return Certificate(multiplier, product, exact, alpha, feasible.slip_bound, residuals)

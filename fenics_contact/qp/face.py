@@ -1,0 +1,150 @@
+"""A face of the feasible set: which contacts are closed and which discs stick, slip or are pinned."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+from fenics_contact.qp.layout import ContactLayout
+from fenics_contact.qp.reductions import Vector
+
+Marks = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Face:
+    """An affine piece of the multiplier space, λ = fixed + Z y, on which contact is linear.
+
+    Free on the face are the equality multipliers, the normal ones of closed contacts, both components of
+    sticking discs, and for a slipping disc τ = Ψ ŵ + s t̂ the offset s along the circle (none in two
+    dimensions). The columns of Z are orthonormal. Everything else is fixed: λ_N = 0 where open, τ = 0 where
+    the disc is pinned (Ψ = 0).
+
+    Attributes:
+        layout: Positions of normal and tangential multipliers.
+        closed: Marks of closed contacts, shape (n_contact,), owned.
+        stick: Marks of sticking discs, shape (n_friction,), owned.
+        slip: Marks of slipping discs, shape (n_friction,), owned; a disc with neither mark is pinned.
+        slip_bound: Ψ, shape (n_friction,), owned.
+        direction: ŵ, direction of the friction force of a slipping disc, shape (n_friction, t), owned.
+        overshoot: ‖w_T‖/Ψ ≥ 1 of a slipping disc and 1 elsewhere, shape (n_friction,), owned.
+        flexibility: 1/ρ_T of the discs, shape (n_friction,), owned.
+    """
+
+    layout: ContactLayout
+    closed: Marks
+    stick: Marks
+    slip: Marks
+    slip_bound: Vector
+    direction: Vector
+    overshoot: Vector
+    flexibility: Vector
+
+    @cached_property
+    def restriction(self) -> sp.csr_matrix:
+        """Z with orthonormal columns, shape (size, n_face), owned rows and columns."""
+        layout = self.layout
+        single = np.concatenate(
+            [layout.equality, layout.normal[self.closed], layout.tangential[self.stick].ravel()]
+        )
+        sliding = self._sliding
+        rows = np.concatenate([single, layout.tangential[sliding].ravel()])
+        width = layout.tangential.shape[1]
+        slip_columns = np.repeat(len(single) + np.arange(len(sliding)), width)
+        columns = np.concatenate([np.arange(len(single)), slip_columns])
+        values = np.concatenate([np.ones(len(single)), self._tangents[sliding].ravel()])
+        return sp.csr_matrix((values, (rows, columns)), shape=(layout.size, len(single) + len(sliding)))
+
+    @property
+    def n_face(self) -> int:
+        """Number of degrees of freedom of the face on this rank."""
+        return self.restriction.shape[1]
+
+    @cached_property
+    def fixed(self) -> Vector:
+        """The part of the multiplier that the face prescribes, Ψ ŵ on slipping discs, owned."""
+        prescribed = np.zeros(self.layout.size)
+        rows = self.layout.tangential[self.slip]
+        prescribed[rows] = self.slip_bound[self.slip, None] * self.direction[self.slip]
+        return prescribed
+
+    @cached_property
+    def curvature(self) -> Vector:
+        """κ = (‖w_T‖ − Ψ)/(ρ_T Ψ) on the offsets of slipping discs, 0 elsewhere, shape (n_face,)."""
+        kappa = np.zeros(self.n_face)
+        sliding = self._sliding
+        kappa[self.n_face - len(sliding) :] = (self.overshoot[sliding] - 1.0) * self.flexibility[sliding]
+        return kappa
+
+    @cached_property
+    def damping(self) -> Vector:
+        """(1 + ρ_T κ)^-½, by which a preconditioner for F becomes one for F + κ, shape (n_face,)."""
+        factor = np.ones(self.n_face)
+        sliding = self._sliding
+        factor[self.n_face - len(sliding) :] = 1.0 / np.sqrt(self.overshoot[sliding])
+        return factor
+
+    def restrict(self, x: Vector) -> Vector:
+        """Return Zᵀ x for an owned vector x."""
+        return self.restriction.T @ x
+
+    def prolong(self, y: Vector) -> Vector:
+        """Return Z y, owned, for y of shape (n_face,)."""
+        return self.restriction @ y
+
+    def nearest(self, x: Vector) -> Vector:
+        """Return the orthogonal projection of an owned vector on the face, fixed + Z Zᵀ x."""
+        return self.fixed + self.prolong(self.restrict(x))
+
+    def changes(self, other: Face) -> int:
+        """Count this rank's contacts and discs whose status differs between two faces."""
+        return int(
+            np.count_nonzero(self.closed != other.closed)
+            + np.count_nonzero((self.stick != other.stick) | (self.slip != other.slip))
+        )
+
+    @property
+    def _sliding(self) -> npt.NDArray[np.int64]:
+        """Slipping discs that have a tangent to move along; none in two dimensions."""
+        return np.flatnonzero(self.slip) if self.layout.tangential.shape[1] == 2 else np.zeros(0, np.int64)
+
+    @property
+    def _tangents(self) -> Vector:
+        return np.stack([-self.direction[:, -1], self.direction[:, 0]], axis=1)
+
+
+def classify(
+    layout: ContactLayout, slip_bound: Vector, multiplier: Vector, residual: Vector, step: Vector
+) -> Face:
+    """Return the face on which the semismooth Newton method linearises w = λ − ρ r.
+
+    Contacts with w_N > 0 are closed. Discs with ‖w_T‖ < Ψ stick, the others slip along ŵ = w_T/‖w_T‖, and
+    those with Ψ = 0 are pinned.
+
+    Args:
+        layout: Positions of normal and tangential multipliers.
+        slip_bound: Ψ, shape (n_friction,), owned.
+        multiplier: λ, owned.
+        residual: r = F λ − d − Gᵀα, owned.
+        step: ρ, positive, the same for the components of one disc, shape (size,), owned.
+    """
+    trial = multiplier - step * residual
+    tangential = trial[layout.tangential]
+    length = np.linalg.norm(tangential, axis=1)
+    free = slip_bound > 0.0
+    slip = free & (length >= slip_bound)
+    divisor = np.where(slip, length, 1.0)
+    return Face(
+        layout=layout,
+        closed=trial[layout.normal] > 0.0,
+        stick=free & ~slip,
+        slip=slip,
+        slip_bound=slip_bound,
+        direction=np.where(slip[:, None], tangential / divisor[:, None], 0.0),
+        overshoot=np.divide(length, slip_bound, out=np.ones_like(length), where=slip),
+        flexibility=1.0 / step[layout.tangential[:, 0]],
+    )

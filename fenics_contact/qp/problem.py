@@ -1,0 +1,113 @@
+"""The dual problem: min ½ λᵀF λ − dᵀλ subject to G λ = e and λ in a cone, given by its operators."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_contact.errors import InfeasibleError, InvalidInputError, together
+from fenics_contact.qp.coarse import CoarseSpace
+from fenics_contact.qp.layout import ContactLayout
+from fenics_contact.qp.reductions import Vector, global_sum
+
+Operator = Callable[[Vector], Vector]
+
+
+@dataclass(frozen=True, eq=False)
+class DualProblem:
+    """Everything a dual solver may know: an operator, a coarse space and who is who in a vector.
+
+    Vectors are distributed: each rank holds the entries it owns, and the inner product is the sum of
+    the ranks' own. Residual convention: r = F λ − d − Gᵀα is minus the violation B u − c of the rows.
+
+    Attributes:
+        comm: Communicator of the ranks that share the vectors.
+        operator: F = B K⁺ Bᵀ, symmetric positive semidefinite, owned to owned, collective.
+        rhs: d = B K⁺ f − c, owned, shape (size,).
+        coarse: Equilibrium G λ = e.
+        layout: Positions of normal and tangential multipliers.
+        diagonal: Approximate positive diagonal of F, owned, shape (size,); only contact rows are used.
+        preconditioner: Approximation of F⁻¹, symmetric positive definite, owned to owned, collective.
+    """
+
+    comm: MPI.Comm
+    operator: Operator
+    rhs: Vector
+    coarse: CoarseSpace
+    layout: ContactLayout
+    diagonal: Vector
+    preconditioner: Operator | None = None
+
+    def dot(self, x: Vector, y: Vector) -> float:
+        """Return the global inner product of two owned vectors. Collective."""
+        return float(global_sum(self.comm, x @ y)[0])
+
+    def norm(self, x: Vector) -> float:
+        """Return the global Euclidean norm of an owned vector. Collective."""
+        return float(np.sqrt(self.dot(x, x)))
+
+    def check(self) -> None:
+        """Refuse data that no solver could use. Collective on ``comm``.
+
+        Raises:
+            InvalidInputError: A shape disagrees with the layout, or an entry is not finite.
+            InfeasibleError: The load drives a rigid motion that no multiplier resists.
+        """
+        with together(self.comm):
+            _require_shape("rhs", self.rhs, self.layout.size)
+            _require_shape("diagonal", self.diagonal, self.layout.size)
+            _require_shape("a column block of G", self.coarse.matrix.T, self.layout.size)
+            _require_finite("rhs", self.rhs)
+            _require_finite("e", self.coarse.load)
+            if not np.all(self.diagonal[self.layout.contact] > 0):
+                raise InvalidInputError(
+                    "diagonal must be positive on every contact row, got "
+                    f"{self.diagonal[self.layout.contact].min()}: estimate it by the flexibility of the rows"
+                )
+            self._require_resisted_load()
+
+    def _require_resisted_load(self) -> None:
+        work = self.coarse.unresisted()
+        size = np.abs(self.coarse.load).max(initial=0.0)
+        if np.abs(work).max(initial=0.0) > 1e-8 * size:
+            worst = int(np.argmax(np.abs(work)))
+            raise InfeasibleError(
+                "every loaded rigid motion needs a multiplier against it, but the load works "
+                f"{work[worst]:.3e} on row {worst} of e and no row of B resists: support or glue that body"
+            )
+
+
+class CountedOperator:
+    """The dual operator together with the number of times it was applied.
+
+    Attributes:
+        products: Applications of F so far.
+    """
+
+    def __init__(self, operator: Operator) -> None:
+        """Wrap ``operator``."""
+        self._operator = operator
+        self.products = 0
+
+    def __call__(self, x: Vector) -> Vector:
+        """Apply F to an owned vector and count. Collective."""
+        self.products += 1
+        return self._operator(x)
+
+
+def _require_shape(name: str, array: Vector, size: int) -> None:
+    if array.shape[0] != size:
+        raise InvalidInputError(
+            f"{name} must have {size} entries like the layout's owned vector, got {array.shape[0]}"
+        )
+
+
+def _require_finite(name: str, array: Vector) -> None:
+    if not np.all(np.isfinite(array)):
+        count = int(np.count_nonzero(~np.isfinite(array)))
+        raise InvalidInputError(
+            f"{name} must be finite, got {count} entries that are not: check loads, gaps and materials"
+        )

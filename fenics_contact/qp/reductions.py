@@ -1,0 +1,37 @@
+"""Global sums and extrema of small arrays: the only way in which ranks take decisions together."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+Vector = npt.NDArray[np.float64]
+
+
+def global_sum(comm: MPI.Comm, *parts: npt.ArrayLike) -> Vector:
+    """Sum arrays over all ranks, joined in one message. Collective on ``comm``.
+
+    Args:
+        comm: Communicator of the ranks.
+        *parts: This rank's contributions, scalars or arrays of any shape.
+
+    Returns:
+        The sums, flattened and concatenated in the order given, the same on every rank.
+    """
+    local = np.concatenate([np.ravel(np.asarray(part, dtype=np.float64)) for part in parts])
+    if comm.size == 1:
+        return local
+    total = np.empty_like(local)
+    comm.Allreduce(local, total, op=MPI.SUM)
+    return total
+
+
+def global_max(comm: MPI.Comm, value: float) -> float:
+    """Return the largest of the ranks' values. Collective on ``comm``."""
+    return float(comm.allreduce(value, op=MPI.MAX))
+
+
+def global_min(comm: MPI.Comm, value: float) -> float:
+    """Return the smallest of the ranks' values. Collective on ``comm``."""
+    return float(comm.allreduce(value, op=MPI.MIN))

@@ -1,0 +1,108 @@
+"""What is wrong with a multiplier: the numbers that every solver must bring under its tolerance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.qp.feasible import FeasibleSet
+from fenics_contact.qp.layout import ContactLayout
+from fenics_contact.qp.problem import DualProblem
+from fenics_contact.qp.reductions import Vector, global_max, global_sum
+
+FORCE_FLOOR = 1e-10
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Relative residuals of a multiplier λ with r = F λ − d − Gᵀα; all are zero at the solution.
+
+    Attributes:
+        natural: ‖λ − P_Λ(λ − ρ r)‖ over the contact rows, relative to ‖λ_N‖.
+        gluing: ‖r‖ over the equality rows, relative to the displacements that cancel there,
+            max(‖(F λ − d)_E‖, ‖d_E‖).
+        coarse: Distance of λ from equilibrium, ‖Gᵀ(G Gᵀ)⁻¹(G λ − e)‖, relative to ‖λ‖.
+        violation: Largest violation of a bound or disc, relative to ‖λ_N‖.
+        force_scale: The force by which `natural` and `violation` were divided.
+        gluing_scale: The displacement by which `gluing` was divided.
+    """
+
+    natural: float
+    gluing: float
+    coarse: float
+    violation: float
+    force_scale: float
+    gluing_scale: float
+
+    @property
+    def worst(self) -> float:
+        """The larger of the natural and the gluing residual, which steer the iteration."""
+        return max(self.natural, self.gluing)
+
+    def within(self, tolerance: float) -> bool:
+        """Tell whether every residual is at most ``tolerance``; NaN is not."""
+        return all(value <= tolerance for value in (self.natural, self.gluing, self.coarse, self.violation))
+
+
+def contact_step(layout: ContactLayout, diagonal: Vector) -> Vector:
+    """Return ρ = 1/diag F on the contact rows, one value a disc, and 0 on equality rows, owned."""
+    step = np.zeros(layout.size)
+    step[layout.normal] = 1.0 / diagonal[layout.normal]
+    step[layout.tangential] = 1.0 / diagonal[layout.tangential].mean(axis=1, keepdims=True)
+    return step
+
+
+def measure(
+    problem: DualProblem, feasible: FeasibleSet, multiplier: Vector, product: Vector, residual: Vector
+) -> Residuals:
+    """Compute all residuals. Collective.
+
+    Contact forces below 1e-10 of ‖λ‖ count as none, so that a body that merely touches does not keep the
+    iteration alive; where no normal force acts at all, ‖λ‖ over all contact rows stands in for ‖λ_N‖.
+
+    Args:
+        problem: The dual problem.
+        feasible: Λ(Ψ).
+        multiplier: λ, owned.
+        product: F λ, owned.
+        residual: r = F λ − d − Gᵀα, owned.
+    """
+    layout, equality, contact = problem.layout, problem.layout.equality, problem.layout.contact
+    mapped = feasible.project(multiplier - contact_step(layout, problem.diagonal) * residual)
+    sums = global_sum(
+        problem.comm,
+        *(_square(x[layout.normal]) for x in (multiplier, mapped)),
+        *(_square(x[contact]) for x in (multiplier, mapped, multiplier - mapped)),
+        *(_square(x[equality]) for x in (residual, product - problem.rhs, problem.rhs)),
+        _square(multiplier),
+        _square(problem.rhs),
+        problem.coarse.local(multiplier),
+    )
+    normal, normal_mapped, force, force_mapped, distance, jump, cancelled, load, everything, rhs = np.sqrt(
+        sums[:10]
+    )
+    unbalanced = problem.coarse.norm(sums[10:] - problem.coarse.load)
+    force_scale = max(normal, normal_mapped)
+    if force_scale <= FORCE_FLOOR * max(force, force_mapped):
+        force_scale = max(force, force_mapped)
+    force_scale = max(force_scale, FORCE_FLOOR * everything)
+    gluing_scale = max(cancelled, load) or rhs
+    return Residuals(
+        natural=_ratio(distance, force_scale),
+        gluing=_ratio(jump, gluing_scale),
+        coarse=_ratio(unbalanced, max(everything, problem.coarse.norm(problem.coarse.load))),
+        violation=_ratio(global_max(problem.comm, feasible.violation(multiplier)), force_scale),
+        force_scale=force_scale,
+        gluing_scale=gluing_scale,
+    )
+
+
+def _square(x: Vector) -> float:
+    return float(x @ x)
+
+
+def _ratio(value: float, scale: float) -> float:
+    if value == 0.0:
+        return 0.0
+    return float(value / scale) if scale > 0.0 else float(np.inf)

@@ -1,0 +1,25 @@
+"""Scenes: bodies, materials, supports, loads and contact pairs."""
+
+from fenics_contact.scene.loads import BodyForce, Load, Support, TotalForce, Traction
+from fenics_contact.scene.materials import IsotropicElasticity, Material, rigid_body_modes
+from fenics_contact.scene.pairs import ContactPair, Coulomb, RigidPlane, Surface, Tresca
+from fenics_contact.scene.scene import Body, Effect, Scene
+
+__all__ = [
+    "Body",
+    "BodyForce",
+    "ContactPair",
+    "Coulomb",
+    "Effect",
+    "IsotropicElasticity",
+    "Load",
+    "Material",
+    "RigidPlane",
+    "Scene",
+    "Support",
+    "Surface",
+    "TotalForce",
+    "Traction",
+    "Tresca",
+    "rigid_body_modes",
+]

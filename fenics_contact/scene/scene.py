@@ -1,0 +1,111 @@
+"""A scene: bodies, what holds and loads them, and who may touch whom. Nothing numerical has happened yet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry import BodyMesh
+from fenics_contact.scene.loads import BodyForce, Load, Support
+from fenics_contact.scene.materials import Material
+from fenics_contact.scene.pairs import ContactPair, Coulomb, Surface, Tresca
+
+
+@dataclass(frozen=True)
+class Body:
+    """A mesh and what it is made of."""
+
+    mesh: BodyMesh
+    material: Material
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One physical effect that a scene calls for, and the reason."""
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Elastic bodies that may touch.
+
+    Attributes:
+        bodies: Bodies by name.
+        supports: Prescribed displacements.
+        loads: Forces.
+        contacts: Pairs of surfaces that may touch.
+    """
+
+    bodies: Mapping[str, Body]
+    supports: Sequence[Support] = field(default=())
+    loads: Sequence[Load] = field(default=())
+    contacts: Sequence[ContactPair] = field(default=())
+
+    def __post_init__(self) -> None:
+        """Refuse names that point to nothing, and surfaces without facets."""
+        if not self.bodies:
+            raise InvalidInputError("a scene needs at least one body, got none: pass bodies={'name': Body(...)}")
+        for part in (*self.supports, *self.loads):
+            self._require(part.body, None if isinstance(part, BodyForce) else part.surface, type(part).__name__)
+        for pair in self.contacts:
+            self._require(pair.slave.body, pair.slave.name, "ContactPair.slave")
+            if isinstance(pair.master, Surface):
+                self._require(pair.master.body, pair.master.name, "ContactPair.master")
+
+    def _require(self, body: str, surface: str | None, user: str) -> None:
+        if body not in self.bodies:
+            raise InvalidInputError(f"{user} names body {body!r}, the scene has {sorted(self.bodies)}: use one of them")
+        if surface is None:
+            return
+        surfaces = self.bodies[body].mesh.surfaces
+        if surface not in surfaces:
+            raise InvalidInputError(
+                f"{user} names surface {surface!r} of body {body!r}, which has {sorted(surfaces)}: use one of them"
+            )
+        if len(surfaces[surface]) == 0:
+            raise InvalidInputError(
+                f"{user} needs a surface with facets, but {surface!r} of body {body!r} is empty: "
+                "check the physical group that defines it"
+            )
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Names of the bodies in the order in which everything is numbered."""
+        return tuple(self.bodies)
+
+    def facets(self, surface: Surface) -> np.ndarray:
+        """Return the facets of a surface, rows of node numbers of its body."""
+        return self.bodies[surface.body].mesh.surfaces[surface.name]
+
+    def moved(self, points: Mapping[str, np.ndarray]) -> Scene:
+        """Return the scene with new coordinates for some bodies; topology and names stay.
+
+        Args:
+            points: Body name -> coordinates, shape (n_nodes, 3), [length].
+        """
+        bodies = dict(self.bodies)
+        for name, coordinates in points.items():
+            bodies[name] = replace(bodies[name], mesh=bodies[name].mesh.moved(coordinates))
+        return replace(self, bodies=bodies)
+
+    def effects(self) -> tuple[Effect, ...]:
+        """List what the scene calls for; whatever is not listed is not built."""
+        found = [Effect("elasticity", f"{len(self.bodies)} elastic bodies")]
+        if self.supports:
+            found.append(Effect("prescribed displacement", f"{len(self.supports)} supports"))
+        if any(isinstance(load, BodyForce) for load in self.loads):
+            found.append(Effect("body force", "a load acts on a volume"))
+        if any(not isinstance(load, BodyForce) for load in self.loads):
+            found.append(Effect("surface load", "a load acts on a surface"))
+        if self.contacts:
+            found.append(Effect("contact", f"{len(self.contacts)} pairs may touch"))
+        if any(pair.has_friction and isinstance(pair.friction, Tresca) for pair in self.contacts):
+            found.append(Effect("Tresca friction", "a pair has a fixed slip bound"))
+        if any(pair.has_friction and isinstance(pair.friction, Coulomb) for pair in self.contacts):
+            found.append(Effect("Coulomb friction", "a pair has a friction coefficient above zero"))
+        return tuple(found)

@@ -1,0 +1,121 @@
+"""What every test stands on: the environment, collected garbage, and scripts run on several ranks."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+LAUNCH = ROOT / "scripts" / "launch.sh"
+MPI_TRACES = ("OMPI_", "ORTE_", "PMI_", "PMIX_", "PRTE_")
+
+
+def read_environment(path: Path) -> dict[str, str]:
+    """Read the NAME=VALUE lines of a file, comments left out."""
+    lines = (line.strip() for line in path.read_text().splitlines())
+    return dict(line.split("=", 1) for line in lines if line and not line.startswith("#"))
+
+
+# Before anything imports NumPy or MPI: both read their environment once, when they are loaded.
+os.environ.update(read_environment(ROOT / "scripts" / "environment"))
+
+
+def pytest_collection_finish() -> None:
+    """Exempt what the imports left behind from garbage collection, which makes it cheap after each test."""
+    gc.collect()
+    gc.freeze()
+
+
+@pytest.fixture(autouse=True)
+def collected_garbage() -> Iterator[None]:
+    """Destroy what a test leaves behind at one moment on all ranks: PETSc's destructors are collective."""
+    yield
+    gc.collect()
+
+
+def _kill_session(leader: int) -> None:
+    """Kill a process and all its descendants; mpirun gives every rank a process group of its own."""
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                if os.getsid(int(entry.name)) == leader:
+                    os.kill(int(entry.name), signal.SIGKILL)
+
+
+def launch(ranks: object, *arguments: object, timeout: float = 120.0) -> subprocess.CompletedProcess[str]:
+    """Run this interpreter on several ranks, and kill all of them when ``timeout`` seconds have passed.
+
+    Raises:
+        subprocess.TimeoutExpired: It did not end in time; the exception holds its output.
+    """
+    # MPI_Init has written into the environment of this process, though not into `os.environ`; ranks that
+    # find those traces, or those of an mpirun around this process, take themselves for parts of it.
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(MPI_TRACES)}
+    command = [str(LAUNCH), str(ranks), sys.executable, *map(str, arguments)]
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment,
+        start_new_session=True,
+    )
+    try:
+        stdout, stderr = process.communicate(timeout=timeout)
+    except subprocess.TimeoutExpired:
+        _kill_session(process.pid)
+        stdout, stderr = process.communicate()
+        raise subprocess.TimeoutExpired(command, timeout, stdout, stderr) from None
+    return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
+
+
+def run_on_ranks(script: Path, ranks: int, *arguments: object, timeout: float = 120.0) -> str:
+    """Run a Python script under mpirun and return what it wrote to stdout.
+
+    Args:
+        script: The script.
+        ranks: Number of MPI ranks; 1 runs it without mpirun.
+        *arguments: What the script finds in ``sys.argv[1:]``.
+        timeout: Seconds after which all ranks are killed.
+
+    Raises:
+        pytest.fail.Exception: It ended with an error or not in time; all its output is in the message.
+    """
+    end: subprocess.CompletedProcess[str] | subprocess.TimeoutExpired
+    try:
+        end = launch(ranks, script, *arguments, timeout=timeout)
+        ending = f"ended with exit status {end.returncode}"
+        if end.returncode == 0:
+            return end.stdout
+    except subprocess.TimeoutExpired as late:
+        end, ending = late, f"did not end within {timeout:g} s and was killed"
+    output = f"--- stdout\n{end.stdout!s}\n--- stderr\n{end.stderr!s}"
+    pytest.fail(f"{script.name} on {ranks} ranks {ending}\n{output}", pytrace=False)
+
+
+@pytest.fixture
+def mpirun(tmp_path: Path) -> Callable[..., str]:
+    """Return ``mpirun(script, ranks, *arguments, timeout=120.0)``, which runs a script on several ranks.
+
+    ``script`` is a path (also as text that ends in ".py") or Python code (indented as the test is); the
+    answer is its stdout. See `run_on_ranks`.
+    """
+
+    def run(script: Path | str, ranks: int, *arguments: object, timeout: float = 120.0) -> str:
+        path = Path(script)
+        if isinstance(script, str) and not script.endswith(".py"):
+            path = tmp_path / "script.py"
+            path.write_text(textwrap.dedent(script))
+        return run_on_ranks(path, ranks, *arguments, timeout=timeout)
+
+    return run

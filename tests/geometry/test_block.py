@@ -1,0 +1,86 @@
+"""A block is a box with six named sides."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry import BodyMesh, block, box_lattice, split_hexahedra, vector_areas
+from fenics_contact.geometry.quality import scaled_jacobian
+
+CELLS = ["hexahedron", "tetrahedron"]
+NORMALS = {"x0": [-6, 0, 0], "x1": [6, 0, 0], "y0": [0, -3, 0], "y1": [0, 3, 0], "z0": [0, 0, -2], "z1": [0, 0, 2]}
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_the_sides_are_complete_plane_and_face_outwards(cell: str) -> None:
+    mesh = block((1, 1, 1), (2, 3, 4), (2, 3, 4), cell)
+    assert set(mesh.surfaces) == set(NORMALS)
+    for d in range(3):
+        for end, plane in ((0, 1.0), (1, 2.0 + d)):
+            facets = mesh.surfaces[f"{'xyz'[d]}{end}"]
+            assert np.all(mesh.points[facets][:, :, d] == plane)
+            areas = vector_areas(mesh.points, facets)
+            assert areas.sum(axis=0) == pytest.approx(NORMALS[f"{'xyz'[d]}{end}"])
+            assert np.linalg.norm(areas, axis=1).sum() == pytest.approx(max(map(abs, NORMALS["xyz"[d] + "0"])))
+
+
+@pytest.mark.parametrize(("cell", "factor"), [("hexahedron", 1), ("tetrahedron", 6)])
+def test_it_has_the_cells_asked_for_and_fills_the_box(cell: str, factor: int) -> None:
+    mesh = block((1, 1, 1), (2, 3, 4), (2, 3, 4), cell)
+    assert (mesh.n_cells, mesh.n_nodes, mesh.cell_type) == (24 * factor, 60, cell)
+    assert mesh.volume == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_the_grid_index_is_the_place_in_the_box(cell: str) -> None:
+    mesh = block((0, 0, 0), (2, 3, 4), (2, 3, 4), cell)
+    assert mesh.grid is not None
+    assert np.array_equal(mesh.grid, np.floor(mesh.points[mesh.cells].mean(axis=1)))
+
+
+def test_planes_may_be_spaced_as_one_likes() -> None:
+    mesh = box_lattice([np.array([0.0, 1.0, 4.0]), np.array([0.0, 1.0]), np.array([0.0, 2.0])])
+    assert sorted(np.unique(mesh.points[:, 0])) == [0.0, 1.0, 4.0]
+    assert mesh.volume == pytest.approx(8.0)
+
+
+def test_mirrored_layers_still_fit_together() -> None:
+    mesh = block((0, 0, 0), (4, 4, 4), (4, 4, 4))
+    assert mesh.grid is not None
+    split = split_hexahedra(mesh, mesh.grid >= 2)
+    assert split.volume == pytest.approx(64.0)
+    middle = np.flatnonzero(np.all(split.points == 2.0, axis=1))
+    meeting = np.count_nonzero(np.any(split.cells == middle, axis=1))
+    assert meeting == 48, "all eight diagonals end in the middle, with six tetrahedra each"
+    assert scaled_jacobian(split.points, split.cells).min() > 0.3
+
+
+def test_hexahedra_numbered_at_random_are_not_split() -> None:
+    mesh = block((0, 0, 0), (2, 1, 1), (2, 1, 1))
+    cells = mesh.cells.copy()
+    cells[1] = cells[1, [1, 2, 3, 0, 5, 6, 7, 4]]
+    with pytest.raises(InvalidInputError, match="some neighbours' diagonals do not meet"):
+        split_hexahedra(BodyMesh(mesh.points, cells))
+
+
+def test_a_box_without_volume_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match=r"upper must exceed lower .* lower \[0, 0, 0\] and upper \[1, 0, 1\]"):
+        block((0, 0, 0), (1, 0, 1), (1, 1, 1))
+
+
+@pytest.mark.parametrize("count", [0, -2, 1.5, True])
+def test_a_count_that_is_none_is_refused(count: object) -> None:
+    with pytest.raises(InvalidInputError, match=rf"counts\[1\] must be an integer of at least 1, got {count}"):
+        block((0, 0, 0), (1, 1, 1), (1, count, 1))  # type: ignore[arg-type]
+
+
+def test_two_counts_are_refused() -> None:
+    with pytest.raises(InvalidInputError, match=r"counts must be three integers, got \(1, 1\)"):
+        block((0, 0, 0), (1, 1, 1), (1, 1))  # type: ignore[arg-type]
+
+
+def test_an_unknown_cell_type_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match=r"cell must be one of .*, got 'wedge'"):
+        block((0, 0, 0), (1, 1, 1), (1, 1, 1), "wedge")

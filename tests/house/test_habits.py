@@ -1,0 +1,51 @@
+"""Habits that every file keeps: it takes a communicator, prints nothing and stays short."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from tests.house.source import ROOT, modules
+
+MOST_LINES = 400
+
+
+def names_used(tree: ast.AST) -> set[str]:
+    """Return every name and attribute that the code mentions; comments and docstrings are not code."""
+    nodes = list(ast.walk(tree))
+    plain = {node.id for node in nodes if isinstance(node, ast.Name)}
+    dotted = {node.attr for node in nodes if isinstance(node, ast.Attribute)}
+    imported = {alias.name for node in nodes if isinstance(node, ast.ImportFrom) for alias in node.names}
+    return plain | dotted | imported
+
+
+def python_files() -> list[Path]:
+    """Return every Python file of the project."""
+    folders = ("fenics_contact", "tests", "demos", "benchmarks")
+    return [path for folder in folders for path in sorted((ROOT / folder).rglob("*.py"))]
+
+
+@pytest.mark.parametrize("name", ["print", "COMM_WORLD"])
+def test_the_package_never_uses(name: str) -> None:
+    house = modules()
+    assert len(house) > 10, "hardly any modules were found: nothing was tested"
+    assert [module.name for module in house if name in names_used(module.tree)] == []
+
+
+@pytest.mark.parametrize(
+    "code", ["print(1)", "MPI.COMM_WORLD.size", "from mpi4py.MPI import COMM_WORLD", "f(PETSc.COMM_WORLD)"]
+)
+def test_a_forbidden_name_is_found(code: str) -> None:
+    assert names_used(ast.parse(code)) & {"print", "COMM_WORLD"}
+
+
+def test_a_name_in_a_docstring_is_not_code() -> None:
+    assert not names_used(ast.parse('"""Call print(MPI.COMM_WORLD)."""  # print')) & {"print", "COMM_WORLD"}
+
+
+def test_files_are_short() -> None:
+    lengths = {str(path.relative_to(ROOT)): len(path.read_text().splitlines()) for path in python_files()}
+    assert len(lengths) > 10, "hardly any files were found: nothing was tested"
+    assert {path: lines for path, lines in lengths.items() if lines > MOST_LINES} == {}

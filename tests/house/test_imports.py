@@ -1,0 +1,178 @@
+"""Imports point down the floors of the house, and FEniCSx is met where it may be met."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import launch
+from tests.house.source import PACKAGE, Module, modules, room_of
+
+#: From the ground up; rooms on one floor do not know each other.
+FLOORS = [
+    {"errors"},
+    {"_requirements", "timing"},
+    {"_dolfinx"},
+    {"geometry"},
+    {"scene", "qp"},
+    {"feti"},
+    {"contact"},
+    {"shape"},
+    {"optimize"},
+]
+FLOOR = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
+BESIDE = {"viz", "io", "study"}
+#: Rooms that are tested with small dense matrices, and what they never meet.
+WITHOUT_FENICS = {
+    "qp": {"dolfinx", "ufl", "basix", "ffcx", "gmsh", "petsc4py"},
+    "optimize": {"dolfinx", "ufl", "basix", "ffcx", "gmsh", "petsc4py", "mpi4py"},
+}
+
+
+def pointing_up(module: Module) -> list[str]:
+    """List the imports of a module that do not point to a lower floor, or point beside the house."""
+    here = module.room
+    wrong = []
+    for found in module.imports():
+        there = room_of(found.target)
+        if there is None or there == here:
+            continue
+        below = there in FLOOR and (here in BESIDE or here == "" or FLOOR[there] < FLOOR[here])
+        # The package itself is above everything: it may offer names, and nobody asks it for them.
+        if not below:
+            wrong.append(f"{module.path.name}:{found.line} ({module.name}) imports {found.target}")
+    return wrong
+
+
+def reached(room: str, house: list[Module]) -> set[str]:
+    """Return the outside libraries that a room imports, itself or through other rooms."""
+    rooms, waiting, outside = {room}, [room], set()
+    while waiting:
+        current = waiting.pop()
+        for module in house:
+            if module.room != current:
+                continue
+            for found in module.imports():
+                there = room_of(found.target)
+                if there is None and not found.for_types:
+                    outside.add(found.target.partition(".")[0])
+                elif there and there not in rooms:
+                    rooms.add(there)
+                    waiting.append(there)
+    return outside
+
+
+def dolfinx_imports(module: Module) -> list[str]:
+    """List the imports of dolfinx that a type checker is not alone to see."""
+    return [
+        f"{module.name}:{found.line}"
+        for found in module.imports()
+        if found.target.partition(".")[0] == "dolfinx" and not found.for_types
+    ]
+
+
+def a_module(room: str, source: str, root: Path) -> Module:
+    """Parse ``source`` as the file ``example.py`` of a room."""
+    path = root / PACKAGE / room / "example.py"
+    path.parent.mkdir(parents=True)
+    path.write_text(source)
+    (module,) = modules(root)
+    return module
+
+
+def test_every_module_has_a_floor_or_stands_beside_the_house() -> None:
+    homeless = [module.name for module in modules() if module.room not in {"", *FLOOR, *BESIDE}]
+    assert homeless == [], "give it a floor here and in the architecture"
+
+
+def test_every_floor_is_inhabited() -> None:
+    assert {module.room for module in modules()} >= set(FLOOR)
+
+
+def test_imports_point_down() -> None:
+    house = modules()
+    inner = [found for module in house for found in module.imports() if room_of(found.target)]
+    assert len(inner) > len(FLOOR), "no imports were found: nothing was tested"
+    assert [line for module in house for line in pointing_up(module)] == []
+
+
+@pytest.mark.parametrize(
+    ("room", "line"),
+    [
+        ("feti", "from fenics_contact.contact import coulomb"),
+        ("feti", "from fenics_contact import contact"),
+        ("feti", "from ..contact.coulomb import solve"),
+        ("feti", "def f():\n    import fenics_contact.shape"),
+        ("feti", "from fenics_contact import solve"),
+        ("scene", "from fenics_contact.qp import minimise"),
+        ("optimize", "import fenics_contact.viz"),
+        ("viz", "import fenics_contact.io"),
+    ],
+)
+def test_an_import_that_does_not_point_down_is_found(room: str, line: str, tmp_path: Path) -> None:
+    assert len(pointing_up(a_module(room, line, tmp_path))) == 1
+
+
+@pytest.mark.parametrize(
+    ("room", "line"),
+    [
+        ("feti", "from fenics_contact.scene import Scene"),
+        ("feti", "from . import rows\nfrom .rows import gap\nfrom ..qp import minimise"),
+        ("viz", "from fenics_contact.contact import State"),
+        ("qp", "import numpy"),
+    ],
+)
+def test_an_import_that_points_down_passes(room: str, line: str, tmp_path: Path) -> None:
+    module = a_module(room, line, tmp_path)
+    assert module.imports()
+    assert pointing_up(module) == []
+
+
+@pytest.mark.parametrize("room", sorted(WITHOUT_FENICS))
+def test_a_room_without_fenics_stays_so_also_through_others(room: str) -> None:
+    outside = reached(room, modules())
+    assert "numpy" in outside, "no imports were found: nothing was tested"
+    assert outside & WITHOUT_FENICS[room] == set()
+
+
+def test_fenics_reached_through_another_room_is_found() -> None:
+    assert "dolfinx" in reached("feti", modules())
+
+
+def test_only_one_module_imports_dolfinx() -> None:
+    importing = {module.room for module in modules() if dolfinx_imports(module)}
+    assert importing == {"_dolfinx"}
+
+
+def test_dolfinx_is_found_inside_functions_and_allowed_for_types(tmp_path: Path) -> None:
+    source = """
+        from typing import TYPE_CHECKING
+        if TYPE_CHECKING:
+            import dolfinx.mesh
+        else:
+            import dolfinx.fem
+        def late():
+            from dolfinx import __version__
+    """
+    lines = "\n".join(line[8:] for line in source.splitlines())
+    assert dolfinx_imports(a_module("feti", lines, tmp_path)) == [
+        "fenics_contact.feti.example:6",
+        "fenics_contact.feti.example:8",
+    ]
+
+
+def test_only_dolfinx_and_requirements_ask_for_its_version() -> None:
+    asking = {module.room for module in modules() if "fenics-dolfinx" in module.path.read_text()}
+    assert "_requirements" in asking, "the name has changed: nothing was tested"
+    assert asking <= {"_requirements", "_dolfinx"}
+
+
+def test_contact_alone_loads_neither_sensitivity_nor_pictures() -> None:
+    code = f"import sys, {PACKAGE}.contact; print(*sorted(sys.modules))"
+    answer = launch(1, "-c", code)
+    assert answer.returncode == 0, answer.stderr
+    loaded = set(answer.stdout.split())
+    assert f"{PACKAGE}.contact" in loaded
+    rooms = {f"{PACKAGE}.{room}" for room in ("shape", "viz", "optimize", "study")}
+    assert loaded & (rooms | {"pyvista", "matplotlib"}) == set()

@@ -1,0 +1,216 @@
+"""A missing or wrong library is reported by name, before anything of it is used."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import logging
+from collections.abc import Callable
+from importlib import metadata
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fenics_contact import _requirements
+from fenics_contact.errors import MissingRequirementError
+from tests.conftest import launch
+
+LIBRARIES = ["numpy", "scipy", "clarabel", "mpi4py", "petsc4py", "dolfinx"]
+find_spec = importlib.util.find_spec
+version_of = metadata.version
+import_module = importlib.import_module
+
+
+@pytest.fixture
+def without(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Return a function that hides a library."""
+
+    def hide(module: str) -> None:
+        def answer(name: str) -> object:
+            return None if name == module else find_spec(name)
+
+        monkeypatch.setattr(importlib.util, "find_spec", answer)
+
+    return hide
+
+
+@pytest.fixture
+def with_version(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, str | None], None]:
+    """Return a function that gives a distribution another version, or none."""
+
+    def pretend(distribution: str, version: str | None) -> None:
+        def answer(name: str) -> str:
+            if name != distribution:
+                return version_of(name)
+            if version is None:
+                raise metadata.PackageNotFoundError(name)
+            return version
+
+        monkeypatch.setattr(metadata, "version", answer)
+
+    return pretend
+
+
+@pytest.fixture
+def loading(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, object], None]:
+    """Return a function that makes a module load as something else, or fail with an exception."""
+
+    def pretend(module: str, outcome: object) -> None:
+        def answer(name: str) -> object:
+            if name != module:
+                return import_module(name)
+            if isinstance(outcome, Exception):
+                raise outcome
+            return outcome
+
+        monkeypatch.setattr(importlib, "import_module", answer)
+
+    return pretend
+
+
+def petsc(scalar: type, packages: tuple[str, ...]) -> SimpleNamespace:
+    """Return a PETSc of the given scalar type that factors with the given packages only."""
+    real: Any = import_module("petsc4py.PETSc")
+
+    class PC(real.PC):  # type: ignore[name-defined,misc]
+        def setFactorSetUpSolverType(self) -> None:
+            if self.getFactorSolverType() not in packages:
+                raise real.Error(92)
+
+        def setFactorSolverType(self, package: str) -> None:
+            self.package = package
+
+        def getFactorSolverType(self) -> str:
+            return self.package
+
+    return SimpleNamespace(ScalarType=scalar, Mat=real.Mat, PC=PC, Error=real.Error, COMM_SELF=real.COMM_SELF)
+
+
+def test_what_is_installed_here_will_do(caplog: pytest.LogCaptureFixture) -> None:
+    _requirements.check()
+    _requirements.check_gmsh()
+    assert caplog.messages == []
+
+
+@pytest.mark.parametrize("module", LIBRARIES)
+def test_a_missing_library_is_named(module: str, without: Callable[[str], None]) -> None:
+    without(module)
+    with pytest.raises(
+        MissingRequirementError, match=rf"needs {module} \d.* or newer, found none\. Debian: .*conda-forge: "
+    ) as caught:
+        _requirements.check()
+    assert caught.value.name == module
+
+
+@pytest.mark.parametrize("module", LIBRARIES)
+def test_a_library_that_is_too_old_is_named_with_its_version(
+    module: str, with_version: Callable[[str, str | None], None]
+) -> None:
+    with_version("fenics-dolfinx" if module == "dolfinx" else module, "0.4.9.dev0")
+    with pytest.raises(MissingRequirementError, match=rf"needs {module} .*found 0\.4\.9\.dev0\. Debian: "):
+        _requirements.check()
+
+
+@pytest.mark.parametrize("version", ["0.5.2", "0.9.0", "0.9.0.post1"])
+def test_a_tested_dolfinx_passes_in_silence(
+    version: str, with_version: Callable[[str, str | None], None], caplog: pytest.LogCaptureFixture
+) -> None:
+    with_version("fenics-dolfinx", version)
+    _requirements.check()
+    assert caplog.messages == []
+
+
+@pytest.mark.parametrize("version", ["0.7.3", "0.10.0", "1.0"])
+def test_an_untested_dolfinx_passes_with_a_warning(
+    version: str, with_version: Callable[[str, str | None], None], caplog: pytest.LogCaptureFixture
+) -> None:
+    with_version("fenics-dolfinx", version)
+    _requirements.check()
+    (record,) = caplog.records
+    assert record.levelno == logging.WARNING
+    assert f"dolfinx {version} was never tested with fenics_contact, only 0.5 and 0.9" in record.message
+
+
+def test_a_dolfinx_without_metadata_passes(with_version: Callable[[str, str | None], None]) -> None:
+    with_version("fenics-dolfinx", None)
+    _requirements.check()
+
+
+@pytest.mark.parametrize("module", ["mpi4py.MPI", "petsc4py.PETSc"])
+def test_a_library_that_does_not_load_is_named_with_the_reason(
+    module: str, loading: Callable[[str, object], None]
+) -> None:
+    library = module.partition(".")[0]
+    loading(module, ImportError("numpy.core.multiarray failed to import"))
+    with pytest.raises(
+        MissingRequirementError, match=rf"needs {library} .*cannot be loaded \(numpy\.core\.multiarray failed"
+    ):
+        _requirements.check()
+
+
+def test_a_petsc_with_complex_numbers_is_refused(loading: Callable[[str, object], None]) -> None:
+    loading("petsc4py.PETSc", petsc(np.complex128, ("cholmod", "mumps")))
+    with pytest.raises(MissingRequirementError, match="with complex numbers, where real ones are needed"):
+        _requirements.check()
+
+
+@pytest.mark.parametrize("package", ["cholmod", "mumps"])
+def test_one_sparse_factorisation_is_enough(package: str, loading: Callable[[str, object], None]) -> None:
+    loading("petsc4py.PETSc", petsc(np.float64, (package,)))
+    _requirements.check()
+
+
+def test_a_petsc_without_sparse_factorisation_is_refused(loading: Callable[[str, object], None]) -> None:
+    loading("petsc4py.PETSc", petsc(np.float64, ("petsc",)))
+    with pytest.raises(MissingRequirementError, match="with neither CHOLMOD nor MUMPS, where one is needed"):
+        _requirements.check()
+
+
+def test_a_package_that_petsc_does_not_have_is_recognised() -> None:
+    real = import_module("petsc4py.PETSc")
+    assert not _requirements._factors(real, "nonsense")
+
+
+def test_a_missing_gmsh_is_named_only_when_a_geometry_needs_it(without: Callable[[str], None]) -> None:
+    without("gmsh")
+    _requirements.check()
+    with pytest.raises(MissingRequirementError, match=r"needs gmsh 4\.8 or newer, found none.*python3-gmsh"):
+        _requirements.check_gmsh()
+
+
+def test_a_gmsh_whose_libraries_are_missing_is_named(loading: Callable[[str, object], None]) -> None:
+    loading("gmsh", OSError("libGLU.so.1: cannot open shared object file"))
+    with pytest.raises(MissingRequirementError, match=r"needs gmsh .*cannot be loaded \(libGLU\.so\.1"):
+        _requirements.check_gmsh()
+
+
+def test_a_gmsh_without_metadata_is_judged_by_its_own_version(
+    loading: Callable[[str, object], None], with_version: Callable[[str, str | None], None]
+) -> None:
+    with_version("gmsh", None)
+    loading("gmsh", SimpleNamespace(__version__="4.7.1"))
+    with pytest.raises(MissingRequirementError, match=r"needs gmsh 4\.8 or newer, found 4\.7\.1"):
+        _requirements.check_gmsh()
+
+
+@pytest.mark.parametrize("module", LIBRARIES)
+def test_the_package_itself_reports_what_is_missing(module: str) -> None:
+    hiding = f"""
+import importlib.abc, sys
+
+class Hidden(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name.partition(".")[0] == {module!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+
+sys.meta_path.insert(0, Hidden())
+find_spec = importlib.util.find_spec
+importlib.util.find_spec = lambda name: None if name == {module!r} else find_spec(name)
+import fenics_contact
+"""
+    answer = launch(1, "-c", hiding)
+    assert answer.returncode == 1, answer.stderr
+    last = answer.stderr.strip().splitlines()[-1]
+    assert last.startswith("fenics_contact.errors.MissingRequirementError: fenics_contact needs " + module)
