@@ -55,6 +55,7 @@ __all__ = [
     "Constant",
     "Function",
     "assemble_csr",
+    "assemble_matrix",
     "assemble_scalar",
     "assemble_vector",
     "cell_nodes",
@@ -62,7 +63,10 @@ __all__ = [
     "coefficient",
     "create_mesh",
     "displacement_space",
+    "field_symbols",
+    "global_dofs",
     "match_facets",
+    "nodal_space",
     "node_dofs",
     "rank_mesh",
     "scalar_space",
@@ -104,6 +108,20 @@ def template(cell_type: str) -> Any:
 def displacement_space(cell_type: str) -> Any:
     """Return the template's space of vector fields, linear (tetrahedra) or trilinear (hexahedra)."""
     return ufl.FunctionSpace(template(cell_type), _element(cell_type, (3,)))
+
+
+def field_symbols(cell_type: str, count: int) -> list[Any]:
+    """Return UFL coefficients on the template's `displacement_space`, to be bound to Functions later.
+
+    They are counted from 0 in every form: ffcx 0.5 writes counts into C identifiers, which fails from ten on.
+    """
+    return [ufl.Coefficient(displacement_space(cell_type), count=number) for number in range(count)]
+
+
+@lru_cache(maxsize=8)
+def nodal_space(cell_type: str) -> Any:
+    """Return the template's space of scalars, linear or trilinear."""
+    return ufl.FunctionSpace(template(cell_type), _element(cell_type, ()))
 
 
 @lru_cache(maxsize=8)
@@ -192,7 +210,9 @@ def scalar_space(mesh: Any, degree: int) -> Any:
 
 
 def _table(adjacency: Any, rows: int) -> np.ndarray:
-    return np.asarray(getattr(adjacency, "array", adjacency)).reshape(rows, -1)
+    flat = np.asarray(getattr(adjacency, "array", adjacency))
+    # A rank without cells of a body has no rows; numpy cannot guess their length then.
+    return flat.reshape(rows, flat.size // max(rows, 1))
 
 
 def _cell_count(mesh: Any) -> int:
@@ -328,6 +348,18 @@ def assemble_csr(form: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     indptr, indices, data = matrix.getValuesCSR()
     matrix.destroy()
     return indptr, indices, data
+
+
+def assemble_matrix(form: Any) -> Any:
+    """Assemble a bilinear form on a distributed mesh into a PETSc matrix. Collective on the mesh."""
+    matrix = dolfinx.fem.petsc.assemble_matrix(form)
+    matrix.assemble()
+    return matrix
+
+
+def global_dofs(space: Any, dofs: np.ndarray) -> np.ndarray:
+    """Return the global numbers of this rank's blocked dofs, ghosts included."""
+    return np.asarray(space.dofmap.index_map.local_to_global(dofs.astype(np.int32)))
 
 
 def assemble_vector(form: Any) -> np.ndarray:

@@ -18,6 +18,10 @@ class InvalidInputError(FenicsContactError, ValueError):
     """The input cannot be used as given; the message says what would be accepted."""
 
 
+class InvalidDesignError(InvalidInputError):
+    """A design lies outside the function's domain, for example because a cell is inverted."""
+
+
 class InfeasibleError(FenicsContactError):
     """No equilibrium exists: nothing holds some motion of some body."""
 

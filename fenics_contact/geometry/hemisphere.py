@@ -133,7 +133,7 @@ def _wrap(core: BodyMesh, round_sides: list[str], frame: _Frame, layers: int, gr
     skin, local = np.unique(facets, return_inverse=True)
     local = local.reshape(facets.shape)
     inner, outer = frame.core(core.points), frame.sphere(core.points[skin])
-    share = 1.0 - graded(layers, grading)[-2::-1, None, None]
+    share = 1.0 - graded(layers, grading)[-2::-1, None, None]  # thinnest layers outside; 1 on the surface
     shell = (1.0 - share) * inner[skin] + share * outer
     points = np.concatenate([inner, shell.reshape(-1, 3)])
     rows = np.vstack([skin, core.n_nodes + np.arange(layers * skin.size).reshape(layers, skin.size)])

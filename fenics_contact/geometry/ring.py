@@ -21,8 +21,8 @@ from fenics_contact.geometry.structured import check_cell_type, check_count
 class LinkShape:
     """Proportions and mesh size of one chain link.
 
-    The defaults are those of short-link chain with 16 mm wire (EN 818-2: pitch 48 mm, inner width at least
-    1.3 and outer width at most 3.7 wire diameters): inner width 22 mm, pitch 48 mm.
+    The defaults are those of a short-link chain, in mm: wire of 16, pitch of 48 (three times the wire), inner
+    width of 22.
 
     Attributes:
         inner_radius: Radius of the inner side of the crowns; half the inner width of the link.
@@ -89,7 +89,7 @@ class LinkShape:
     @property
     def faceting(self) -> float:
         """How far the flat facets of the inner crown stand off the smooth surface."""
-        ring = self.inner_radius * (1.0 - np.cos(0.5 * np.pi / 2.0 / (self.n_around // 6)))
+        ring = self.inner_radius * (1.0 - np.cos(np.pi / 4.0 / (self.n_around // 6)))
         across = self.section.crown_radius * (1.0 - np.cos(self.section.half_angle / self.n_b))
         return float(max(ring, across))
 
@@ -114,19 +114,18 @@ def stations(shape: LinkShape) -> tuple[np.ndarray, np.ndarray]:
         (n_around, 3).
     """
     n = shape.n_around // 6
-    quarter = np.linspace(0.0, np.pi / 2.0, n, endpoint=False)
-    turn = np.concatenate([quarter - np.pi / 2.0, quarter, np.full(n, np.pi / 2.0)])
-    turn = np.concatenate([turn, turn + np.pi])
-    centre = np.zeros((6 * n, 3))
+    half_turn = np.linspace(-np.pi / 2.0, np.pi / 2.0, 2 * n, endpoint=False)
     leg = np.linspace(0.0, shape.straight, n, endpoint=False)
-    centre[2 * n : 3 * n, 0] = -leg
-    centre[3 * n : 5 * n, 0] = -shape.straight
-    centre[5 * n :, 0] = leg - shape.straight
-    centre[:, 0] -= shape.inner_radius
+    # Crown, leg, far crown, leg: direction a turns in the crowns only, the centre moves along the legs only.
+    turn = np.concatenate([half_turn, np.full(n, np.pi / 2.0)])
+    turn = np.concatenate([turn, turn + np.pi])
+    moved = np.concatenate([np.zeros(2 * n), leg, np.full(2 * n, shape.straight), shape.straight - leg])
+    centre = np.zeros((6 * n, 3))
+    centre[:, 0] = -shape.inner_radius - moved
     outward = np.column_stack([np.cos(turn), np.zeros(6 * n), np.sin(turn)])
-    shift = -crown_start(shape)
     line = centre + shape.centre_radius * outward
-    return np.roll(line, -shift, axis=0), np.roll(outward, -shift, axis=0)
+    start = crown_start(shape)
+    return np.roll(line, start, axis=0), np.roll(outward, start, axis=0)
 
 
 def ring_lattice(shape: LinkShape) -> np.ndarray:

@@ -85,14 +85,14 @@ def _build_section(gmsh: ModuleType, shape: LinkShape) -> int:
     """
     geo, section = gmsh.model.geo, shape.section
     c_a, c_b = section.corner
-    rise_a = section.thickness / 2.0 - section.crown_radius
-    rise_b = section.width / 2.0 - section.flank_radius
+    beyond_a = section.crown_radius - section.thickness / 2.0
+    beyond_b = section.flank_radius - section.width / 2.0
 
     def point(a: float, b: float) -> int:
         return int(geo.addPoint(-shape.inner_radius, b, -shape.centre_radius - a))
 
     corners = [point(-c_a, -c_b), point(-c_a, c_b), point(c_a, c_b), point(c_a, -c_b)]
-    centres = [point(-rise_a, 0.0), point(0.0, rise_b), point(rise_a, 0.0), point(0.0, -rise_b)]
+    centres = [point(beyond_a, 0.0), point(0.0, -beyond_b), point(-beyond_a, 0.0), point(0.0, beyond_b)]
     arcs = [geo.addCircleArc(corners[k], centres[k], corners[(k + 1) % 4]) for k in range(4)]
     for k, arc in enumerate(arcs):
         geo.mesh.setTransfiniteCurve(arc, (shape.n_a if k % 2 else shape.n_b) + 1)

@@ -87,8 +87,7 @@ class WireSection:
             n: Number of pieces.
 
         Returns:
-            Points (a, b), (n + 1, 2), from negative to positive b, and unit normals out of the section, (n +
-            1, 2).
+            Points (a, b), from negative to positive b, and unit normals out of the section, both (n + 1, 2).
         """
         angle = np.linspace(-self.half_angle, self.half_angle, n + 1)
         normals = np.column_stack([-np.cos(angle), np.sin(angle)])

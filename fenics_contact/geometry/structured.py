@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
@@ -88,7 +86,7 @@ def split_hexahedra(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> BodyM
             "hexahedra must be numbered alike to be split, some neighbours' diagonals do not meet: build "
             "them with `structured_cells`, or mesh with tetrahedra from the start"
         )
-    surfaces: Mapping[str, np.ndarray] = {
+    surfaces = {
         name: orient(cells, _split_facets(facets, boundary)) for name, facets in mesh.surfaces.items()
     }
     return BodyMesh(mesh.points, cells, surfaces, grid)

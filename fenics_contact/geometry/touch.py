@@ -117,10 +117,10 @@ def mutual_clearance(first: BodyMesh, second: BodyMesh) -> float:
         The smaller of both ways round; negative where they overlap, infinite where they are nowhere opposite.
     """
     ways = (axial_clearance(first, second), axial_clearance(second, first))
-    return float(min(np.min(distance, initial=np.inf) for distance in ways))
+    return float(min(np.min(distance, initial=np.inf) for _, distance in ways))
 
 
-def axial_clearance(slave: BodyMesh, master: BodyMesh, reach: float = 60.0) -> np.ndarray:
+def axial_clearance(slave: BodyMesh, master: BodyMesh, reach: float = 60.0) -> tuple[np.ndarray, np.ndarray]:
     """Measure the distance along the pull axis from the slave's contact nodes to the master's contact facets.
 
     Facets are looked at as triangles (those of an unmoved link are plane). Only facets within ``reach``
@@ -132,7 +132,7 @@ def axial_clearance(slave: BodyMesh, master: BodyMesh, reach: float = 60.0) -> n
         reach: Largest angle between facet normal and axis, in degrees.
 
     Returns:
-        Distances, positive when open, for those nodes that have a facet opposite; (n,).
+        Those nodes that have a facet opposite, (n,), and their distances, positive when open, (n,).
     """
     nodes = np.unique(slave.surfaces["contact"])
     triangles = _triangles(master.points, master.surfaces["contact"])
@@ -140,11 +140,12 @@ def axial_clearance(slave: BodyMesh, master: BodyMesh, reach: float = 60.0) -> n
     cosine = normals @ PULL_AXIS / np.linalg.norm(normals, axis=1)
     triangles = triangles[np.abs(cosine) > np.cos(np.radians(reach))]
     if triangles.shape[0] == 0:
-        return np.zeros(0)
+        return nodes[:0], np.zeros(0)
     side = np.sign(cosine[np.argmax(np.abs(cosine))])
     points = slave.points[nodes]
     height = _height_over(points[:, 1:], triangles)
-    return np.asarray(side * (points[:, 0] - height))[np.isfinite(height)]
+    found = np.isfinite(height)
+    return nodes[found], side * (points[:, 0] - height)[found]
 
 
 def _triangles(points: np.ndarray, facets: np.ndarray) -> np.ndarray:

@@ -1,2 +1,27 @@
-"""x."""
+"""Minimise a nonsmooth function, of which one subgradient at a point is known, over linear constraints."""
+
+from __future__ import annotations
+
+from fenics_contact.optimize.bundle_trust import BundleTrust
 from fenics_contact.optimize.constraints import Bounds, LinearConstraints, nearest_feasible
+from fenics_contact.optimize.minimization import minimize
+from fenics_contact.optimize.problem import Problem, pose
+from fenics_contact.optimize.quadratic_program import SubproblemError
+from fenics_contact.optimize.result import InvalidDesignError, Kind, NotConvergedError, Reason, Record, Result
+
+__all__ = [
+    "Bounds",
+    "BundleTrust",
+    "InvalidDesignError",
+    "Kind",
+    "LinearConstraints",
+    "NotConvergedError",
+    "Problem",
+    "Reason",
+    "Record",
+    "Result",
+    "SubproblemError",
+    "minimize",
+    "nearest_feasible",
+    "pose",
+]

@@ -15,6 +15,7 @@ from fenics_contact.optimize.objective import Evaluation, evaluate
 from fenics_contact.optimize.problem import Problem
 from fenics_contact.optimize.quadratic_program import SubproblemError
 from fenics_contact.optimize.result import InvalidDesignError, Kind, NotConvergedError, Reason, Record, Result
+from fenics_contact.optimize.stopping import stopping_test
 from fenics_contact.optimize.subproblem import Step, solve_step
 from fenics_contact.optimize.trust import Trial, Trust
 
@@ -22,3 +23,247 @@ Array = NDArray[np.float64]
 Callback = Callable[[Record, Array], None]
 
 _LOG = logging.getLogger(__name__)
+
+_RADIUS = 3.0  # first trust radius, in lengths of the problem
+_RADIUS_LEAST = 1e-8  # least one, in lengths of the problem
+_T_LEAST, _T_MOST = 1e-10, 1e4  # range of t, in units of the first t
+
+
+@dataclass(frozen=True)
+class BundleTrust:
+    r"""Parameters of the bundle trust method.
+
+    At the centre x with value J the method keeps planes (subgradient g_i, measure β_i ≥ 0) and solves
+
+        min_{y, v}  v + ‖y‖²/(2t)   s.t.   g_i·y - β_i ≤ v,   x + y feasible,
+
+    which predicts the decrease w = -v = σ + t‖z‖², where z = -y/t is the aggregate subgradient (normals of
+    the constraints included) and σ its linearisation error. A trial that brings at least ``descent``·w is
+    a serious step and becomes the centre. Any other is a null step: it leaves the centre, adds its plane
+    and, where that plane says little, shortens t. For a convex J no feasible point within the
+    distance r is lower than J(x) by more than σ + r‖z‖: the certificate.
+
+    | it stops when | reason |
+    |---|---|
+    | w ≤ ε (s + \|J\|) at the present t and at the first one, and σ + r‖z‖ ≤ 10 ε (s + \|J\|) | CONVERGED |
+    | σ + r‖z‖ ≤ ε (s + \|J\|) | STATIONARY |
+    | ``max_iterations``, ``max_evaluations`` are spent | ITERATION_LIMIT, EVALUATION_LIMIT |
+    | t or the radius is 0 for practical purposes | NO_DESCENT, INVALID_DESIGNS |
+    | the quadratic programme cannot be solved | STEP_FAILED |
+
+    with ε ``tolerance``, s ``value_scale`` and r the length of the first step. On the published convex test
+    functions the error of J at the stop is below ε (s + \|J\|); for a nonconvex one the test asks for
+    stationarity only.
+
+    Attributes:
+        tolerance: ε, relative stopping tolerance.
+        max_iterations: Most serious steps.
+        max_evaluations: Most evaluations, failed ones included.
+        max_bundle: Most planes kept, at least 3; aggregation keeps the method convergent with few.
+        first_step: Length of the first step, as a part of the length that the problem lives on: half the
+            diagonal of the box, or the larger of 1 and ‖x0/scale‖ where a variable is unbounded.
+        locality: Weight of the distance in β_i = max(\|α_i\|, c s_i²), c = locality·‖g‖/length: how fast old
+            planes of a nonconvex J are distrusted. 0 is right, and faster, for a convex J.
+        descent: Part of the predicted decrease that makes a step serious, in (0, 1).
+        value_scale: Absolute part of the stopping test, for an objective whose least value is about 0.
+        raise_on_failure: Whether a stop for any other reason than CONVERGED or STATIONARY raises.
+
+    References:
+        H. Schramm and J. Zowe, A version of the bundle idea for minimizing a nonsmooth function: conceptual
+        idea, convergence analysis, numerical results, SIAM J. Optim. 2 (1992) 121-152.
+        K. C. Kiwiel, Proximity control in bundle methods for convex nondifferentiable
+        minimization, Math. Program. 46 (1990) 105-122.
+    """
+
+    tolerance: float = 1e-4
+    max_iterations: int = 100
+    max_evaluations: int = 500
+    max_bundle: int = 100
+    first_step: float = 0.3
+    locality: float = 0.1
+    descent: float = 0.05
+    value_scale: float = 1.0
+    raise_on_failure: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse parameters with which the method cannot work."""
+        for name in ("tolerance", "first_step", "value_scale"):
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise InvalidInputError(f"{name} must be positive and finite, got {getattr(self, name)}")
+        for name, least in (("max_iterations", 0), ("max_evaluations", 1), ("max_bundle", 3)):
+            if getattr(self, name) < least:
+                raise InvalidInputError(f"{name} must be at least {least}, got {getattr(self, name)}")
+        if not 0.0 < self.descent < 1.0:
+            raise InvalidInputError(f"descent must lie in (0, 1), got {self.descent}")
+        if not 0.0 <= self.locality < np.inf:
+            raise InvalidInputError(f"locality must not be negative (0 for a convex J), got {self.locality}")
+
+    def minimize(self, problem: Problem, callback: Callback | None = None) -> Result:
+        """Run the method on a checked problem; `fenics_contact.optimize.minimize` is the usual way in.
+
+        Args:
+            problem: What `pose` returned.
+            callback: Called with each record and a copy of the best point.
+
+        Returns:
+            The best point, the reason for the stop and the history.
+
+        Raises:
+            NotConvergedError: If the stop is a failure and ``raise_on_failure`` is set.
+        """
+        state = _start(self, problem)
+        reason: Reason | None = None
+        while reason is None:
+            if callback is not None:
+                callback(state.history[-1], state.centre.x.copy())
+            try:
+                state, reason = _iterated(self, problem, state)
+            except SubproblemError as error:
+                _LOG.warning("%s", error)
+                reason = Reason.STEP_FAILED
+        return _finish(self, state, reason)
+
+
+@dataclass(frozen=True)
+class _State:
+    """Where the method stands between two evaluations."""
+
+    centre: Evaluation
+    bundle: Bundle
+    trust: Trust
+    first_t: float
+    history: tuple[Record, ...]
+
+    @property
+    def iterations(self) -> int:
+        return self.history[-1].iteration
+
+    @property
+    def evaluations(self) -> int:
+        return self.history[-1].evaluations
+
+
+def _start(method: BundleTrust, problem: Problem) -> _State:
+    try:
+        centre = evaluate(problem.fun, problem.start, 1)
+    except InvalidDesignError as error:
+        raise InvalidDesignError(f"the starting design must be valid: {error}") from error
+    gradient = centre.subgradient * problem.scale
+    norm = float(np.linalg.norm(gradient))
+    t = method.first_step * problem.length / (norm or 1.0)
+    zero = np.zeros(1)
+    bundle = Bundle(gradient[None], zero, zero, method.locality * norm / problem.length)
+    radius = _RADIUS * problem.length
+    trust = Trust(t, radius, _T_LEAST * t, _T_MOST * t, _RADIUS_LEAST * problem.length)
+    record = Record(0, Kind.START, centre.value, centre.value, 0.0, t, 0.0, norm, 0.0, 1, 1)
+    return _State(centre, bundle, trust, t, (record,))
+
+
+def _iterated(method: BundleTrust, problem: Problem, state: _State) -> tuple[_State, Reason | None]:
+    step, trust = _guarded_step(problem, state)
+    state = replace(state, trust=trust)
+    reason = _reason_to_stop(method, problem, state, step)
+    return (_advanced(method, problem, state, step), None) if reason is None else (state, reason)
+
+
+def _guarded_step(problem: Problem, state: _State) -> tuple[Step, Trust]:
+    """Solve the step's programme, with t small enough to stay in the trust region."""
+    near = problem.allowed.around(state.centre.x, problem.scale)
+    trust = state.trust
+    step = solve_step(state.bundle, near, trust.t)
+    while step.length > 1.001 * trust.radius and not trust.exhausted:
+        # A kink can hold the length while t falls, so that t must be able to fall fast.
+        t = trust.t * max(0.05, min(0.5, 0.95 * trust.radius / step.length))
+        trust = replace(trust, t=max(t, trust.t_least))
+        step = solve_step(state.bundle, near, trust.t)
+    return step, trust
+
+
+def _reason_to_stop(method: BundleTrust, problem: Problem, state: _State, step: Step) -> Reason | None:
+    """Return why the method must stop before trying the step, or None."""
+    test = stopping_test(
+        state.centre.value,
+        tolerance=method.tolerance,
+        value_scale=method.value_scale,
+        reach=method.first_step * problem.length,
+        first_t=state.first_t,
+    )
+    near = problem.allowed.around(state.centre.x, problem.scale)
+    solved = test.reason(step, lambda t: solve_step(state.bundle, near, t))
+    if solved is not None:
+        return solved
+    if state.trust.cornered:
+        return Reason.INVALID_DESIGNS
+    if state.trust.exhausted:
+        return Reason.NO_DESCENT
+    if state.iterations >= method.max_iterations:
+        return Reason.ITERATION_LIMIT
+    return Reason.EVALUATION_LIMIT if state.evaluations >= method.max_evaluations else None
+
+
+def _advanced(method: BundleTrust, problem: Problem, state: _State, step: Step) -> _State:
+    """Try the step and return the state after its null, serious or rejected trial."""
+    x = problem.allowed.project(state.centre.x + problem.scale * step.move)
+    step = replace(step, move=(x - state.centre.x) / problem.scale)
+    try:
+        found = evaluate(problem.fun, x, state.evaluations + 1)
+    except InvalidDesignError as error:
+        _LOG.info("trial design %d is invalid: %s", state.evaluations + 1, error)
+        trust = state.trust.after_rejection(step.length)
+        return replace(state, trust=trust, history=_recorded(state, step, Kind.REJECTED, np.nan))
+    gradient = found.subgradient * problem.scale
+    change, slope = found.value - state.centre.value, float(gradient @ step.move)
+    bundle = state.bundle.reduced(step.weights, method.max_bundle - 1)
+    bundle = bundle.with_cut(gradient, slope - change, step.length)
+    trial = Trial(step, change, slope, float(bundle.measures[-1]))
+    if change > -method.descent * step.decrease:
+        history = _recorded(state, step, Kind.NULL, found.value)
+        return replace(state, bundle=bundle, trust=state.trust.after_null(trial), history=history)
+    locality = method.locality * float(np.linalg.norm(gradient)) / problem.length
+    return replace(
+        state,
+        centre=found,
+        bundle=bundle.moved(step.move, change, locality),
+        trust=state.trust.after_serious(trial),
+        history=_recorded(state, step, Kind.SERIOUS, found.value),
+    )
+
+
+def _recorded(state: _State, step: Step, kind: Kind, value: float) -> tuple[Record, ...]:
+    serious = kind is Kind.SERIOUS
+    record = Record(
+        iteration=state.iterations + serious,
+        kind=kind,
+        value=value,
+        best=value if serious else state.centre.value,
+        predicted_decrease=step.decrease,
+        t=step.t,
+        step_length=step.length,
+        aggregate_norm=step.aggregate_norm,
+        aggregate_error=step.aggregate_error,
+        bundle_size=state.bundle.size,
+        evaluations=state.evaluations + 1,
+    )
+    _LOG.info("%s", record)
+    return (*state.history, record)
+
+
+def _finish(method: BundleTrust, state: _State, reason: Reason) -> Result:
+    centre = state.centre
+    result = Result(
+        x=centre.x,
+        value=centre.value,
+        subgradient=centre.subgradient,
+        reason=reason,
+        iterations=state.iterations,
+        evaluations=state.evaluations,
+        history=state.history,
+    )
+    if reason.success or not method.raise_on_failure:
+        return result
+    raise NotConvergedError(
+        f"{reason.value} (after {result.iterations} serious steps and {result.evaluations} evaluations, "
+        f"best value {result.value:.9g})",
+        result.history,
+        result,
+    )

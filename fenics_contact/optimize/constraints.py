@@ -149,7 +149,8 @@ class FeasibleSet:
         fixed = self.lower == self.upper
         low, high = np.isfinite(below) & ~fixed, np.isfinite(above) & ~fixed
         rows, room = _unit_rows(self.matrix * scale, self.limit - self.matrix @ x)
-        equality, miss = _unit_rows(self.equality_matrix * scale, self.equality_value - self.equality_matrix @ x)
+        gap = self.equality_value - self.equality_matrix @ x
+        equality, miss = _unit_rows(self.equality_matrix * scale, gap)
         return Surroundings(
             rows=np.vstack([rows, -unit[low], unit[high]]),
             room=np.concatenate([room, below[low], above[high]]),

@@ -44,22 +44,20 @@ def evaluate(fun: Fun, x: Array, number: int) -> Evaluation:
         InvalidInputError: If the answer is no pair of a finite number and n finite numbers.
         InvalidDesignError: If the function raises it.
     """
-    answer = fun(x.copy())
+    answer, where = fun(x.copy()), f"at evaluation {number}"
     if not isinstance(answer, tuple) or len(answer) != 2:
+        raise InvalidInputError(f"fun must return (value, subgradient), got {type(answer).__name__} {where}")
+    value, subgradient = np.array(answer[0], dtype=float), np.array(answer[1], dtype=float)
+    if value.size != 1 or subgradient.shape != x.shape:
         raise InvalidInputError(
-            f"fun must return the pair (value, subgradient), got {type(answer).__name__} at evaluation {number}"
+            f"fun must return a number and a subgradient of shape {x.shape}, got shapes {value.shape} and "
+            f"{subgradient.shape} {where}"
         )
-    if np.size(answer[0]) != 1 or np.shape(answer[1]) != x.shape:
-        raise InvalidInputError(
-            f"fun must return a number and a subgradient of shape {x.shape}, got shapes "
-            f"{np.shape(answer[0])} and {np.shape(answer[1])} at evaluation {number}"
-        )
-    value, subgradient = float(np.asarray(answer[0], dtype=float).item()), np.array(answer[1], dtype=float)
-    for name, finite in (("value", np.isfinite(value)), ("subgradient", np.isfinite(subgradient).all())):
-        if not finite:
-            shown = value if name == "value" else f"a bad entry at {np.flatnonzero(~np.isfinite(subgradient))}"
+    for name, numbers in (("value", value.ravel()), ("subgradient", subgradient)):
+        bad = np.flatnonzero(~np.isfinite(numbers))
+        if bad.size:
             raise InvalidInputError(
-                f"fun must return a finite {name}, got {shown} at evaluation {number}: raise "
+                f"fun must return a finite {name}, got {numbers[bad[0]]} in entry {bad[0]} {where}: raise "
                 "InvalidDesignError for a design that cannot be evaluated"
             )
-    return Evaluation(x.copy(), value, subgradient)
+    return Evaluation(x.copy(), float(value.item()), subgradient)

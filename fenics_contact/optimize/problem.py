@@ -1,4 +1,4 @@
-"""The door of the package: check the problem, hand it to the method."""
+"""The problem min J(x) over a feasible set: checked input and the scales that the method works in."""
 
 from __future__ import annotations
 
@@ -52,7 +52,8 @@ def pose(
     if start.ndim != 1 or start.size == 0:
         raise InvalidInputError(f"x0 must have shape (n,) with n ≥ 1, got {start.shape}")
     if not np.isfinite(start).all():
-        raise InvalidInputError(f"x0 must be finite, got {start} (entry {np.flatnonzero(~np.isfinite(start))[0]})")
+        k = np.flatnonzero(~np.isfinite(start))[0]
+        raise InvalidInputError(f"x0 must be finite, got x0[{k}] = {start[k]}")
     allowed = feasible_set(start.size, bounds, constraints)
     violations = allowed.violations(start)
     if violations:
@@ -72,7 +73,7 @@ def _scale(n: int, allowed: FeasibleSet, scale: ArrayLike | None) -> Array:
         return np.where(width > 0.0, width, 1.0) if np.isfinite(width).all() else np.ones(n)
     size = np.array(scale, dtype=float)
     if size.shape not in ((), (n,)) or not (np.isfinite(size).all() and (size > 0.0).all()):
-        raise InvalidInputError(f"scale must be a positive number or have shape ({n},) and be positive, got {scale}")
+        raise InvalidInputError(f"scale must be positive, a number or of shape ({n},), got {size}")
     return np.broadcast_to(size, (n,)).copy()
 
 

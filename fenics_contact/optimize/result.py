@@ -15,7 +15,10 @@ Array = NDArray[np.float64]
 
 
 class InvalidDesignError(InvalidInputError):
-    """The objective does not exist at this design (a cell is inverted, bodies penetrate): try a shorter step."""
+    """The objective does not exist at this design: a cell is inverted, bodies penetrate.
+
+    A minimisation that meets it tries a shorter step.
+    """
 
 
 class Reason(Enum):
@@ -39,6 +42,10 @@ class Reason(Enum):
     INVALID_DESIGNS = (
         "every trial design was invalid, down to the shortest step: bound the design away from the "
         "invalid region by bounds or linear constraints"
+    )
+    STEP_FAILED = (
+        "the quadratic programme of a step could not be solved: rescale the variables with scale, and look "
+        "for subgradients of very different size"
     )
 
     @property

@@ -22,6 +22,9 @@ class SlipLaw(Protocol):
     def feasible(self, multiplier: Vector) -> FeasibleSet:
         """Return Λ(Ψ) for the slip bound that belongs to the multiplier."""
 
+    def admit(self, multiplier: Vector) -> Vector:
+        """Return the nearest multiplier that the law admits with the slip bound of its own normal force."""
+
 
 @dataclass(frozen=True, eq=False)
 class Tresca:
@@ -42,6 +45,10 @@ class Tresca:
     def feasible(self, multiplier: Vector) -> FeasibleSet:
         """Return Λ(Ψ), the same for every multiplier."""
         return FeasibleSet(self.layout, self.slip_bound)
+
+    def admit(self, multiplier: Vector) -> Vector:
+        """Return the projection on Λ(Ψ)."""
+        return self.feasible(multiplier).project(multiplier)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,3 +88,18 @@ class Coulomb:
     def feasible(self, multiplier: Vector) -> FeasibleSet:
         """Return Λ(μ λ_N)."""
         return FeasibleSet(self.layout, self.bound(multiplier))
+
+    def admit(self, multiplier: Vector) -> Vector:
+        """Return the projection on the friction cones ‖τ‖ ≤ μ λ_N, a convex set."""
+        layout, mu_f = self.layout, self.friction_coefficient
+        admitted = np.array(multiplier)
+        admitted[layout.normal] = np.maximum(multiplier[layout.normal], 0.0)
+        normal = multiplier[layout.tangential_frictional]
+        tau = multiplier[layout.tangential]
+        length = np.linalg.norm(tau, axis=1)
+        outside = length > mu_f * normal
+        peak = np.maximum((normal + mu_f * length) / (1.0 + mu_f**2), 0.0)
+        shrink = np.divide(mu_f * peak, length, out=np.ones_like(length), where=outside)
+        admitted[layout.tangential_frictional[outside]] = peak[outside]
+        admitted[layout.tangential] = shrink[:, None] * tau
+        return admitted

@@ -10,7 +10,15 @@ from fenics_contact.geometry import BodyMesh, block, box_lattice, split_hexahedr
 from fenics_contact.geometry.quality import scaled_jacobian
 
 CELLS = ["hexahedron", "tetrahedron"]
-NORMALS = {"x0": [-6, 0, 0], "x1": [6, 0, 0], "y0": [0, -3, 0], "y1": [0, 3, 0], "z0": [0, 0, -2], "z1": [0, 0, 2]}
+NORMALS = {
+    "x0": [-6, 0, 0],
+    "x1": [6, 0, 0],
+    "y0": [0, -3, 0],
+    "y1": [0, 3, 0],
+    "z0": [0, 0, -2],
+    "z1": [0, 0, 2],
+}
+"""Outward normal times area of the sides of a box of size 1 x 2 x 3."""
 
 
 @pytest.mark.parametrize("cell", CELLS)
@@ -21,9 +29,7 @@ def test_the_sides_are_complete_plane_and_face_outwards(cell: str) -> None:
         for end, plane in ((0, 1.0), (1, 2.0 + d)):
             facets = mesh.surfaces[f"{'xyz'[d]}{end}"]
             assert np.all(mesh.points[facets][:, :, d] == plane)
-            areas = vector_areas(mesh.points, facets)
-            assert areas.sum(axis=0) == pytest.approx(NORMALS[f"{'xyz'[d]}{end}"])
-            assert np.linalg.norm(areas, axis=1).sum() == pytest.approx(max(map(abs, NORMALS["xyz"[d] + "0"])))
+            assert vector_areas(mesh.points, facets).sum(axis=0) == pytest.approx(NORMALS[f"{'xyz'[d]}{end}"])
 
 
 @pytest.mark.parametrize(("cell", "factor"), [("hexahedron", 1), ("tetrahedron", 6)])
@@ -60,19 +66,23 @@ def test_mirrored_layers_still_fit_together() -> None:
 def test_hexahedra_numbered_at_random_are_not_split() -> None:
     mesh = block((0, 0, 0), (2, 1, 1), (2, 1, 1))
     cells = mesh.cells.copy()
-    cells[1] = cells[1, [1, 2, 3, 0, 5, 6, 7, 4]]
+    cells[1] = cells[1, [3, 0, 1, 2, 7, 4, 5, 6]]
     with pytest.raises(InvalidInputError, match="some neighbours' diagonals do not meet"):
         split_hexahedra(BodyMesh(mesh.points, cells))
 
 
 def test_a_box_without_volume_is_refused() -> None:
-    with pytest.raises(InvalidInputError, match=r"upper must exceed lower .* lower \[0, 0, 0\] and upper \[1, 0, 1\]"):
+    with pytest.raises(
+        InvalidInputError, match=r"upper must exceed lower .* lower \[0, 0, 0\] and upper \[1, 0, 1\]"
+    ):
         block((0, 0, 0), (1, 0, 1), (1, 1, 1))
 
 
 @pytest.mark.parametrize("count", [0, -2, 1.5, True])
 def test_a_count_that_is_none_is_refused(count: object) -> None:
-    with pytest.raises(InvalidInputError, match=rf"counts\[1\] must be an integer of at least 1, got {count}"):
+    with pytest.raises(
+        InvalidInputError, match=rf"counts\[1\] must be an integer of at least 1, got {count}"
+    ):
         block((0, 0, 0), (1, 1, 1), (1, count, 1))  # type: ignore[arg-type]
 
 

@@ -65,7 +65,7 @@ def test_every_inner_face_makes_a_pair_of_neighbours() -> None:
 
 def test_a_face_of_three_cells_is_refused() -> None:
     cells = block((0, 0, 0), (1, 1, 1), (2, 1, 1)).cells
-    with pytest.raises(InvalidInputError, match="at most 2 cells, the face with nodes .* belongs to 3"):
+    with pytest.raises(InvalidInputError, match=r"at most 2 cells, the face with nodes .* belongs to 3"):
         neighbours(np.vstack([cells, cells[:1]]))
 
 

@@ -1,4 +1,4 @@
-"""Published nonsmooth test functions with their starting points and least values.
+"""Published nonsmooth test functions.
 
 Every function returns its value and one subgradient: the gradient of the first piece that
 attains the maximum, or the sign convention sign(0) = 1 for an absolute value.
@@ -14,38 +14,12 @@ References:
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fenics_contact.optimize import Bounds, LinearConstraints
-
 Array = NDArray[np.float64]
 Fun = Callable[[Array], tuple[float, Array]]
-
-
-@dataclass(frozen=True)
-class Case:
-    """One published problem.
-
-    Attributes:
-        name: Its name in the report.
-        fun: Value and subgradient.
-        start: Published starting point, shape (n,).
-        minimum: Published least value (for a nonconvex function: the one bundle methods reach).
-        most_evaluations: Bound on the evaluations that the test allows.
-        bounds: Box, or None.
-        constraints: Linear constraints, or None.
-    """
-
-    name: str
-    fun: Fun
-    start: Array
-    minimum: float
-    most_evaluations: int
-    bounds: Bounds | None = None
-    constraints: LinearConstraints | None = field(default=None)
 
 
 def largest(values: Sequence[float], gradients: Sequence[ArrayLike]) -> tuple[float, Array]:
@@ -82,9 +56,7 @@ def cb3(x: Array) -> tuple[float, Array]:
 def dem(x: Array) -> tuple[float, Array]:
     """Demyanov and Malozemov: two planes and a paraboloid."""
     a, b = x
-    return largest(
-        [5 * a + b, -5 * a + b, a**2 + b**2 + 4 * b], [[5, 1], [-5, 1], [2 * a, 2 * b + 4]]
-    )
+    return largest([5 * a + b, -5 * a + b, a**2 + b**2 + 4 * b], [[5, 1], [-5, 1], [2 * a, 2 * b + 4]])
 
 
 def ql(x: Array) -> tuple[float, Array]:
@@ -242,7 +214,7 @@ _COLVILLE_C = np.array(
         [-10, 32, -10, -20, 30],
     ]
 )
-_COLVILLE_A = np.array(
+COLVILLE_A = np.array(
     [
         [-16.0, 2, 0, 1, 0],
         [0, -2, 0, 0.4, 2],
@@ -256,11 +228,11 @@ _COLVILLE_A = np.array(
         [1, 1, 1, 1, 1],
     ]
 )
-_COLVILLE_B = np.array([-40, -2, -0.25, -4, -4, -1, -40, -60, 5, 1])
+COLVILLE_B = np.array([-40, -2, -0.25, -4, -4, -1, -40, -60, 5, 1])
 
 
 def hs86(x: Array) -> tuple[float, Array]:
-    """Colville's cubic (Hock and Schittkowski 86); its rows are in `COLVILLE_ROWS`."""
+    """Colville's cubic (Hock and Schittkowski 86); its rows are COLVILLE_A x ≥ COLVILLE_B."""
     product = _COLVILLE_C @ x
     value = _COLVILLE_D @ x**3 + x @ product + _COLVILLE_E @ x
     return float(value), 3 * _COLVILLE_D * x**2 + 2 * product + _COLVILLE_E
@@ -269,11 +241,11 @@ def hs86(x: Array) -> tuple[float, Array]:
 def colville1(x: Array) -> tuple[float, Array]:
     """`hs86` with the worst violated row in an exact penalty."""
     value, gradient = hs86(x)
-    violation = _COLVILLE_B - _COLVILLE_A @ x
+    violation = COLVILLE_B - COLVILLE_A @ x
     worst = int(np.argmax(violation))
     if violation[worst] <= 0:
         return value, gradient
-    return value + 50 * float(violation[worst]), gradient - 50 * _COLVILLE_A[worst]
+    return value + 50 * float(violation[worst]), gradient - 50 * COLVILLE_A[worst]
 
 
 def hs78(x: Array) -> tuple[float, Array]:
@@ -311,9 +283,7 @@ def mad4(x: Array) -> tuple[float, Array]:
     """Madsen and Schjaer-Jacobsen 4 and 5."""
     a, b = x
     e = np.exp(a - b)
-    return largest(
-        [-e, np.sinh(a - 1) - 1, -np.log(b) - 1], [[-e, e], [np.cosh(a - 1), 0], [0, -1 / b]]
-    )
+    return largest([-e, np.sinh(a - 1) - 1, -np.log(b) - 1], [[-e, e], [np.cosh(a - 1), 0], [0, -1 / b]])
 
 
 def pentagon(x: Array) -> tuple[float, Array]:
@@ -326,56 +296,3 @@ def pentagon(x: Array) -> tuple[float, Array]:
     gradient[k] -= away[k] / lengths[k]
     gradient[(k + 1) % 3] += away[k] / lengths[k]
     return float(-lengths[k]), gradient.ravel()
-
-
-def _pentagon_rows() -> LinearConstraints:
-    angle = 2 * np.pi * np.arange(5) / 5
-    rows = np.kron(np.eye(3), np.column_stack([np.cos(angle), np.sin(angle)]))
-    return LinearConstraints(rows, np.ones(15))
-
-
-_SLOPE = np.array([*range(1, 11), *range(-11, -21, -1)], dtype=float)
-
-CONVEX = (
-    Case("CB2", cb2, np.array([1.0, -0.1]), 1.9522245, 50),
-    Case("CB3", cb3, np.array([2.0, 2.0]), 2.0, 50),
-    Case("DEM", dem, np.array([1.0, 1.0]), -3.0, 50),
-    Case("QL", ql, np.array([-1.0, 5.0]), 7.2, 50),
-    Case("LQ", lq, np.array([-0.5, -0.5]), -np.sqrt(2.0), 50),
-    Case("Mifflin1", mifflin1, np.array([0.8, 0.6]), -1.0, 80),
-    Case("Rosen-Suzuki", rosen_suzuki, np.zeros(4), -44.0, 80),
-    Case("Shor", shor, np.array([0.0, 0, 0, 0, 1]), 22.600162, 80),
-    Case("Maxquad", maxquad, np.ones(10), -0.8414083, 150),
-    Case("Maxq", maxq, _SLOPE, 0.0, 300),
-    Case("Maxl", maxl, _SLOPE, 0.0, 150),
-    Case("Goffin", goffin, np.arange(50) - 24.5, 0.0, 150),
-    Case("MXHILB", mxhilb, np.ones(50), 0.0, 150),
-)
-
-NONCONVEX = (
-    Case("Wolfe", wolfe, np.array([3.0, 2.0]), -8.0, 80),
-    Case("Mifflin2", mifflin2, np.array([-1.0, -1.0]), -1.0, 80),
-    Case("Crescent", crescent, np.array([-1.5, 2.0]), 0.0, 80),
-    Case("Rosenbrock", rosenbrock, np.array([-1.2, 1.0]), 0.0, 150),
-    Case("Colville1", colville1, np.array([0.0, 0, 0, 0, 1]), -32.348679, 150),
-    Case("HS78", hs78, np.array([-2.0, 1.5, 2.0, -1.0, -1.0]), -2.9197004, 250),
-    Case("El-Attar", el_attar, np.array([2.0, 2, 7, 0, -2, 1]), 0.5598131, 250),
-)
-
-CONSTRAINED = (
-    Case("MAD1", mad1, np.array([1.0, 2.0]), -0.38965952, 50,
-         constraints=LinearConstraints(np.array([[-1.0, -1.0]]), np.array([-0.5]))),
-    Case("MAD2", mad1, np.array([-2.0, -1.0]), -0.33035714, 50,
-         constraints=LinearConstraints(np.array([[3.0, 1.0]]), np.array([-2.5]))),
-    Case("MAD4", mad4, np.array([-1.0, 0.01]), -0.44891079, 50,
-         constraints=LinearConstraints(np.array([[-0.05, 1.0]]), np.array([0.5]))),
-    Case("MAD5", mad4, np.array([-1.0, 3.0]), -0.42928061, 50,
-         constraints=LinearConstraints(np.array([[0.9, -1.0]]), np.array([-1.0]))),
-    Case("Pentagon", pentagon, np.array([-1.0, 0, 0, -1, 1, 1]), -1.85961870, 80,
-         constraints=_pentagon_rows()),
-    Case("HS86", hs86, np.array([0.0, 0, 0, 0, 1]), -32.348679, 80,
-         bounds=Bounds(np.zeros(5), np.full(5, np.inf)),
-         constraints=LinearConstraints(-_COLVILLE_A, -_COLVILLE_B)),
-)
-
-BY_NAME = {case.name: case for case in (*CONVEX, *NONCONVEX, *CONSTRAINED)}

@@ -1,0 +1,60 @@
+"""The door of the package: min J(x) over a box and linear constraints."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from fenics_contact.optimize.bundle_trust import BundleTrust, Callback
+from fenics_contact.optimize.constraints import Bounds, LinearConstraints
+from fenics_contact.optimize.objective import Fun
+from fenics_contact.optimize.problem import pose
+from fenics_contact.optimize.result import Result
+
+
+def minimize(
+    fun: Fun,
+    x0: ArrayLike,
+    method: BundleTrust | None = None,
+    *,
+    bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
+    constraints: LinearConstraints | None = None,
+    scale: ArrayLike | None = None,
+    callback: Callback | None = None,
+) -> Result:
+    """Minimise a locally Lipschitz function, convex or not, over a box and linear constraints.
+
+    The iterates depend on nothing but the arguments: replicated on the ranks of a communicator, with a
+    ``fun`` that returns the same bits on all of them, they are the same bits on all of them.
+
+    Args:
+        fun: Takes x of shape (n,), returns J(x) and one (Clarke) subgradient of shape (n,). It is only called
+            at points within the box, and within the other constraints to rounding. Where J does not exist it
+            raises `InvalidDesignError`, and a shorter step is tried.
+        x0: Feasible starting point, shape (n,).
+        method: Parameters; None for the default ones.
+        bounds: Box, or a pair (lower, upper), or None.
+        constraints: Linear constraints, or None.
+        scale: Size of each variable, shape (n,) or a number. None takes the widths of the box where it is
+            bounded on all sides, so choose bounds that mean something; else 1.
+        callback: Called after every evaluation with its record and the best point so far.
+
+    Returns:
+        The best point, its value and subgradient, the reason for the stop and the history.
+
+    Raises:
+        InvalidInputError: If a shape does not fit, x0 is infeasible, or ``fun`` returns nan or inf.
+        InvalidDesignError: If J does not exist at x0.
+        NotConvergedError: If the method stops before its tolerance is met, with the history and the best
+            result so far; not if ``method.raise_on_failure`` is False.
+
+    Example:
+        >>> import numpy as np
+        >>> def largest_component(x):
+        ...     k = int(np.argmax(np.abs(x)))
+        ...     return abs(x[k]), np.sign(x[k]) * np.eye(x.size)[k]
+        >>> result = minimize(largest_component, [3.0, -1.0], bounds=([1.0, -4.0], [5.0, 4.0]))
+        >>> round(result.value, 3), result.reason.name
+        (1.0, 'STATIONARY')
+    """
+    problem = pose(fun, x0, bounds, constraints, scale)
+    return (method or BundleTrust()).minimize(problem, callback)

@@ -1,0 +1,86 @@
+"""Can bounds and friction hold the load at all? A question about G, e and the cone only, not about F."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.errors import InfeasibleError
+from fenics_contact.qp.problem import DualProblem
+from fenics_contact.qp.reductions import Vector, global_sum
+from fenics_contact.qp.slip_law import SlipLaw
+
+LARGEST_FORCE = 1e4
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """An admissible multiplier in equilibrium, or the rigid motion that proves there is none.
+
+    Attributes:
+        multiplier: The admissible multiplier found, owned; in equilibrium up to `error`.
+        error: ‖Gᵀ(G Gᵀ)⁻¹(G λ − e)‖ relative to that of e.
+        motion: Coefficients of a rigid motion on which the load does work and which no admissible
+            multiplier resists, shape (m,); None unless that is proven.
+    """
+
+    multiplier: Vector
+    error: float
+    motion: Vector | None
+
+
+def find_equilibrium(
+    problem: DualProblem, law: SlipLaw, *, tolerance: float = 1e-4, max_iterations: int = 2000
+) -> Equilibrium:
+    """Look for an admissible multiplier that balances the load, without a single F-product. Collective.
+
+    Minimises ½‖Q z − λ₀‖² over the admissible set by accelerated projected gradients, Q = I − P. At
+    distance g = Q z − λ₀ with optimality error s = z − P_Λ(z − g), any equilibrium y obeys
+    ‖g‖² ≤ ‖s‖(‖y − z‖ + ‖g‖). Once that would take a force 10⁴ times the load's, none exists.
+
+    Args:
+        problem: Coarse space and layout are used.
+        law: Tresca's bounds or Coulomb's cones.
+        tolerance: Relative error of equilibrium at which a multiplier counts as found.
+        max_iterations: Give up undecided after that many cheap iterations.
+    """
+    coarse = problem.coarse
+    target = coarse.particular()
+    size = coarse.norm(coarse.load)
+    z = law.admit(target)
+    momentum, weight = z, 1.0
+    for _ in range(max_iterations):
+        resultant = coarse.solve(coarse.residual(momentum))
+        gradient = coarse.transpose(resultant)
+        following = law.admit(momentum - gradient)
+        step = momentum - following
+        distance, error, turn = np.array(
+            global_sum(problem.comm, gradient @ gradient, step @ step, step @ (following - z))
+        )
+        if distance <= (tolerance * size) ** 2:
+            return Equilibrium(momentum, float(np.sqrt(distance)) / (size or 1.0), None)
+        if distance > np.sqrt(error) * (LARGEST_FORCE * size + np.sqrt(distance)):
+            return Equilibrium(following, float(np.sqrt(distance)) / size, resultant)
+        weight, previous = (1.0, 1.0) if turn > 0.0 else (0.5 + np.sqrt(0.25 + weight**2), weight)
+        momentum = following + (previous - 1.0) / weight * (following - z) * (turn <= 0.0)
+        z = following
+    return Equilibrium(z, float(np.sqrt(distance)) / size, None)
+
+
+def require_equilibrium(problem: DualProblem, law: SlipLaw) -> Equilibrium:
+    """Return an admissible multiplier near equilibrium, or refuse the problem. Collective.
+
+    Raises:
+        InfeasibleError: It is proven that none exists.
+    """
+    found = find_equilibrium(problem, law)
+    if found.motion is not None:
+        size = np.abs(found.motion)
+        rows = np.flatnonzero(size > 0.1 * size.max())
+        raise InfeasibleError(
+            "contact and friction need to balance the load, but no admissible multiplier comes closer than "
+            f"{100 * found.error:.3g} % of it: the rigid motions in rows {rows.tolist()} of e are not held; "
+            "add a support, turn the load into the contact or raise the friction"
+        )
+    return found

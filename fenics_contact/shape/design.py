@@ -1,0 +1,84 @@
+"""Design variables: control points that move a surface of a body along its normals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry import DesignSurface
+from fenics_contact.shape.bernstein import tensor_bernstein
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceDesign:
+    """A net of control points over a design surface; each moves along the surface's normals.
+
+    Design variable k displaces the surface by B_k(s, t) times the outward unit normal of the reference
+    surface, B_k a tensor-product Bernstein polynomial. α = 0 is the reference shape, positive α adds material.
+
+    Attributes:
+        body: Name of the body.
+        surface: Nodes of the surface, their parameters and directions.
+        net: Number of control points along s and t.
+    """
+
+    body: str
+    surface: DesignSurface
+    net: tuple[int, int] = (7, 4)
+
+    def __post_init__(self) -> None:
+        """Refuse a net without points or with more points than the surface has nodes."""
+        if min(self.net) < 1:
+            raise InvalidInputError(f"a net needs at least one control point each way, got {self.net}: try (7, 4)")
+        if any(points > nodes for points, nodes in zip(self.net, self.surface.counts, strict=True)):
+            raise InvalidInputError(
+                f"a net of {self.net} control points needs at least as many nodes each way, the surface has "
+                f"{self.surface.counts}: take fewer control points or a finer mesh"
+            )
+
+    @property
+    def size(self) -> int:
+        """Number of design variables."""
+        return self.net[0] * self.net[1]
+
+    @property
+    def basis(self) -> np.ndarray:
+        """Values of the B_k at the surface's nodes, shape (n_nodes, size)."""
+        return tensor_bernstein(self.surface.parameters, self.net)
+
+    def displacement(self, alpha: np.ndarray) -> np.ndarray:
+        """Return the displacement of the surface's nodes, shape (n_nodes, 3), [length].
+
+        Args:
+            alpha: Design variables, shape (size,), [length].
+        """
+        return (self.basis @ alpha)[:, None] * self.surface.directions
+
+    def pull_back(self, gradient: np.ndarray) -> np.ndarray:
+        """Return the gradient by the design variables from that by the surface's nodes.
+
+        Args:
+            gradient: Derivative by the nodes' displacements, shape (n_nodes, 3).
+
+        Returns:
+            Derivative by α, shape (size,).
+        """
+        return self.basis.T @ np.einsum("nd,nd->n", gradient, self.surface.directions)
+
+    def control_points(self, points: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+        """Return where to draw the control points, shape (net[0], net[1], 3), [length].
+
+        Each is drawn at its Greville abscissa on the reference surface, moved by its own variable.
+
+        Args:
+            points: Reference coordinates of the body, shape (n_nodes, 3).
+            alpha: Design variables, shape (size,), [length].
+        """
+        s, t = (np.linspace(0, 1, count) if count > 1 else np.array([0.5]) for count in self.net)
+        wanted = np.stack(np.meshgrid(s, t, indexing="ij"), axis=-1).reshape(-1, 2)
+        distance = np.linalg.norm(self.surface.parameters[None] - wanted[:, None], axis=2)
+        nearest = np.argmin(distance, axis=1)
+        on_surface = points[self.surface.nodes[nearest]]
+        return (on_surface + alpha[:, None] * self.surface.directions[nearest]).reshape(*self.net, 3)

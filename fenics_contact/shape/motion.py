@@ -1,0 +1,120 @@
+"""Smooth extension of a surface displacement into the mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+import ufl
+from petsc4py import PETSc
+
+from fenics_contact import _dolfinx
+from fenics_contact.contact.fields import body_mesh
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti import Decomposition
+from fenics_contact.feti.forms import Template, volume_measure
+from fenics_contact.scene import Body
+
+
+class HarmonicExtension:
+    """Each component of the mesh displacement is harmonic, given on the design surface, zero where held.
+
+    The matrix is that of the reference mesh: the extension is linear in the surface displacement, and one
+    factorisation serves all designs and, transposed, all gradients.
+    """
+
+    def __init__(
+        self, decomposition: Decomposition, name: str, body: Body, moving: np.ndarray, held: np.ndarray
+    ) -> None:
+        """Assemble and factor the Laplacian of a body. Collective on the decomposition's communicator.
+
+        Args:
+            decomposition: Says which rank owns which cells.
+            name: Name of the body.
+            body: The body in its reference shape.
+            moving: Nodes of the design surface.
+            held: Nodes that do not move.
+
+        Raises:
+            InvalidInputError: If a node is to move and to be held.
+        """
+        both = np.intersect1d(moving, held)
+        if len(both):
+            raise InvalidInputError(
+                f"the design surface must keep away from supports and loads, but {len(both)} nodes of body {name!r} "
+                "lie on both: choose another surface"
+            )
+        self.moving = moving
+        mesh = body_mesh(decomposition, name, body)
+        V = _dolfinx.nodal_space(body.mesh.cell_type)
+        form = ufl.inner(ufl.grad(ufl.TrialFunction(V)), ufl.grad(ufl.TestFunction(V)))
+        template = Template(mesh.comm, form * volume_measure(body.mesh.cell_type, 2), ())
+        space = _dolfinx.scalar_space(mesh, 1)
+        self._laplacian = _dolfinx.assemble_matrix(template.bind([space, space], ()))
+        nodes, dofs = _dolfinx.node_dofs(space)
+        self._rows = np.zeros(body.mesh.n_nodes, dtype=PETSc.IntType)
+        mine = np.full(body.mesh.n_nodes, -1, dtype=np.int64)
+        mine[nodes] = _dolfinx.global_dofs(space, dofs)
+        self._rows[:] = mesh.comm.allreduce(mine, op=_max())
+        self._ksp = self._factor(np.concatenate([moving, held]))
+
+    def _factor(self, given: np.ndarray) -> PETSc.KSP:
+        matrix = self._laplacian.copy()
+        matrix.zeroRowsColumns(self._rows[given], diag=1.0)
+        ksp = PETSc.KSP().create(matrix.getComm())
+        ksp.setOperators(matrix)
+        ksp.setType(PETSc.KSP.Type.PREONLY)
+        ksp.getPC().setType(PETSc.PC.Type.LU)
+        ksp.getPC().setFactorSolverType("mumps")
+        ksp.setUp()
+        self._given = self._rows[given]
+        return ksp
+
+    def extend(self, displacement: np.ndarray) -> np.ndarray:
+        """Return the displacement of all nodes, shape (n_nodes, 3), from that of the moving ones. Collective."""
+        prescribed, right = self._laplacian.createVecs()
+        solution = right.duplicate()
+        result = np.zeros((len(self._rows), 3))
+        for axis in range(3):
+            prescribed.zeroEntries()
+            self._put(prescribed, self._rows[self.moving], displacement[:, axis])
+            self._laplacian.mult(prescribed, right)
+            right.scale(-1.0)
+            self._put(right, self._given, self._values(prescribed)[self._given])
+            self._ksp.solve(right, solution)
+            result[:, axis] = self._values(solution)[self._rows]
+        return result
+
+    def pull_back(self, gradient: np.ndarray) -> np.ndarray:
+        """Return the transpose of `extend` applied to nodal derivatives, shape (n_moving, 3). Collective.
+
+        Args:
+            gradient: Derivative by the displacement of every node, shape (n_nodes, 3), replicated.
+        """
+        right, image = self._laplacian.createVecs()
+        adjoint = right.duplicate()
+        result = np.zeros((len(self.moving), 3))
+        for axis in range(3):
+            self._put(right, self._rows, gradient[:, axis])
+            self._put(right, self._given, np.zeros(len(self._given)))
+            self._ksp.solve(right, adjoint)
+            self._laplacian.mult(adjoint, image)
+            result[:, axis] = gradient[self.moving, axis] - self._values(image)[self._rows[self.moving]]
+        return result
+
+    @staticmethod
+    def _put(vector: PETSc.Vec, rows: np.ndarray, values: np.ndarray) -> None:
+        """Set the entries that this rank owns."""
+        start, stop = vector.getOwnershipRange()
+        here = (rows >= start) & (rows < stop)
+        vector.array_w[rows[here] - start] = values[here]
+
+    @staticmethod
+    def _values(vector: PETSc.Vec) -> np.ndarray:
+        """Return all entries of a distributed vector on every rank."""
+        comm = vector.getComm().tompi4py()
+        return np.concatenate(comm.allgather(vector.array_r))
+
+
+def _max() -> object:
+    from mpi4py import MPI
+
+    return MPI.MAX

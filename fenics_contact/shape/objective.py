@@ -1,0 +1,175 @@
+"""What a design is judged by, with the partial derivatives that the adjoint needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from fenics_contact import _dolfinx
+from fenics_contact.contact import ContactResult, State
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.scene import Body
+from fenics_contact.shape.forms import (
+    Integrand,
+    ShapeForms,
+    subdomain_fields,
+    sum_over_subdomains,
+    work_by_shape,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Partials:
+    """An objective J(u, λ, X) at a state, with its partial derivatives.
+
+    Attributes:
+        value: J, the same on every rank.
+        by_displacement: ∂J/∂u on this rank's torn dofs, shape (torn_size,).
+        by_multiplier: ∂J/∂λ, owned, shape (n_owned,).
+        by_shape: ∂J/∂X at fixed u and λ, this rank's share, shape (n_nodes, 3) for the nodes of all bodies.
+    """
+
+    value: float
+    by_displacement: np.ndarray
+    by_multiplier: np.ndarray
+    by_shape: np.ndarray
+
+
+class Objective(Protocol):
+    """A function of the state; `TotalPotential`, `VolumeIntegral`, `ContactForces` come with the package."""
+
+    def value(self, state: State, forms: ShapeForms) -> float:
+        """Return J alone. Collective."""
+
+    def partials(self, state: State, forms: ShapeForms) -> Partials:
+        """Evaluate J and its partial derivatives. Collective."""
+
+
+@dataclass(frozen=True)
+class TotalPotential:
+    """J = ½ uᵀK u − fᵀu, [force · length]."""
+
+    def value(self, state: State, forms: ShapeForms) -> float:
+        """Return the total potential energy."""
+        return state.energies.total_potential
+
+    def partials(self, state: State, forms: ShapeForms) -> Partials:
+        """∂J/∂u = K u − f, ∂J/∂X from UFL: half of a(u, u), all of L(u)."""
+        torn, u = state.system.torn, state.torn_displacement
+        internal = np.concatenate([s.stiffness @ u[part] for s, part in _parts(state)])
+        # a(u, w) − L(w) with w = u counts the strain energy twice; a(u, u/2) − L(u/2) twice over does not.
+        full, none = work_by_shape(forms, torn, u, u), work_by_shape(forms, torn, np.zeros_like(u), u)
+        by_shape = 0.5 * (full - none) + none
+        nothing = np.zeros(len(torn.numbering.owned))
+        return Partials(self.value(state, forms), internal - torn.load, nothing, by_shape)
+
+
+@dataclass(frozen=True)
+class VolumeIntegral:
+    """J = ∫ integrand(u, x, σ) dx over one body.
+
+    Attributes:
+        name: Identifies the integrand among compiled forms; use a new name for a new integrand.
+        integrand: Takes displacement, coordinates and stress (UFL), returns a UFL scalar.
+        body: Name of the body.
+
+    Example:
+        >>> import ufl
+        >>> VolumeIntegral("motion", lambda u, x, stress: ufl.inner(u, u), "link2").body
+        'link2'
+    """
+
+    name: str
+    integrand: Integrand
+    body: str
+
+    def value(self, state: State, forms: ShapeForms) -> float:
+        """Integrate. Collective."""
+        body = self._body(state)
+        template = forms.functional(self.name, self.integrand, body.material, body.mesh.cell_type, "value")
+        total = 0.0
+        for name, space, _, functions in subdomain_fields(state.system.torn, [state.torn_displacement]):
+            if name == self.body:
+                form = template.bind([], body.material.parameters, functions, mesh=space.mesh)
+                total += _dolfinx.assemble_scalar(form)
+        return float(state.system.problem.comm.allreduce(total))
+
+    def partials(self, state: State, forms: ShapeForms) -> Partials:
+        """Differentiate the integral by UFL."""
+        body, torn, u = self._body(state), state.system.torn, state.torn_displacement
+        cell_type = body.mesh.cell_type
+        by_shape, by_displacement = (
+            forms.functional(self.name, self.integrand, body.material, cell_type, by) for by in ("shape", "displacement")
+        )
+
+        def assemble(template: Any, name: str, space: Any, functions: Any) -> np.ndarray:
+            if name != self.body:
+                return np.zeros(3 * space.dofmap.index_map.size_local)
+            return _dolfinx.assemble_vector(template.bind([space], body.material.parameters, functions))
+
+        def shape(_: Body, name: str, space: Any, functions: Any) -> np.ndarray:
+            return assemble(by_shape, name, space, functions)
+
+        gradient = [assemble(by_displacement, name, space, fs) for name, space, _, fs in subdomain_fields(torn, [u])]
+        nothing = np.zeros(len(torn.numbering.owned))
+        return Partials(
+            self.value(state, forms), np.concatenate(gradient), nothing, sum_over_subdomains(torn, [u], shape)
+        )
+
+    def _body(self, state: State) -> Body:
+        bodies = state.scene.bodies
+        if self.body not in bodies:
+            raise InvalidInputError(
+                f"VolumeIntegral.body must name a body of the scene, got {self.body!r}, there are {sorted(bodies)}"
+            )
+        return bodies[self.body]
+
+
+#: Returns value, derivative by normal forces (n,), derivative by friction forces (n, 2).
+ForceFunction = Callable[[ContactResult], tuple[float, np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class ContactForces:
+    """J = φ(λ_N, τ), a function of the contact forces alone, [any].
+
+    Attributes:
+        function: Takes the contact result; returns φ, ∂φ/∂λ_N of shape (n,) and ∂φ/∂τ of shape (n, 2), the
+            latter in the points' tangents. Invariant under rotation of the tangents if it is to be smooth.
+    """
+
+    function: ForceFunction
+
+    def value(self, state: State, forms: ShapeForms) -> float:
+        """Return φ."""
+        return float(self.function(state.contact)[0])
+
+    def partials(self, state: State, forms: ShapeForms) -> Partials:
+        """Place the user's derivatives on the contact rows."""
+        system, torn = state.system, state.system.torn
+        value, normal, tangential = self.function(state.contact)
+        count = torn.points.count
+        if normal.shape != (count,) or tangential.shape != (count, 2):
+            raise InvalidInputError(
+                f"ContactForces.function must return derivatives of shapes ({count},) and ({count}, 2), got "
+                f"{normal.shape} and {tangential.shape}: one row for each contact point"
+            )
+        by_multiplier = np.zeros(len(torn.numbering.owned))
+        for rows, values in (
+            (torn.normal_rows, normal),
+            (torn.tangential_rows.ravel(), tangential[torn.frictional].ravel()),
+        ):
+            position = system.positions(rows)
+            by_multiplier[position[position >= 0]] = values[position >= 0]
+        nodes = int(torn.decomposition.tearing.node_offset[-1])
+        return Partials(float(value), np.zeros(len(state.torn_displacement)), by_multiplier, np.zeros((nodes, 3)))
+
+
+def _parts(state: State) -> Any:
+    start = 0
+    for subdomain in state.system.torn.subdomains:
+        yield subdomain, slice(start, start + subdomain.mesh.size)
+        start += subdomain.mesh.size

@@ -1,0 +1,227 @@
+"""A design problem: value and subgradient of an objective as functions of the design variables."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_contact.contact import State, find_state
+from fenics_contact.errors import InvalidDesignError, InvalidInputError
+from fenics_contact.feti import decompose
+from fenics_contact.qp import DualSolver, FaceNewton
+from fenics_contact.scene import BodyForce, Scene
+from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
+from fenics_contact.shape.contact_derivative import bound_sensitivity, contact_by_shape
+from fenics_contact.shape.design import SurfaceDesign
+from fenics_contact.shape.forms import ShapeForms, work_by_shape
+from fenics_contact.shape.linearised_face import WeakChoice, WeakPoints, linearise_face
+from fenics_contact.shape.motion import HarmonicExtension
+from fenics_contact.shape.objective import Objective
+from fenics_contact.shape.volume import volume_by_points
+from fenics_contact.timing import PhaseTimer
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class DesignPoint:
+    """A design that was evaluated.
+
+    Attributes:
+        alpha: Design variables, shape (size,).
+        value: Objective.
+        gradient: Clarke subgradient, shape (size,); the gradient where no point is weakly active.
+        state: Equilibrium.
+        weak: Weakly active points and the branch they were given.
+        adjoint_iterations: F-products of the adjoint.
+    """
+
+    alpha: np.ndarray
+    value: float
+    gradient: np.ndarray
+    state: State
+    weak: WeakPoints
+    adjoint_iterations: int
+
+
+class ShapeProblem:
+    """J(α) with a Clarke subgradient, for one or more moving surfaces of a scene.
+
+    Call it with α to get (J, subgradient): one state, one adjoint, whatever the number of variables.
+    Topology, partition and compiled forms are kept; each state starts from the one before.
+
+    Attributes:
+        designs: The moving surfaces; α is their variables one after the other.
+        last: The design evaluated last.
+        seconds: Wall time of this rank by phase, over all evaluations.
+        products: F-products of states and adjoints so far.
+        evaluations: Number of designs evaluated.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        partitions: Mapping[str, np.ndarray],
+        designs: tuple[SurfaceDesign, ...] | SurfaceDesign,
+        objective: Objective,
+        comm: MPI.Comm,
+        *,
+        solver: DualSolver | None = None,
+        choice: WeakChoice = WeakChoice.RELEASED,
+    ) -> None:
+        """Decompose the scene and prepare the mesh motion. Collective on ``comm``.
+
+        Args:
+            scene: The scene in its reference shape.
+            partitions: Body name -> subdomain of every cell.
+            designs: What moves.
+            objective: What is judged.
+            comm: Communicator.
+            solver: Dual solver of the states, `FaceNewton()` by default.
+            choice: Branch for weakly active points.
+        """
+        self.scene, self.objective, self.choice = scene, objective, choice
+        self.designs = (designs,) if isinstance(designs, SurfaceDesign) else tuple(designs)
+        self.solver = solver or FaceNewton()
+        self._timer = PhaseTimer()
+        self.evaluations, self.products = 0, 0
+        self.last: DesignPoint | None = None
+        self._previous: State | None = None
+        self._forms: ShapeForms | None = None
+        with self._timer.phase("decompose"):
+            self.decomposition = decompose(scene, partitions, comm)
+        with self._timer.phase("mesh motion"):
+            self._motions = [self._motion(design) for design in self.designs]
+
+    @property
+    def size(self) -> int:
+        """Number of design variables."""
+        return sum(design.size for design in self.designs)
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Wall time of this rank by phase, over all evaluations."""
+        return self._timer.seconds
+
+    def __call__(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return J(α) and a Clarke subgradient. Collective.
+
+        Raises:
+            InvalidDesignError: If the design inverts a cell.
+        """
+        point = self.evaluate(alpha)
+        return point.value, point.gradient
+
+    def points_of(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the coordinates of the designed bodies, body name -> (n_nodes, 3), [length]. Collective."""
+        alpha = np.asarray(alpha, dtype=float)
+        if alpha.shape != (self.size,):
+            raise InvalidInputError(f"alpha must have shape ({self.size},), got {alpha.shape}: one number a control point")
+        points: dict[str, np.ndarray] = {}
+        for design, motion, part in zip(self.designs, self._motions, self._split(alpha), strict=True):
+            start = points.get(design.body, self.scene.bodies[design.body].mesh.points)
+            points[design.body] = start + motion.extend(design.displacement(part))
+        return points
+
+    def scene_of(self, alpha: np.ndarray) -> Scene:
+        """Return the scene in the shape of a design. Collective.
+
+        Raises:
+            InvalidDesignError: If the design inverts a cell.
+        """
+        points = self.points_of(alpha)
+        try:
+            return self.scene.moved(points)
+        except InvalidInputError as error:
+            raise InvalidDesignError(f"the design cannot be meshed: {error}") from error
+
+    def state_of(self, alpha: np.ndarray) -> State:
+        """Return the equilibrium of a design, started from the one before. Collective."""
+        with self._timer.phase("mesh motion"):
+            scene = self.scene_of(alpha)
+        state = find_state(
+            scene, self.decomposition, solver=self.solver, previous=self._previous,
+            start_geometry=self._previous is None, timer=self._timer,
+        )  # fmt: skip
+        self._previous = state
+        return state
+
+    def value_of(self, alpha: np.ndarray) -> float:
+        """Return J(α) alone, without adjoint. Collective."""
+        state = self.state_of(alpha)
+        return self.objective.value(state, self._shape_forms(state))
+
+    def evaluate(self, alpha: np.ndarray) -> DesignPoint:
+        """Solve the state and its adjoint and return value and subgradient. Collective."""
+        state = self.state_of(alpha)
+        before = state.system.products
+        forms = self._shape_forms(state)
+        with self._timer.phase("objective"):
+            partials = self.objective.partials(state, forms)
+        with self._timer.phase("adjoint"):
+            linearised = linearise_face(state, self.choice)
+            adjoint = solve_adjoint(state, partials, linearised)
+        with self._timer.phase("gradient"):
+            by_bound = bound_sensitivity(state, adjoint, partials, linearised)
+            by_points = self._by_points(state, adjoint, partials.by_shape, by_bound)
+            gradient = self._by_design(by_points)
+        self.evaluations += 1
+        self.products += state.system.products
+        comm = self.decomposition.comm
+        # Ranks must take the same decisions: rounding in sums over ranks may not tell them apart.
+        value, gradient = comm.bcast((partials.value, gradient))
+        point = DesignPoint(
+            np.array(alpha, dtype=float), value, gradient, state, linearised.weak, state.system.products - before
+        )
+        logger.info("design %d: J = %.9g, %d products", self.evaluations, value, state.system.products)
+        self.last = point
+        return point
+
+    def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the volume of the designed bodies and its gradient, [length³]. Collective."""
+        scene = self.scene_of(alpha)
+        names = sorted({design.body for design in self.designs})
+        tearing = self.decomposition.tearing
+        total, by_points = 0.0, np.zeros((int(tearing.node_offset[-1]), 3))
+        for name in names:
+            mesh = scene.bodies[name].mesh
+            total += mesh.volume
+            by_points[tearing.global_nodes(name, np.arange(mesh.n_nodes))] = volume_by_points(mesh)
+        return total, self._by_design(by_points)
+
+    def _by_points(self, state: State, adjoint: Adjoint, by_shape: np.ndarray, by_bound: np.ndarray) -> np.ndarray:
+        """Sum the objective's own derivative, −wᵀ(δK u − δf) and the contact points' share over all ranks."""
+        torn = state.system.torn
+        work = work_by_shape(self._shape_forms(state), torn, state.torn_displacement, adjoint.displacement)
+        contact = contact_by_shape(state, adjoint, by_bound)
+        return np.asarray(torn.decomposition.comm.allreduce(by_shape - work)) + contact
+
+    def _by_design(self, by_points: np.ndarray) -> np.ndarray:
+        parts = []
+        for design, motion in zip(self.designs, self._motions, strict=True):
+            mesh = self.scene.bodies[design.body].mesh
+            nodes = self.decomposition.tearing.global_nodes(design.body, np.arange(mesh.n_nodes))
+            parts.append(design.pull_back(motion.pull_back(by_points[nodes])))
+        return np.concatenate(parts)
+
+    def _split(self, alpha: np.ndarray) -> list[np.ndarray]:
+        return np.split(alpha, np.cumsum([design.size for design in self.designs])[:-1])
+
+    def _shape_forms(self, state: State) -> ShapeForms:
+        if self._forms is None:
+            self._forms = ShapeForms(state.system.torn)
+        return self._forms
+
+    def _motion(self, design: SurfaceDesign) -> HarmonicExtension:
+        scene, name = self.scene, design.body
+        if name not in scene.bodies:
+            raise InvalidInputError(f"a design names body {name!r}, the scene has {sorted(scene.bodies)}: use one of them")
+        body = scene.bodies[name]
+        surfaces = {part.surface for part in scene.supports if part.body == name}
+        surfaces |= {load.surface for load in scene.loads if load.body == name and not isinstance(load, BodyForce)}
+        held = np.unique(np.concatenate([np.unique(body.mesh.surfaces[s]) for s in sorted(surfaces)] or [[]])).astype(int)
+        return HarmonicExtension(self.decomposition, name, body, design.surface.nodes, held)

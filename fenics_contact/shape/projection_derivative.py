@@ -1,0 +1,92 @@
+"""Reverse mode through the closest-point projection: from gap, normal and weights back to coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.feti.contact_search import reference_axes
+from fenics_contact.feti.projection import interpolated_normal, newton_matrix
+from fenics_contact.feti.surface import FacetedSurface, shape_functions
+from fenics_contact.shape.surface_derivative import normals_pulled_back
+
+
+@dataclass(frozen=True)
+class PointDerivatives:
+    """Derivatives of a scalar by what the projection gives at each contact point.
+
+    Attributes:
+        gap: By the gap, shape (n,).
+        normal: By the normal, shape (n, 3).
+        tangents: By the tangents, shape (n, 2, 3).
+        weight: By the weights of the facet's corners, shape (n, corners).
+    """
+
+    gap: np.ndarray
+    normal: np.ndarray
+    tangents: np.ndarray
+    weight: np.ndarray
+
+
+def frames_pulled_back(normal: np.ndarray, by_tangents: np.ndarray) -> np.ndarray:
+    """Return the derivative by the unit normals from that by the tangents built on them, shape (n, 3).
+
+    Reverse of `fenics_contact.feti.contact_search.tangent_frames`.
+
+    Args:
+        normal: Unit normals, shape (n, 3).
+        by_tangents: Derivative by both tangents, shape (n, 2, 3).
+    """
+    axes = reference_axes(normal)
+    along = np.einsum("nd,nd->n", axes, normal)
+    first = axes - along[:, None] * normal
+    length = np.linalg.norm(first, axis=1)
+    t1 = first / length[:, None]
+    # t2 = n × t1
+    by_t1 = by_tangents[:, 0] + np.cross(by_tangents[:, 1], normal)
+    by_normal = np.cross(t1, by_tangents[:, 1])
+    by_first = (by_t1 - np.einsum("nd,nd->n", by_t1, t1)[:, None] * t1) / length[:, None]
+    by_normal -= along[:, None] * by_first + np.einsum("nd,nd->n", by_first, normal)[:, None] * axes
+    return by_normal
+
+
+def projection_pulled_back(
+    master: FacetedSurface, facet: np.ndarray, local: np.ndarray, gap: np.ndarray, by: PointDerivatives
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the derivatives by the slave points and by the master's nodes.
+
+    The projection solves Σ N_j(ξ) x_j + g n(ξ) − x_s = 0 with n = m/‖m‖, m = Σ N_j(ξ) a_j, a_j the nodal
+    normals; the implicit function theorem gives ξ and g.
+
+    Args:
+        master: The master surface.
+        facet: Facet of each point, shape (n,).
+        local: ξ, shape (n, 2).
+        gap: g, shape (n,), [length].
+        by: Derivatives by gap, normal, tangents and weights.
+
+    Returns:
+        Derivative by each slave point, shape (n, 3), and by each node of the master surface, (n_nodes, 3).
+    """
+    nodes = master.facets[facet]
+    corners, normals = master.points[nodes], master.normals[nodes]
+    values, derivatives = shape_functions(local, master.corners)
+    normal, length = interpolated_normal(values, normals)
+    by_normal = by.normal + frames_pulled_back(normal, by.tangents)
+    by_mean = _tangential(by_normal, normal) / length[:, None]
+    by_local = np.einsum("nk,nka->na", by.weight, derivatives)
+    by_local += np.einsum("nka,nkd,nd->na", derivatives, normals, by_mean)
+    matrix = newton_matrix(corners, normals, derivatives, gap, normal, length)
+    right = np.concatenate([by_local, by.gap[:, None]], axis=1)
+    z = -np.linalg.solve(np.swapaxes(matrix, 1, 2), right[:, :, None])[:, :, 0]
+    # z is the derivative by the residual; the residual depends on x_s, x_j and, through g n, on a_j.
+    by_mean = by_mean + gap[:, None] * _tangential(z, normal) / length[:, None]
+    by_points, by_normals = np.zeros_like(master.points), np.zeros_like(master.points)
+    np.add.at(by_points, nodes, values[:, :, None] * z[:, None])
+    np.add.at(by_normals, nodes, values[:, :, None] * by_mean[:, None])
+    return -z, by_points + normals_pulled_back(master, by_normals)
+
+
+def _tangential(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    return vectors - np.einsum("nd,nd->n", vectors, normal)[:, None] * normal

@@ -1,0 +1,118 @@
+"""Picture of the bodies cut into subdomains."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry import BodyMesh, boundary_faces
+from fenics_contact.scene import Scene
+from fenics_contact.viz.colours import INK, colour_subdomains, neighbours
+from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet, show_image
+from fenics_contact.viz.stage import Layer, render, segments, surface
+from fenics_contact.viz.view import frame_around, oblique_view
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+
+def plot_decomposition(
+    scene: Scene,
+    partitions: Mapping[str, np.ndarray],
+    path: str | Path,
+    *,
+    explode: float = 0.0,
+    width: int = 1600,
+    comm: MPI.Comm | None = None,
+) -> Path:
+    """Draw the subdomains of all bodies; neighbours have different colours.
+
+    Args:
+        scene: The bodies.
+        partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
+        path: PNG file to write.
+        explode: How much each subdomain shrinks towards its centre, from 0 (whole bodies) to below 1.
+        width: Width of the picture in pixels.
+        comm: If given, only rank 0 draws, and all ranks learn of an error.
+
+    Returns:
+        The path.
+
+    Raises:
+        InvalidInputError: If a partition does not fit its body or ``explode`` is out of range.
+        MissingRequirementError: If this machine cannot render.
+
+    Note:
+        Collective on ``comm`` if given.
+    """
+    target = png_path(path)
+    if not 0.0 <= explode < 1.0:
+        raise InvalidInputError(f"explode must be at least 0 and below 1, got {explode}: try 0.1")
+    for name, body in scene.bodies.items():
+        _check_partition(name, body.mesh, partitions)
+    draw_on_one_rank(comm, lambda: _draw(scene, partitions, target, explode, width))
+    return target
+
+
+def _check_partition(name: str, mesh: BodyMesh, partitions: Mapping[str, np.ndarray]) -> None:
+    shape = np.shape(partitions[name]) if name in partitions else "none"
+    if shape != (mesh.n_cells,):
+        raise InvalidInputError(
+            f"partitions[{name!r}] must have shape ({mesh.n_cells},), one subdomain a cell, got {shape}: pass the "
+            "partitions that the scene was cut with"
+        )
+
+
+def _draw(
+    scene: Scene, partitions: Mapping[str, np.ndarray], target: Path, explode: float, width: int
+) -> None:
+    layers = []
+    for family, (name, body) in enumerate(scene.bodies.items()):
+        layers += _body_layers(body.mesh, np.asarray(partitions[name]), family, explode)
+    points = np.concatenate([body.mesh.points for body in scene.bodies.values()])
+    view = oblique_view(points)
+    frame = frame_around(view, points)
+    count = sum(np.unique(partitions[name]).size for name in scene.bodies)
+    cells = sum(body.mesh.n_cells for body in scene.bodies.values())
+    title = f"{count} subdomains of {len(scene.bodies)} bodies, {cells:,} cells".replace(",", "\u202f")
+    image = render(layers, view, frame, width)
+    with sheet(target, (width, image.shape[0] + 60), title) as figure:
+        show_image(figure.subplots(), image)
+
+
+def _body_layers(mesh: BodyMesh, partition: np.ndarray, family: int, explode: float) -> list[Layer]:
+    colours = colour_subdomains(neighbours(mesh.cells, partition), family)
+    layers = []
+    for number in np.unique(partition):
+        faces, _ = boundary_faces(mesh.cells[partition == number])
+        piece = surface(mesh.points, faces)
+        centre = piece.points.mean(axis=0)
+        piece.points = centre + (1.0 - explode) * (piece.points - centre)
+        look = {"color": colours[number], "show_edges": True, "edge_color": INK, "edge_opacity": 0.25}
+        layers.append(Layer(piece, {**look, "ambient": 0.25, "diffuse": 0.8, "line_width": 1}))
+        edges = outline(faces, np.zeros(len(faces), dtype=int)) if explode else None
+        del edges
+    return [*layers, *([] if explode else [Layer(segments(mesh.points, _seams(mesh, partition)), _SEAM)])]
+
+
+_SEAM = {"color": INK, "line_width": 4, "lighting": False}
+
+
+def _seams(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
+    """Edges of the body's surface at which subdomains meet, (n, 2)."""
+    faces, cells = boundary_faces(mesh.cells)
+    return outline(faces, partition[cells])
+
+
+def outline(faces: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """Return the edges of a closed surface between faces of different labels, (n, 2)."""
+    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    labels = np.repeat(label, faces.shape[1])
+    order = np.lexsort((edges[:, 1], edges[:, 0]))
+    edges, labels = edges[order], labels[order]
+    same = np.all(edges[1:] == edges[:-1], axis=1) & (labels[1:] != labels[:-1])
+    return edges[1:][same]

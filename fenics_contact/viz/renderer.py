@@ -1,0 +1,59 @@
+"""Can this machine render? Asked in a process of its own, because VTK without OpenGL dies by a signal."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+from functools import lru_cache
+
+from fenics_contact.errors import MissingRequirementError
+
+#: Renders a window of four pixels. VTK's choice of OpenGL depends on the environment and on shared libraries only.
+_PROBE = """
+from vtkmodules.vtkRenderingCore import vtkRenderWindow
+import vtkmodules.vtkRenderingOpenGL2
+window = vtkRenderWindow()
+window.SetOffScreenRendering(1)
+window.SetSize(2, 2)
+window.Render()
+"""
+
+#: What decides where VTK looks for OpenGL.
+_DECIDING = ("VTK_DEFAULT_OPENGL_WINDOW", "VTK_DEFAULT_EGL_DEVICE_INDEX", "DISPLAY", "LD_LIBRARY_PATH")
+
+
+def check_renderer() -> None:
+    """Make sure that pyvista can draw, with or without a display; takes half a second, once.
+
+    Raises:
+        MissingRequirementError: If pyvista is not installed, or if there is neither EGL nor OSMesa nor an X
+            server to draw with.
+    """
+    for module in ("pyvista", "matplotlib"):
+        if importlib.util.find_spec(module) is None:
+            raise MissingRequirementError(
+                f"pictures need {module}, found none: pip install 'fenics_contact[viz]'", name=module
+            )
+    ending = _probe(tuple(os.environ.get(name) for name in _DECIDING))
+    if ending:
+        window = os.environ.get("VTK_DEFAULT_OPENGL_WINDOW", "not set")
+        raise MissingRequirementError(
+            f"pictures need EGL, OSMesa or an X server to draw with, but a trial rendering {ending} "
+            f"(VTK_DEFAULT_OPENGL_WINDOW is {window}): install EGL (Debian: apt-get install libegl1; conda-forge: "
+            "conda install libegl mesa-libegl-devel-cos7-x86_64) and set VTK_DEFAULT_OPENGL_WINDOW=vtkEGLRenderWindow",
+            name="libegl1",
+        )
+
+
+@lru_cache(maxsize=4)
+def _probe(environment: tuple[str | None, ...]) -> str:
+    """Return how the trial rendering ended, empty if well. ``environment`` only tells answers apart."""
+    try:
+        ending = subprocess.run([sys.executable, "-c", _PROBE], capture_output=True, timeout=120.0, check=False)
+    except subprocess.TimeoutExpired:
+        return "did not end within two minutes"
+    if ending.returncode < 0:
+        return f"died by signal {-ending.returncode}"
+    return f"ended with exit status {ending.returncode}" if ending.returncode else ""

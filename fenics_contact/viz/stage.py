@@ -1,0 +1,87 @@
+"""Renders meshes to an image array with pyvista, off screen, on white, in parallel projection."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from fenics_contact.viz.renderer import check_renderer
+from fenics_contact.viz.view import Frame, View
+
+#: Pixels are averaged over squares of this many, which smooths edges on every machine alike.
+SUPERSAMPLING = 2
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A mesh and how to draw it.
+
+    Attributes:
+        mesh: pyvista data set.
+        options: Keywords of ``pyvista.Plotter.add_mesh``.
+    """
+
+    mesh: Any
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+
+def surface(points: np.ndarray, faces: np.ndarray) -> Any:
+    """Return faces (n, 3 | 4) as a pyvista surface that holds only the points it uses."""
+    used, local = np.unique(faces, return_inverse=True)
+    mesh = pv.PolyData.from_regular_faces(points[used], local.reshape(faces.shape))
+    mesh.point_data["node"] = used
+    return mesh
+
+
+def segments(points: np.ndarray, edges: np.ndarray) -> Any:
+    """Return edges (n, 2) as pyvista lines."""
+    lines = np.column_stack([np.full(len(edges), 2), edges])
+    return pv.PolyData(np.asarray(points), lines=lines.ravel())
+
+
+def render(layers: Iterable[Layer], view: View, frame: Frame, width: int) -> np.ndarray:
+    """Render one image.
+
+    Args:
+        layers: What to draw.
+        view: From which side.
+        frame: Which part; its proportions are those of the image.
+        width: Width of the image in pixels.
+
+    Returns:
+        Image, (height, width, 3) uint8.
+
+    Raises:
+        MissingRequirementError: If this machine cannot render.
+    """
+    check_renderer()
+    height = max(2, round(width * float(frame.size[1] / frame.size[0])))
+    window = [SUPERSAMPLING * width, SUPERSAMPLING * height]
+    plotter = pv.Plotter(off_screen=True, window_size=window, theme=pv.themes.DocumentTheme())
+    try:
+        plotter.background_color = "white"
+        middle = np.zeros(3)
+        for layer in layers:
+            plotter.add_mesh(layer.mesh, **{"show_scalar_bar": False, "reset_camera": False, **layer.options})
+            middle = np.asarray(layer.mesh.center)
+        _aim(plotter, view, frame, middle)
+        image = plotter.screenshot(None, return_img=True)
+    finally:
+        plotter.close()
+    blocks = np.asarray(image)[..., :3].reshape(height, SUPERSAMPLING, width, SUPERSAMPLING, 3)
+    return np.asarray(blocks.mean(axis=(1, 3)).round(), dtype=np.uint8)
+
+
+def _aim(plotter: Any, view: View, frame: Frame, middle: np.ndarray) -> None:
+    target = frame.centre[0] * view.right + frame.centre[1] * view.up + (middle @ view.towards) * view.towards
+    camera = plotter.camera
+    camera.parallel_projection = True
+    camera.focal_point = target
+    camera.position = target + float(np.max(frame.size)) * view.towards
+    camera.up = view.up
+    camera.parallel_scale = float(frame.size[1]) / 2
+    plotter.reset_camera_clipping_range()

@@ -1,0 +1,104 @@
+"""From which side a picture is taken, and what part of it is seen; parallel projection."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class View:
+    """A direction of view.
+
+    Attributes:
+        towards: Unit vector from the scene to the viewer, (3,).
+        up: Unit vector that points up in the picture, perpendicular to it, (3,).
+    """
+
+    towards: np.ndarray
+    up: np.ndarray
+
+    @property
+    def right(self) -> np.ndarray:
+        """Unit vector that points right in the picture, (3,)."""
+        return np.cross(self.up, self.towards)
+
+    def project(self, points: np.ndarray) -> np.ndarray:
+        """Return places in the picture, (n, 2): right and up."""
+        return points @ np.column_stack([self.right, self.up])
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The rectangle of a view that a picture shows.
+
+    Attributes:
+        low: Lower left corner in picture coordinates, (2,).
+        high: Upper right corner, (2,).
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Middle, (2,)."""
+        return (self.low + self.high) / 2
+
+    @property
+    def size(self) -> np.ndarray:
+        """Width and height, (2,)."""
+        return self.high - self.low
+
+
+def frame_around(view: View, points: np.ndarray, margin: float = 0.02) -> Frame:
+    """Return the frame that holds all points, wider by a fraction of its larger side."""
+    places = view.project(points)
+    low, high = places.min(axis=0), places.max(axis=0)
+    border = margin * float(np.max(high - low))
+    return Frame(low - border, high + border)
+
+
+def looking_along(towards: np.ndarray, horizontal: np.ndarray) -> View:
+    """Return the view from a side in which a direction appears horizontal.
+
+    Args:
+        towards: From the scene to the viewer, (3,), any length.
+        horizontal: Direction that points right in the picture, not parallel to it, (3,).
+    """
+    towards = towards / np.linalg.norm(towards)
+    right = horizontal - (horizontal @ towards) * towards
+    right /= np.linalg.norm(right)
+    return View(towards, np.cross(towards, right))
+
+
+def oblique_view(points: np.ndarray) -> View:
+    """Look from the front, somewhat from above and from the left, the longer of x and y horizontal.
+
+    The turn about the vertical axis is small: both a ring that lies and one that stands show their openings.
+    """
+    extent = np.ptp(points, axis=0)
+    front = np.array([-0.30, -1.0, 0.72])
+    if extent[1] > extent[0]:
+        return looking_along(np.array([1.0, -0.30, 0.72]), np.array([0.0, 1.0, 0.0]))
+    return looking_along(front, np.array([1.0, 0.0, 0.0]))
+
+
+def face_on(normal: np.ndarray) -> View:
+    """Look straight onto a plane: z up where the plane is upright, else y up.
+
+    Args:
+        normal: From the plane to the viewer, (3,), any length.
+    """
+    towards = normal / np.linalg.norm(normal)
+    reference = np.array([0.0, 0.0, 1.0]) if abs(towards[2]) < 0.8 else np.array([0.0, 1.0, 0.0])
+    return looking_along(towards, np.cross(reference, towards))
+
+
+def axis_label(direction: np.ndarray) -> str:
+    """Name a direction: "x", "−z", or "" if it runs along no axis."""
+    axis = int(np.argmax(np.abs(direction)))
+    if abs(direction[axis]) < 0.999:
+        return ""
+    return ("" if direction[axis] > 0 else "−") + "xyz"[axis]

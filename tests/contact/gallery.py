@@ -1,0 +1,69 @@
+"""Tiny scenes with everything in them: nodes that stick, nodes that slip, nodes that lift off."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fenics_contact.geometry import BodyMesh, block, box_partition
+from fenics_contact.scene import (
+    Body,
+    BodyForce,
+    ContactPair,
+    Coulomb,
+    IsotropicElasticity,
+    RigidPlane,
+    Scene,
+    Support,
+    Surface,
+    Traction,
+    Tresca,
+)
+
+SOFT, STIFF = IsotropicElasticity(100.0, 0.3), IsotropicElasticity(300.0, 0.2)
+FLOOR = RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+Friction = Coulomb | Tresca | None
+
+
+def crowned(mesh: BodyMesh, rise: float) -> BodyMesh:
+    """Bend the lower face of a block upwards towards its ends in x, most at the ends, not at all on top."""
+    points = mesh.points.copy()
+    low, high = points.min(axis=0), points.max(axis=0)
+    along = 2 * (points[:, 0] - low[0]) / (high[0] - low[0]) - 1
+    below = (high[2] - points[:, 2]) / (high[2] - low[2])
+    points[:, 2] += rise * along**2 * below
+    return mesh.moved(points)
+
+
+def block_on_plane(friction: Friction, cell: str = "hexahedron", push: float = 1.0) -> Scene:
+    """A block on a rigid floor that nothing else holds: pressed on top, pushed along x and a little along y.
+
+    The push tips the block: its heel lifts off, its toe is pressed hardest.
+    """
+    mesh = block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (6, 3, 3), cell)
+    load = Traction("block", "z1", (push, 0.3 * push, -2.0))
+    pair = ContactPair(Surface("block", "z0"), FLOOR, friction)
+    return Scene({"block": Body(mesh, SOFT)}, loads=[load], contacts=[pair])
+
+
+def two_blocks(friction: Friction, cell: str = "hexahedron", push: float = 0.6) -> Scene:
+    """A crowned block pressed on another with a mesh that does not match; nothing else holds the upper one."""
+    lower = block((0.0, 0.0, -1.0), (2.0, 1.0, 0.0), (5, 3, 2), cell)
+    upper = crowned(block((0.1, 0.05, 0.0), (1.9, 0.95, 0.8), (6, 4, 2), cell), 0.02)
+    return Scene(
+        {"lower": Body(lower, STIFF), "upper": Body(upper, SOFT)},
+        [Support("lower", "z0")],
+        [Traction("upper", "z1", (push, 0.2 * push, -2.0)), BodyForce("upper", (0.0, 0.0, -0.1))],
+        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), friction)],
+    )
+
+
+def partitions(scene: Scene, boxes: tuple[int, int, int] = (2, 1, 1)) -> dict[str, np.ndarray]:
+    """Cut every body into the same boxes."""
+    return {name: box_partition(body.mesh, boxes) for name, body in scene.bodies.items()}
+
+
+def with_friction(scene: Scene, friction: Friction) -> Scene:
+    """Return the scene with another friction law on every pair."""
+    return replace(scene, contacts=[replace(pair, friction=friction) for pair in scene.contacts])
