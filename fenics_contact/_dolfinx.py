@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import logging
 import sys
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -30,6 +32,7 @@ def _side_effects_undone() -> Iterator[None]:
     """
     root = logging.getLogger()
     handlers, level, setdlopenflags = list(root.handlers), root.level, sys.setdlopenflags
+    showwarning = warnings.showwarning
     sys.setdlopenflags = lambda flags: None
     try:
         yield
@@ -37,7 +40,8 @@ def _side_effects_undone() -> Iterator[None]:
         sys.setdlopenflags = setdlopenflags
         root.handlers[:] = handlers
         root.setLevel(level)
-        logging.captureWarnings(False)
+        if warnings.showwarning is not showwarning:
+            logging.captureWarnings(False)
 
 
 with _side_effects_undone():
@@ -61,10 +65,10 @@ __all__ = [
     "cell_nodes",
     "cellwise_space",
     "coefficient",
-    "create_mesh",
     "displacement_space",
     "field_symbols",
     "global_dofs",
+    "local_mesh",
     "match_facets",
     "nodal_space",
     "node_dofs",
@@ -138,57 +142,73 @@ def _cellwise_element(cell_type: str) -> Any:
     return basix.ufl.element("DG", cell_type, 0)
 
 
-def _partitioner() -> Any:
-    """Leave every cell on the rank that hands it in."""
+def _partitioner(destinations: Any) -> Any:
+    """Send every cell to the ranks in its row of ``destinations``, the first of which owns it."""
     if _OLD:
-
-        def stay(comm: Any, parts: int, tdim: int, cells: Any, ghost_mode: Any) -> Any:
-            return cpp.graph.AdjacencyList_int32(np.full((cells.num_nodes, 1), comm.rank, dtype=np.int32))
-
-        return stay
-
-    def stay_new(comm: Any, parts: int, cell_types: Any, cells: Any) -> Any:
-        vertices = len(_VERTEX_ORDER[cell_types[0].name])
-        count = len(cells[0]) // vertices
-        return cpp.graph.AdjacencyList_int32(np.full((count, 1), comm.rank, dtype=np.int32))
-
-    return stay_new
+        return lambda comm, parts, tdim, cells, ghost_mode: destinations
+    return lambda comm, parts, cell_types, cells: destinations
 
 
-def create_mesh(comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, cell_type: str) -> Any:
-    """Build a dolfinx mesh whose cells stay on the rank that hands them in. Collective on ``comm``.
+def local_mesh(points: np.ndarray, cells: np.ndarray, cell_type: str) -> Any:
+    """Build a mesh that lives on this rank alone.
 
     Args:
-        comm: Communicator of the mesh.
-        points: This rank's slice of the coordinates, shape (n, 3), [length]; the slices of all ranks,
-            concatenated, hold the input nodes in order.
-        cells: This rank's cells as input nodes, VTK order, shape (m, 8) or (m, 4).
+        points: Coordinates, shape (n, 3), [length].
+        cells: Rows of node numbers in VTK order, shape (m, 8) or (m, 4).
         cell_type: ``"hexahedron"`` or ``"tetrahedron"``.
     """
-    ordered = np.ascontiguousarray(cells[:, _VERTEX_ORDER[cell_type]], dtype=np.int64)
-    points = np.ascontiguousarray(points, dtype=np.float64)
-    if _OLD:
-        domain = ufl.Mesh(_element(cell_type, (3,)))
-        adjacency = cpp.graph.AdjacencyList_int64(ordered)
-        ghost = cpp.mesh.GhostMode.none
-        return dolfinx.mesh.create_mesh(comm, adjacency, points, domain, ghost, _partitioner())
-    element = _element(cell_type, (3,))
-    return dolfinx.mesh.create_mesh(comm, cells=ordered, x=points, e=element, partitioner=_partitioner())
+    return _create_mesh(MPI.COMM_SELF, points, cells, cell_type, np.zeros((len(cells), 1), dtype=np.int32))
 
 
-def rank_mesh(comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, cell_type: str) -> Any:
-    """Build a distributed mesh from coordinates known to all ranks and cells known to their owners.
-
-    Collective on ``comm``.
+def rank_mesh(comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, rank: np.ndarray, cell_type: str) -> Any:
+    """Build a distributed mesh whose cells live on given ranks; a rank may have none. Collective on ``comm``.
 
     Args:
         comm: Communicator of the mesh.
-        points: All coordinates, shape (n_nodes, 3), the same on every rank.
-        cells: The cells that this rank owns, as rows of node numbers in VTK order.
+        points: All coordinates, shape (n_nodes, 3), replicated, [length].
+        cells: All cells, rows of node numbers in VTK order, replicated.
+        rank: Owner of each cell, shape (n_cells,), replicated.
         cell_type: ``"hexahedron"`` or ``"tetrahedron"``.
     """
     bounds = np.linspace(0, len(points), comm.size + 1).astype(int)
-    return create_mesh(comm, points[bounds[comm.rank] : bounds[comm.rank + 1]], cells, cell_type)
+    mine = np.flatnonzero(rank == comm.rank)
+    destinations: Any = np.full((len(mine), 1), comm.rank, dtype=np.int32)
+    if _OLD and comm.size > 1:
+        destinations = _with_ghosts(cells, rank, mine, comm)
+    part = points[bounds[comm.rank] : bounds[comm.rank + 1]]
+    return _create_mesh(comm, part, cells[mine], cell_type, destinations)
+
+
+def _with_ghosts(cells: np.ndarray, rank: np.ndarray, mine: np.ndarray, comm: MPI.Comm) -> Any:
+    """Send each cell to its owner and to all ranks around it.
+
+    dolfinx 0.5 does not find out that two ranks share a vertex unless a ghost cell tells it.
+    """
+    n_nodes, vertices = int(cells.max()) + 1, cells.shape[1]
+    around = sp.csr_matrix((np.ones(cells.size), (cells.ravel(), np.repeat(rank, vertices))), shape=(n_nodes, comm.size))
+    incidence = sp.csr_matrix(
+        (np.ones(len(mine) * vertices), (np.repeat(np.arange(len(mine)), vertices), cells[mine].ravel())),
+        shape=(len(mine), n_nodes),
+    )
+    reached = (incidence @ around).tocoo()
+    others = reached.col != comm.rank
+    rows = np.concatenate([np.arange(len(mine)), reached.row[others]])
+    columns = np.concatenate([np.full(len(mine), comm.rank), reached.col[others]])
+    order = np.argsort(rows, kind="stable")  # the owner, listed first, stays first
+    offsets = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(mine)))])
+    return cpp.graph.AdjacencyList_int32(columns[order].astype(np.int32), offsets.astype(np.int32))
+
+
+def _create_mesh(comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, cell_type: str, destinations: Any) -> Any:
+    ordered = np.ascontiguousarray(cells[:, _VERTEX_ORDER[cell_type]], dtype=np.int64)
+    points = np.ascontiguousarray(points, dtype=np.float64)
+    if isinstance(destinations, np.ndarray):
+        destinations = cpp.graph.AdjacencyList_int32(destinations)
+    element, partitioner = _element(cell_type, (3,)), _partitioner(destinations)
+    if _OLD:
+        adjacency, ghost_mode = cpp.graph.AdjacencyList_int64(ordered), cpp.mesh.GhostMode.shared_facet
+        return dolfinx.mesh.create_mesh(comm, adjacency, points, ufl.Mesh(element), ghost_mode, partitioner)
+    return dolfinx.mesh.create_mesh(comm, cells=ordered, x=points, e=element, partitioner=partitioner)
 
 
 def _space(mesh: Any, shape: tuple[int, ...]) -> Any:
@@ -220,10 +240,14 @@ def _cell_count(mesh: Any) -> int:
     return int(index_map.size_local + index_map.num_ghosts)
 
 
+def _input_nodes(mesh: Any) -> np.ndarray:
+    return np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
+
+
 def cell_nodes(mesh: Any) -> np.ndarray:
     """Return the input nodes of this rank's cells, tensor-product order, shape (n_cells, n_vertices)."""
     dofmap = _table(mesh.geometry.dofmap, _cell_count(mesh))
-    return np.asarray(mesh.geometry.input_global_indices)[dofmap]
+    return _input_nodes(mesh)[dofmap]
 
 
 def node_dofs(space: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -241,7 +265,7 @@ def node_dofs(space: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def update_coordinates(mesh: Any, points: np.ndarray) -> None:
     """Move the nodes of ``mesh`` to ``points``, shape (n_nodes, 3), indexed by input node."""
-    mesh.geometry.x[:] = points[np.asarray(mesh.geometry.input_global_indices)]
+    mesh.geometry.x[:] = points[_input_nodes(mesh)]
 
 
 def match_facets(mesh: Any, surface: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

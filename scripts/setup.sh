@@ -72,10 +72,12 @@ fingerprint() {
   { echo "$root" "$release"; "$python" --version; cat pyproject.toml "$constraints" "${BASH_SOURCE[0]}"; } | sha256sum
 }
 
-# A .venv that was begun and not finished, is of another Python or cannot run pip is built anew.
+# A .venv that was begun and not finished, was moved, is of another Python or cannot run pip is built anew.
 venv_is_sound() {
-  [ ! -e "$unfinished" ] && grep -qs '^include-system-site-packages = true' $venv/pyvenv.cfg &&
-    grep -qsx "home = ${python%/*}" $venv/pyvenv.cfg && $venv/bin/python -m pip --version >/dev/null 2>&1
+  local config=$venv/pyvenv.cfg
+  [ ! -e $unfinished ] && grep -qsx 'include-system-site-packages = true' $config &&
+    grep -qsx "home = ${python%/*}" $config && grep -qsF " $root/$venv" $config &&
+    $venv/bin/python -m pip --version >/dev/null 2>&1
 }
 
 build_venv() {

@@ -12,6 +12,7 @@ import textwrap
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -27,6 +28,10 @@ def read_environment(path: Path) -> dict[str, str]:
 
 # Before anything imports NumPy or MPI: both read their environment once, when they are loaded.
 os.environ.update(read_environment(ROOT / "scripts" / "environment"))
+
+# How long an example takes says nothing on cores that ranks share, or while a form is compiled.
+hypothesis.settings.register_profile("house", deadline=None)
+hypothesis.settings.load_profile("house")
 
 
 def pytest_collection_finish() -> None:

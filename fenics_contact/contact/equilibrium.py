@@ -13,9 +13,8 @@ from fenics_contact.contact.held import check_held
 from fenics_contact.contact.result import ContactResult, Status
 from fenics_contact.contact.state import State
 from fenics_contact.contact.warm_start import carried_over
-from fenics_contact.errors import together
 from fenics_contact.feti import Decomposition, DualSystem, build_torn_system, decompose
-from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, contact_step, solve
+from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, Smalse, contact_step, solve
 from fenics_contact.scene import Scene
 from fenics_contact.timing import PhaseTimer
 
@@ -82,14 +81,21 @@ def find_state(
 
 
 def solve_dual(system: DualSystem, solver: DualSolver, start: np.ndarray | None = None) -> DualSolution:
-    """Solve the dual problem of a system with the friction laws of its scene. Collective."""
+    """Solve the dual problem of a system with the friction laws of its scene. Collective.
+
+    Args:
+        system: The system.
+        solver: `FaceNewton` and `FixedPoint` know Coulomb's law; a `FixedPoint` is put around `Smalse`.
+        start: Multiplier to start from, owned, or None.
+    """
     discs, torn = system.owned_discs(), system.torn
     tresca, coefficient = torn.tresca_bound[discs], torn.friction_coefficient[discs]
     if not np.any(torn.friction_coefficient > 0):
         return solve(system.problem, tresca, solver, start)
-    if isinstance(solver, FaceNewton):
-        return solve(system.problem, None, solver, start, friction_coefficient=coefficient)
-    return FixedPoint(solver).run(system.problem, coefficient, tresca, start)
+    if isinstance(solver, Smalse):
+        solver = FixedPoint(solver)
+    given = tresca if np.any(torn.tresca_bound > 0) else None
+    return solve(system.problem, given, solver, start, friction_coefficient=coefficient)
 
 
 def contact_result(system: DualSystem, solution: DualSolution) -> ContactResult:
@@ -114,5 +120,3 @@ def contact_result(system: DualSystem, solution: DualSolution) -> ContactResult:
 
     return ContactResult(torn.points, normal, spread(tau), spread(bound), gap, spread(-minus_slip), status)
 
-
-_ = together

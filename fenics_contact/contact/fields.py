@@ -15,9 +15,10 @@ from fenics_contact.scene import Body
 
 def body_mesh(decomposition: Decomposition, name: str, body: Body) -> Any:
     """Build the mesh of one body; a cell lives on the rank that owns its subdomain. Collective."""
-    own = [mesh.cells for mesh in decomposition.meshes if mesh.body == name]
-    cells = np.concatenate(own) if own else np.zeros(0, dtype=np.int64)
-    return _dolfinx.rank_mesh(decomposition.comm, body.mesh.points, body.mesh.cells[cells], body.mesh.cell_type)
+    tearing, mesh = decomposition.tearing, body.mesh
+    first = tearing.subdomain_offset[tearing.body_names.index(name)]
+    rank = tearing.subdomain_rank[first + decomposition.partitions[name]]
+    return _dolfinx.rank_mesh(decomposition.comm, mesh.points, mesh.cells, rank, mesh.cell_type)
 
 
 def nodal_displacement(decomposition: Decomposition, name: str, body: Body, torn: np.ndarray) -> np.ndarray:

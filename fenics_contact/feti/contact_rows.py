@@ -49,7 +49,7 @@ def _directed_rows(
     copy = np.repeat(tearing.first_copy[node], copies) + within
     row = np.repeat(row, copies)
     value = np.repeat(weight / copies, copies)[:, None] * directions[row]
+    # Directions along an axis leave the other components alone: the preconditioner asks what is touched.
+    entry, component = np.nonzero(value)
     owner = tearing.subdomain_rank[tearing.copy_subdomain[tearing.first_copy[slave]]]
-    return Rows(
-        np.repeat(row, 3), np.repeat(copy, 3), np.tile(np.arange(3), len(row)), value.ravel(), right, owner
-    )
+    return Rows(row[entry], copy[entry], component, value[entry, component], right, owner)

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 
 from fenics_contact import _dolfinx
 from fenics_contact.errors import InvalidInputError
@@ -76,7 +75,7 @@ def cut_out(number: int, body_name: str, body: Body, cells: np.ndarray, loads: S
     mesh = body.mesh
     used, local = np.unique(mesh.cells[cells], return_inverse=True)
     local = local.reshape(len(cells), -1)
-    own = _dolfinx.create_mesh(MPI.COMM_SELF, mesh.points[used], local, mesh.cell_type)
+    own = _dolfinx.local_mesh(mesh.points[used], local, mesh.cell_type)
     space = _dolfinx.coefficient(own, "u").function_space
     input_nodes, dofs = _dolfinx.node_dofs(space)
     nodes = np.empty(len(used), dtype=np.int64)

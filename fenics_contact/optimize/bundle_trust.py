@@ -51,9 +51,9 @@ class BundleTrust:
     | t or the radius is 0 for practical purposes | NO_DESCENT, INVALID_DESIGNS |
     | the quadratic programme cannot be solved | STEP_FAILED |
 
-    with ε ``tolerance``, s ``value_scale`` and r the length of the first step. On the published convex test
-    functions the error of J at the stop is below ε (s + \|J\|); for a nonconvex one the test asks for
-    stationarity only.
+    with ε ``tolerance``, s ``value_scale`` and r the length of the first step, or of the present one where
+    that is longer. On the published convex test functions the error of J at the stop is below ε (s + \|J\|);
+    for a nonconvex one the test asks for stationarity only.
 
     Attributes:
         tolerance: ε, relative stopping tolerance.

@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 
 # A row counts as satisfied within this fraction of the size of its terms: rounding, not freedom.
 _FEASIBILITY = 1e-9
+_PROJECTIONS = 3
 
 
 def _frozen(values: ArrayLike, name: str, dimensions: int) -> Array:
@@ -124,15 +125,18 @@ class FeasibleSet:
 
     def project(self, x: Array) -> Array:
         """Return the feasible point nearest to x, shape (n,); x clipped to the box where it is feasible."""
-        if not self.violations(x):
-            return self.clip(x)
         ones = np.ones(x.size)
-        near = self.around(x, ones)
-        reach = max(-near.room.min(initial=0.0), np.abs(near.miss).max(initial=0.0))
-        program = QuadraticProgram(
-            ones, 0.0 * ones, near.equality_rows, near.miss / reach, near.rows, near.room / reach
-        )
-        return self.clip(x + reach * solve(program).point)
+        # The first programme is solved to a part of the distance; the second removes what that leaves.
+        for _ in range(_PROJECTIONS):
+            if not self.violations(x):
+                break
+            near = self.around(x, ones)
+            reach = max(-near.room.min(initial=0.0), np.abs(near.miss).max(initial=0.0))
+            program = QuadraticProgram(
+                ones, 0.0 * ones, near.equality_rows, near.miss / reach, near.rows, near.room / reach
+            )
+            x = x + reach * solve(program).point
+        return self.clip(x)
 
     def around(self, x: Array, scale: Array) -> Surroundings:
         """Return the constraints on a step y from x in scaled variables.

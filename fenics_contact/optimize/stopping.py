@@ -17,14 +17,14 @@ _CERTIFICATE = 10.0  # slack of the certificate beside the predicted decrease
 class StoppingTest:
     r"""Test on the predicted decrease w and on the certificate σ + r‖z‖.
 
-    For a convex J every feasible point at the distance r satisfies J ≥ J(x) - (σ + r‖z‖): that is what
-    the certificate says, whatever t is. The predicted decrease w = σ + t‖z‖² alone could be
-    small only because t is, so that it is also asked for with the first t.
+    For a convex J no feasible point within the distance r is lower than the centre by more than
+    σ + r‖z‖: that is what the certificate says, whatever t is. The predicted decrease w = σ + t‖z‖² could
+    be small only because t is, so that it is asked for with the first t as well.
 
     Attributes:
         limit: Decrease of J that is not worth a step, ε (s + \|J\|).
         rounding: Decrease of J that its floating-point number cannot show.
-        reach: r in scaled variables.
+        reach: Least r, in scaled variables; a longer step extends it to its own length.
         first_t: Proximal parameter that the method began with.
     """
 
@@ -40,7 +40,7 @@ class StoppingTest:
             step: The step from the centre.
             solve: Gives the step from the same centre with another t.
         """
-        certificate = step.aggregate_error + self.reach * step.aggregate_norm
+        certificate = step.aggregate_error + max(self.reach, step.length) * step.aggregate_norm
         if certificate <= self.limit:
             return Reason.STATIONARY
         promising = step.decrease > max(self.limit, self.rounding)

@@ -78,7 +78,7 @@ def solve_step(bundle: Bundle, near: Surroundings, t: float) -> Step:
     lengths = np.sqrt((bundle.gradients**2).sum(axis=1))
     step, unit = _solved(bundle, near, t, lengths)
     for _ in range(_REFINEMENTS):
-        if step.aggregate_norm > _BLURRED * unit or step.aggregate_norm < _VANISHED * lengths.max():
+        if not _VANISHED * lengths.max() < step.aggregate_norm < _BLURRED * unit:
             break
         unit = step.aggregate_norm
         sharper = _refined(bundle, near, step, lengths)

@@ -1,1 +1,58 @@
-"""Solvers for the dual problem of contact: quadratic, with equilibrium, bounds and friction discs."""
+"""Solvers for the dual problem of contact: quadratic, with equilibrium, bounds and friction discs.
+
+The problem (`DualProblem`) is an operator, a coarse space and a layout; a solver (`FaceNewton`, `Smalse`,
+`ProjectedCG`) holds only its parameters; `solve` joins them to a `DualSolution` or raises. Vectors are
+distributed over the ranks of the problem's communicator.
+"""
+
+from __future__ import annotations
+
+from fenics_contact.qp.coarse import CoarseSpace
+from fenics_contact.qp.equilibrium import Equilibrium, find_equilibrium, require_equilibrium
+from fenics_contact.qp.face import Face, classify
+from fenics_contact.qp.face_newton import FaceNewton
+from fenics_contact.qp.face_system import FaceSystem, FaceSystems
+from fenics_contact.qp.feasible import FeasibleSet
+from fenics_contact.qp.layout import ContactLayout
+from fenics_contact.qp.linear import ProjectedCG
+from fenics_contact.qp.mpgp import Mpgp
+from fenics_contact.qp.pcg import FaceStep, Stop, projected_cg
+from fenics_contact.qp.problem import CountedOperator, DualProblem
+from fenics_contact.qp.residual import Residuals, contact_step, measure
+from fenics_contact.qp.slip_law import Coulomb, SlipLaw, Tresca
+from fenics_contact.qp.smalse import Smalse
+from fenics_contact.qp.solution import DualSolution, SmalseMemory, SolverStep
+from fenics_contact.qp.solve import DualSolver, solve
+
+__all__ = [
+    "CoarseSpace",
+    "ContactLayout",
+    "Coulomb",
+    "CountedOperator",
+    "DualProblem",
+    "DualSolution",
+    "DualSolver",
+    "Equilibrium",
+    "Face",
+    "FaceNewton",
+    "FaceStep",
+    "FaceSystem",
+    "FaceSystems",
+    "FeasibleSet",
+    "Mpgp",
+    "ProjectedCG",
+    "Residuals",
+    "SlipLaw",
+    "Smalse",
+    "SmalseMemory",
+    "SolverStep",
+    "Stop",
+    "Tresca",
+    "classify",
+    "contact_step",
+    "find_equilibrium",
+    "measure",
+    "projected_cg",
+    "require_equilibrium",
+    "solve",
+]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from fenics_contact.qp.iterate import Iterate, iterate_at
 from fenics_contact.qp.problem import DualProblem, Operator
 from fenics_contact.qp.reductions import Vector
-from fenics_contact.qp.residual import Residuals, measure
 from fenics_contact.qp.slip_law import SlipLaw
 from fenics_contact.qp.solution import DualSolution, SmalseMemory, SolverStep
 
@@ -17,37 +17,31 @@ class Certificate:
     """A multiplier whose product, α and residuals were recomputed from it alone.
 
     Attributes:
-        multiplier: λ, owned.
-        product: F λ, owned.
-        residual: r = F λ − d − Gᵀα, owned.
+        iterate: The multiplier with its exact product and residuals.
         alpha: α, shape (m,), replicated.
         slip_bound: Ψ, shape (n_friction,), owned.
-        residuals: All residuals of λ.
     """
 
-    multiplier: Vector
-    product: Vector
-    residual: Vector
+    iterate: Iterate
     alpha: Vector
     slip_bound: Vector
-    residuals: Residuals
 
     def solution(
         self,
         problem: DualProblem,
         history: Sequence[SolverStep],
         products: int,
-        memory: SmalseMemory | None,
+        memory: SmalseMemory | None = None,
     ) -> DualSolution:
         """Return the answer of a solve that took ``products`` products."""
         return DualSolution(
             problem=problem,
-            multiplier=self.multiplier,
-            residual=self.residual,
-            product=self.product,
+            multiplier=self.iterate.multiplier,
+            residual=self.iterate.residual,
+            product=self.iterate.product,
             alpha=self.alpha,
             slip_bound=self.slip_bound,
-            residuals=self.residuals,
+            residuals=self.iterate.residuals,
             iterations=len(history),
             products=products,
             history=tuple(history),
@@ -69,9 +63,6 @@ def certify(
         residual: A solver's own r, owned; of it only the choice of α is kept.
     """
     product = operator(multiplier)
-    flexed = product - problem.rhs
-    alpha = problem.coarse.coefficients(flexed - residual)
-    exact = flexed - problem.coarse.transpose(alpha)
-    feasible = law.feasible(multiplier)
-    residuals = measure(problem, feasible, multiplier, product, exact)
-    return Certificate(multiplier, product, exact, alpha, feasible.slip_bound, residuals)
+    alpha = problem.coarse.coefficients(product - problem.rhs - residual)
+    iterate = iterate_at(problem, law, multiplier, product, alpha)
+    return Certificate(iterate, alpha, law.bound(multiplier))

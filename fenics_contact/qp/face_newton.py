@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -10,72 +10,177 @@ from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp.certify import certify
 from fenics_contact.qp.face import Face, classify
 from fenics_contact.qp.face_system import FaceSystem, FaceSystems
-from fenics_contact.qp.pcg import FaceStep, projected_cg
+from fenics_contact.qp.iterate import Iterate, Start, apply_unless_zero, iterate_at
+from fenics_contact.qp.pcg import FaceStep, Stop, projected_cg
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_sum
-from fenics_contact.qp.residual import Residuals, contact_step, measure
+from fenics_contact.qp.rescue import rescue
+from fenics_contact.qp.residual import Residuals, contact_step
 from fenics_contact.qp.slip_law import SlipLaw
+from fenics_contact.qp.smalse import Smalse
 from fenics_contact.qp.solution import DualSolution, SolverStep
-from fenics_contact.qp.start import Start
 
 
 @dataclass(frozen=True)
 class FaceNewton:
+    """Faces by the natural map w = λ − ρ r, each solved by projected preconditioned CG.
+
+    On a face G λ = e holds exactly, so there is no loop for equilibrium. The inner tolerance follows the
+    outer residual. With Coulomb's law the slip bound is refreshed in every step: one loop for all.
+
+    Three things keep the active set from cycling. A disc whose friction force would turn by more than a
+    right angle has a ρ too large for it; its ρ is reduced until the force stays or the disc sticks. Steps
+    without progress are followed by SMALSE steps from the best iterate so far. And nothing is accepted
+    before its residuals were recomputed.
+
+    Attributes:
+        tolerance: Every residual of `Residuals` ends below it.
+        max_steps: Give up after that many Newton steps and rescues.
+        max_products: Give up after that many F-products.
+        forcing: Inner tolerance relative to the outer residual.
+        loosest: Largest inner tolerance.
+        patience: Steps in which the residual must halve before a rescue is called.
+        rescue: Parameters of the fallback.
+        rescue_products: Products that one rescue may spend.
+
+    References:
+        S. Hüeber, G. Stadler, B. Wohlmuth, A primal-dual active set algorithm for three-dimensional
+        contact problems with Coulomb friction, SIAM J. Sci. Comput. 30 (2008).
+    """
+
     tolerance: float = 1e-6
-    max_steps: int = 100
+    max_steps: int = 200
     max_products: int = 5000
-    forcing: float = 0.1
+    forcing: float = 0.2
     loosest: float = 0.1
-    rho: float = 1.0
-    adapt: bool = True
+    patience: int = 6
+    rescue: Smalse = field(default_factory=Smalse)
+    rescue_products: int = 300
 
     def run(self, problem: DualProblem, law: SlipLaw, start: Start) -> DualSolution:
-        history: list[SolverStep] = []
-        systems = FaceSystems(problem, start.operator)
-        rho = self.rho*contact_step(problem.layout, problem.diagonal)
-        lam, product, residual, residuals = start.multiplier, start.product, start.residual, start.residuals
-        face = None
-        for k in range(self.max_steps):
-            psi = law.bound(lam)
-            new = classify(problem.layout, psi, lam, residual, rho)
-            if face is not None and self.adapt:
-                flip = new.slip & face.slip & (np.einsum('ia,ia->i', new.direction, face.direction) < 0)
-                rho[problem.layout.tangential[flip]] *= 0.3
-                if flip.any():
-                    new = classify(problem.layout, psi, lam, residual, rho)
-            changes = -1 if face is None else round(float(global_sum(problem.comm, face.changes(new))[0]))
-            face = new
-            system = systems.build(face)
-            entered = system.enter(lam)
-            move = entered - lam
-            if problem.norm(move) > 0:
-                product = product + start.operator(move)
-            lam = entered
-            g = system.gradient(lam, product - problem.rhs)
-            w = self.weights(problem, face, residuals, rho)
-            tol = max(min(self.loosest, self.forcing * residuals.worst), 0.3 * self.tolerance)
-            out = projected_cg(system, g, w, tol, self.max_products - start.operator.products)
-            lam = lam + face.prolong(out.step)
-            product = product + out.product
-            flexed = product - problem.rhs
-            alpha = system.coarse.coefficients(system.gradient(lam, flexed))
-            residual = flexed - problem.coarse.transpose(alpha)
-            residuals = measure(problem, law.feasible(lam), lam, product, residual)
-            n = [round(float(v)) for v in global_sum(problem.comm, face.closed.sum(), face.stick.sum(), face.slip.sum())]
-            history.append(SolverStep("face Newton", k, start.operator.products, residuals, *n, f"{out.iterations} its, {changes} changes, {out.stop.value}, rank {system.coarse.gram.rank}/{system.coarse.m}"))
-            if residuals.within(self.tolerance):
-                c = certify(problem, start.operator, law, lam, residual)
-                if c.residuals.within(self.tolerance):
-                    return c.solution(problem, history, start.operator.products, start.memory)
-                product, residual, residuals = c.product, c.residual, c.residuals
-        raise ConvergenceError("no", history)
+        """Solve from ``start``; called by `solve`. Collective.
 
-    def weights(self, problem, face, residuals, rho):
-        n_e = len(problem.layout.equality)
-        w = np.empty(face.n_face)
-        gs, fs = residuals.gluing_scale, residuals.force_scale
-        w[:n_e] = 1 / gs if gs > 0 else 1.0
-        rest = abs(face.restriction[:, n_e:])
-        r = (rest.T @ rho) / np.maximum(np.asarray(rest.sum(axis=0)).ravel(), 1e-300)
-        w[n_e:] = r / fs if fs > 0 else 1 / gs
-        return w * face.damping**2
+        Raises:
+            ConvergenceError: Steps or products were used up; carries the history.
+        """
+        operator, memory = start.operator, start.memory
+        newton = NewtonSteps(problem, law, start, self)
+        history: list[SolverStep] = []
+        iterate, best, since_best = start.iterate, start.iterate, 0
+        while len(history) < self.max_steps and operator.products < self.max_products:
+            iterate, line = newton.step(iterate, len(history))
+            history.append(line)
+            if iterate.residuals.within(self.tolerance):
+                answer = certify(problem, operator, law, iterate.multiplier, iterate.residual)
+                iterate = answer.iterate
+                if iterate.residuals.within(self.tolerance):
+                    return answer.solution(problem, history, operator.products, memory)
+            if iterate.residuals.worst < 0.5 * best.residuals.worst:
+                best, since_best = iterate, 0
+            else:
+                since_best += 1
+            if since_best >= self.patience or not np.isfinite(iterate.residuals.worst):
+                stuck = Start(best, operator, memory, cold=False)
+                iterate, memory = rescue(
+                    problem,
+                    law,
+                    stuck,
+                    self.rescue,
+                    reduction=0.1,
+                    budget=self.rescue_products,
+                    history=history,
+                )
+                best, since_best = iterate, 0
+        raise ConvergenceError(
+            f"face Newton needs residuals below {self.tolerance:.1e}, got after {operator.products} "
+            f"products and {len(history)} steps: {history[-1]}; raise max_products, start from a "
+            "neighbouring solution, or use SMALSE",
+            history,
+        )
+
+
+class NewtonSteps:
+    """Takes Newton steps of one solve and remembers the last face and each disc's ρ."""
+
+    def __init__(self, problem: DualProblem, law: SlipLaw, start: Start, parameters: FaceNewton) -> None:
+        """Prepare the coarse spaces of all faces. Collective."""
+        self._problem, self._law, self._parameters = problem, law, parameters
+        self._operator = start.operator
+        self._systems = FaceSystems(problem, start.operator)
+        self._natural_step = contact_step(problem.layout, problem.diagonal)
+        self._rho = self._natural_step.copy()
+        self._face: Face | None = None
+
+    def step(self, iterate: Iterate, number: int) -> tuple[Iterate, SolverStep]:
+        """Classify, solve the face, and return the new iterate with its line of history. Collective."""
+        face = self._next_face(iterate)
+        changes = 0 if self._face is None else face.changes(self._face)
+        self._face = face
+        system = self._systems.build(face)
+        entered = system.enter(iterate.multiplier)
+        moved = apply_unless_zero(self._problem, self._operator, entered - iterate.multiplier)
+        product = iterate.product + moved
+        solved = self._solve(system, entered, product, iterate.residuals)
+        multiplier, product = entered + face.prolong(solved.step), product + solved.product
+        gradient = system.gradient(multiplier, product - self._problem.rhs)
+        alpha = system.coarse.coefficients(gradient)
+        after = iterate_at(self._problem, self._law, multiplier, product, alpha)
+        return after, self._record(number, after, system, solved, changes)
+
+    def _next_face(self, iterate: Iterate) -> Face:
+        """Classify, with a smaller ρ for discs whose force would otherwise turn back."""
+        layout, slip_bound = self._problem.layout, self._law.bound(iterate.multiplier)
+        face = classify(layout, slip_bound, iterate.multiplier, iterate.residual, self._rho)
+        if self._face is None:
+            return face
+        turned = np.einsum("ia,ia->i", face.direction, self._face.direction) < 0.0
+        self._rho[layout.tangential[turned]] *= 0.3
+        return classify(layout, slip_bound, iterate.multiplier, iterate.residual, self._rho)
+
+    def _solve(
+        self, system: FaceSystem, multiplier: Vector, product: Vector, residuals: Residuals
+    ) -> FaceStep:
+        wanted = min(self._parameters.loosest, self._parameters.forcing * residuals.worst)
+        weights = residual_weights(system.face, residuals, self._natural_step)
+        return projected_cg(
+            system,
+            system.gradient(multiplier, product - self._problem.rhs),
+            weights,
+            max(wanted, 0.3 * self._parameters.tolerance),
+            max(self._parameters.max_products - self._operator.products, 1),
+        )
+
+    def _record(
+        self, number: int, after: Iterate, system: FaceSystem, solved: FaceStep, changes: int
+    ) -> SolverStep:
+        face, coarse = system.face, system.coarse
+        counts = global_sum(
+            self._problem.comm,
+            np.count_nonzero(face.closed),
+            np.count_nonzero(face.stick),
+            np.count_nonzero(face.slip),
+            changes,
+        )
+        closed, stick, slip, changed = (round(float(count)) for count in counts)
+        note = f"{solved.iterations} CG steps, {changed} status changes"
+        if solved.stop is not Stop.CONVERGED:
+            note += f", {solved.stop.value}"
+        if coarse.gram.rank < coarse.m:
+            note += f", {coarse.m - coarse.gram.rank} rigid motions not held by the face"
+        return SolverStep(
+            "face Newton", number, self._operator.products, after.residuals, closed, stick, slip, note
+        )
+
+
+def residual_weights(face: Face, residuals: Residuals, step: Vector) -> Vector:
+    """Return the weights that turn a residual on a face into the natural and the gluing residual.
+
+    Args:
+        face: The face.
+        residuals: The last residuals, for their scales.
+        step: ρ of the natural map, 0 on equality rows, owned.
+    """
+    gluing = residuals.gluing_scale or 1.0
+    weights = np.sqrt(face.restriction.power(2).T @ step**2) * face.damping**2
+    weights /= residuals.force_scale or np.inf
+    return np.where(weights > 0.0, weights, 1.0 / gluing)

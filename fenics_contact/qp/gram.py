@@ -41,6 +41,8 @@ class GramInverse:
 
     def solve(self, right_side: Vector) -> Vector:
         """Apply the generalised inverse to an array of shape (m,) or (m, k)."""
+        if right_side.size == 0:
+            return np.zeros_like(right_side)
         scale = self._scale if right_side.ndim == 1 else self._scale[:, None]
         if self._cholesky is None:
             return scale * (self._root @ (self._root.T @ (scale * right_side)))

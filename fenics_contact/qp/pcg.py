@@ -11,6 +11,7 @@ from fenics_contact.qp.face_system import FaceSystem
 from fenics_contact.qp.reductions import Vector, global_sum
 
 CURVATURE_TOLERANCE = 1e-14
+DIVERGENCE_FACTOR = 1e6
 
 
 class Stop(Enum):
@@ -21,6 +22,7 @@ class Stop(Enum):
     NO_CURVATURE = "direction without curvature: the operator is singular on this face"
     BAD_PRECONDITIONER = "preconditioner is not positive"
     STAGNATION = "stagnation: rounding has eaten the residual"
+    DIVERGENCE = "divergence: the system is inconsistent or nearly so"
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +102,7 @@ def projected_cg(
     step, product = np.zeros_like(gradient), np.zeros(system.face.layout.size)
     store = DirectionStore(len(gradient))
     size = system.weighted_norm(residual, weights)
-    best, since_best, iterations, stop = size, 0, 0, Stop.CONVERGED
+    first, best, since_best, iterations, stop = size, size, 0, 0, Stop.CONVERGED
     while not size <= tolerance:
         if iterations == max_iterations:
             stop = Stop.ITERATION_LIMIT
@@ -122,8 +124,8 @@ def projected_cg(
         residual = residual + length * image
         size = system.weighted_norm(residual, weights)
         best, since_best = (size, 0) if size < 0.9 * best else (best, since_best + 1)
-        if since_best > system.patience:
-            stop = Stop.STAGNATION
+        if since_best > system.patience or not size <= DIVERGENCE_FACTOR * first:
+            stop = Stop.STAGNATION if since_best > system.patience else Stop.DIVERGENCE
             break
     return FaceStep(step, product, residual, iterations, size, stop)
 

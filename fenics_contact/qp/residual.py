@@ -37,8 +37,8 @@ class Residuals:
 
     @property
     def worst(self) -> float:
-        """The larger of the natural and the gluing residual, which steer the iteration."""
-        return max(self.natural, self.gluing)
+        """The largest of the natural, gluing and coarse residual, which steers the iteration."""
+        return max(self.natural, self.gluing, self.coarse)
 
     def within(self, tolerance: float) -> bool:
         """Tell whether every residual is at most ``tolerance``; NaN is not."""

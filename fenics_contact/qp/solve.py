@@ -7,12 +7,13 @@ from typing import Protocol
 import numpy as np
 
 from fenics_contact.errors import ConvergenceError, InvalidInputError, together
+from fenics_contact.qp.equilibrium import require_equilibrium
+from fenics_contact.qp.iterate import Start, apply_unless_zero, iterate_at
 from fenics_contact.qp.problem import CountedOperator, DualProblem
 from fenics_contact.qp.reductions import Vector
-from fenics_contact.qp.residual import measure
+from fenics_contact.qp.rigid import fit_rigid_motions
 from fenics_contact.qp.slip_law import Coulomb, SlipLaw, Tresca
 from fenics_contact.qp.solution import DualSolution
-from fenics_contact.qp.start import Start
 
 
 class DualSolver(Protocol):
@@ -50,12 +51,15 @@ def solve(
 
     Raises:
         InvalidInputError: Shapes disagree, values are not finite, or the solver does not fit the problem.
-        InfeasibleError: The load drives a rigid motion that no multiplier resists.
+        InfeasibleError: The load drives a rigid motion that no admissible multiplier resists; looked for
+            only in a cold start.
         ConvergenceError: The tolerance was not met; carries the history.
     """
     problem.check()
     with together(problem.comm):
         law = _slip_law(problem, slip_bound, friction_coefficient)
+    if start is None:
+        require_equilibrium(problem, law)
     solution = solver.run(problem, law, _begin(problem, law, start))
     if not solution.residuals.within(solver.tolerance):
         raise ConvergenceError(
@@ -90,23 +94,21 @@ def _slip_law(
 def _begin(problem: DualProblem, law: SlipLaw, start: DualSolution | Vector | None) -> Start:
     """Compute product and residual of the starting multiplier. Collective; at most one product."""
     coarse, operator = problem.coarse, CountedOperator(problem.operator)
-    if isinstance(start, DualSolution) and start.problem is problem:
-        multiplier, product = start.multiplier, start.product
+    earlier = start if isinstance(start, DualSolution) else None
+    if earlier is not None and earlier.problem is problem:
+        multiplier, product = earlier.multiplier, earlier.product
     else:
-        given = start.multiplier if isinstance(start, DualSolution) else start
+        given = start if earlier is None else earlier.multiplier
         multiplier = coarse.particular() if given is None else np.array(given, dtype=np.float64)
         with together(problem.comm):
             _require_size(multiplier, problem.layout.size)
-        moved = problem.norm(multiplier) > 0.0
-        product = operator(multiplier) if moved else np.zeros_like(multiplier)
-    flexed = product - problem.rhs
-    if isinstance(start, DualSolution) and start.alpha.shape == (coarse.m,):
-        residual = flexed - coarse.transpose(start.alpha)
+        product = apply_unless_zero(problem, operator, multiplier)
+    if earlier is not None and earlier.alpha.shape == (coarse.m,):
+        alpha = earlier.alpha
     else:
-        residual = coarse.project(flexed)
-    residuals = measure(problem, law.feasible(multiplier), multiplier, product, residual)
-    memory = start.memory if isinstance(start, DualSolution) else None
-    return Start(operator, multiplier, product, residual, residuals, memory, warm=start is not None)
+        alpha = fit_rigid_motions(problem, law, multiplier, product)
+    iterate = iterate_at(problem, law, multiplier, product, alpha)
+    return Start(iterate, operator, None if earlier is None else earlier.memory, cold=start is None)
 
 
 def _require_size(multiplier: Vector, size: int) -> None:

@@ -33,10 +33,11 @@ class RigidPlane:
     def __post_init__(self) -> None:
         """Scale the normal, refuse one without direction."""
         length = float(np.linalg.norm(self.normal))
-        if not (np.isfinite(length) and length > 0 and np.all(np.isfinite(self.point))):
+        vectors = len(self.point) == len(self.normal) == 3 and np.all(np.isfinite(self.point))
+        if not (vectors and np.isfinite(length) and length > 0):
             raise InvalidInputError(
-                f"RigidPlane needs a finite point and a normal other than zero, got point {self.point!r} and "
-                f"normal {self.normal!r}: for a floor give normal (0, 0, 1)"
+                "RigidPlane needs a point and a normal of three finite numbers, the normal not zero, got point "
+                f"{self.point!r} and normal {self.normal!r}: for a floor give normal (0, 0, 1)"
             )
         object.__setattr__(self, "normal", tuple(float(c / length) for c in self.normal))
 

@@ -47,7 +47,7 @@ class Scene:
     contacts: Sequence[ContactPair] = field(default=())
 
     def __post_init__(self) -> None:
-        """Refuse names that point to nothing, and surfaces without facets."""
+        """Refuse names that point to nothing."""
         if not self.bodies:
             raise InvalidInputError("a scene needs at least one body, got none: pass bodies={'name': Body(...)}")
         for part in (*self.supports, *self.loads):
@@ -67,11 +67,6 @@ class Scene:
             raise InvalidInputError(
                 f"{user} names surface {surface!r} of body {body!r}, which has {sorted(surfaces)}: use one of them"
             )
-        if len(surfaces[surface]) == 0:
-            raise InvalidInputError(
-                f"{user} needs a surface with facets, but {surface!r} of body {body!r} is empty: "
-                "check the physical group that defines it"
-            )
 
     @property
     def body_names(self) -> tuple[str, ...]:
@@ -87,9 +82,13 @@ class Scene:
 
         Args:
             points: Body name -> coordinates, shape (n_nodes, 3), [length].
+
+        Raises:
+            InvalidInputError: If a body is unknown, a coordinate is not finite or a cell is inverted.
         """
         bodies = dict(self.bodies)
         for name, coordinates in points.items():
+            self._require(name, None, "moved")
             bodies[name] = replace(bodies[name], mesh=bodies[name].mesh.moved(coordinates))
         return replace(self, bodies=bodies)
 

@@ -7,6 +7,7 @@ from enum import Enum
 
 import numpy as np
 import scipy.sparse as sp
+from mpi4py import MPI
 
 from fenics_contact.contact import State
 from fenics_contact.qp import Face, classify, contact_step
@@ -71,7 +72,7 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
     step = contact_step(layout, system.problem.diagonal)
     face = classify(layout, solution.slip_bound, solution.multiplier, solution.residual, step)
     trial = solution.multiplier - step * solution.residual
-    scale = comm.allreduce(float(np.abs(solution.multiplier[layout.normal]).max(initial=0.0)), op=_max())
+    scale = comm.allreduce(float(np.abs(solution.multiplier[layout.normal]).max(initial=0.0)), op=MPI.MAX)
     weak_contact = np.abs(trial[layout.normal]) <= WEAK_TOLERANCE * scale
     length = np.linalg.norm(trial[layout.tangential], axis=1)
     bound = solution.slip_bound
@@ -112,8 +113,3 @@ def _friction_growth(state: State, face: Face) -> sp.csr_matrix:
     columns = np.broadcast_to(column[growing, None], rows.shape)
     return sp.csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape=face.restriction.shape)
 
-
-def _max() -> object:
-    from mpi4py import MPI
-
-    return MPI.MAX

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import ufl
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenics_contact import _dolfinx
@@ -53,7 +54,8 @@ class HarmonicExtension:
         self._rows = np.zeros(body.mesh.n_nodes, dtype=PETSc.IntType)
         mine = np.full(body.mesh.n_nodes, -1, dtype=np.int64)
         mine[nodes] = _dolfinx.global_dofs(space, dofs)
-        self._rows[:] = mesh.comm.allreduce(mine, op=_max())
+        mesh.comm.Allreduce(mine, everywhere := np.empty_like(mine), op=MPI.MAX)
+        self._rows[:] = everywhere
         self._ksp = self._factor(np.concatenate([moving, held]))
 
     def _factor(self, given: np.ndarray) -> PETSc.KSP:
@@ -113,8 +115,3 @@ class HarmonicExtension:
         comm = vector.getComm().tompi4py()
         return np.concatenate(comm.allgather(vector.array_r))
 
-
-def _max() -> object:
-    from mpi4py import MPI
-
-    return MPI.MAX

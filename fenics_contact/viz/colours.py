@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
+from matplotlib import colormaps
+from matplotlib.colors import ListedColormap
 
 INK = "#222222"
 GREY = "#9a9a9a"
@@ -19,13 +21,16 @@ GREEN = "#009e73"
 
 #: Cool and warm colours for areas: bodies take turns, so that those in contact are told apart.
 FAMILIES = (
-    ("#77aadd", "#44bb99", "#bbcc33", "#99ddff"),
-    ("#ee8866", "#eedd88", "#ffaabb", "#aaaa00"),
+    ("#77aadd", "#44bb99", "#4466aa", "#99ddff"),
+    ("#ee8866", "#eedd88", "#ffaabb", "#bbcc33"),
 )
 SPARE = "#dddddd"
 
-#: Maps with lightness that only rises, readable in grey as well; the last one has zero in its middle.
-STRESS_MAP, PRESSURE_MAP, SIGNED_MAP = "viridis", "viridis", "PuOr"
+#: Maps whose lightness only falls, readable in grey as well. The first stops short of black, on which no line
+#: would be seen; the last has zero in its middle.
+STRESS_MAP = ListedColormap(colormaps["magma_r"](np.linspace(0.04, 0.82, 256)), "stress")
+PRESSURE_MAP = colormaps["YlGnBu"]
+SIGNED_MAP = colormaps["PuOr"]
 
 
 def neighbours(cells: np.ndarray, partition: np.ndarray) -> np.ndarray:

@@ -1,0 +1,107 @@
+"""Diagram of an optimisation: objective against evaluations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.viz.colours import BLUE, GREY, ORANGE
+from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet, written
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+KINDS = ("start", "serious", "null", "rejected")
+
+
+def plot_convergence(
+    values: Sequence[float] | np.ndarray,
+    kinds: Sequence[str],
+    path: str | Path,
+    *,
+    label: str = "objective",
+    title: str = "",
+    width: int = 1200,
+    comm: MPI.Comm | None = None,
+) -> Path:
+    """Draw the objective of every evaluation: the start and serious steps connected, null steps beside them.
+
+    Args:
+        values: Objective of each trial point in the order of evaluation, (n,); NaN where it was rejected.
+        kinds: What became of each: "start", "serious", "null" or "rejected".
+        path: PNG file to write.
+        label: Name of the objective, with its unit.
+        title: What comes before the facts in the title.
+        width: Width of the picture in pixels.
+        comm: If given, only rank 0 draws, and all ranks learn of an error.
+
+    Returns:
+        The path.
+
+    Raises:
+        InvalidInputError: If the arrays do not belong together or hold no start.
+
+    Note:
+        Collective on ``comm`` if given.
+    """
+    target = png_path(path)
+    objective, kind = _checked(values, kinds)
+    draw_on_one_rank(comm, lambda: _draw(objective, kind, target, (label, title), width))
+    return target
+
+
+def _checked(values: Sequence[float] | np.ndarray, kinds: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    objective, kind = np.asarray(values, dtype=float), np.asarray(kinds, dtype=str)
+    if objective.ndim != 1 or objective.shape != kind.shape:
+        raise InvalidInputError(
+            f"values and kinds must have one entry for each evaluation, got {objective.shape} and {kind.shape}: "
+            "pass both from the same history"
+        )
+    unknown = sorted(set(kind.tolist()) - set(KINDS))
+    if unknown:
+        raise InvalidInputError(f"kinds must be among {KINDS}, got {unknown}: translate them first")
+    if not np.any(kind == "start"):
+        raise InvalidInputError('a history begins with its "start", got none: pass it from the first evaluation')
+    if not np.all(np.isfinite(objective[kind != "rejected"])):
+        raise InvalidInputError("the objective must be finite wherever it was not rejected: mark rejected points")
+    return objective, kind
+
+
+def _draw(values: np.ndarray, kind: np.ndarray, target: Path, words: tuple[str, str], width: int) -> None:
+    label, title = words
+    number = np.arange(len(values))
+    centre = (kind == "start") | (kind == "serious")
+    first, last = values[centre][0], values[centre][-1]
+    facts = f"{written(first, 6)} → {written(last, 6)}"
+    if first != 0:
+        facts += f", {100 * abs((last - first) / first):.2f} % {'lower' if last <= first else 'higher'}"
+    with sheet(target, (width, round(0.6 * width)), f"{title}: {facts}" if title else facts) as figure:
+        axes = figure.subplots()
+        axes.plot(number[centre], values[centre], "-o", color=BLUE, lw=2, ms=8, label="start and serious steps")
+        _mark(axes, number[kind == "null"], values[kind == "null"])
+        _mark_rejected(axes, number[kind == "rejected"])
+        axes.set_xlabel("evaluation")
+        axes.set_ylabel(label)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.grid(axis="y", color=GREY, alpha=0.3)
+        axes.legend(loc="best")
+
+
+def _mark(axes: Any, number: np.ndarray, values: np.ndarray) -> None:
+    if len(number):
+        style = {"marker": "o", "facecolors": "white", "edgecolors": ORANGE, "linewidths": 1.8, "s": 64, "zorder": 3}
+        axes.scatter(number, values, label="null steps", **style)
+
+
+def _mark_rejected(axes: Any, number: np.ndarray) -> None:
+    """Put crosses on the lower edge: a rejected point has no value."""
+    if len(number):
+        places = axes.get_xaxis_transform()
+        axes.scatter(
+            number, np.full(len(number), 0.03), transform=places, marker="x", color=GREY, s=64, label="rejected points"
+        )

@@ -12,7 +12,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import BodyMesh, boundary_faces
 from fenics_contact.scene import Scene
 from fenics_contact.viz.colours import INK, colour_subdomains, neighbours
-from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet, show_image
+from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet, show_image, written
 from fenics_contact.viz.stage import Layer, render, segments, surface
 from fenics_contact.viz.view import frame_around, oblique_view
 
@@ -78,7 +78,7 @@ def _draw(
     frame = frame_around(view, points)
     count = sum(np.unique(partitions[name]).size for name in scene.bodies)
     cells = sum(body.mesh.n_cells for body in scene.bodies.values())
-    title = f"{count} subdomains of {len(scene.bodies)} bodies, {cells:,} cells".replace(",", "\u202f")
+    title = f"{count} subdomains of {len(scene.bodies)} bodies, {written(cells)} cells"
     image = render(layers, view, frame, width)
     with sheet(target, (width, image.shape[0] + 60), title) as figure:
         show_image(figure.subplots(), image)
@@ -93,10 +93,10 @@ def _body_layers(mesh: BodyMesh, partition: np.ndarray, family: int, explode: fl
         centre = piece.points.mean(axis=0)
         piece.points = centre + (1.0 - explode) * (piece.points - centre)
         look = {"color": colours[number], "show_edges": True, "edge_color": INK, "edge_opacity": 0.25}
-        layers.append(Layer(piece, {**look, "ambient": 0.25, "diffuse": 0.8, "line_width": 1}))
-        edges = outline(faces, np.zeros(len(faces), dtype=int)) if explode else None
-        del edges
-    return [*layers, *([] if explode else [Layer(segments(mesh.points, _seams(mesh, partition)), _SEAM)])]
+        layers.append(Layer(piece, {**look, "ambient": 0.5, "diffuse": 0.55, "line_width": 1}))
+    if not explode:
+        layers.append(Layer(segments(mesh.points, _seams(mesh, partition)), _SEAM))
+    return layers
 
 
 _SEAM = {"color": INK, "line_width": 4, "lighting": False}
@@ -105,13 +105,8 @@ _SEAM = {"color": INK, "line_width": 4, "lighting": False}
 def _seams(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
     """Edges of the body's surface at which subdomains meet, (n, 2)."""
     faces, cells = boundary_faces(mesh.cells)
-    return outline(faces, partition[cells])
-
-
-def outline(faces: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Return the edges of a closed surface between faces of different labels, (n, 2)."""
     edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    labels = np.repeat(label, faces.shape[1])
+    labels = np.repeat(partition[cells], faces.shape[1])
     order = np.lexsort((edges[:, 1], edges[:, 0]))
     edges, labels = edges[order], labels[order]
     same = np.all(edges[1:] == edges[:-1], axis=1) & (labels[1:] != labels[:-1])

@@ -62,6 +62,7 @@ def sheet(path: str | Path, size: tuple[int, int], title: str) -> Iterator[Any]:
     with mpl.rc_context({**mpl.rcParamsDefault, **_STYLE}):
         figure = Figure(figsize=(size[0] / DPI, size[1] / DPI), dpi=DPI, layout="constrained")
         FigureCanvasAgg(figure)
+        figure.get_layout_engine().set(w_pad=0.12, h_pad=0.12)
         figure.suptitle(title, fontsize=16, fontweight="bold")
         yield figure
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -96,10 +97,29 @@ def show_image(axes: Any, image: np.ndarray, title: str = "") -> None:
         axes.set_title(title)
 
 
-def colour_bar(figure: Any, axes: Any, colours: tuple[str, tuple[float, float]], label: str, **options: Any) -> Any:
-    """Add the colour bar of a named map over a range beside axes."""
-    name, (low, high) = colours
-    return figure.colorbar(ScalarMappable(Normalize(low, high), name), ax=axes, label=label, **options)
+def scale_bar(axes: Any, image: np.ndarray, width: float, unit: str) -> None:
+    """Draw a bar of round length into the lower left corner of an image shown in axes.
+
+    Args:
+        axes: Axes that show the image.
+        image: The image.
+        width: Width of what the image shows, [length].
+        unit: Unit of length.
+    """
+    length = nice_number(width / 5)
+    pixels = length / width * image.shape[1]
+    left, bottom = 0.04 * image.shape[1], 0.94 * image.shape[0]
+    axes.plot([left, left + pixels], [bottom, bottom], color=INK, linewidth=4, solid_capstyle="butt")
+    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 2}
+    place = (left + pixels / 2, bottom - 0.02 * image.shape[0])
+    axes.text(*place, f"{written(length, 1)} {unit}", ha="center", va="bottom", bbox=box)
+
+
+def colour_bar(
+    figure: Any, axes: Any, colours: Any, clim: tuple[float, float], label: str, **options: Any
+) -> None:
+    """Add the colour bar of a colour map over a range beside axes."""
+    figure.colorbar(ScalarMappable(Normalize(*clim), colours), ax=axes, label=label, **options)
 
 
 def checked_range(clim: tuple[float, float]) -> tuple[float, float]:
@@ -108,6 +128,24 @@ def checked_range(clim: tuple[float, float]) -> tuple[float, float]:
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise InvalidInputError(f"clim must be a finite range (low, high) with low < high, got {clim}: widen it")
     return low, high
+
+
+def written(value: float, digits: int = 4) -> str:
+    """Write a number for readers: 79 713, −0.138, 1.2e−05; thousands apart, a true minus.
+
+    Args:
+        value: The number.
+        digits: Significant digits of what is not an integer.
+    """
+    size = abs(value)
+    if isinstance(value, int | np.integer):
+        text = f"{value:,}"
+    elif size == 0 or 1e-3 <= size < 1e7:
+        decimals = digits - 1 - int(np.floor(np.log10(size))) if size else 0
+        text = f"{round(value, decimals):,.{max(0, decimals)}f}"
+    else:
+        text = f"{value:.{digits - 1}e}"
+    return text.replace(",", "\u202f").replace("-", "\u2212")
 
 
 def nice_number(value: float) -> float:

@@ -43,6 +43,16 @@ def segments(points: np.ndarray, edges: np.ndarray) -> Any:
     return pv.PolyData(np.asarray(points), lines=lines.ravel())
 
 
+def tubes(points: np.ndarray, edges: np.ndarray, radius: float) -> Any:
+    """Return edges (n, 2) as round bars."""
+    return segments(points, edges).tube(radius=radius)
+
+
+def balls(points: np.ndarray, radius: float) -> Any:
+    """Return points (n, 3) as spheres."""
+    return pv.PolyData(np.asarray(points)).glyph(geom=pv.Sphere(radius=radius), scale=False, orient=False)
+
+
 def render(layers: Iterable[Layer], view: View, frame: Frame, width: int) -> np.ndarray:
     """Render one image.
 
@@ -61,9 +71,12 @@ def render(layers: Iterable[Layer], view: View, frame: Frame, width: int) -> np.
     check_renderer()
     height = max(2, round(width * float(frame.size[1] / frame.size[0])))
     window = [SUPERSAMPLING * width, SUPERSAMPLING * height]
-    plotter = pv.Plotter(off_screen=True, window_size=window, theme=pv.themes.DocumentTheme())
+    theme = pv.themes.DocumentTheme()
+    plotter = pv.Plotter(off_screen=True, window_size=window, theme=theme, lighting="none")
     try:
         plotter.background_color = "white"
+        # One lamp above the viewer's left shoulder: colours keep their brightness on all that is seen.
+        plotter.add_light(pv.Light(position=(-0.4, 0.6, 1.0), light_type="camera light"))
         middle = np.zeros(3)
         for layer in layers:
             plotter.add_mesh(layer.mesh, **{"show_scalar_bar": False, "reset_camera": False, **layer.options})

@@ -36,21 +36,21 @@ def crowned(mesh: BodyMesh, rise: float) -> BodyMesh:
     return mesh.moved(points)
 
 
-def block_on_plane(friction: Friction, cell: str = "hexahedron", push: float = 1.0) -> Scene:
-    """A block on a rigid floor that nothing else holds: pressed on top, pushed along x and a little along y.
+def block_on_plane(friction: Friction, cell: str = "hexahedron", *, push: float = 1.0) -> Scene:
+    """A crowned block on a rigid floor that nothing else holds: pressed on top, pushed along x and a little y.
 
-    The push tips the block: its heel lifts off, its toe is pressed hardest.
+    The push tips the block: its heel lifts off, its toe is pressed hardest. Load: 4 down, 2 ``push`` along x.
     """
-    mesh = block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (6, 3, 3), cell)
+    mesh = crowned(block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (6, 3, 3), cell), 0.02)
     load = Traction("block", "z1", (push, 0.3 * push, -2.0))
     pair = ContactPair(Surface("block", "z0"), FLOOR, friction)
     return Scene({"block": Body(mesh, SOFT)}, loads=[load], contacts=[pair])
 
 
-def two_blocks(friction: Friction, cell: str = "hexahedron", push: float = 0.6) -> Scene:
+def two_blocks(friction: Friction, cell: str = "hexahedron", *, push: float = 0.6) -> Scene:
     """A crowned block pressed on another with a mesh that does not match; nothing else holds the upper one."""
     lower = block((0.0, 0.0, -1.0), (2.0, 1.0, 0.0), (5, 3, 2), cell)
-    upper = crowned(block((0.1, 0.05, 0.0), (1.9, 0.95, 0.8), (6, 4, 2), cell), 0.02)
+    upper = crowned(block((0.1, 0.05, 0.0), (1.9, 0.95, 0.8), (6, 4, 2), cell), 0.04)
     return Scene(
         {"lower": Body(lower, STIFF), "upper": Body(upper, SOFT)},
         [Support("lower", "z0")],
@@ -59,9 +59,30 @@ def two_blocks(friction: Friction, cell: str = "hexahedron", push: float = 0.6) 
     )
 
 
+def pressed_block(friction: Friction, cell: str = "hexahedron", *, push: float = 0.01) -> Scene:
+    """A crowned block on a rigid floor whose top is pressed down and dragged along x by a given way."""
+    mesh = crowned(block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (6, 3, 3), cell), 0.03)
+    pair = ContactPair(Surface("block", "z0"), FLOOR, friction)
+    support = Support("block", "z1", (push, 0.0, -0.025))
+    return Scene({"block": Body(mesh, SOFT)}, [support], contacts=[pair])
+
+
+def stack(upper: Friction, lower: Friction) -> Scene:
+    """The two blocks, the lower one lying on a rigid floor with a friction law of its own: both float."""
+    blocks = two_blocks(upper)
+    floor = ContactPair(Surface("lower", "z0"), RigidPlane((0.0, 0.0, -1.0), (0.0, 0.0, 1.0)), lower)
+    return replace(blocks, supports=[], contacts=[*blocks.contacts, floor])
+
+
 def partitions(scene: Scene, boxes: tuple[int, int, int] = (2, 1, 1)) -> dict[str, np.ndarray]:
     """Cut every body into the same boxes."""
     return {name: box_partition(body.mesh, boxes) for name, body in scene.bodies.items()}
+
+
+def guided(scene: Scene, body: str) -> Scene:
+    """Keep one side of a body from moving along x and one from moving along y: without friction it would slide."""
+    guides = [Support(body, "x0", (0.0, None, None)), Support(body, "y0", (None, 0.0, None))]
+    return replace(scene, supports=[*scene.supports, *guides])
 
 
 def with_friction(scene: Scene, friction: Friction) -> Scene:

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 Fun = Callable[[Array], tuple[float, Array]]
 
 
-def largest(values: Sequence[float], gradients: Sequence[ArrayLike]) -> tuple[float, Array]:
+def largest(values: Sequence[float] | Array, gradients: Sequence[ArrayLike] | Array) -> tuple[float, Array]:
     """Return the largest of several smooth pieces and its gradient."""
     which = int(np.argmax(values))
     return float(values[which]), np.array(gradients[which], dtype=float)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -18,11 +20,11 @@ PUBLISHED = 1e-7
 all_cases = pytest.mark.parametrize("case", [*CONVEX, *NONCONVEX, *CONSTRAINED], ids=lambda case: case.name)
 
 
+METHOD = BundleTrust(tolerance=TOLERANCE, max_iterations=500, max_evaluations=1000)
+
+
 @cache
-def solved(case: Case, **parameters: float) -> Result:
-    method = BundleTrust(
-        **{"tolerance": TOLERANCE, "max_iterations": 500, "max_evaluations": 1000, **parameters}
-    )
+def solved(case: Case, method: BundleTrust = METHOD) -> Result:
     return minimize(case.fun, case.start, method, bounds=case.bounds, constraints=case.constraints)
 
 
@@ -64,15 +66,13 @@ def test_constrained_minimum_is_found_with_a_constraint_active(case: Case) -> No
     assert 5 < result.evaluations <= case.most_evaluations
     assert case.constraints is not None
     room = np.asarray(case.constraints.limit) - np.asarray(case.constraints.matrix) @ result.x
-    assert room.min() > -1e-8
-    if case.name != "MAD4":  # its constraint leaves the minimum inside
-        assert room.min() < 1e-4
+    assert -1e-8 < room.min() < 1e-6
 
 
 @pytest.mark.parametrize("name", ["Maxl", "Goffin", "MXHILB"])
 def test_a_convex_function_that_is_known_to_be_so_costs_fewer_evaluations(name: str) -> None:
     case = BY_NAME[name]
-    trusting, careful = solved(case, locality=0.0), solved(case)
+    trusting, careful = solved(case, replace(METHOD, locality=0.0)), solved(case)
     assert relative_error(case, trusting) <= TOLERANCE
     assert trusting.evaluations < 0.7 * careful.evaluations
 
@@ -80,7 +80,7 @@ def test_a_convex_function_that_is_known_to_be_so_costs_fewer_evaluations(name: 
 @pytest.mark.parametrize("name", ["Rosen-Suzuki", "Shor", "Maxquad", "Mifflin1"])
 def test_aggregation_keeps_a_small_bundle_convergent(name: str) -> None:
     case = BY_NAME[name]
-    result = solved(case, max_bundle=6)
+    result = solved(case, replace(METHOD, max_bundle=6))
     assert max(record.bundle_size for record in result.history) == 6
     assert relative_error(case, result) <= TOLERANCE
 
@@ -89,7 +89,9 @@ def test_aggregation_keeps_a_small_bundle_convergent(name: str) -> None:
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-8])
 def test_error_follows_the_tolerance(name: str, tolerance: float) -> None:
     case = BY_NAME[name]
-    assert relative_error(case, solved(case, tolerance=tolerance)) <= max(tolerance, PUBLISHED)
+    assert relative_error(case, solved(case, replace(METHOD, tolerance=tolerance))) <= max(
+        tolerance, PUBLISHED
+    )
 
 
 @all_cases
@@ -97,7 +99,7 @@ def test_every_serious_step_descends_and_every_null_step_leaves_the_best_value(c
     history = solved(case).history
     kinds = {record.kind for record in history}
     assert Kind.SERIOUS in kinds, "without a serious step this tests nothing"
-    for before, after in zip(history[:-1], history[1:], strict=True):
+    for before, after in pairwise(history):
         if after.kind is Kind.SERIOUS:
             assert after.best == after.value < before.best - 0.05 * after.predicted_decrease * (1 - 1e-9)
         else:

@@ -190,7 +190,7 @@ def torn_problem(bricks: Bricks, comm: MPI.Comm = MPI.COMM_SELF) -> tuple[DualPr
     """Return the dual problem, rows dealt out to the ranks in contiguous pieces, and its matrices."""
     torn = Torn(bricks)
     B, n = torn.B, torn.B.shape[0]
-    owner, layout_rows = _deal(torn, comm.size)
+    owner, layout_rows = row_owners(torn, comm.size), contact_rows(torn)
     mine = np.flatnonzero(owner == comm.rank)
     order = np.concatenate([np.flatnonzero(owner == r) for r in range(comm.size)])
 
@@ -220,18 +220,22 @@ def torn_problem(bricks: Bricks, comm: MPI.Comm = MPI.COMM_SELF) -> tuple[DualPr
     return DualProblem(comm, flexibility, d[mine], coarse, layout, weights[mine], preconditioner), torn
 
 
-def _deal(torn: Torn, ranks: int) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
-    n = torn.B.shape[0]
-    owner = np.empty(n, dtype=int)
-    owner[: torn.n_equality] = np.arange(torn.n_equality) * ranks // max(torn.n_equality, 1)
+def contact_rows(torn: Torn) -> tuple[np.ndarray, np.ndarray]:
+    """Return the normal rows and the pairs of tangential rows."""
     normal = np.array(torn.normal if torn.bricks.contact else [], dtype=int)
-    tangential = np.array(
-        torn.tangential if torn.bricks.contact and torn.bricks.friction else np.zeros((0, 2)), dtype=int
-    )
+    has_discs = torn.bricks.contact and torn.bricks.friction
+    return normal, np.array(torn.tangential if has_discs else np.zeros((0, 2)), dtype=int)
+
+
+def row_owners(torn: Torn, ranks: int) -> np.ndarray:
+    """Deal gluing rows and contacts out to the ranks in equal pieces; a contact stays whole."""
+    owner = np.empty(torn.B.shape[0], dtype=int)
+    owner[: torn.n_equality] = np.arange(torn.n_equality) * ranks // max(torn.n_equality, 1)
+    normal, tangential = contact_rows(torn)
     share = np.arange(len(normal)) * ranks // max(len(normal), 1)
     owner[normal] = share
     owner[tangential] = share[: len(tangential), None]
-    return owner, (normal, tangential)
+    return owner
 
 
 def _dirichlet(torn: Torn, gather, mine):

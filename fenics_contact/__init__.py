@@ -1,0 +1,21 @@
+"""Contact mechanics with friction, and contact shape optimisation, on FEniCSx by Total FETI.
+
+The floors of the package, from the ground up; each imports only those before it:
+
+* `fenics_contact.geometry`: chain links, blocks, Hertz bodies, partitions,
+* `fenics_contact.scene`: bodies, materials, supports, loads, contact pairs,
+* `fenics_contact.qp`: dual solvers for bounds and friction discs,
+* `fenics_contact.feti`: subdomains, gluing, contact rows, the dual problem,
+* `fenics_contact.contact`: scene → state,
+* `fenics_contact.shape`: design → value and subgradient,
+* `fenics_contact.optimize`: the bundle trust method.
+
+Beside them: `fenics_contact.viz` (pictures) and `fenics_contact.io` (files).
+"""
+
+from fenics_contact import _requirements
+
+_requirements.check()
+
+__version__ = "0.1.0.dev0"
+__all__ = ["__version__"]

@@ -1,0 +1,11 @@
+"""Results as files that ParaView and other programs open; whole or not at all.
+
+On several ranks every function is collective, rank 0 writes (XDMF: all ranks together), and all raise if one fails.
+"""
+
+from fenics_contact.io.json_file import write_json
+from fenics_contact.io.versions import versions
+from fenics_contact.io.vtu import write_vtu
+from fenics_contact.io.xdmf import write_xdmf
+
+__all__ = ["versions", "write_json", "write_vtu", "write_xdmf"]

@@ -1,0 +1,87 @@
+"""JSON files of results, with NumPy's types converted and numbers that JSON does not have refused."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.io.replacing import replacing
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+
+def write_json(path: str | Path, data: Any, *, comm: MPI.Comm | None = None) -> Path:
+    """Write data to a JSON file, indented, with the keys in the order given.
+
+    Args:
+        path: File to write; its folder is created. A file of that name is replaced when the new one is complete.
+        data: Mappings, sequences, strings, numbers, truth values and None; also NumPy's arrays and numbers, paths
+            and enumerations (by their values).
+        comm: If given, only rank 0 writes, and all ranks learn of an error.
+
+    Returns:
+        The path.
+
+    Raises:
+        InvalidInputError: If a number is NaN or infinite or something has no counterpart in JSON; says where.
+
+    Note:
+        Collective on ``comm`` if given.
+
+    Example:
+        >>> write_json("result.json", {"objective": np.float64(-1.5), "force": np.zeros(3)})  # doctest: +SKIP
+    """
+    target = Path(path)
+    with nullcontext() if comm is None else together(comm):
+        if comm is None or comm.rank == 0:
+            text = json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+            with replacing(target) as (temporary,):
+                temporary.write_text(text, encoding="utf-8")
+    return target
+
+
+def plain(data: Any, place: str = "data") -> Any:
+    """Convert data to what JSON knows.
+
+    Args:
+        data: The data.
+        place: How error messages call it.
+
+    Raises:
+        InvalidInputError: If some part cannot be converted; says which.
+    """
+    if isinstance(data, Enum):
+        return plain(data.value, place)
+    if isinstance(data, np.ndarray | np.generic):
+        return plain(data.tolist(), place)
+    if isinstance(data, Mapping):
+        return {_key(key, place): plain(value, f"{place}[{key!r}]") for key, value in data.items()}
+    if isinstance(data, float) and not math.isfinite(data):
+        raise InvalidInputError(
+            f"{place} must be finite, got {data}: JSON has no such number; leave it out or write None"
+        )
+    if data is None or isinstance(data, str | bool | int | float):
+        return data
+    if isinstance(data, Path):
+        return str(data)
+    if isinstance(data, Sequence) and not isinstance(data, bytes | bytearray):
+        return [plain(value, f"{place}[{index}]") for index, value in enumerate(data)]
+    raise InvalidInputError(
+        f"{place} must be a mapping, sequence, string, number, truth value, None or array, got a "
+        f"{type(data).__name__}: convert it first"
+    )
+
+
+def _key(key: Any, place: str) -> str:
+    if not isinstance(key, str):
+        raise InvalidInputError(f"keys of {place} must be strings, got {key!r}: convert it first")
+    return key

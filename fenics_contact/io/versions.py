@@ -1,0 +1,40 @@
+"""What a result was computed with."""
+
+from __future__ import annotations
+
+import importlib
+import platform
+from importlib import metadata
+from types import ModuleType
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from fenics_contact import _dolfinx
+
+_MODULES = ("numpy", "scipy", "mpi4py", "petsc4py", "gmsh", "clarabel", "pyvista", "vtk")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python, of the libraries that computed and of this package, by name.
+
+    A library that is not installed, or that does not tell, says so instead.
+    """
+    found = {"fenics_contact": _installed("fenics_contact"), "python": platform.python_version()}
+    found["dolfinx"] = ".".join(map(str, _dolfinx.VERSION))
+    found["petsc"] = ".".join(map(str, PETSc.Sys.getVersion()))
+    found["mpi"] = MPI.Get_library_version().partition(",")[0].strip("\x00 \n")
+    return found | {name: _installed(name) for name in _MODULES}
+
+
+def _installed(name: str) -> str:
+    """Return what the metadata say or, where a library was installed without, what the library says."""
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        pass
+    try:
+        module: ModuleType = importlib.import_module(name)
+    except ImportError:
+        return "not installed"
+    return str(getattr(module, "__version__", "unknown"))

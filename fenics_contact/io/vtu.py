@@ -1,0 +1,74 @@
+"""VTU files, one a body, gathered from all ranks, with an index that opens them together."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import meshio
+import numpy as np
+
+from fenics_contact.contact import State
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.io.fields import cell_values, contact_fields
+from fenics_contact.io.replacing import replacing
+
+
+def write_vtu(state: State, folder: str | Path, name: str = "state") -> Path:
+    """Write a state for ParaView: a file for each body and a multi-block file to open. Collective.
+
+    On points: ``displacement`` and the fields of `contact_fields`. On cells: ``von_mises`` and ``subdomain``,
+    numbered over all bodies.
+
+    Args:
+        state: The state.
+        folder: Where to write; created.
+        name: What the files' names begin with: "state" gives "state.vtm" and, for a body "link1",
+            "state_link1.vtu". Files are replaced when the new ones are complete.
+
+    Returns:
+        The multi-block file.
+
+    Raises:
+        InvalidInputError: If the name holds a folder.
+    """
+    if not name or Path(name).name != name:
+        raise InvalidInputError(f"name must be the beginning of a file's name, got {name!r}: put folders into folder")
+    index = Path(folder) / f"{name}.vtm"
+    meshes = {body: _gathered(state, body) for body in state.scene.bodies}
+    files = [index.with_name(f"{name}_{body}.vtu") for body in meshes]
+    comm = state.system.torn.decomposition.comm
+    with together(comm):
+        if comm.rank == 0:
+            # The index last: whoever finds it finds what it names.
+            with replacing(*files, index) as paths:
+                for path, mesh in zip(paths, meshes.values(), strict=False):
+                    meshio.write(path, mesh, file_format="vtu")
+                paths[-1].write_text(_multi_block(list(meshes), files), encoding="utf-8")
+    return index
+
+
+def _gathered(state: State, body: str) -> meshio.Mesh:
+    mesh = state.scene.bodies[body].mesh
+    decomposition = state.system.torn.decomposition
+    tearing = decomposition.tearing
+    first = int(tearing.subdomain_offset[tearing.body_names.index(body)])
+    subdomain = np.asarray(decomposition.partitions[body], dtype=np.int32) + np.int32(first)
+    kind = {"hexahedron": "hexahedron", "tetrahedron": "tetra"}[mesh.cell_type]
+    return meshio.Mesh(
+        mesh.points,
+        [(kind, mesh.cells)],
+        point_data={"displacement": state.gather_displacement(body), **contact_fields(state, body)},
+        cell_data={"von_mises": [cell_values(state.von_mises[body], mesh.cells)], "subdomain": [subdomain]},
+    )
+
+
+def _multi_block(bodies: list[str], files: list[Path]) -> str:
+    blocks = "".join(
+        f"    <DataSet index={quoteattr(str(number))} name={quoteattr(body)} file={quoteattr(file.name)}/>\n"
+        for number, (body, file) in enumerate(zip(bodies, files, strict=True))
+    )
+    return (
+        '<?xml version="1.0"?>\n<VTKFile type="vtkMultiBlockDataSet" version="1.0">\n'
+        f"  <vtkMultiBlockDataSet>\n{blocks}  </vtkMultiBlockDataSet>\n</VTKFile>\n"
+    )

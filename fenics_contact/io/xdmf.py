@@ -1,0 +1,62 @@
+"""XDMF files of the fields on the bodies' own meshes, written by dolfinx."""
+
+from __future__ import annotations
+
+import secrets
+import shutil
+from pathlib import Path
+from typing import Any
+
+from fenics_contact import _dolfinx
+from fenics_contact.contact import State
+from fenics_contact.errors import InvalidInputError, agree, together
+from fenics_contact.io.replacing import replace_all
+
+
+def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
+    """Write displacement and von Mises stress of every body to XDMF with HDF5, all ranks together. Collective.
+
+    ParaView opens them with its reader "Xdmf3 Reader S".
+
+    Args:
+        state: The state.
+        path: Name to derive the files from: "chain.xdmf" becomes "chain_link1.xdmf" and "chain_link1.h5" for
+            the body "link1". The folder is created; files are replaced when the new ones are complete.
+
+    Returns:
+        Body name -> its XDMF file.
+
+    Raises:
+        InvalidInputError: If the name does not end in ".xdmf".
+    """
+    base = Path(path)
+    if base.suffix != ".xdmf":
+        raise InvalidInputError(f"the file must be an XDMF file, got the name {base.name!r}: let it end in '.xdmf'")
+    written = {}
+    for name, displacement in state.displacement.items():
+        written[name] = base.with_name(f"{base.stem}_{name}.xdmf")
+        _write(written[name], displacement, state.von_mises[name])
+    return written
+
+
+def _write(target: Path, displacement: Any, von_mises: Any) -> None:
+    mesh = displacement.function_space.mesh
+    comm = mesh.comm
+    token = comm.bcast(secrets.token_hex(4))
+    # The XDMF file names its HDF5 file: both keep their names and are written in a folder of their own.
+    hidden = target.parent / f".{target.stem}.{token}"
+    with together(comm):
+        if comm.rank == 0:
+            hidden.mkdir(parents=True)
+    error: Exception | None = None
+    try:
+        _dolfinx.write_xdmf(hidden / target.name, mesh, [displacement, von_mises])
+        comm.barrier()
+        if comm.rank == 0:
+            replace_all([hidden / target.with_suffix(".h5").name, hidden / target.name], target.parent)
+    except Exception as caught:
+        error = caught
+    finally:
+        if comm.rank == 0:
+            shutil.rmtree(hidden, ignore_errors=True)
+    agree(comm, error)

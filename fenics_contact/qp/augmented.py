@@ -1,0 +1,91 @@
+"""The augmented Lagrangian of the dual problem, scaled so that its Hessian has norm 1."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fenics_contact.qp.feasible import FeasibleSet
+from fenics_contact.qp.iterate import Start
+from fenics_contact.qp.mpgp import BoundedMinimum, BoundedQuadratic
+from fenics_contact.qp.norm_estimate import largest_eigenvalue
+from fenics_contact.qp.problem import DualProblem
+from fenics_contact.qp.reductions import Vector, global_min, global_sum
+from fenics_contact.qp.residual import Residuals
+
+
+class AugmentedLagrangian:
+    """L(λ, v) = ½ λᵀ(P F P/‖PFP‖ + Q) λ − (P(d − F λ₀)/‖PFP‖ + λ₀ − v)ᵀλ + const.
+
+    λ₀ = Gᵀ(G Gᵀ)⁻¹e, Q = I − P, and v in range(Gᵀ) is the multiplier of Q λ = λ₀, which says the same as
+    G λ = e. Where that holds, L and ½ λᵀF λ − dᵀλ differ by a factor and a constant.
+
+    Attributes:
+        norm: Upper estimate of ‖PFP‖.
+    """
+
+    def __init__(self, problem: DualProblem, start: Start) -> None:
+        """Estimate ‖PFP‖ unless the start remembers it, and build the right side. Collective."""
+        self._problem, self._operator, self._coarse = problem, start.operator, problem.coarse
+        self._particular = self._coarse.particular()
+        if start.memory is None:
+            self.norm = largest_eigenvalue(problem.comm, self._projected, problem.layout.size) or 1.0
+        else:
+            self.norm = start.memory.norm
+        if start.cold:
+            flexed = problem.rhs - start.iterate.product
+        elif problem.norm(self._particular) > 0.0:
+            flexed = problem.rhs - start.operator(self._particular)
+        else:
+            flexed = problem.rhs
+        self._base = self._coarse.project(flexed) / self.norm + self._particular
+        self._size = problem.norm(self._base)
+        softest = problem.diagonal[problem.layout.contact].min(initial=np.inf)
+        softest = global_min(problem.comm, float(softest))
+        self._softest = softest if np.isfinite(softest) else 0.0
+
+    def quadratic(self, feasible: FeasibleSet, v: Vector) -> BoundedQuadratic:
+        """Return L(·, v) on a feasible set."""
+        return BoundedQuadratic(self._problem.comm, self._penalised, self._base - v, feasible, 1.0)
+
+    def first_multiplier(self, residual: Vector) -> Vector:
+        """Return v for which the gradient of L, times ‖PFP‖, is a given residual r. Collective."""
+        return (residual - self._coarse.project(residual)) / self.norm
+
+    def drift(self, x: Vector) -> Vector:
+        """Return Q x − λ₀, owned. Collective."""
+        return x - self._coarse.project(x) - self._particular
+
+    def imbalance(self, x: Vector) -> float:
+        """Return ‖Q x − λ₀‖. Collective."""
+        return self._coarse.norm(self._coarse.residual(x)) if self._coarse.m else 0.0
+
+    def value(self, minimum: BoundedMinimum, v: Vector) -> float:
+        """Return L at a minimum of L(·, v), up to a constant that no iteration changes. Collective."""
+        x, rhs = minimum.x, self._base - v
+        half, shift = global_sum(
+            self._problem.comm, 0.5 * (x @ (minimum.gradient - rhs)), v @ self._particular
+        )
+        return float(half - shift)
+
+    def floor(self, residuals: Residuals, tolerance: float) -> float:
+        """Return a projected gradient small enough for the natural and the gluing residual."""
+        scales = (residuals.gluing_scale, residuals.force_scale * self._softest)
+        scale = min((scale for scale in scales if scale > 0.0), default=0.0)
+        return 0.3 * tolerance * scale / self.norm
+
+    def stopping_rule(self, balance: float, loosest: float, floor: float) -> Callable[[Vector], float]:
+        """Return the target of the inner iteration, max(floor, min(M‖Q x − λ₀‖, η‖b‖))."""
+
+        def target(x: Vector) -> float:
+            return max(min(balance * self.imbalance(x), loosest * self._size), floor)
+
+        return target
+
+    def _projected(self, x: Vector) -> Vector:
+        return self._coarse.project(self._operator(self._coarse.project(x)))
+
+    def _penalised(self, x: Vector) -> Vector:
+        inside = self._coarse.project(x)
+        return self._coarse.project(self._operator(inside)) / self.norm + (x - inside)

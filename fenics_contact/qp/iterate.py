@@ -1,0 +1,61 @@
+"""A multiplier with what is known about it, and where a dual solve starts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.qp.problem import CountedOperator, DualProblem
+from fenics_contact.qp.reductions import Vector
+from fenics_contact.qp.residual import Residuals, measure
+from fenics_contact.qp.slip_law import SlipLaw
+from fenics_contact.qp.solution import SmalseMemory
+
+
+@dataclass(frozen=True, eq=False)
+class Iterate:
+    """A multiplier on its way to the solution.
+
+    Attributes:
+        multiplier: λ, owned.
+        product: F λ, owned, recomputed or carried by recursion.
+        residual: r = F λ − d − Gᵀα, owned, with the α of the solver.
+        residuals: Residuals of λ.
+    """
+
+    multiplier: Vector
+    product: Vector
+    residual: Vector
+    residuals: Residuals
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where a solve begins.
+
+    Attributes:
+        iterate: The first multiplier.
+        operator: F with its counter, to be used for the whole solve.
+        memory: What SMALSE learned before, None if nothing.
+        cold: Whether λ is the shortest multiplier in equilibrium, Gᵀ(G Gᵀ)⁻¹e.
+    """
+
+    iterate: Iterate
+    operator: CountedOperator
+    memory: SmalseMemory | None = None
+    cold: bool = True
+
+
+def iterate_at(
+    problem: DualProblem, law: SlipLaw, multiplier: Vector, product: Vector, alpha: Vector
+) -> Iterate:
+    """Return the iterate of a multiplier with known product F λ and rigid motions α. Collective."""
+    residual = product - problem.rhs - problem.coarse.transpose(alpha)
+    residuals = measure(problem, law.feasible(multiplier), multiplier, product, residual)
+    return Iterate(multiplier, product, residual, residuals)
+
+
+def apply_unless_zero(problem: DualProblem, operator: CountedOperator, x: Vector) -> Vector:
+    """Return F x, without a product where x is zero on all ranks. Collective."""
+    return operator(x) if problem.norm(x) > 0.0 else np.zeros_like(x)

@@ -1,0 +1,76 @@
+"""Starting from a neighbouring state costs less and changes nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.contact import FixedPoint, State, find_state
+from fenics_contact.feti import Decomposition, decompose
+from fenics_contact.qp import DualSolver, FaceNewton, Smalse
+from fenics_contact.scene import Coulomb, Scene, Traction, Tresca
+from tests.contact.checks import assert_solved
+from tests.contact.gallery import block_on_plane, crowned, partitions, two_blocks
+
+TOLERANCE = 1e-8
+SOLVERS: dict[str, DualSolver] = {
+    "face Newton": FaceNewton(tolerance=TOLERANCE),
+    "SMALSE": Smalse(tolerance=TOLERANCE),
+    "fixed point": FixedPoint(Smalse(tolerance=TOLERANCE)),
+}
+
+
+def cut(scene: Scene) -> Decomposition:
+    return decompose(scene, partitions(scene), MPI.COMM_SELF)
+
+
+def assert_same(one: State, two: State) -> None:
+    size = np.abs(two.contact.force).max()
+    assert size > 0.01
+    assert np.abs(one.contact.force - two.contact.force).max() < 1e-6 * size
+    assert one.energies.total_potential == pytest.approx(two.energies.total_potential, rel=1e-8)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("friction", [Coulomb(0.38), Tresca(1.0)])
+def test_solving_again_costs_at_most_a_few_products(friction: Coulomb | Tresca, solver: str) -> None:
+    scene = two_blocks(friction)
+    decomposition = cut(scene)
+    first = find_state(scene, decomposition, solver=SOLVERS[solver])
+    again = find_state(scene, decomposition, solver=SOLVERS[solver], previous=first)
+    assert_solved(again, TOLERANCE)
+    assert_same(again, first)
+    assert first.counts["f_products"] > 20
+    assert again.counts["f_products"] <= 5
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("friction", [Coulomb(0.38), Tresca(1.0)])
+def test_a_moved_scene_has_the_same_answer_from_a_warm_and_a_cold_start(
+    friction: Coulomb | Tresca, solver: str
+) -> None:
+    scene = two_blocks(friction)
+    decomposition = cut(scene)
+    before = find_state(scene, decomposition, solver=SOLVERS[solver])
+    moved = scene.moved({"upper": crowned(scene.bodies["upper"].mesh, 0.002).points})
+    cold = find_state(moved, decomposition, solver=SOLVERS[solver])
+    warm = find_state(moved, decomposition, solver=SOLVERS[solver], previous=before)
+    assert_solved(cold, TOLERANCE)
+    assert_solved(warm, TOLERANCE)
+    assert_same(warm, cold)
+    change = np.abs(cold.contact.force - before.contact.force).max()
+    assert change > 1e-3 * np.abs(cold.contact.force).max()
+    assert warm.counts["f_products"] < cold.counts["f_products"]
+
+
+def test_a_body_turned_in_space_keeps_its_contact_forces() -> None:
+    scene = block_on_plane(Coulomb(0.6))
+    decomposition = cut(scene)
+    before = find_state(scene, decomposition, solver=SOLVERS["face Newton"])
+    heavier = replace(scene, loads=[Traction("block", "z1", (1.05, 0.3, -2.1))])
+    warm = find_state(heavier, decomposition, solver=SOLVERS["face Newton"], previous=before)
+    cold = find_state(heavier, decomposition, solver=SOLVERS["face Newton"])
+    assert_same(warm, cold)

@@ -1,0 +1,92 @@
+"""Forms are compiled once and mean the same on every mesh they are bound to."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+from mpi4py import MPI
+
+from fenics_contact import _dolfinx
+from fenics_contact.geometry import block
+
+CELLS = ["hexahedron", "tetrahedron"]
+
+
+def constants(cell: str, count: int) -> list[Any]:
+    return [ufl.Constant(_dolfinx.template(cell)) for _ in range(count)]
+
+
+def boxes(cell: str) -> list[tuple[Any, Any, float]]:
+    """Three boxes of different size and fineness with their volumes."""
+    found = []
+    for k in (1, 2, 3):
+        mesh = block((0, 0, 0), (k, 1, 2), (k, 1, k), cell)
+        found.append((mesh, _dolfinx.local_mesh(mesh.points, mesh.cells, cell), 2.0 * k))
+    return found
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_form_bound_to_several_meshes_is_compiled_once(cell: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    factor = constants(cell, 1)[0]
+    dx = ufl.dx(domain=_dolfinx.template(cell), metadata={"quadrature_degree": 1})
+    form = _dolfinx.CompiledForm(MPI.COMM_SELF, factor * dx)
+
+    def refuse(*arguments: Any, **options: Any) -> None:
+        raise AssertionError("compiled again")
+
+    monkeypatch.setattr(_dolfinx.jit, "ffcx_jit", refuse)
+    with pytest.raises(AssertionError, match="compiled again"):
+        _dolfinx.CompiledForm(MPI.COMM_SELF, 2 * factor * dx)
+    for scale, (_, mesh, volume) in enumerate(boxes(cell), start=1):
+        bound = form.bind(mesh, [], {}, {factor: _dolfinx.Constant(mesh, np.float64(scale))})
+        assert _dolfinx.assemble_scalar(bound) == pytest.approx(scale * volume, rel=1e-13)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_surface_integral_covers_the_facets_it_is_given(cell: str) -> None:
+    area = ufl.Constant(_dolfinx.template(cell)) * ufl.ds(
+        domain=_dolfinx.template(cell), metadata={"quadrature_degree": 2}
+    )(1)
+    one = area.constants()[0]
+    form = _dolfinx.CompiledForm(MPI.COMM_SELF, area)
+    for geometry, mesh, volume in boxes(cell):
+        sides = {"x0": 2.0, "y1": volume, "z0": volume / 2}
+        for side, expected in sides.items():
+            facets = {1: _dolfinx.match_facets(mesh, geometry.surfaces[side])}
+            bound = form.bind(mesh, [], {}, {one: _dolfinx.Constant(mesh, np.float64(1.0))}, facets)
+            assert _dolfinx.assemble_scalar(bound) == pytest.approx(expected, rel=1e-13)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_constants_and_coefficients_reach_their_own_places(cell: str) -> None:
+    space = _dolfinx.displacement_space(cell)
+    u, v = ufl.Coefficient(space), ufl.Coefficient(space)
+    a, b = constants(cell, 2)
+    dx = ufl.dx(domain=_dolfinx.template(cell), metadata={"quadrature_degree": 2})
+    form = _dolfinx.CompiledForm(MPI.COMM_SELF, (a * u[0] + b * b * v[1]) * dx)
+    _, mesh, volume = boxes(cell)[1]
+    fields = {u: _dolfinx.coefficient(mesh, "u"), v: _dolfinx.coefficient(mesh, "v")}
+    fields[u].x.array[:], fields[v].x.array[:] = 3.0, 5.0
+    numbers = {b: _dolfinx.Constant(mesh, np.float64(10.0)), a: _dolfinx.Constant(mesh, np.float64(2.0))}
+    bound = form.bind(mesh, [], fields, numbers)
+    assert _dolfinx.assemble_scalar(bound) == pytest.approx((2 * 3 + 100 * 5) * volume, rel=1e-13)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_the_mass_matrix_and_a_uniform_load_hold_the_volume(cell: str) -> None:
+    space = _dolfinx.displacement_space(cell)
+    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+    dx = ufl.dx(domain=_dolfinx.template(cell), metadata={"quadrature_degree": 2})
+    mass = _dolfinx.CompiledForm(MPI.COMM_SELF, ufl.inner(u, v) * dx)
+    load = _dolfinx.CompiledForm(MPI.COMM_SELF, (v[0] + 2 * v[1]) * dx)
+    for _, mesh, volume in boxes(cell):
+        V = _dolfinx.coefficient(mesh, "u").function_space
+        indptr, indices, data = _dolfinx.assemble_csr(mass.bind(mesh, [V, V], {}, {}))
+        assert len(indptr) == len(mesh.geometry.x) * 3 + 1
+        assert len(indices) == len(data) == indptr[-1]
+        assert data.sum() == pytest.approx(3 * volume, rel=1e-13)
+        force = _dolfinx.assemble_vector(load.bind(mesh, [V], {}, {}))
+        assert force.reshape(-1, 3).sum(axis=0) == pytest.approx([volume, 2 * volume, 0.0])

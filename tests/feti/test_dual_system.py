@@ -1,0 +1,159 @@
+"""The operators of the dual problem are what their formulas say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.sparse as sp
+from mpi4py import MPI
+
+from fenics_contact.feti import DualSystem, build_torn_system, decompose
+from fenics_contact.feti.factor import regularised
+from tests.feti.scenes import CELLS, Cut, clamped_block, ragged_block, touching_blocks
+
+
+def dual(cut: Cut) -> DualSystem:
+    scene, partitions = cut
+    return DualSystem(build_torn_system(scene, decompose(scene, partitions, MPI.COMM_SELF)))
+
+
+SCENES = {
+    "hexahedra": lambda: clamped_block("hexahedron"),
+    "tetrahedra": lambda: clamped_block("tetrahedron"),
+    "free and ragged": lambda: ragged_block("tetrahedron"),
+    "contact": touching_blocks,
+}
+
+
+@pytest.fixture(scope="module", params=list(SCENES))
+def system(request: pytest.FixtureRequest) -> DualSystem:
+    return dual(SCENES[request.param]())
+
+
+def dense(system: DualSystem, operator: object) -> np.ndarray:
+    identity = np.eye(system.torn.numbering.total)
+    return np.column_stack([operator(column) for column in identity])  # type: ignore[operator]
+
+
+def test_the_dual_operator_is_b_times_inverse_times_b_transposed(system: DualSystem) -> None:
+    B = system.torn.B.toarray()
+    blocks = [
+        np.linalg.inv(regularised(s.stiffness, s.kernel, s.points).toarray()) for s in system.torn.subdomains
+    ]
+    expected = B @ sp.block_diag(blocks).toarray() @ B.T
+    F = dense(system, system.apply)
+    assert np.abs(F - expected).max() < 1e-9 * np.abs(expected).max()
+
+
+def test_the_dual_operator_is_symmetric_and_positive_semidefinite(system: DualSystem) -> None:
+    F = dense(system, system.apply)
+    size = np.abs(F).max()
+    assert np.abs(F - F.T).max() < 1e-11 * size
+    assert np.linalg.eigvalsh(0.5 * (F + F.T)).min() > -1e-11 * size
+    assert size > 0
+
+
+def test_columns_of_g_are_the_resultants_of_the_multipliers(system: DualSystem) -> None:
+    torn = system.torn
+    kernels = [subdomain.kernel for subdomain in torn.subdomains]
+    R = sp.block_diag(kernels).toarray()
+    np.testing.assert_allclose(system.kernel.toarray(), R, atol=0)
+    G = system.problem.coarse.matrix.toarray()
+    assert G.shape == (6 * len(kernels), torn.numbering.total)
+    np.testing.assert_allclose(G, R.T @ torn.B.toarray().T, atol=1e-13)
+    np.testing.assert_allclose(system.problem.coarse.load, R.T @ torn.load, atol=1e-12)
+
+
+def test_a_gluing_multiplier_moves_only_the_subdomains_that_it_couples(system: DualSystem) -> None:
+    G = system.problem.coarse.matrix.toarray().reshape(len(system.torn.subdomains), 6, -1)
+    touched = (np.abs(G).max(axis=1) > 1e-14).sum(axis=0)
+    B = system.torn.B
+    owner = np.repeat(np.arange(len(system.torn.subdomains)), [s.mesh.size for s in system.torn.subdomains])
+    coupled = [len(set(owner[B.indices[B.indptr[row] : B.indptr[row + 1]]])) for row in range(B.shape[0])]
+    np.testing.assert_array_equal(touched, coupled)
+    assert max(coupled[: system.torn.n_equality]) > 1
+
+
+def test_the_right_side_is_the_jump_of_the_loaded_subdomains(system: DualSystem) -> None:
+    torn = system.torn
+    expected = torn.B @ system.inverse(torn.load) - torn.right
+    np.testing.assert_allclose(system.problem.rhs, expected, atol=1e-13 * max(np.abs(expected).max(), 1e-3))
+
+
+def test_the_preconditioner_is_symmetric_and_positive_in_equilibrium(system: DualSystem) -> None:
+    assert system.problem.preconditioner is not None
+    M = dense(system, system.problem.preconditioner)
+    size = np.abs(M).max()
+    assert np.abs(M - M.T).max() < 1e-11 * size
+    basis = scipy.linalg.null_space(system.problem.coarse.matrix.toarray())
+    assert 0 < basis.shape[1] < len(M)
+    assert np.linalg.eigvalsh(basis.T @ M @ basis).min() > 1e-6 * size
+
+
+def test_the_preconditioner_is_the_scaled_schur_complement(system: DualSystem) -> None:
+    B, n = system.torn.B.toarray(), system.torn.n_equality
+    touched = np.abs(B).sum(axis=0) > 0
+    S = np.zeros((B.shape[1],) * 2)
+    start = 0
+    for subdomain in system.torn.subdomains:
+        here = np.arange(start, start + subdomain.mesh.size)
+        K = subdomain.stiffness.toarray()
+        b, i = touched[here], ~touched[here]
+        inner = K[np.ix_(b, i)] @ np.linalg.solve(K[np.ix_(i, i)], K[np.ix_(i, b)]) if i.any() else 0.0
+        S[np.ix_(here[b], here[b])] = K[np.ix_(b, b)] - inner
+        start += subdomain.mesh.size
+    scale = np.eye(len(B))
+    scale[n:, n:] = np.linalg.inv(B[n:] @ B[n:].T)
+    expected = scale @ B @ S @ B.T @ scale
+    assert system.problem.preconditioner is not None
+    M = dense(system, system.problem.preconditioner)
+    assert np.abs(M - expected).max() < 1e-10 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_the_preconditioner_makes_the_operator_well_conditioned(cell: str) -> None:
+    system = dual(clamped_block(cell, layers=3))
+    assert system.problem.preconditioner is not None
+    project = system.problem.coarse.project
+    F, M, P = (dense(system, op) for op in (system.apply, system.problem.preconditioner, project))
+
+    def condition(matrix: np.ndarray) -> float:
+        values = np.linalg.eigvals(matrix).real
+        values = values[values > 1e-8 * values.max()]
+        return float(values.max() / values.min())
+
+    assert condition(P @ M @ P @ F @ P) < 0.2 * condition(P @ F @ P)
+
+
+def test_the_diagonal_is_that_of_the_operator_on_contact_rows() -> None:
+    system = dual(touching_blocks())
+    F, contact = dense(system, system.apply), np.arange(system.torn.n_equality, system.torn.numbering.total)
+    np.testing.assert_allclose(system.problem.diagonal[contact], np.diag(F)[contact], rtol=1e-9)
+    assert len(contact) > 50
+    np.testing.assert_array_equal(system.problem.diagonal[: system.torn.n_equality], 1.0)
+
+
+def test_displacements_of_any_multiplier_obey_equilibrium_in_every_subdomain() -> None:
+    system = dual(clamped_block("hexahedron"))
+    problem = system.problem
+    multiplier = problem.coarse.particular() + problem.coarse.project(
+        np.random.default_rng(4).standard_normal(problem.layout.size)
+    )
+    alpha = np.random.default_rng(5).standard_normal(problem.coarse.m)
+    u = system.displacement(multiplier, alpha)
+    K = sp.block_diag([subdomain.stiffness for subdomain in system.torn.subdomains], format="csr")
+    right = system.torn.load - system.force(multiplier)
+    assert np.abs(K @ u - right).max() < 1e-9 * np.abs(right).max()
+    violation = system.jump(u) - system.torn.right
+    flexed = system.apply(multiplier) - problem.rhs - problem.coarse.transpose(alpha)
+    np.testing.assert_allclose(-violation, flexed, atol=1e-10 * np.abs(violation).max())
+
+
+def test_contact_and_frictional_multipliers_have_their_places_in_the_layout() -> None:
+    system = dual(touching_blocks())
+    layout, torn = system.problem.layout, system.torn
+    np.testing.assert_array_equal(layout.normal, torn.normal_rows)
+    np.testing.assert_array_equal(layout.tangential, torn.tangential_rows)
+    np.testing.assert_array_equal(layout.friction_of, torn.frictional)
+    np.testing.assert_array_equal(system.owned_discs(), np.arange(len(torn.frictional)))

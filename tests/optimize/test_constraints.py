@@ -1,0 +1,82 @@
+"""Points are projected onto the feasible set, and the set is seen rightly from within."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.optimize import Bounds, LinearConstraints, nearest_feasible
+from fenics_contact.optimize.constraints import feasible_set
+
+BOX = Bounds([-1.0, 0.0, -np.inf], [1.0, np.inf, 2.0])
+ROWS = LinearConstraints([[1.0, 1.0, 1.0], [2.0, -1.0, 0.0]], [1.0, 1.5], [[0.0, 1.0, -1.0]], [0.25])
+
+
+@given(seed=st.integers(0, 10_000), size=st.sampled_from([1e-3, 1.0, 1e4]))
+@settings(max_examples=40, deadline=None, derandomize=True)
+def test_projection_is_feasible_and_no_feasible_point_is_nearer(seed: int, size: float) -> None:
+    generator = np.random.default_rng(seed)
+    x = size * generator.standard_normal(3)
+    nearest = nearest_feasible(x, BOX, ROWS)
+    allowed = feasible_set(3, BOX, ROWS)
+    assert allowed.violations(nearest) == []
+    # A feasible point near the projection: the projection of a neighbour.
+    other = nearest_feasible(nearest + 0.1 * generator.standard_normal(3), BOX, ROWS)
+    assert (x - nearest) @ (other - nearest) <= 1e-6 * (1.0 + size)
+
+
+def test_projection_onto_a_plane_is_the_analytic_one() -> None:
+    plane = LinearConstraints([[3.0, 4.0]], [10.0])
+    assert nearest_feasible([9.0, 12.0], None, plane) == pytest.approx([1.2, 1.6], abs=1e-8)
+
+
+def test_feasible_point_is_its_own_projection() -> None:
+    x = np.array([0.1, 0.2, -0.05])
+    assert (nearest_feasible(x, BOX, ROWS) == x).all()
+
+
+def test_contradicting_constraints_have_no_nearest_point() -> None:
+    with pytest.raises(InvalidInputError, match="must leave at least one point"):
+        nearest_feasible([0.0], (0.0, 1.0), LinearConstraints([[1.0]], [-1.0]))
+
+
+def test_violations_are_named_with_their_amount() -> None:
+    found = feasible_set(3, BOX, ROWS).violations(np.array([-2.0, 3.0, 4.0]))
+    assert len(found) == 4
+    assert "x[0] = -2 is below its lower bound -1" in found[0]
+    assert "x[2] = 4 is above its upper bound 2" in found[1]
+    assert "row 0 of A x ≤ b is exceeded by 4" in found[2]
+    assert "row 0 of E x = e is missed by -1.25" in found[3]
+
+
+def test_rounding_is_no_violation() -> None:
+    allowed = feasible_set(2, (-1e6, 1e6), LinearConstraints([[1e3, 1.0]], [1e9]))
+    x = np.array([1e6 * (1 + 1e-12), 0.0])
+    assert allowed.violations(x) == []
+    assert allowed.clip(x)[0] == 1e6
+
+
+def test_surroundings_are_distances_in_scaled_variables() -> None:
+    scale, x = np.array([2.0, 0.5, 10.0]), np.array([0.1, 0.2, -0.05])
+    near = feasible_set(3, BOX, ROWS).around(x, scale)
+    assert np.linalg.norm(near.rows, axis=1) == pytest.approx(np.ones(6))
+    step = 0.01 * np.array([1.0, -2.0, 3.0])
+    allowed = feasible_set(3, BOX, ROWS)
+    after = allowed.around(x + scale * step, scale)
+    assert near.room - near.rows @ step == pytest.approx(after.room)
+    assert near.miss - near.equality_rows @ step == pytest.approx(after.miss)
+    assert near.room.min() > 0.0
+
+
+def test_variable_with_equal_bounds_is_an_equality() -> None:
+    near = feasible_set(2, ([1.0, 0.0], [1.0, 5.0])).around(np.array([1.0, 2.0]), np.ones(2))
+    assert near.equality_rows.tolist() == [[1.0, 0.0]]
+    assert near.rows.tolist() == [[0.0, -1.0], [0.0, 1.0]]
+
+
+def test_nothing_asked_is_nothing_in_the_way() -> None:
+    near = feasible_set(3).around(np.zeros(3), np.ones(3))
+    assert near.rows.shape == near.equality_rows.shape == (0, 3)

@@ -1,0 +1,187 @@
+"""The front door: what is refused, what is reported, and the edges where something is missing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from fenics_contact.errors import ConvergenceError, InvalidInputError
+from fenics_contact.qp import (
+    ContactLayout,
+    FaceNewton,
+    FeasibleSet,
+    ProjectedCG,
+    Residuals,
+    Smalse,
+    contact_step,
+    measure,
+    solve,
+)
+from tests.qp.random_problems import random_problem
+from tests.qp.torn_bricks import Bricks, torn_problem
+
+SOLVERS = [FaceNewton(), Smalse(), ProjectedCG()]
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("m", [0, 4])
+def test_linear_problem_equals_the_dense_saddle_point_solution(solver, m):
+    problem = random_problem(1, n_equality=30, n_contact=0, m=m)
+    found = solve(problem.dual, None, solver)
+    block = np.block([[problem.F, problem.G.T], [problem.G, np.zeros((m, m))]])
+    expected = np.linalg.solve(block, np.concatenate([problem.d, problem.e]))
+    accuracy = 1e2 * solver.tolerance * np.abs(expected).max()
+    np.testing.assert_allclose(found.multiplier, expected[:30], atol=accuracy)
+    np.testing.assert_allclose(found.alpha, -expected[30:], atol=accuracy)
+
+
+def test_projected_cg_needs_one_run_for_a_torn_body():
+    dual, _ = torn_problem(Bricks(n=4, cubes=(2, 2), contact=False))
+    found = solve(dual, None, ProjectedCG(tolerance=1e-10))
+    assert found.iterations == 1
+    assert found.gluing_residual <= 1e-10
+    assert found.coarse_residual <= 1e-13
+    assert 5 < found.products < 25
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_unloaded_body_has_no_multipliers(solver):
+    dual, _ = torn_problem(Bricks(contact=False, press=0.0, shear=0.0))
+    found = solve(dual, None, solver)
+    assert np.all(found.multiplier == 0.0)
+    assert found.residuals.worst == 0.0
+
+
+@pytest.mark.parametrize("solver", [FaceNewton(), Smalse()])
+def test_contact_that_stays_open_has_no_force(solver):
+    problem = random_problem(6, n_contact=8, m=0)
+    d = problem.d.copy()
+    d[problem.layout.normal] = -50.0
+    found = solve(replace(problem.dual, rhs=d), np.zeros(8), solver)
+    assert np.all(found.multiplier[problem.layout.contact] == 0.0)
+    assert np.linalg.norm(found.multiplier) > 1.0
+    assert found.natural_residual == 0.0
+
+
+@pytest.mark.parametrize("solver", [FaceNewton(), Smalse()])
+def test_tresca_friction_acts_without_normal_force_too(solver):
+    problem = random_problem(6, n_contact=8, m=0)
+    d = problem.d.copy()
+    d[problem.layout.normal] = -50.0
+    found = solve(replace(problem.dual, rhs=d), np.full(8, 0.2), solver)
+    assert np.all(found.multiplier[problem.layout.normal] == 0.0)
+    assert np.linalg.norm(found.multiplier[problem.layout.tangential]) > 0.3
+    assert 0.0 < found.natural_residual <= 1e-6
+
+
+def test_projected_cg_refuses_contact():
+    with pytest.raises(
+        InvalidInputError, match="projected CG needs a problem without contact, got 12 contacts"
+    ):
+        solve(random_problem(1).dual, np.ones(12), ProjectedCG())
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"rhs": np.zeros(5)}, "rhs must have 56 entries"),
+        ({"diagonal": np.ones(5)}, "diagonal must have 56 entries"),
+        ({"rhs": np.full(56, np.nan)}, "rhs must be finite, got 56 entries that are not"),
+        ({"diagonal": np.zeros(56)}, "diagonal must be positive on every contact row, got 0.0"),
+        ({"layout": ContactLayout.build(50)}, "must have 50 entries"),
+    ],
+)
+def test_unusable_problem_is_refused(change, message):
+    problem = random_problem(1)
+    with pytest.raises(InvalidInputError, match=message):
+        solve(replace(problem.dual, **change), problem.slip_bound, FaceNewton())
+
+
+@pytest.mark.parametrize(
+    ("slip_bound", "mu_f", "message"),
+    [
+        (None, None, "12 friction discs need a slip_bound or a friction_coefficient, got neither"),
+        (np.ones(12), np.ones(12), "give slip_bound or friction_coefficient, got both"),
+        (np.ones(11), None, r"slip_bound must have shape \(12,\)"),
+        (-np.ones(12), None, "slip_bound must be finite and not negative"),
+    ],
+)
+def test_unclear_friction_is_refused(slip_bound, mu_f, message):
+    with pytest.raises(InvalidInputError, match=message):
+        solve(random_problem(1).dual, slip_bound, FaceNewton(), friction_coefficient=mu_f)
+
+
+def test_start_of_the_wrong_length_is_refused():
+    problem = random_problem(1)
+    with pytest.raises(
+        InvalidInputError, match=r"start must have shape \(56,\) like this rank's owned vector"
+    ):
+        solve(problem.dual, problem.slip_bound, FaceNewton(), np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("solver", "message"),
+    [
+        (
+            Smalse(tolerance=1e-12, max_products=40),
+            r"SMALSE needs residuals below 1.0e-12, got after \d+ products",
+        ),
+        (FaceNewton(tolerance=1e-12, max_products=20), r"face Newton needs residuals below 1.0e-12"),
+    ],
+)
+def test_failure_is_an_error_with_history(solver, message):
+    problem = random_problem(1)
+    with pytest.raises(ConvergenceError, match=message) as caught:
+        solve(problem.dual, problem.slip_bound, solver)
+    assert len(caught.value.history) >= 1
+
+
+def test_solver_that_claims_too_much_is_found_out():
+    @dataclass(frozen=True)
+    class Boaster:
+        tolerance: float = 1e-9
+
+        def run(self, problem, law, start):
+            return FaceNewton(tolerance=1e-2).run(problem, law, start)
+
+    problem = random_problem(1)
+    with pytest.raises(ConvergenceError, match="claims convergence that its own answer does not show"):
+        solve(problem.dual, problem.slip_bound, Boaster())
+
+
+def measured(problem, lam, alpha):
+    product = problem.F @ lam
+    residual = product - problem.d - problem.G.T @ alpha
+    feasible = FeasibleSet(problem.layout, problem.slip_bound)
+    return measure(problem.dual, feasible, lam, product, residual), residual, feasible
+
+
+def test_residuals_are_what_their_formulas_say():
+    problem = random_problem(3)
+    rng = np.random.default_rng(0)
+    lam, layout = rng.standard_normal(problem.layout.size), problem.layout
+    found, r, feasible = measured(problem, lam, rng.standard_normal(6))
+    step = contact_step(layout, np.diagonal(problem.F))
+    assert np.all(step[layout.equality] == 0.0)
+    np.testing.assert_allclose(step[layout.normal], 1.0 / np.diagonal(problem.F)[layout.normal])
+    assert np.all(step[layout.tangential[:, 0]] == step[layout.tangential[:, 1]])
+    mapped = feasible.project(lam - step * r)
+    force = max(np.linalg.norm(lam[layout.normal]), np.linalg.norm(mapped[layout.normal]))
+    assert found.natural == pytest.approx(np.linalg.norm((lam - mapped)[layout.contact]) / force)
+    flexed = (problem.F @ lam - problem.d)[layout.equality]
+    scale = max(np.linalg.norm(flexed), np.linalg.norm(problem.d[layout.equality]))
+    assert found.gluing == pytest.approx(np.linalg.norm(r[layout.equality]) / scale)
+    shortest = np.linalg.lstsq(problem.G, problem.G @ lam - problem.e, rcond=None)[0]
+    balanced = np.linalg.lstsq(problem.G, problem.e, rcond=None)[0]
+    larger = max(np.linalg.norm(lam), np.linalg.norm(balanced))
+    assert found.coarse == pytest.approx(np.linalg.norm(shortest) / larger)
+    assert found.violation == pytest.approx(feasible.violation(lam) / force)
+    assert found.worst == max(found.natural, found.gluing, found.coarse)
+    assert min(found.natural, found.gluing, found.coarse, found.violation) > 1e-3
+
+
+def test_not_a_number_is_never_within_a_tolerance():
+    assert not Residuals(np.nan, 0.0, 0.0, 0.0, 1.0, 1.0).within(1.0)
+    assert Residuals(0.1, 0.0, 0.0, 0.0, 1.0, 1.0).within(0.1)
