@@ -19,7 +19,10 @@ class InvalidInputError(FenicsContactError, ValueError):
 
 
 class InvalidDesignError(InvalidInputError):
-    """A design lies outside the function's domain, for example because a cell is inverted."""
+    """The objective does not exist at this design, for example because a cell is inverted.
+
+    A minimisation that meets it tries a shorter step.
+    """
 
 
 class InfeasibleError(FenicsContactError):

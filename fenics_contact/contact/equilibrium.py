@@ -13,10 +13,13 @@ from fenics_contact.contact.held import check_held
 from fenics_contact.contact.result import ContactResult, Status
 from fenics_contact.contact.state import State
 from fenics_contact.contact.warm_start import carried_over
-from fenics_contact.feti import Decomposition, DualSystem, build_torn_system, decompose
-from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, Smalse, contact_step, solve
+from fenics_contact.feti import Decomposition, DualSystem, TornSystem, build_torn_system, decompose
+from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, ProjectedCG, Smalse, contact_step, solve
 from fenics_contact.scene import Scene
 from fenics_contact.timing import PhaseTimer
+
+#: Largest relative residual of a scene without contact; its answer then equals that of a direct solver.
+LINEAR_TOLERANCE = 1e-10
 
 
 def solve_scene(
@@ -28,7 +31,7 @@ def solve_scene(
         scene: Bodies, supports, loads and contact pairs, the same on every rank.
         partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
         comm: Communicator over which the subdomains are spread.
-        solver: Dual solver with its tolerance, `FaceNewton()` by default.
+        solver: Dual solver with its tolerance; `default_solver` chooses if it is None.
 
     Raises:
         InvalidInputError: If scene or partition cannot be used.
@@ -58,12 +61,12 @@ def find_state(
     Args:
         scene: The scene, with the coordinates to use.
         decomposition: Its decomposition; only topology and numbering are taken from it.
-        solver: Dual solver with its tolerance, `FaceNewton()` by default.
+        solver: Dual solver with its tolerance; `default_solver` chooses if it is None.
         previous: State of a neighbouring geometry to start from.
         start_geometry: Refuse bodies that overlap before they are loaded.
         timer: Collects the seconds.
     """
-    solver, timer = solver or FaceNewton(), timer or PhaseTimer()
+    timer = timer or PhaseTimer()
     with timer.phase("assemble"):
         torn = build_torn_system(scene, decomposition, start_geometry=start_geometry)
         if previous is None:
@@ -71,13 +74,18 @@ def find_state(
     system = DualSystem(torn, timer)
     with timer.phase("solve"):
         start = None if previous is None else carried_over(previous.system, previous.solution, system)
-        solution = solve_dual(system, solver, start)
+        solution = solve_dual(system, solver or default_solver(torn), start)
     with timer.phase("state"):
         displacement = system.displacement(solution.multiplier, solution.alpha)
         contact = contact_result(system, solution)
         friction = float(np.sum(contact.slip_bound * np.linalg.norm(contact.slip, axis=1)))
         energies = compute_energies(system, displacement, solution.multiplier, friction)
     return State(system, solution, displacement, contact, energies, timer.seconds)
+
+
+def default_solver(torn: TornSystem) -> DualSolver:
+    """Return projected conjugate gradients for a scene without contact, Newton on faces for one with."""
+    return FaceNewton() if torn.points.count else ProjectedCG(tolerance=LINEAR_TOLERANCE)
 
 
 def solve_dual(system: DualSystem, solver: DualSolver, start: np.ndarray | None = None) -> DualSolution:

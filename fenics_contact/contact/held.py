@@ -12,6 +12,8 @@ from fenics_contact.scene import rigid_body_modes
 
 #: Support reactions below this fraction of the largest count as none: the motion is not resisted.
 RANK_TOLERANCE = 1e-9
+#: A resultant below this fraction of the loads' sum is rounding: the loads balance each other.
+BALANCED = 1e-12
 
 
 def check_held(torn: TornSystem) -> None:
@@ -30,6 +32,7 @@ def check_held(torn: TornSystem) -> None:
     comm = torn.numbering.comm
     bodies = [_RigidBody(torn, index) for index in range(len(torn.scene.bodies))]
     loads = comm.allreduce(np.array([body.load_wrench(torn) for body in bodies]))
+    loads[np.abs(loads) <= BALANCED * comm.allreduce(np.abs(torn.load).sum())] = 0.0
     with together(comm):
         floating = [index for index, body in enumerate(bodies) if body.support.shape[1] < 6]
         if comm.rank == 0 and floating:
@@ -130,10 +133,10 @@ def _infeasibility_ray(
 def _describe(motion: np.ndarray, bodies: list[_RigidBody]) -> str:
     worst = int(np.argmax(np.linalg.norm(motion, axis=1)))
     # The certificate points against the right side, which is minus the load.
-    free = motion[worst] / np.abs(motion[worst]).max()
+    free = np.round(motion[worst] / np.abs(motion[worst]).max(), 3) + 0.0  # no -0
     parts = [("translation", free[:3]), ("rotation", free[3:])]
     words = " with ".join(
-        f"{kind} ({part[0]:.2g}, {part[1]:.2g}, {part[2]:.2g})" for kind, part in parts if np.abs(part).max() > 1e-3
+        f"{kind} ({part[0]:.2g}, {part[1]:.2g}, {part[2]:.2g})" for kind, part in parts if np.any(part)
     )
     return (
         f"every body must be held by supports, contact or friction, but body {bodies[worst].name!r} can move away "

@@ -9,9 +9,7 @@ from mpi4py import MPI
 from fenics_contact.feti.dirichlet import DirichletPreconditioner
 from fenics_contact.feti.inverse import GeneralizedInverse, kernel_matrix
 from fenics_contact.feti.torn import TornSystem
-from fenics_contact.qp.coarse import CoarseSpace
-from fenics_contact.qp.layout import ContactLayout
-from fenics_contact.qp.problem import DualProblem
+from fenics_contact.qp import CoarseSpace, ContactLayout, DualProblem
 from fenics_contact.timing import PhaseTimer
 
 

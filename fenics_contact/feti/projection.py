@@ -9,9 +9,13 @@ from scipy.spatial import cKDTree
 
 from fenics_contact.feti.surface import FacetedSurface, outside, shape_functions
 
-#: Facets tried for each node, nearest centroids first; the second round is for nodes the first leaves over.
-CANDIDATES = (9, 64)
+#: Facets tried for each point in the first round, nearest centroids first.
+NEAREST = 9
+#: A facet is tried in the second round if its ball comes as near as the nearest centroid, times this factor.
+REACH = 1.1
 NEWTON_STEPS = 25
+#: After so many steps a point that is still a facet's width away belongs to another facet.
+PATIENCE = 8
 #: How far outside a facet a projection may lie, in local coordinates: rounding on shared edges, no more.
 EDGE_TOLERANCE = 1e-9
 
@@ -73,19 +77,36 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
         normals: Their outward unit normals, shape (n, 3).
         master: The surface to project on.
     """
-    tree = cKDTree(master.points[master.facets].mean(axis=1))
-    found: list[Projection] = []
-    waiting, tried = np.arange(len(points)), 0
-    for candidates in CANDIDATES:
-        wanted = np.arange(tried, min(candidates, len(master.facets))) + 1
-        if len(waiting) == 0 or len(wanted) == 0:
-            break
-        _, facets = tree.query(points[waiting], k=wanted)
-        tried = candidates
-        best = _best(_solve(points, normals, master, np.repeat(waiting, len(wanted)), facets.ravel()))
-        found.append(best)
-        waiting = np.setdiff1d(waiting, best.point)
-    return _concatenated(found)
+    corners = master.points[master.facets]
+    centroids = corners.mean(axis=1)
+    radius = np.linalg.norm(corners - centroids[:, None], axis=2).max(axis=1)
+    tree = cKDTree(centroids)
+    first = _best(_solve(points, normals, master, *_nearest(tree, points)))
+    waiting = np.setdiff1d(np.arange(len(points)), first.point)
+    second = _best(_solve(points, normals, master, *_within_reach(tree, radius, points, waiting)))
+    return _concatenated([first, second])
+
+
+def _nearest(tree: cKDTree, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pair every point with the facets whose centroids are nearest."""
+    ranks = np.arange(min(NEAREST, tree.n)) + 1
+    _, facets = tree.query(points, k=ranks)
+    return np.repeat(np.arange(len(points)), len(ranks)), facets.ravel()
+
+
+def _within_reach(
+    tree: cKDTree, radius: np.ndarray, points: np.ndarray, waiting: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pair the waiting points with all facets that can be closest, whatever the grading of the mesh."""
+    if len(waiting) == 0:
+        return waiting, waiting
+    nearest, _ = tree.query(points[waiting])
+    lists = tree.query_ball_point(points[waiting], REACH * nearest + radius.max())
+    pair = np.repeat(np.arange(len(waiting)), [len(facets) for facets in lists])
+    facet = np.concatenate(lists).astype(np.int64)
+    distance = np.linalg.norm(points[waiting[pair]] - tree.data[facet], axis=1)
+    near = distance <= REACH * nearest[pair] + radius[facet]
+    return waiting[pair[near]], facet[near]
 
 
 def _solve(
@@ -97,18 +118,17 @@ def _solve(
     size = np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).max(axis=1)
     local = np.full((len(point), 2), 0.0 if master.corners == 4 else 1 / 3)
     gap = np.zeros(len(point))
-    for _ in range(NEWTON_STEPS):
-        values, derivatives = shape_functions(local, master.corners)
-        normal, length = interpolated_normal(values, corner_normals)
-        residual = np.einsum("nk,nkd->nd", values, corners) + gap[:, None] * normal - target
-        matrix = newton_matrix(corners, corner_normals, derivatives, gap, normal, length)
-        regular = np.abs(np.linalg.det(matrix)) > 1e-12 * size**2
-        matrix[~regular] = np.eye(3)
-        step = np.where(regular[:, None], -np.linalg.solve(matrix, residual[:, :, None])[:, :, 0], 0.0)
+    at = np.arange(len(point))  # the pairs still iterated
+    for count in range(NEWTON_STEPS):
+        step = _newton_step(corners[at], corner_normals[at], target[at], local[at], gap[at], size[at])
         # A point far beyond the facet belongs to another one; keeping it near keeps its iterates finite.
-        local = np.clip(local + step[:, :2], -3, 3)
-        gap = gap + step[:, 2]
-        if np.all(np.abs(step[:, :2]).max(axis=1) < 1e-14):
+        local[at] = np.clip(local[at] + step[:, :2], -3, 3)
+        gap[at] += step[:, 2]
+        moving = np.abs(step[:, :2]).max(axis=1) > 1e-8  # convergence is quadratic: the next step is rounding
+        if count >= PATIENCE:
+            moving &= outside(local[at], master.corners) < 1.0
+        at = at[moving]
+        if len(at) == 0:
             break
     values, _ = shape_functions(local, master.corners)
     normal, _ = interpolated_normal(values, corner_normals)
@@ -117,6 +137,19 @@ def _solve(
     good &= outside(local, master.corners) <= EDGE_TOLERANCE
     good &= np.einsum("nd,nd->n", normal, normals[point]) < 0
     return Projection(point[good], facet[good], local[good], gap[good], normal[good])
+
+
+def _newton_step(
+    corners: np.ndarray, normals: np.ndarray, target: np.ndarray, local: np.ndarray, gap: np.ndarray, size: np.ndarray
+) -> np.ndarray:
+    """Return the changes of (ξ, g), shape (n, 3); none where the facet and its normals are degenerate."""
+    values, derivatives = shape_functions(local, corners.shape[1])
+    normal, length = interpolated_normal(values, normals)
+    residual = np.einsum("nk,nkd->nd", values, corners) + gap[:, None] * normal - target
+    matrix = newton_matrix(corners, normals, derivatives, gap, normal, length)
+    regular = np.abs(np.linalg.det(matrix)) > 1e-12 * size**2
+    matrix[~regular] = np.eye(3)
+    return np.where(regular[:, None], -np.linalg.solve(matrix, residual[:, :, None])[:, :, 0], 0.0)
 
 
 def _best(found: Projection) -> Projection:

@@ -33,7 +33,9 @@ def write_vtu(state: State, folder: str | Path, name: str = "state") -> Path:
         InvalidInputError: If the name holds a folder.
     """
     if not name or Path(name).name != name:
-        raise InvalidInputError(f"name must be the beginning of a file's name, got {name!r}: put folders into folder")
+        raise InvalidInputError(
+            f"name must be the beginning of a file's name, got {name!r}: put folders into folder"
+        )
     index = Path(folder) / f"{name}.vtm"
     meshes = {body: _gathered(state, body) for body in state.scene.bodies}
     files = [index.with_name(f"{name}_{body}.vtu") for body in meshes]

@@ -31,7 +31,9 @@ def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
     """
     base = Path(path)
     if base.suffix != ".xdmf":
-        raise InvalidInputError(f"the file must be an XDMF file, got the name {base.name!r}: let it end in '.xdmf'")
+        raise InvalidInputError(
+            f"the file must be an XDMF file, got the name {base.name!r}: let it end in '.xdmf'"
+        )
     written = {}
     for name, displacement in state.displacement.items():
         written[name] = base.with_name(f"{base.stem}_{name}.xdmf")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from fenics_contact.errors import InvalidDesignError
 from fenics_contact.optimize.bundle_trust import BundleTrust
 from fenics_contact.optimize.constraints import Bounds, LinearConstraints, nearest_feasible
 from fenics_contact.optimize.minimization import minimize
 from fenics_contact.optimize.problem import Problem, pose
 from fenics_contact.optimize.quadratic_program import SubproblemError
-from fenics_contact.optimize.result import InvalidDesignError, Kind, NotConvergedError, Reason, Record, Result
+from fenics_contact.optimize.result import Kind, NotConvergedError, Reason, Record, Result
 
 __all__ = [
     "Bounds",

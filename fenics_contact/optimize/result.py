@@ -9,16 +9,9 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from fenics_contact.errors import ConvergenceError, InvalidInputError
+from fenics_contact.errors import ConvergenceError
 
 Array = NDArray[np.float64]
-
-
-class InvalidDesignError(InvalidInputError):
-    """The objective does not exist at this design: a cell is inverted, bodies penetrate.
-
-    A minimisation that meets it tries a shorter step.
-    """
 
 
 class Reason(Enum):

@@ -100,6 +100,24 @@ class Face:
         """Return the orthogonal projection of an owned vector on the face, fixed + Z Zᵀ x."""
         return self.fixed + self.prolong(self.restrict(x))
 
+    def growth(self, rate: Vector) -> sp.csr_matrix:
+        """Return how slipping forces grow with their normal forces, shape (size, n_face).
+
+        Entries ``rate`` · ŵ in the tangential rows of a slipping disc, in the column of its normal multiplier.
+
+        Args:
+            rate: dΨ/dλ_N of each disc, shape (n_friction,), owned.
+        """
+        layout = self.layout
+        column_of_contact = np.full(layout.n_contact, -1)
+        column_of_contact[self.closed] = len(layout.equality) + np.arange(np.count_nonzero(self.closed))
+        column = column_of_contact[layout.friction_of]
+        growing = np.flatnonzero(self.slip & (column >= 0) & (rate > 0.0))
+        rows = layout.tangential[growing]
+        values = rate[growing, None] * self.direction[growing]
+        columns = np.broadcast_to(column[growing, None], rows.shape)
+        return sp.csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape=self.restriction.shape)
+
     def changes(self, other: Face) -> int:
         """Count this rank's contacts and discs whose status differs between two faces."""
         return int(

@@ -8,8 +8,10 @@ import numpy as np
 
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp.certify import certify
+from fenics_contact.qp.coupled import CoupledSystem, couple
 from fenics_contact.qp.face import Face, classify
 from fenics_contact.qp.face_system import FaceSystem, FaceSystems
+from fenics_contact.qp.gmres import projected_gmres
 from fenics_contact.qp.iterate import Iterate, Start, apply_unless_zero, iterate_at
 from fenics_contact.qp.pcg import FaceStep, Stop, projected_cg
 from fenics_contact.qp.problem import DualProblem
@@ -54,6 +56,8 @@ class FaceNewton:
     forcing: float = 0.2
     loosest: float = 0.1
     patience: int = 6
+    ew: bool = True
+    ls: bool = True
     rescue: Smalse = field(default_factory=Smalse)
     rescue_products: int = 300
 
@@ -110,6 +114,7 @@ class NewtonSteps:
         self._natural_step = contact_step(problem.layout, problem.diagonal)
         self._rho = self._natural_step.copy()
         self._face: Face | None = None
+        self._eta = parameters.loosest
 
     def step(self, iterate: Iterate, number: int) -> tuple[Iterate, SolverStep]:
         """Classify, solve the face, and return the new iterate with its line of history. Collective."""
@@ -117,14 +122,28 @@ class NewtonSteps:
         changes = 0 if self._face is None else face.changes(self._face)
         self._face = face
         system = self._systems.build(face)
-        entered = system.enter(iterate.multiplier)
+        coupled = couple(system, self._problem.coarse, self._law.growth, iterate.multiplier)
+        linear = coupled or system
+        entered = linear.enter(iterate.multiplier)
         moved = apply_unless_zero(self._problem, self._operator, entered - iterate.multiplier)
         product = iterate.product + moved
-        solved = self._solve(system, entered, product, iterate.residuals)
-        multiplier, product = entered + face.prolong(solved.step), product + solved.product
-        gradient = system.gradient(multiplier, product - self._problem.rhs)
-        alpha = system.coarse.coefficients(gradient)
+        solved = self._solve(system, coupled, entered, product, iterate.residuals)
+        multiplier, product = entered + linear.advance(solved.step), product + solved.product
+        alpha = linear.motions(system.gradient(multiplier, product - self._problem.rhs))
         after = iterate_at(self._problem, self._law, multiplier, product, alpha)
+        b, a = (np.hypot(x.residuals.natural, x.residuals.gluing) for x in (iterate, after))
+        self._eta = abs(a - solved.measure) / b
+        self.t = 1.0
+        if self._parameters.ls and a > b:
+            def mix(t):
+                one, two = iterate, after
+                lam, prod, res = ((1 - t) * x + t * y for x, y in zip((one.multiplier, one.product, one.residual), (two.multiplier, two.product, two.residual)))
+                from fenics_contact.qp.residual import measure
+                return Iterate(lam, prod, res, measure(self._problem, self._law.feasible(lam), lam, prod, res))
+            tries = [after] + [mix(t) for t in (.5, .25, .1)]
+            k = int(np.argmin([x.residuals.worst for x in tries]))
+            self.t = (1, .5, .25, .1)[k]
+            after = tries[k]
         return after, self._record(number, after, system, solved, changes)
 
     def _next_face(self, iterate: Iterate) -> Face:
@@ -138,17 +157,21 @@ class NewtonSteps:
         return classify(layout, slip_bound, iterate.multiplier, iterate.residual, self._rho)
 
     def _solve(
-        self, system: FaceSystem, multiplier: Vector, product: Vector, residuals: Residuals
+        self,
+        system: FaceSystem,
+        coupled: CoupledSystem | None,
+        multiplier: Vector,
+        product: Vector,
+        residuals: Residuals,
     ) -> FaceStep:
         wanted = min(self._parameters.loosest, self._parameters.forcing * residuals.worst)
+        tolerance = max(wanted, 0.3 * self._parameters.tolerance)
+        gradient = system.gradient(multiplier, product - self._problem.rhs)
         weights = residual_weights(system.face, residuals, self._natural_step)
-        return projected_cg(
-            system,
-            system.gradient(multiplier, product - self._problem.rhs),
-            weights,
-            max(wanted, 0.3 * self._parameters.tolerance),
-            max(self._parameters.max_products - self._operator.products, 1),
-        )
+        limit = max(self._parameters.max_products - self._operator.products, 1)
+        if coupled is None:
+            return projected_cg(system, gradient, weights, tolerance, limit)
+        return projected_gmres(coupled, gradient, weights, tolerance, limit)
 
     def _record(
         self, number: int, after: Iterate, system: FaceSystem, solved: FaceStep, changes: int
@@ -163,6 +186,7 @@ class NewtonSteps:
         )
         closed, stick, slip, changed = (round(float(count)) for count in counts)
         note = f"{solved.iterations} CG steps, {changed} status changes"
+        if self.t < 1: note += f", damped {self.t}"
         if solved.stop is not Stop.CONVERGED:
             note += f", {solved.stop.value}"
         if coarse.gram.rank < coarse.m:

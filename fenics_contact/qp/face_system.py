@@ -55,6 +55,14 @@ class FaceSystem:
         missing = self.coarse.residual(y)
         return on_face - self.face.prolong(self.coarse.transpose(self.coarse.solve(missing)))
 
+    def advance(self, step: Vector) -> Vector:
+        """Return how the multiplier moves, Z δ, owned, for a step δ in face coordinates."""
+        return self.face.prolong(step)
+
+    def motions(self, gradient: Vector) -> Vector:
+        """Return α, the rigid motions that fit a gradient on the face best, replicated. Collective."""
+        return self.coarse.coefficients(gradient)
+
     def weighted_norm(self, y: Vector, weights: Vector) -> float:
         """Return the global norm of weights · y. Collective."""
         scaled = weights * y

@@ -19,6 +19,10 @@ class SlipLaw(Protocol):
     def bound(self, multiplier: Vector) -> Vector:
         """Return Ψ, a nodal force per friction disc, shape (n_friction,), owned."""
 
+    @property
+    def growth(self) -> Vector:
+        """dΨ/dλ_N of each disc, shape (n_friction,), owned."""
+
     def feasible(self, multiplier: Vector) -> FeasibleSet:
         """Return Λ(Ψ) for the slip bound that belongs to the multiplier."""
 
@@ -41,6 +45,11 @@ class Tresca:
     def bound(self, multiplier: Vector) -> Vector:
         """Return the given slip bound."""
         return self.slip_bound
+
+    @property
+    def growth(self) -> Vector:
+        """Zero: the bounds are given."""
+        return np.zeros_like(self.slip_bound)
 
     def feasible(self, multiplier: Vector) -> FeasibleSet:
         """Return Λ(Ψ), the same for every multiplier."""
@@ -84,6 +93,11 @@ class Coulomb:
         """Return μ max(λ_N, 0)."""
         normal = multiplier[self.layout.tangential_frictional]
         return self.friction_coefficient * np.maximum(normal, 0.0)
+
+    @property
+    def growth(self) -> Vector:
+        """The friction coefficient."""
+        return self.friction_coefficient
 
     def feasible(self, multiplier: Vector) -> FeasibleSet:
         """Return Λ(μ λ_N)."""

@@ -6,9 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scipy.spatial import cKDTree
+
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import DesignSurface
+from fenics_contact.geometry import BodyMesh, DesignSurface, boundary_faces
 from fenics_contact.shape.bernstein import tensor_bernstein
+
+#: Default width of the transition strip, relative to the extent of the design surface.
+TRANSITION = 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,11 +27,14 @@ class SurfaceDesign:
         body: Name of the body.
         surface: Nodes of the surface, their parameters and directions.
         net: Number of control points along s and t.
+        transition: Width of the strip of boundary around the surface that follows it smoothly; the rest of the
+            boundary keeps its place, [length]. By default 0.15 times the extent of the surface.
     """
 
     body: str
     surface: DesignSurface
     net: tuple[int, int] = (7, 4)
+    transition: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse a net without points or with more points than the surface has nodes."""
@@ -66,6 +74,21 @@ class SurfaceDesign:
             Derivative by α, shape (size,).
         """
         return self.basis.T @ np.einsum("nd,nd->n", gradient, self.surface.directions)
+
+    def nodes_beyond_transition(self, mesh: BodyMesh) -> np.ndarray:
+        """Return the boundary nodes of the body that do not follow the surface.
+
+        Args:
+            mesh: The body in its reference shape.
+        """
+        surface = mesh.points[self.surface.nodes]
+        width = self.transition
+        if width is None:
+            width = TRANSITION * float(np.linalg.norm(np.ptp(surface, axis=0)))
+        facets, _ = boundary_faces(mesh.cells)
+        nodes = np.setdiff1d(facets, self.surface.nodes)
+        distance, _ = cKDTree(surface).query(mesh.points[nodes])
+        return nodes[distance > width]
 
     def control_points(self, points: np.ndarray, alpha: np.ndarray) -> np.ndarray:
         """Return where to draw the control points, shape (net[0], net[1], 3), [length].

@@ -56,6 +56,8 @@ class ShapeProblem:
 
     Attributes:
         designs: The moving surfaces; α is their variables one after the other.
+        first: The design evaluated first.
+        best: The design with the smallest objective so far.
         last: The design evaluated last.
         seconds: Wall time of this rank by phase, over all evaluations.
         products: F-products of states and adjoints so far.
@@ -89,6 +91,8 @@ class ShapeProblem:
         self.solver = solver or FaceNewton()
         self._timer = PhaseTimer()
         self.evaluations, self.products = 0, 0
+        self.first: DesignPoint | None = None
+        self.best: DesignPoint | None = None
         self.last: DesignPoint | None = None
         self._previous: State | None = None
         self._forms: ShapeForms | None = None
@@ -179,6 +183,8 @@ class ShapeProblem:
         )
         logger.info("design %d: J = %.9g, %d products", self.evaluations, value, state.system.products)
         self.last = point
+        self.first = self.first or point
+        self.best = point if self.best is None or value < self.best.value else self.best
         return point
 
     def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
@@ -223,5 +229,6 @@ class ShapeProblem:
         body = scene.bodies[name]
         surfaces = {part.surface for part in scene.supports if part.body == name}
         surfaces |= {load.surface for load in scene.loads if load.body == name and not isinstance(load, BodyForce)}
-        held = np.unique(np.concatenate([np.unique(body.mesh.surfaces[s]) for s in sorted(surfaces)] or [[]])).astype(int)
-        return HarmonicExtension(self.decomposition, name, body, design.surface.nodes, held)
+        held = [body.mesh.surfaces[surface].ravel() for surface in sorted(surfaces)]
+        held.append(design.nodes_beyond_transition(body.mesh))
+        return HarmonicExtension(self.decomposition, name, body, design.surface.nodes, np.unique(np.concatenate(held)))

@@ -4,26 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import DesignSurface
 from fenics_contact.viz.colours import GREY, INK, ORANGE, SIGNED_MAP
-from fenics_contact.viz.sheet import (
-    checked_range,
-    colour_bar,
-    draw_on_one_rank,
-    nice_number,
-    png_path,
-    sheet,
-    show_image,
-    written,
-)
+from fenics_contact.viz.sheet import TITLE, draw_on_one_rank, place_colour_bar, place_image, png_path, sheet
 from fenics_contact.viz.stage import Layer, balls, render, surface, tubes
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.view import Frame, View, frame_around, looking_along
+from fenics_contact.viz.words import checked_range, headline, nice_number, written
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -34,6 +26,8 @@ VISIBLE = 0.06
 OPACITY = 0.75
 #: Straight pieces between two control points.
 BARS = 8
+#: Part of the width that each of the two pictures takes.
+PART = 0.45
 
 
 def plot_control_net(
@@ -82,12 +76,16 @@ def plot_control_net(
             "control points as a grid"
         )
     if magnify is not None and not np.isfinite(magnify):
-        raise InvalidInputError(f"magnify must be finite, got {magnify}: give the factor of the movement, such as 5")
+        raise InvalidInputError(
+            f"magnify must be finite, got {magnify}: give the factor of the movement, such as 5"
+        )
     outward = np.einsum("nd,nd->n", after - before, design.directions)
     largest = float(np.abs(outward).max()) or 1.0
     factor = _chosen_factor(before, after) if magnify is None else magnify
     shown = (-largest, largest) if clim is None else checked_range(clim)
-    change = _Change(design.counts, before, after - before, outward, nets[0], nets[1] - nets[0], factor, shown)
+    change = _Change(
+        design.counts, before, after - before, outward, nets[0], nets[1] - nets[0], factor, shown
+    )
     draw_on_one_rank(comm, lambda: _draw(change, target, title, units or Units(), width))
     return target
 
@@ -121,24 +119,32 @@ def _draw(change: _Change, target: Path, title: str, units: Units, width: int) -
     ends = [change.start, change.start + change.factor * change.movement]
     nets = [change.net, change.net + change.factor * change.net_movement]
     frame = frame_around(view, np.concatenate([*ends, *(net.reshape(-1, 3) for net in nets)]), 0.05)
-    images = [
-        _seen_through(_surface_layer(change, end, moved), _nets(change, net, moved), view, frame, round(0.44 * width))
-        for end, net, moved in ((ends[0], nets[0], False), (ends[1], nets[1], True))
-    ]
-    low, high = change.outward.min(), change.outward.max()
-    facts = f"surface moved by {written(low, 3)} to {written(high, 3)} {units.length} along its outward normal"
-    with sheet(target, (width, images[0].shape[0] + 140), f"{title}: {facts}" if title else facts) as figure:
-        axes = figure.subplots(1, 2)
-        show_image(axes[0], images[0], "before")
-        show_image(axes[1], images[1], f"after, movement × {change.factor:g}")
+    size = round(PART * width)
+    before = _seen_through(
+        _surface_layer(change, ends[0], False), _nets(change, nets[0], False), view, frame, size
+    )
+    after = _seen_through(
+        _surface_layer(change, ends[1], True), _nets(change, nets[1], True), view, frame, size
+    )
+    low, high = (written(float(value), 3) for value in (change.outward.min(), change.outward.max()))
+    facts = f"surface moved by {low} to {high} {units.length} along its outward normal"
+    top = round((TITLE + 0.03) * width)
+    with sheet(
+        target, (width, top + before.shape[0] + round(0.01 * width)), headline(title, facts)
+    ) as figure:
+        place_image(figure, before, 0, top, "before")
+        place_image(figure, after, size, top, f"after, movement × {change.factor:g}")
         label = f"outward movement ({units.length})"
-        colour_bar(figure, axes, SIGNED_MAP, change.clim, label, fraction=0.04, pad=0.01)
+        place_colour_bar(figure, (2 * size, top, before.shape[0]), SIGNED_MAP, change.clim, label)
 
 
 def _view(change: _Change) -> View:
     """Look onto the middle of the surface from its outside, aslant, s running to the right."""
     grid = change.start.reshape(*change.counts, 3)
-    along, across = grid[-1].mean(axis=0) - grid[0].mean(axis=0), grid[:, -1].mean(axis=0) - grid[:, 0].mean(axis=0)
+    along, across = (
+        grid[-1].mean(axis=0) - grid[0].mean(axis=0),
+        grid[:, -1].mean(axis=0) - grid[:, 0].mean(axis=0),
+    )
     size = float(np.linalg.norm(along))
     outside = np.cross(along, across) / (size * np.linalg.norm(across))
     return looking_along(outside - 0.2 * along / size - 0.5 * across / np.linalg.norm(across), along)
@@ -182,7 +188,10 @@ def _curved_net(change: _Change, net: np.ndarray) -> tuple[np.ndarray, np.ndarra
     shape = tuple(len(f) for f in fine)
     grid = change.start.reshape(*change.counts, 3)
     at = [f / max(n - 1, 1) * (m - 1) for f, n, m in zip(fine, net.shape[:2], change.counts, strict=True)]
-    coarse = [np.linspace(0, m - 1, n) if n > 1 else np.zeros(1) for n, m in zip(net.shape[:2], change.counts, strict=True)]
+    coarse = [
+        np.linspace(0, m - 1, n) if n > 1 else np.zeros(1)
+        for n, m in zip(net.shape[:2], change.counts, strict=True)
+    ]
     base = bilinear(grid, *at)
     points = base + bilinear(net - bilinear(grid, *coarse), *fine)
     number = np.arange(shape[0] * shape[1]).reshape(shape)
@@ -193,7 +202,9 @@ def _curved_net(change: _Change, net: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 def bilinear(grid: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Interpolate a grid (m, n, 3) at all pairs of fractional row and column numbers, (r, c, 3)."""
-    i, j = (np.minimum(x.astype(int), max(n - 2, 0)) for x, n in ((rows, grid.shape[0]), (columns, grid.shape[1])))
+    i, j = (
+        np.minimum(x.astype(int), max(n - 2, 0)) for x, n in ((rows, grid.shape[0]), (columns, grid.shape[1]))
+    )
     a, b = (rows - i)[:, None, None], (columns - j)[None, :, None]
     below, beside = np.minimum(i + 1, grid.shape[0] - 1), np.minimum(j + 1, grid.shape[1] - 1)
     first = (1 - b) * grid[np.ix_(i, j)] + b * grid[np.ix_(i, beside)]

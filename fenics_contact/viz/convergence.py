@@ -11,7 +11,8 @@ from matplotlib.ticker import MaxNLocator
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import BLUE, GREY, ORANGE
-from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet, written
+from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet
+from fenics_contact.viz.words import headline, written
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -66,9 +67,13 @@ def _checked(values: Sequence[float] | np.ndarray, kinds: Sequence[str]) -> tupl
     if unknown:
         raise InvalidInputError(f"kinds must be among {KINDS}, got {unknown}: translate them first")
     if not np.any(kind == "start"):
-        raise InvalidInputError('a history begins with its "start", got none: pass it from the first evaluation')
+        raise InvalidInputError(
+            'a history begins with its "start", got none: pass it from the first evaluation'
+        )
     if not np.all(np.isfinite(objective[kind != "rejected"])):
-        raise InvalidInputError("the objective must be finite wherever it was not rejected: mark rejected points")
+        raise InvalidInputError(
+            "the objective must be finite wherever it was not rejected: mark rejected points"
+        )
     return objective, kind
 
 
@@ -80,9 +85,11 @@ def _draw(values: np.ndarray, kind: np.ndarray, target: Path, words: tuple[str, 
     facts = f"{written(first, 6)} → {written(last, 6)}"
     if first != 0:
         facts += f", {100 * abs((last - first) / first):.2f} % {'lower' if last <= first else 'higher'}"
-    with sheet(target, (width, round(0.6 * width)), f"{title}: {facts}" if title else facts) as figure:
+    with sheet(target, (width, round(0.6 * width)), headline(title, facts), "constrained") as figure:
         axes = figure.subplots()
-        axes.plot(number[centre], values[centre], "-o", color=BLUE, lw=2, ms=8, label="start and serious steps")
+        axes.plot(
+            number[centre], values[centre], "-o", color=BLUE, lw=2, ms=8, label="start and serious steps"
+        )
         _mark(axes, number[kind == "null"], values[kind == "null"])
         _mark_rejected(axes, number[kind == "rejected"])
         axes.set_xlabel("evaluation")
@@ -94,7 +101,14 @@ def _draw(values: np.ndarray, kind: np.ndarray, target: Path, words: tuple[str, 
 
 def _mark(axes: Any, number: np.ndarray, values: np.ndarray) -> None:
     if len(number):
-        style = {"marker": "o", "facecolors": "white", "edgecolors": ORANGE, "linewidths": 1.8, "s": 64, "zorder": 3}
+        style = {
+            "marker": "o",
+            "facecolors": "white",
+            "edgecolors": ORANGE,
+            "linewidths": 1.8,
+            "s": 64,
+            "zorder": 3,
+        }
         axes.scatter(number, values, label="null steps", **style)
 
 
@@ -103,5 +117,11 @@ def _mark_rejected(axes: Any, number: np.ndarray) -> None:
     if len(number):
         places = axes.get_xaxis_transform()
         axes.scatter(
-            number, np.full(len(number), 0.03), transform=places, marker="x", color=GREY, s=64, label="rejected points"
+            number,
+            np.full(len(number), 0.03),
+            transform=places,
+            marker="x",
+            color=GREY,
+            s=64,
+            label="rejected points",
         )

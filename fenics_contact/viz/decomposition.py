@@ -12,9 +12,10 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import BodyMesh, boundary_faces
 from fenics_contact.scene import Scene
 from fenics_contact.viz.colours import INK, colour_subdomains, neighbours
-from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet, show_image, written
+from fenics_contact.viz.sheet import TITLE, draw_on_one_rank, place_image, png_path, sheet
 from fenics_contact.viz.stage import Layer, render, segments, surface
 from fenics_contact.viz.view import frame_around, oblique_view
+from fenics_contact.viz.words import written
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -80,8 +81,9 @@ def _draw(
     cells = sum(body.mesh.n_cells for body in scene.bodies.values())
     title = f"{count} subdomains of {len(scene.bodies)} bodies, {written(cells)} cells"
     image = render(layers, view, frame, width)
-    with sheet(target, (width, image.shape[0] + 60), title) as figure:
-        show_image(figure.subplots(), image)
+    band = round(TITLE * width)
+    with sheet(target, (width, band + image.shape[0]), title) as figure:
+        place_image(figure, image, 0, band)
 
 
 def _body_layers(mesh: BodyMesh, partition: np.ndarray, family: int, explode: float) -> list[Layer]:

@@ -60,7 +60,7 @@ def cell_values(function: Any, cells: np.ndarray) -> np.ndarray:
         One value for every cell, (n_cells,), replicated.
     """
     space = function.function_space
-    mine = _dolfinx.cell_nodes(space.mesh)
+    mine = _dolfinx.cell_nodes(space.mesh).reshape(-1, cells.shape[1])
     # dolfinx has its own order of cells: they are recognised by their nodes.
     _, key = np.unique(np.sort(np.vstack([cells, mine]), axis=1), axis=0, return_inverse=True)
     place = np.empty(len(cells), dtype=np.int64)

@@ -7,17 +7,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
+from matplotlib.colors import Normalize
+from matplotlib.ticker import FuncFormatter
 from matplotlib.tri import Triangulation
 
 from fenics_contact.contact import State, Status
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import BLUE, GREY, INK, ORANGE, PALE, PRESSURE_MAP
-from fenics_contact.viz.places import contact_places
-from fenics_contact.viz.sheet import checked_range, colour_bar, draw_on_one_rank, png_path, sheet, written
+from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet
 from fenics_contact.viz.units import Units
-from fenics_contact.viz.view import View, axis_label, face_on
+from fenics_contact.viz.view import View, axis_label, face_on, frame_around
+from fenics_contact.viz.words import checked_range, headline, written
 
+#: Straight pieces by which the edge of a facet is cut to colour it.
+PIECES = 6
 #: Symbols of the points: how they are drawn and what the legend calls them.
 _SYMBOLS: dict[Status, dict[str, Any]] = {
     Status.OPEN: {"marker": "o", "facecolors": "none", "edgecolors": GREY, "s": 30},
@@ -66,7 +71,9 @@ def plot_contact_pressure(
             "draw a scene with contact"
         )
     if half_width is not None and not 0 < half_width < np.inf:
-        raise InvalidInputError(f"half_width must be positive, got {half_width}: leave it out to have it chosen")
+        raise InvalidInputError(
+            f"half_width must be positive, got {half_width}: leave it out to have it chosen"
+        )
     given = None if clim is None else checked_range(clim)
     units = units or Units()
     draw_on_one_rank(
@@ -125,6 +132,9 @@ def _patch(state: State, pair: int, half_width: float | None) -> _Patch:
     slip = np.einsum("na,nad->nd", contact.slip[chosen], contact.points.tangents[chosen])
     places = view.project(mesh.points[nodes])
     low, high = _window(places[points], contact.points.area[chosen], force, half_width)
+    if half_width is None:
+        edge = frame_around(view, mesh.points[nodes], 0.05)
+        low, high = np.maximum(low, edge.low), np.minimum(high, edge.high)
     return _Patch(
         view, f"{slave.body}, {slave.name}", places, local.reshape(-1, facets.shape[1]), pressure, points,
         contact.status[chosen], view.project(slip), float(force.sum()), low, high,
@@ -148,13 +158,17 @@ def _draw(
 ) -> None:
     peak = float(patch.pressure.max())
     shown = clim or (0.0, peak or 1.0)
-    facts = f"largest pressure {written(peak)} {units.stress}, normal force {written(patch.force)} {units.force}"
-    with sheet(target, (width, round(0.56 * width)), f"{title}: {facts}" if title else facts) as figure:
+    facts = (
+        f"largest pressure {written(peak)} {units.stress}, normal force {written(patch.force)} {units.force}"
+    )
+    proportion = float((patch.high - patch.low)[1] / (patch.high - patch.low)[0])
+    height = round((0.17 + 0.39 * proportion) * width)
+    with sheet(target, (width, height), headline(title, facts), "constrained") as figure:
         left, right = figure.subplots(1, 2, sharex=True, sharey=True)
         _draw_pressure(left, patch, shown)
         label = f"contact pressure ({units.stress})"
         extend = "max" if peak > shown[1] else "neither"
-        colour_bar(figure, left, PRESSURE_MAP, shown, label, extend=extend, shrink=0.85)
+        figure.colorbar(ScalarMappable(Normalize(*shown), PRESSURE_MAP), ax=left, label=label, extend=extend)
         _draw_status(right, patch, units)
         for axes in (left, right):
             _label(axes, patch, units)
@@ -163,21 +177,29 @@ def _draw(
 
 
 def _draw_pressure(axes: Any, patch: _Patch, clim: tuple[float, float]) -> None:
-    mesh, values = _with_centres(patch)
+    mesh, values = _refined(patch)
     axes.tripcolor(mesh, values, shading="gouraud", cmap=PRESSURE_MAP, vmin=clim[0], vmax=clim[1])
     outlines = {"facecolors": "none", "edgecolors": GREY, "linewidths": 0.5}
     axes.add_collection(PolyCollection(patch.places[patch.facets], **outlines))
     axes.set_title(f"pressure on {patch.name}")
 
 
-def _with_centres(patch: _Patch) -> tuple[Triangulation, np.ndarray]:
-    """Cut every facet into triangles around its middle, so that the colours favour no diagonal."""
-    facets, count = patch.facets, len(patch.places)
-    places = np.vstack([patch.places, patch.places[facets].mean(axis=1)])
-    values = np.concatenate([patch.pressure, patch.pressure[facets].mean(axis=1)])
-    middle = np.repeat(count + np.arange(len(facets)), facets.shape[1])
-    triangles = np.column_stack([facets.ravel(), np.roll(facets, -1, axis=1).ravel(), middle])
-    return Triangulation(*places.T, triangles), values
+def _refined(patch: _Patch) -> tuple[Triangulation, np.ndarray]:
+    """Cut every facet into triangles so small that colours are bilinear on quadrilaterals and favour no diagonal."""
+    facets = patch.facets
+    if facets.shape[1] == 3:
+        return Triangulation(*patch.places.T, facets), patch.pressure
+    s, t = np.meshgrid(np.linspace(0, 1, PIECES + 1), np.linspace(0, 1, PIECES + 1), indexing="ij")
+    shape = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1).reshape(-1, 4)
+    places = np.einsum("kc,fcd->fkd", shape, patch.places[facets]).reshape(-1, 2)
+    number = np.arange(len(shape)).reshape(s.shape)
+    low, high = (
+        [number[:-1, :-1], number[1:, :-1], number[1:, 1:]],
+        [number[:-1, :-1], number[1:, 1:], number[:-1, 1:]],
+    )
+    small = np.concatenate([np.stack(corners, axis=-1).reshape(-1, 3) for corners in (low, high)])
+    triangles = (small + len(shape) * np.arange(len(facets))[:, None, None]).reshape(-1, 3)
+    return Triangulation(*places.T, triangles), (patch.pressure[facets] @ shape.T).ravel()
 
 
 def _draw_status(axes: Any, patch: _Patch, units: Units) -> None:
@@ -192,11 +214,13 @@ def _draw_status(axes: Any, patch: _Patch, units: Units) -> None:
     longest = float(length.max(initial=0.0))
     if longest > 0:
         _draw_arrows(axes, patch, places[slips], patch.slip[slips] / longest)
-    axes.set_title(f"status, largest slip {written(longest, 2)} {units.length}" if longest > 0 else "status, no slip")
+    axes.set_title(
+        f"status, largest slip {written(longest, 2)} {units.length}" if longest > 0 else "status, no slip"
+    )
 
 
 def _draw_arrows(axes: Any, patch: _Patch, places: np.ndarray, slip: np.ndarray) -> None:
-    reach = 0.1 * float(patch.high[0] - patch.low[0])
+    reach = 0.1 * float(np.max(patch.high - patch.low))
     axes.quiver(
         *places.T, *(reach * slip).T, angles="xy", scale_units="xy", scale=1, color=INK, width=0.004, zorder=4
     )
@@ -206,6 +230,8 @@ def _label(axes: Any, patch: _Patch, units: Units) -> None:
     axes.set_aspect("equal")
     axes.set_xlim(patch.low[0], patch.high[0])
     axes.set_ylim(patch.low[1], patch.high[1])
-    for direction, name in ((patch.view.right, "x"), (patch.view.up, "y")):
-        label = axis_label(direction) or ("right" if name == "x" else "up")
-        getattr(axes, f"set_{name}label")(f"{label} ({units.length})")
+    for axis, direction, word in ((axes.xaxis, patch.view.right, "right"), (axes.yaxis, patch.view.up, "up")):
+        name = axis_label(direction)
+        axis.set_label_text(f"{name.strip('−') or word} ({units.length})")
+        if name.startswith("−"):
+            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{0 - value:g}".replace("-", "−")))

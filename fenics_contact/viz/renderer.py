@@ -51,7 +51,9 @@ def check_renderer() -> None:
 def _probe(environment: tuple[str | None, ...]) -> str:
     """Return how the trial rendering ended, empty if well. ``environment`` only tells answers apart."""
     try:
-        ending = subprocess.run([sys.executable, "-c", _PROBE], capture_output=True, timeout=120.0, check=False)
+        ending = subprocess.run(
+            [sys.executable, "-c", _PROBE], capture_output=True, timeout=120.0, check=False
+        )
     except subprocess.TimeoutExpired:
         return "did not end within two minutes"
     if ending.returncode < 0:

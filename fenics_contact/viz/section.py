@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,63 +13,77 @@ from fenics_contact.contact import ContactResult
 from fenics_contact.viz.colours import INK
 from fenics_contact.viz.fields import BodyFields
 from fenics_contact.viz.stage import Layer
-from fenics_contact.viz.view import Frame, View, looking_along
+from fenics_contact.viz.view import Frame, View, frame_around, looking_along
 
-#: Half width of a section, in radii of a disc as large as the closed part of the contact surface.
+#: Half height of a section, in radii of a disc as large as the closed part of the contact surface.
 REACH = 5.0
+#: Width of a section by its height, unless the bodies end before.
+PROPORTION = 1.4
 
-_OUTLINE = (("white", 7), (INK, 3))
+#: Dark on a light border, to be seen on every colour.
+_OUTLINE = (("white", 6), (INK, 3))
 _CELL_TYPES = {"hexahedron": pv.CellType.HEXAHEDRON, "tetrahedron": pv.CellType.TETRA}
 
 
-def contact_centre(contact: ContactResult, points: np.ndarray) -> np.ndarray:
-    """Return the force-weighted middle of the contact, (3,).
+@dataclass(frozen=True)
+class Spot:
+    """Where a pair of surfaces touches.
+
+    Attributes:
+        centre: Force-weighted middle, (3,).
+        normal: Mean unit normal, from master to slave, (3,).
+        radius: Radius of a disc as large as the closed part of the surface, [length].
+    """
+
+    centre: np.ndarray
+    normal: np.ndarray
+    radius: float
+
+
+def strongest_contact(contact: ContactResult, places: np.ndarray) -> Spot:
+    """Return where the pair with the largest normal force touches.
 
     Args:
-        contact: Forces on the contact points; some force must act.
-        points: Places of the contact points, (n, 3).
+        contact: What happens on the contact points; some force must act.
+        places: Places of the contact points, (n, 3), [length].
     """
-    weight = contact.normal_force / contact.normal_force.sum()
-    return np.asarray(weight @ points)
+    force, points = contact.normal_force, contact.points
+    pair = int(np.argmax(np.bincount(points.pair, weights=force)))
+    weight = np.where(points.pair == pair, force, 0.0)
+    normal = weight @ points.normal
+    area = float(points.area[weight > 0].sum())
+    return Spot(weight @ places / weight.sum(), normal / np.linalg.norm(normal), float(np.sqrt(area / np.pi)))
 
 
-def section_views(contact: ContactResult, main: View) -> list[View]:
-    """Return the views onto two planes that hold the mean contact normal, perpendicular to each other.
+def section_views(spot: Spot, main: View) -> list[View]:
+    """Return the views onto two planes that hold the contact normal, perpendicular to each other.
 
     Both are seen from the side of the main view, and what is horizontal there stays so where it can.
     """
-    normal = contact.normal_force @ contact.points.normal
-    normal = normal / np.linalg.norm(normal)
-    helper = np.eye(3)[int(np.argmin(np.round(np.abs(normal), 6)))]
-    first = np.cross(normal, helper)
+    helper = np.eye(3)[int(np.argmin(np.round(np.abs(spot.normal), 6)))]
+    first = np.cross(spot.normal, helper)
     first /= np.linalg.norm(first)
     views = []
-    for across in (first, np.cross(first, normal)):
+    for across in (first, np.cross(first, spot.normal)):
         towards = across if across @ main.towards > 0 else -across
-        inside = (normal, np.cross(normal, towards))
-        horizontal = max(inside, key=lambda d: abs(float(d @ main.right)))
-        sign = 1.0 if horizontal @ main.right > 0 else -1.0
-        views.append(looking_along(towards, sign * horizontal))
+        inside = (spot.normal, np.cross(spot.normal, towards))
+        horizontal = max(inside, key=lambda direction: abs(float(direction @ main.right)))
+        views.append(looking_along(towards, np.sign(horizontal @ main.right) * horizontal))
     return sorted(views, key=lambda view: -float(view.towards @ main.towards))
 
 
-def half_width(contact: ContactResult, points: np.ndarray) -> float:
-    """Return how far around the contact a section reaches, [length].
+def section_frame(view: View, spot: Spot, points: np.ndarray) -> Frame:
+    """Return the frame around a contact, not wider than what there is to see.
 
     Args:
-        contact: Tells the closed part of the surface.
-        points: All nodes of the bodies, (n, 3): it never reaches beyond their size.
+        view: View onto the section.
+        spot: Middle and size of the contact.
+        points: All nodes of the bodies, (n, 3).
     """
-    closed = contact.normal_force > 0
-    radius = float(np.sqrt(contact.points.area[closed].sum() / np.pi))
-    return min(REACH * radius, 0.6 * float(np.ptp(points, axis=0).max()))
-
-
-def section_frame(view: View, centre: np.ndarray, half: float, proportion: float) -> Frame:
-    """Return a frame of given half height around a point, ``proportion`` times as wide as high."""
-    middle = view.project(centre[None])[0]
-    reach = half * np.array([proportion, 1.0])
-    return Frame(middle - reach, middle + reach)
+    bodies = frame_around(view, points)
+    middle = view.project(spot.centre[None])[0]
+    reach = REACH * spot.radius * np.array([PROPORTION, 1.0])
+    return Frame(np.maximum(middle - reach, bodies.low), np.minimum(middle + reach, bodies.high))
 
 
 def section_layers(
@@ -90,8 +105,7 @@ def section_layers(
     layers = []
     for name, body in bodies.items():
         points = body.deformed(1.0)
-        kind = _CELL_TYPES[body.mesh.cell_type]
-        grid = pv.UnstructuredGrid({kind: body.mesh.cells}, points)
+        grid = pv.UnstructuredGrid({_CELL_TYPES[body.mesh.cell_type]: body.mesh.cells}, points)
         on_nodes = len(scalars[name]) == body.mesh.n_nodes
         (grid.point_data if on_nodes else grid.cell_data)["shown"] = scalars[name]
         # A hair beside the plane: where it runs along faces of cells, both neighbours would be cut or none.
@@ -100,6 +114,5 @@ def section_layers(
         if cut.n_points:
             layers.append(Layer(cut, {"scalars": "shown", "lighting": False, **colours}))
             edge = cut.extract_feature_edges(boundary_edges=True, feature_edges=False, manifold_edges=False)
-            # Dark on a light border, to be seen on every colour.
             layers += [Layer(edge, {"color": c, "line_width": w, "lighting": False}) for c, w in _OUTLINE]
     return layers

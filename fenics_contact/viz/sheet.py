@@ -18,11 +18,15 @@ from matplotlib.figure import Figure
 
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.viz.colours import INK
+from fenics_contact.viz.words import nice_number, written
 
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-DPI = 100
+#: Inches of every sheet's width: fonts and lines grow with the number of pixels.
+INCHES = 16.0
+#: Height of the band with the title, relative to the width of the sheet.
+TITLE = 0.035
 
 _STYLE = {
     "font.family": "sans-serif",
@@ -44,31 +48,37 @@ _STYLE = {
 
 
 @contextmanager
-def sheet(path: str | Path, size: tuple[int, int], title: str) -> Iterator[Any]:
+def sheet(path: str | Path, size: tuple[int, int], title: str, layout: str = "none") -> Iterator[Any]:
     """Open an empty figure and save it at the end, whole or not at all.
 
     Args:
         path: PNG file; its folder is created. A file of that name is replaced when the new one is complete.
         size: Width and height in pixels.
-        title: Title above everything.
+        title: Title above everything, in a band of height ``TITLE`` times the width.
+        layout: "constrained" to let matplotlib find room for axes and labels, "none" to place them by hand.
 
     Yields:
         A matplotlib Figure.
 
     Raises:
-        InvalidInputError: If the name does not end in ".png" or the size is not positive.
+        InvalidInputError: If the name does not end in ".png".
     """
     target = png_path(path)
+    dpi = size[0] / INCHES
     with mpl.rc_context({**mpl.rcParamsDefault, **_STYLE}):
-        figure = Figure(figsize=(size[0] / DPI, size[1] / DPI), dpi=DPI, layout="constrained")
+        figure = Figure(figsize=(INCHES, size[1] / dpi), dpi=dpi, layout=layout)
         FigureCanvasAgg(figure)
-        figure.get_layout_engine().set(w_pad=0.12, h_pad=0.12)
-        figure.suptitle(title, fontsize=16, fontweight="bold")
+        if layout == "constrained":
+            figure.get_layout_engine().set(w_pad=0.12, h_pad=0.12)
+            figure.suptitle(title, fontsize=16, fontweight="bold")
+        else:
+            middle = 1 - TITLE / 2 * size[0] / size[1]
+            figure.text(0.5, middle, title, fontsize=16, fontweight="bold", ha="center", va="center")
         yield figure
         target.parent.mkdir(parents=True, exist_ok=True)
         temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.png")
         try:
-            figure.savefig(temporary, dpi=DPI, format="png")
+            figure.savefig(temporary, dpi=dpi, format="png")
             os.replace(temporary, target)
         finally:
             temporary.unlink(missing_ok=True)
@@ -89,12 +99,27 @@ def draw_on_one_rank(comm: MPI.Comm | None, draw: Callable[[], None]) -> None:
             draw()
 
 
-def show_image(axes: Any, image: np.ndarray, title: str = "") -> None:
-    """Put a rendered image into axes without scales."""
-    axes.imshow(image, interpolation="antialiased")
+def place_image(figure: Any, image: np.ndarray, left: int, top: int, title: str = "") -> Any:
+    """Put an image onto the sheet, pixel on pixel, its title above it; return its axes.
+
+    Args:
+        figure: The sheet.
+        image: The image.
+        left: Pixels from the sheet's left edge.
+        top: Pixels from the sheet's upper edge.
+        title: Words above the image.
+    """
+    axes = figure.add_axes(_box(figure, left, top, image.shape[1], image.shape[0]))
+    axes.imshow(image, aspect="auto", interpolation="nearest")
     axes.set_axis_off()
-    if title:
-        axes.set_title(title)
+    axes.set_title(title)
+    return axes
+
+
+def _box(figure: Any, left: int, top: int, width: int, height: int) -> tuple[float, float, float, float]:
+    """Turn pixels from the upper left corner into matplotlib's fractions from the lower left one."""
+    wide, high = (round(float(size)) for size in figure.bbox.size)
+    return left / wide, 1 - (top + height) / high, width / wide, height / high
 
 
 def scale_bar(axes: Any, image: np.ndarray, width: float, unit: str) -> None:
@@ -115,42 +140,24 @@ def scale_bar(axes: Any, image: np.ndarray, width: float, unit: str) -> None:
     axes.text(*place, f"{written(length, 1)} {unit}", ha="center", va="bottom", bbox=box)
 
 
-def colour_bar(
-    figure: Any, axes: Any, colours: Any, clim: tuple[float, float], label: str, **options: Any
+def place_colour_bar(
+    figure: Any,
+    box: tuple[int, int, int],
+    colours: Any,
+    clim: tuple[float, float],
+    label: str,
+    **options: Any,
 ) -> None:
-    """Add the colour bar of a colour map over a range beside axes."""
-    figure.colorbar(ScalarMappable(Normalize(*clim), colours), ax=axes, label=label, **options)
-
-
-def checked_range(clim: tuple[float, float]) -> tuple[float, float]:
-    """Return a colour range, refuse one that is empty or not finite."""
-    low, high = (float(value) for value in clim)
-    if not (np.isfinite(low) and np.isfinite(high) and low < high):
-        raise InvalidInputError(f"clim must be a finite range (low, high) with low < high, got {clim}: widen it")
-    return low, high
-
-
-def written(value: float, digits: int = 4) -> str:
-    """Write a number for readers: 79 713, −0.138, 1.2e−05; thousands apart, a true minus.
+    """Put an upright colour bar onto the sheet.
 
     Args:
-        value: The number.
-        digits: Significant digits of what is not an integer.
+        figure: The sheet.
+        box: Left, top and height in pixels.
+        colours: Colour map.
+        clim: Its range.
+        label: What is shown, with its unit.
+        **options: Keywords of matplotlib's ``colorbar``.
     """
-    size = abs(value)
-    if isinstance(value, int | np.integer):
-        text = f"{value:,}"
-    elif size == 0 or 1e-3 <= size < 1e7:
-        decimals = digits - 1 - int(np.floor(np.log10(size))) if size else 0
-        text = f"{round(value, decimals):,.{max(0, decimals)}f}"
-    else:
-        text = f"{value:.{digits - 1}e}"
-    return text.replace(",", "\u202f").replace("-", "\u2212")
-
-
-def nice_number(value: float) -> float:
-    """Round down to 1, 2 or 5 times a power of ten; 1 for what is not positive."""
-    if not value > 0:
-        return 1.0
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= value * (1 + 1e-9)))
+    left, top, height = box
+    axes = figure.add_axes(_box(figure, left, top, max(2, round(0.3 * figure.dpi)), height))
+    figure.colorbar(ScalarMappable(Normalize(*clim), colours), cax=axes, label=label, **options)

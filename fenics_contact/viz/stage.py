@@ -76,7 +76,7 @@ def render(layers: Iterable[Layer], view: View, frame: Frame, width: int) -> np.
     try:
         plotter.background_color = "white"
         # One lamp above the viewer's left shoulder: colours keep their brightness on all that is seen.
-        plotter.add_light(pv.Light(position=(-0.4, 0.6, 1.0), light_type="camera light"))
+        plotter.add_light(pv.Light(position=(-0.3, 0.35, 1.0), light_type="camera light"))
         middle = np.zeros(3)
         for layer in layers:
             plotter.add_mesh(layer.mesh, **{"show_scalar_bar": False, "reset_camera": False, **layer.options})

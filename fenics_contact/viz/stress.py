@@ -15,28 +15,29 @@ from fenics_contact.geometry import boundary_faces
 from fenics_contact.viz.colours import INK, STRESS_MAP
 from fenics_contact.viz.fields import BodyFields, gather
 from fenics_contact.viz.places import contact_places
-from fenics_contact.viz.section import contact_centre, half_width, section_frame, section_layers, section_views
+from fenics_contact.viz.section import Spot, section_frame, section_layers, section_views, strongest_contact
 from fenics_contact.viz.sheet import (
-    checked_range,
-    colour_bar,
+    TITLE,
     draw_on_one_rank,
-    nice_number,
+    place_colour_bar,
+    place_image,
     png_path,
     scale_bar,
     sheet,
-    show_image,
-    written,
 )
 from fenics_contact.viz.stage import Layer, render, surface
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.view import View, axis_label, frame_around, oblique_view
+from fenics_contact.viz.words import checked_range, headline, nice_number, written
 
 #: Fraction of the bodies' size that the largest displacement appears to have.
 VISIBLE = 0.03
-#: Width of a section by its height.
-PROPORTION = 1.4
 #: The colours end at this quantile of the cells' stresses: the peak under a contact would leave the rest in one shade.
 QUANTILE = 0.995
+#: Part of the width that the pictures take; the rest is the colour bar's.
+WIDE = 0.88
+#: Room between pictures, relative to the width.
+GAP = 0.03
 
 
 def plot_stress(
@@ -53,8 +54,8 @@ def plot_stress(
 ) -> Path:
     """Draw the von Mises stress on the deformed bodies. Collective.
 
-    Below, two sections through the middle of the contact, in true deformation: bodies whose displacement is
-    exaggerated overlap where they touch.
+    Below, two sections through the middle of the strongest contact, in true deformation: bodies whose
+    displacement is exaggerated overlap where they touch.
 
     Args:
         state: The state.
@@ -77,23 +78,35 @@ def plot_stress(
     """
     target = png_path(path)
     if scale is not None and not np.isfinite(scale):
-        raise InvalidInputError(f"scale must be finite, got {scale}: give the factor of the displacement, such as 10")
+        raise InvalidInputError(
+            f"scale must be finite, got {scale}: give the factor of the displacement, such as 10"
+        )
     given = None if clim is None else checked_range(clim)
     bodies = gather(state)
-    look = _Look(
-        given or stress_range(bodies),
-        chosen_scale(bodies) if scale is None else float(scale),
-        smooth,
-        title,
-        units or Units(),
-        width,
-    )
-    with_sections = sections and bool(np.any(state.contact.normal_force > 0))
-    draw_on_one_rank(
-        state.system.torn.decomposition.comm,
-        lambda: _draw(bodies, state if with_sections else None, target, look),
-    )
+    factor = chosen_scale(bodies) if scale is None else float(scale)
+    look = _Look(given or stress_range(bodies), factor, smooth, title, units or Units(), width)
+    spot = None
+    if sections and np.any(state.contact.normal_force > 0):
+        places = contact_places(state, {name: body.deformed(1.0) for name, body in bodies.items()})
+        spot = strongest_contact(state.contact, places)
+    draw_on_one_rank(state.system.torn.decomposition.comm, lambda: _draw(bodies, spot, target, look))
     return target
+
+
+def stress_range(bodies: Mapping[str, BodyFields]) -> tuple[float, float]:
+    """Return the default range of the colours, from zero to a round number above a high quantile."""
+    top = float(np.quantile(np.concatenate([body.von_mises for body in bodies.values()]), QUANTILE))
+    if top <= 0:
+        return 0.0, 1.0
+    step = 10.0 ** np.floor(np.log10(top)) / 2
+    return 0.0, float(step * np.ceil(top / step))
+
+
+def chosen_scale(bodies: Mapping[str, BodyFields]) -> float:
+    """Return the round factor, at least 1, that makes the displacement visible."""
+    moved = max(float(np.linalg.norm(body.displacement, axis=1).max()) for body in bodies.values())
+    extent = np.ptp(np.concatenate([body.mesh.points for body in bodies.values()]), axis=0)
+    return max(1.0, nice_number(VISIBLE * float(extent.max()) / moved)) if moved > 0 else 1.0
 
 
 @dataclass(frozen=True)
@@ -115,39 +128,6 @@ class _Look:
         return body.nodal_von_mises if self.smooth else body.von_mises
 
 
-def stress_range(bodies: Mapping[str, BodyFields]) -> tuple[float, float]:
-    """Return the default range of the colours, from zero to a round number near a high quantile."""
-    top = float(np.quantile(np.concatenate([body.von_mises for body in bodies.values()]), QUANTILE))
-    if top <= 0:
-        return 0.0, 1.0
-    step = 10.0 ** np.floor(np.log10(top)) / 2
-    return 0.0, float(step * np.ceil(top / step))
-
-
-def chosen_scale(bodies: Mapping[str, BodyFields]) -> float:
-    """Return the round factor that makes the displacement visible; 1 where nothing moves."""
-    moved = max(float(np.linalg.norm(body.displacement, axis=1).max()) for body in bodies.values())
-    extent = np.ptp(np.concatenate([body.mesh.points for body in bodies.values()]), axis=0)
-    return nice_number(VISIBLE * float(extent.max()) / moved) if moved > 0 else 1.0
-
-
-def _draw(bodies: Mapping[str, BodyFields], state: State | None, target: Path, look: _Look) -> None:
-    points = np.concatenate([body.deformed(look.scale) for body in bodies.values()])
-    view = oblique_view(points)
-    layers = [_body_layer(body, look) for body in bodies.values()]
-    wide = int(0.88 * look.width)
-    whole = render(layers, view, frame_around(view, points), wide)
-    details = [] if state is None else _sections(bodies, state, view, look, wide // 2)
-    peak = max(float(body.von_mises.max()) for body in bodies.values())
-    facts = f"von Mises stress, largest {written(peak)} {look.units.stress}; displacement × {look.scale:g}"
-    height = whole.shape[0] + 90 + (details[0].image.shape[0] + 40 if details else 0)
-    with sheet(target, (look.width, height), f"{look.title}: {facts}" if look.title else facts) as figure:
-        _compose(figure, whole, details, look.units)
-        extend = "max" if peak > look.clim[1] else "neither"
-        label = f"von Mises stress ({look.units.stress})"
-        colour_bar(figure, figure.axes, STRESS_MAP, look.clim, label, extend=extend, aspect=40, fraction=0.05, pad=0.01)
-
-
 @dataclass(frozen=True)
 class _Detail:
     title: str
@@ -155,16 +135,34 @@ class _Detail:
     size: float
 
 
-def _compose(figure: Any, whole: np.ndarray, details: list[_Detail], units: Units) -> None:
-    if not details:
-        show_image(figure.subplots(), whole)
-        return
-    grid = figure.add_gridspec(2, len(details), height_ratios=[whole.shape[0], details[0].image.shape[0]])
-    show_image(figure.add_subplot(grid[0, :]), whole)
-    for column, detail in enumerate(details):
-        axes = figure.add_subplot(grid[1, column])
-        show_image(axes, detail.image, detail.title)
-        scale_bar(axes, detail.image, detail.size, units.length)
+def _draw(bodies: Mapping[str, BodyFields], spot: Spot | None, target: Path, look: _Look) -> None:
+    points = np.concatenate([body.deformed(look.scale) for body in bodies.values()])
+    view = oblique_view(points)
+    frame = frame_around(view, points)
+    wide = min(WIDE, 0.5 * float(frame.size[0] / frame.size[1]))
+    whole = render(
+        [_body_layer(body, look) for body in bodies.values()], view, frame, round(wide * look.width)
+    )
+    details = [] if spot is None else _sections(bodies, spot, view, look)
+    peak = max(float(body.von_mises.max()) for body in bodies.values())
+    facts = f"von Mises stress, largest {written(peak)} {look.units.stress}; displacement × {look.scale:g}"
+    top, below = round(TITLE * look.width), round((TITLE + GAP) * look.width) + whole.shape[0]
+    height = below + details[0].image.shape[0] if details else below
+    with sheet(target, (look.width, height + top // 2), headline(look.title, facts)) as figure:
+        place_image(figure, whole, round(WIDE * look.width - whole.shape[1]) // 2, top)
+        _place_sections(figure, details, below, look)
+        label, extend = f"von Mises stress ({look.units.stress})", "max" if peak > look.clim[1] else "neither"
+        box = (round((WIDE + 0.02) * look.width), top, height - top)
+        place_colour_bar(figure, box, STRESS_MAP, look.clim, label, extend=extend)
+
+
+def _place_sections(figure: Any, details: list[_Detail], top: int, look: _Look) -> None:
+    gap = round(GAP * look.width)
+    left = (round((WIDE + GAP) * look.width) - sum(detail.image.shape[1] + gap for detail in details)) // 2
+    for detail in details:
+        axes = place_image(figure, detail.image, left, top, detail.title)
+        scale_bar(axes, detail.image, detail.size, look.units.length)
+        left += detail.image.shape[1] + gap
 
 
 def _body_layer(body: BodyFields, look: _Look) -> Layer:
@@ -175,21 +173,30 @@ def _body_layer(body: BodyFields, look: _Look) -> Layer:
     else:
         mesh.cell_data["shown"] = body.von_mises[cells]
     edges = {"show_edges": True, "edge_color": INK, "edge_opacity": 0.12, "line_width": 1}
-    return Layer(mesh, {"scalars": "shown", **look.colours, **edges, "ambient": 0.6, "diffuse": 0.42, "smooth_shading": True})
+    shading = {
+        "ambient": 0.6,
+        "diffuse": 0.42,
+        "smooth_shading": True,
+        "split_sharp_edges": True,
+        "feature_angle": 50,
+    }
+    return Layer(mesh, {"scalars": "shown", **look.colours, **edges, **shading})
 
 
-def _sections(
-    bodies: Mapping[str, BodyFields], state: State, main: View, look: _Look, width: int
-) -> list[_Detail]:
-    places = contact_places(state, {name: body.deformed(1.0) for name, body in bodies.items()})
-    centre = contact_centre(state.contact, places)
-    half = half_width(state.contact, np.concatenate([body.mesh.points for body in bodies.values()]))
+def _sections(bodies: Mapping[str, BodyFields], spot: Spot, main: View, look: _Look) -> list[_Detail]:
+    points = np.concatenate([body.deformed(1.0) for body in bodies.values()])
     scalars = {name: look.scalars(body) for name, body in bodies.items()}
+    views = section_views(spot, main)
+    frames = [section_frame(view, spot, points) for view in views]
+    # All are equally high and together as wide as the picture, but not higher than half of that.
+    proportions = [float(frame.size[0] / frame.size[1]) for frame in frames]
+    height = look.width * min((WIDE - GAP) / sum(proportions), 0.4)
     details = []
-    for view in section_views(state.contact, main):
-        frame = section_frame(view, centre, half, PROPORTION)
-        image = render(section_layers(bodies, scalars, view, centre, look.colours), view, frame, width)
+    for view, frame, proportion in zip(views, frames, proportions, strict=True):
+        layers = section_layers(bodies, scalars, view, spot.centre, look.colours)
+        image = render(layers, view, frame, round(proportion * height))
         across = axis_label(view.towards).strip("−")
-        where = f"cut perpendicular to {across}" if across else "cut"
-        details.append(_Detail(f"{where} through the contact, true deformation", image, float(frame.size[0])))
-    return details
+        title = f"section across {across}" if across else "section"
+        details.append(_Detail(f"{title}; displacement × 1", image, float(frame.size[0])))
+    smallest = min(detail.image.shape[0] for detail in details)
+    return [_Detail(detail.title, detail.image[:smallest], detail.size) for detail in details]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 from fenics_contact import _dolfinx
 from fenics_contact.geometry import BodyMesh, block

@@ -1,0 +1,126 @@
+"""The face system of Coulomb friction in full: a slipping force grows with its normal force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+from scipy.linalg import lapack
+
+from fenics_contact.qp.coarse import CoarseSpace
+from fenics_contact.qp.face_system import FaceSystem
+from fenics_contact.qp.reductions import Vector, global_max
+
+RANK_TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class ObliqueProjector:
+    """v ↦ v − G_sᵀ (G_u G_sᵀ)⁻¹ G_u v: removes rigid motions, lands where G_u vanishes.
+
+    Attributes:
+        tested: G_s, this rank's columns on the tested basis, shape (m, n_face).
+        moving: Coarse space of G_u on the moving basis.
+        factor: LU factors of the scaled G_u G_sᵀ and the scale, None for m = 0.
+    """
+
+    tested: sp.csr_matrix
+    moving: CoarseSpace
+    factor: tuple[tuple[Vector, Vector], Vector] | None
+
+    @classmethod
+    def build(cls, tested: sp.csr_matrix, moving: CoarseSpace) -> ObliqueProjector | None:
+        """Factor G_u G_sᵀ; None if it is singular: then the face does not hold every body. Collective."""
+        mixed = np.asarray(moving.comm.allreduce((moving.matrix @ tested.T).toarray()))
+        if len(mixed) == 0:
+            return cls(tested, moving, None)
+        scale = 1.0 / np.sqrt(np.maximum(np.abs(mixed).max(axis=1), np.finfo(float).tiny))
+        scaled = scale[:, None] * mixed * scale
+        lu, pivots, info = lapack.dgetrf(scaled)
+        condition, _ = lapack.dgecon(lu, np.abs(scaled).sum(axis=0).max())
+        if info != 0 or not condition > RANK_TOLERANCE:
+            return None
+        return cls(tested, moving, ((lu, pivots), scale))
+
+    def solve(self, resultant: Vector) -> Vector:
+        """Return (G_u G_sᵀ)⁻¹ times a replicated array of shape (m,)."""
+        if self.factor is None:
+            return resultant
+        factor, scale = self.factor
+        return np.asarray(scale * scipy.linalg.lu_solve(factor, scale * resultant, check_finite=False))
+
+    def coefficients(self, v: Vector) -> Vector:
+        """Return (G_u G_sᵀ)⁻¹ G_u v, replicated. Collective."""
+        return self.solve(self.moving.apply(v))
+
+    def __call__(self, v: Vector) -> Vector:
+        """Project. Collective."""
+        return v - self.tested.T @ self.coefficients(v)
+
+
+@dataclass(frozen=True, eq=False)
+class CoupledSystem:
+    """(Z_sᵀ F Z_u + κ) y = Z_sᵀ d + G_sᵀ α on {G Z_u y = e − G fixed}, unsymmetric where discs slip.
+
+    The multiplier is λ = fixed + Z_u y with Z_u = Z_s + growth: a column of a normal multiplier carries the
+    friction μ ŵ that slips with it.
+
+    Attributes:
+        system: The symmetric face system: tested basis Z_s, curvature κ, preconditioner.
+        coarse: Equilibrium of all multipliers, G λ = e.
+        moving: Z_u, shape (n_owned, n_face).
+        fixed: The part of the multiplier that does not grow, owned.
+        oblique: Projector that keeps equilibrium.
+    """
+
+    system: FaceSystem
+    coarse: CoarseSpace
+    moving: sp.csr_matrix
+    fixed: Vector
+    oblique: ObliqueProjector
+
+    def enter(self, multiplier: Vector) -> Vector:
+        """Return the multiplier on the coupled face and in equilibrium that shares λ's coordinates. Collective."""
+        on_face = self.fixed + self.moving @ self.system.face.restrict(multiplier)
+        missing = self.coarse.residual(on_face)
+        return on_face - self.moving @ (self.oblique.tested.T @ self.oblique.solve(missing))
+
+    def advance(self, step: Vector) -> Vector:
+        """Return how the multiplier moves, Z_u δ, owned, for a step δ in face coordinates."""
+        return self.moving @ step
+
+    def motions(self, gradient: Vector) -> Vector:
+        """Return α, the rigid motions of a gradient on the face, replicated. Collective."""
+        return self.oblique.coefficients(gradient)
+
+    def image(self, z: Vector, full: Vector) -> Vector:
+        """Return the projected image of z, shape (n_face,), where full = F Z_u z. Collective."""
+        return self.oblique(self.system.image(z, full))
+
+    def precondition(self, residual: Vector) -> Vector:
+        """Apply the symmetric preconditioner and return to equilibrium, G_u z = 0. Collective."""
+        return self.oblique.moving.project(self.system.precondition(residual))
+
+
+def couple(system: FaceSystem, coarse: CoarseSpace, growth: Vector, multiplier: Vector) -> CoupledSystem | None:
+    """Add the growth of friction to a face system. Collective.
+
+    Args:
+        system: The symmetric system of the face.
+        coarse: Equilibrium of all multipliers.
+        growth: dΨ/dλ_N of each disc, shape (n_friction,), owned.
+        multiplier: λ at which the face was found, owned.
+
+    Returns:
+        The coupled system; None where no disc grows, or where the face does not hold every body.
+    """
+    face = system.face
+    if global_max(system.comm, float(np.any(growth[face.slip] > 0.0))) == 0.0:
+        return None
+    coupling = face.growth(growth)
+    moving = (face.restriction + coupling).tocsr()
+    fixed = face.fixed - coupling @ np.maximum(face.restrict(multiplier), 0.0)
+    oblique = ObliqueProjector.build(system.coarse.matrix, coarse.restricted(moving))
+    return None if oblique is None else CoupledSystem(system, coarse, moving, fixed, oblique)

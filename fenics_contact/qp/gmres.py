@@ -1,0 +1,132 @@
+"""Generalised minimal residuals on a coupled face, keeping equilibrium."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.qp.coupled import CoupledSystem
+from fenics_contact.qp.pcg import FaceStep, Stop
+from fenics_contact.qp.reductions import Vector, global_sum
+
+
+def projected_gmres(
+    coupled: CoupledSystem, gradient: Vector, weights: Vector, tolerance: float, max_iterations: int
+) -> FaceStep:
+    """Solve (Z_sᵀ F Z_u + κ) δ = −g + G_sᵀ α with G Z_u δ = 0. Collective.
+
+    Right preconditioned, without restart, in the norm ‖weights · r‖ of the projected residual, which is what
+    is minimised and compared with the tolerance.
+
+    Args:
+        coupled: The face with growing friction.
+        gradient: g = Z_sᵀ(F λ − d) + κ y at the starting point, shape (n_face,), owned.
+        weights: Positive weights, shape (n_face,), owned.
+        tolerance: Stop when the weighted norm is at most this.
+        max_iterations: Largest number of operator applications.
+
+    Returns:
+        The step in face coordinates (the multiplier moves by Z_u δ) and why the iteration ended.
+
+    References:
+        Y. Saad, Iterative Methods for Sparse Linear Systems, 2nd ed. (2003), algorithms 6.9 and 9.5.
+    """
+    comm, operator = coupled.system.comm, coupled.system.operator
+    first = -weights * coupled.oblique(gradient)
+    size = float(np.sqrt(global_sum(comm, first @ first)[0]))
+    basis = _Basis(len(gradient), len(coupled.fixed))
+    small = _LeastSquares(size)
+    stop = Stop.CONVERGED
+    vector = first / size if size > 0.0 else first
+    while not small.residual <= tolerance:
+        if basis.count == max_iterations:
+            stop = Stop.ITERATION_LIMIT
+            break
+        direction = coupled.precondition(vector / weights)
+        full = operator(coupled.moving @ direction)
+        image = weights * coupled.image(direction, full)
+        basis.append(vector, direction, full)
+        image, column = _orthogonalised(comm, basis.vectors, image)
+        small.append(column)
+        if basis.count - small.last_progress > coupled.system.patience:
+            stop = Stop.STAGNATION
+            break
+        if column[-1] == 0.0:
+            break
+        vector = image / column[-1]
+    factors = small.solution()
+    step, product = factors @ basis.directions, factors @ basis.products
+    residual = coupled.oblique(gradient + coupled.system.image(step, product))
+    return FaceStep(step, product, residual, basis.count, small.residual, stop)
+
+
+def _orthogonalised(comm: object, vectors: Vector, image: Vector) -> tuple[Vector, Vector]:
+    """Subtract the components along the basis, twice, and return the rest with the Hessenberg column."""
+    coefficients = np.zeros(len(vectors))
+    for _ in range(2):
+        correction = global_sum(comm, vectors @ image)  # type: ignore[arg-type]
+        image = image - correction @ vectors
+        coefficients += correction
+    length = np.sqrt(global_sum(comm, image @ image))  # type: ignore[arg-type]
+    return image, np.concatenate([coefficients, length])
+
+
+class _Basis:
+    """Krylov vectors v, preconditioned directions z and products F Z_u z as rows of growing blocks."""
+
+    def __init__(self, n_face: int, n_owned: int) -> None:
+        self.count = 0
+        self._blocks = [np.empty((32, n_face)), np.empty((32, n_face)), np.empty((32, n_owned))]
+
+    def append(self, *rows: Vector) -> None:
+        if self.count == len(self._blocks[0]):
+            self._blocks = [np.vstack([block, np.empty_like(block)]) for block in self._blocks]
+        for block, row in zip(self._blocks, rows, strict=True):
+            block[self.count] = row
+        self.count += 1
+
+    @property
+    def vectors(self) -> Vector:
+        return self._blocks[0][: self.count]
+
+    @property
+    def directions(self) -> Vector:
+        return self._blocks[1][: self.count]
+
+    @property
+    def products(self) -> Vector:
+        return self._blocks[2][: self.count]
+
+
+class _LeastSquares:
+    """min ‖β e₁ − H y‖ for a Hessenberg matrix that grows by columns; replicated."""
+
+    def __init__(self, beta: float) -> None:
+        self._beta = beta
+        self._columns: list[Vector] = []
+        self._best = beta
+        self.residual = beta
+        self.last_progress = 0
+
+    def append(self, column: Vector) -> None:
+        self._columns.append(column)
+        y = self.solution()
+        self.residual = float(np.linalg.norm(self._right() - self._matrix() @ y))
+        if self.residual < 0.9 * self._best:
+            self._best, self.last_progress = self.residual, len(self._columns)
+
+    def solution(self) -> Vector:
+        if not self._columns:
+            return np.zeros(0)
+        return np.asarray(np.linalg.lstsq(self._matrix(), self._right(), rcond=None)[0])
+
+    def _matrix(self) -> Vector:
+        size = len(self._columns)
+        matrix = np.zeros((size + 1, size))
+        for j, column in enumerate(self._columns):
+            matrix[: len(column), j] = column
+        return matrix
+
+    def _right(self) -> Vector:
+        right = np.zeros(len(self._columns) + 1)
+        right[0] = self._beta
+        return right

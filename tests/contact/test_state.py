@@ -1,0 +1,90 @@
+"""What a state says about itself: energies, pressures, statuses, counts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.contact import State, Status, solve_scene
+from fenics_contact.qp import FaceNewton
+from fenics_contact.scene import Coulomb, Tresca
+from tests.contact.checks import assert_solved
+from tests.contact.gallery import block_on_plane, partitions, pressed_block, two_blocks
+from tests.contact.rank_cases import TENSION, uniaxial
+
+TOLERANCE = 1e-9
+
+
+def solved(scene) -> State:
+    state = solve_scene(scene, partitions(scene), MPI.COMM_SELF, solver=FaceNewton(tolerance=TOLERANCE))
+    assert_solved(state, TOLERANCE)
+    return state
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [block_on_plane(Coulomb(0.6)), two_blocks(Tresca(1.0), "tetrahedron"), pressed_block(Coulomb(0.5))],
+    ids=["Coulomb", "Tresca", "prescribed displacement"],
+)
+def test_the_primal_energy_is_the_dual_energy_and_contains_the_friction(scene) -> None:
+    state = solved(scene)
+    energies = state.energies
+    assert energies.primal == pytest.approx(energies.dual, rel=1e-7)
+    assert energies.strain > 0.01
+    assert energies.friction > 1e-5 * energies.strain
+    assert energies.primal == energies.total_potential + energies.friction
+    lengths = np.linalg.norm(state.contact.slip, axis=1)
+    assert energies.friction == pytest.approx(state.contact.slip_bound @ lengths, rel=1e-12)
+
+
+def test_pressures_integrate_to_the_load() -> None:
+    state = solved(block_on_plane(Coulomb(0.6)))
+    contact = state.contact
+    assert contact.points.area.sum() == pytest.approx(2.0, rel=1e-2)  # slightly more than the flat face has
+    assert contact.pressure @ contact.points.area == pytest.approx(4.0, rel=1e-9)
+    assert contact.force.sum(axis=0) == pytest.approx([-2.0, -0.6, 4.0], rel=1e-8)
+    assert contact.pressure.max() > 2.0  # the mean
+
+
+def test_statuses_say_what_forces_and_ways_say() -> None:
+    contact = solved(block_on_plane(Coulomb(0.6))).contact
+    open_, stick, slip = (contact.status == status for status in (Status.OPEN, Status.STICK, Status.SLIP))
+    assert min(open_.sum(), stick.sum(), slip.sum()) > 0
+    size, way = contact.normal_force.max(), np.abs(contact.slip).max()
+    friction, sliding = np.linalg.norm(contact.friction_force, axis=1), np.linalg.norm(contact.slip, axis=1)
+    assert contact.gap[open_].min() > 1e-6 * way
+    assert contact.normal_force[open_].max() == 0
+    assert np.abs(contact.gap[~open_]).max() < 1e-6 * way
+    assert contact.normal_force[~open_].min() > 0
+    assert sliding[stick].max() < 1e-6 * way
+    assert np.all(friction[stick] < contact.slip_bound[stick])
+    assert sliding[slip].min() > 1e-6 * way
+    assert friction[slip] == pytest.approx(contact.slip_bound[slip], abs=1e-6 * size)
+
+
+def test_a_scene_without_contact_is_a_linear_solve() -> None:
+    scene = uniaxial("hexahedron")
+    state = solve_scene(scene, partitions(scene), MPI.COMM_SELF)
+    assert_solved(state, TOLERANCE)
+    assert state.contact.points.count == 0
+    assert state.contact.force.shape == (0, 3)
+    assert state.counts["normal_multipliers"] == state.counts["tangential_multipliers"] == 0
+    assert state.counts["solver_steps"] <= 2
+    assert state.counts["f_products"] < 50
+    assert state.energies.friction == 0
+    assert state.energies.load == pytest.approx(TENSION * state.gather_displacement("bar")[:, 0].max(), rel=1e-8)
+
+
+def test_counts_and_seconds_are_told() -> None:
+    state = solved(two_blocks(Coulomb(0.38)))
+    counts = state.counts
+    assert counts["subdomains"] == 4
+    assert counts["torn_unknowns"] == sum(s.mesh.size for s in state.system.torn.subdomains)
+    assert counts["normal_multipliers"] == 35
+    assert counts["tangential_multipliers"] == 70
+    assert 10 < counts["f_products"] < 300
+    assert counts["f_products"] <= state.system.products
+    assert counts["solver_steps"] == len(state.solution.history) > 1
+    assert {"decompose", "assemble", "factor", "solve", "state"} <= set(state.seconds)
+    assert all(seconds >= 0 for seconds in state.seconds.values())

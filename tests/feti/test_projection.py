@@ -1,0 +1,179 @@
+"""Points project onto faceted surfaces exactly on planes, ever better on curved ones, and without jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from fenics_contact.feti.projection import Projection, project
+from fenics_contact.feti.surface import FacetedSurface, faceted_surface, quadrature_areas, shape_functions
+
+CORNERS = [4, 3]
+Height = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+def sphere(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return np.sqrt(1.0 - x**2 - y**2)
+
+
+def cylinder(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return np.sqrt(1.0 - x**2) + 0.0 * y
+
+
+def lattice(x: np.ndarray, y: np.ndarray, z: np.ndarray, corners: int) -> FacetedSurface:
+    """The surface over a lattice of points (ij-indexed), seen from above."""
+    number = np.arange(x.size).reshape(x.shape)
+    quads = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1).reshape(
+        -1, 4
+    )
+    facets = quads if corners == 4 else quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    return faceted_surface(np.column_stack([x.ravel(), y.ravel(), z.ravel()]), facets)
+
+
+def cap(height: Height, n: int, corners: int) -> FacetedSurface:
+    """A piece of a unit sphere or cylinder over a square of side 1.2, smoothly uneven."""
+    ticks = np.linspace(-0.6, 0.6, n + 1)
+    x, y = np.meshgrid(ticks + 0.05 * np.sin(4 * ticks), ticks - 0.04 * np.cos(3 * ticks), indexing="ij")
+    return lattice(x, y, height(x, y), corners)
+
+
+def downwards(count: int) -> np.ndarray:
+    return np.tile([0.0, 0.0, -1.0], (count, 1))
+
+
+def foot(found: Projection, surface: FacetedSurface) -> np.ndarray:
+    values, _ = shape_functions(found.local, surface.corners)
+    return np.einsum("nk,nkd->nd", values, surface.points[surface.facets[found.facet]])
+
+
+@pytest.mark.parametrize("corners", CORNERS)
+def test_planes_are_exact(corners: int) -> None:
+    rng = np.random.default_rng(1)
+    x, y = np.meshgrid(np.linspace(0, 3, 13), np.linspace(0, 2, 9), indexing="ij")
+    x, y = x + rng.uniform(-0.06, 0.06, x.shape), y + rng.uniform(-0.06, 0.06, y.shape)
+    plane = lattice(x, y, np.zeros_like(x), corners)
+    points = np.column_stack(
+        [rng.uniform(0.1, 2.9, 300), rng.uniform(0.1, 1.9, 300), rng.uniform(-0.5, 2, 300)]
+    )
+    turn, _ = np.linalg.qr(rng.standard_normal((3, 3)))
+    turn *= np.sign(np.linalg.det(turn))
+    turned = faceted_surface(plane.points @ turn.T, plane.facets)
+    found = project(points @ turn.T, downwards(300) @ turn.T, turned)
+    np.testing.assert_array_equal(found.point, np.arange(300))
+    np.testing.assert_allclose(found.gap, points[:, 2], atol=1e-13)
+    np.testing.assert_allclose(found.normal, np.tile(turn[:, 2], (300, 1)), atol=1e-13)
+    np.testing.assert_allclose(foot(found, turned) @ turn, points * [1, 1, 0], atol=1e-13)
+
+
+@pytest.mark.parametrize("corners", CORNERS)
+@pytest.mark.parametrize("height", [sphere, cylinder])
+def test_distance_and_normal_converge_with_second_order(height: Height, corners: int) -> None:
+    rng = np.random.default_rng(2)
+    direction = np.column_stack([rng.uniform(-0.3, 0.3, (50, 2)), np.ones(50)])
+    if height is cylinder:
+        direction[:, 1] = 0.0
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    distance = rng.uniform(-0.05, 0.2, 50)
+    points = (1 + distance)[:, None] * direction
+    errors = []
+    for n in (8, 16, 32, 64):
+        found = project(points, -direction, cap(height, n, corners))
+        assert len(found.point) == 50
+        errors.append([np.abs(found.gap - distance).max(), np.abs(found.normal - direction).max()])
+    rates = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+    assert rates[-1].min() > 1.8, f"orders of gap and normal: {rates}"
+    assert errors[0][0] > 1e-4, "the coarse surface is too good: nothing was tested"
+
+
+@pytest.mark.parametrize("corners", CORNERS)
+@pytest.mark.parametrize("level", [0.04, 0.0, -0.03])
+def test_gap_normal_and_weights_do_not_jump_between_facets(corners: int, level: float) -> None:
+    surface = cap(sphere, 7, corners)
+
+    def along(steps: int) -> tuple[Projection, np.ndarray]:
+        t = np.linspace(-0.4, 0.4, steps + 1)
+        x, y = t, 0.3 * np.sin(3 * t + 0.4)
+        found = project(np.column_stack([x, y, sphere(x, y) + level]), downwards(steps + 1), surface)
+        assert len(found.point) == steps + 1, "a point between two facets was lost"
+        weights = np.zeros((steps + 1, len(surface.points)))
+        values, _ = shape_functions(found.local, corners)
+        np.add.at(weights, (np.arange(steps + 1)[:, None], surface.facets[found.facet]), values)
+        return found, np.column_stack([found.gap, found.normal, weights])
+
+    found, coarse = along(400)
+    assert len(np.unique(found.facet)) > 6, "hardly an edge was crossed"
+    jumps = [np.abs(np.diff(field, axis=0)).max(axis=0) for field in (coarse, along(3200)[1])]
+    assert (jumps[1] < jumps[0] / 6 + 1e-12).all()
+
+
+@pytest.mark.parametrize("corners", CORNERS)
+def test_nodes_of_the_surface_itself_project_onto_themselves(corners: int) -> None:
+    surface = cap(sphere, 6, corners)
+    found = project(surface.points, -surface.normals, surface)
+    np.testing.assert_array_equal(found.point, np.arange(len(surface.points)))
+    np.testing.assert_allclose(foot(found, surface), surface.points, atol=1e-12)
+    np.testing.assert_allclose(found.gap, 0.0, atol=1e-12)
+    np.testing.assert_allclose(found.normal, surface.normals, atol=1e-9)
+
+
+def test_points_beyond_the_rim_have_no_projection() -> None:
+    x, y = np.meshgrid(np.linspace(0, 1, 4), np.linspace(0, 1, 4), indexing="ij")
+    points = np.array([[0.5, 0.5, 0.1], [1.01, 0.5, 0.1], [0.5, -0.01, 0.1], [1.0, 1.0, 0.1]])
+    found = project(points, downwards(4), lattice(x, y, 0 * x, 4))
+    assert found.point.tolist() == [0, 3]
+
+
+def test_surfaces_that_face_the_same_way_do_not_touch() -> None:
+    surface = cap(sphere, 5, 4)
+    point = np.array([[0.0, 0.0, 1.1]])
+    assert len(project(point, -downwards(1), surface).point) == 0
+    assert len(project(point, downwards(1), surface).point) == 1
+
+
+def test_the_nearer_of_two_sheets_is_met() -> None:
+    x, y = np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 5), indexing="ij")
+    upper, lower = lattice(x, y, 0 * x, 4), lattice(x, y, 0 * x - 0.2, 4)
+    both = faceted_surface(
+        np.vstack([lower.points, upper.points]), np.vstack([lower.facets, upper.facets + 25])
+    )
+    points = np.array([[0.4, 0.3, 0.05], [0.4, 0.3, -0.15]])
+    assert project(points, downwards(2), both).gap == pytest.approx([0.05, 0.05])
+
+
+@pytest.mark.parametrize("corners", CORNERS)
+@pytest.mark.parametrize("cells", [4, 40])
+def test_no_point_is_lost_where_large_facets_meet_small_ones(corners: int, cells: int) -> None:
+    ticks = np.concatenate([[0.0], np.linspace(1, 2, cells + 1)])
+    x, y = np.meshgrid(ticks, np.linspace(0, 2, 2 * cells + 1), indexing="ij")
+    points = np.random.default_rng(0).uniform([0, 0, 0.01], [2, 2, 0.01], (500, 3))
+    found = project(points, downwards(500), lattice(x, y, 0 * x, corners))
+    np.testing.assert_array_equal(found.point, np.arange(500))
+
+
+def test_no_points_have_no_projections() -> None:
+    found = project(np.zeros((0, 3)), np.zeros((0, 3)), cap(sphere, 4, 4))
+    assert len(found.point) == len(found.gap) == 0
+
+
+@pytest.mark.parametrize("corners", CORNERS)
+def test_nodal_areas_add_up_to_the_surface(corners: int) -> None:
+    x, y = np.meshgrid(np.linspace(0, 3, 5), np.linspace(0, 2, 4), indexing="ij")
+    tilted = lattice(x, y, 0.75 * x, corners)
+    assert tilted.areas.sum() == pytest.approx(1.25 * 6)
+    assert quadrature_areas(tilted.points, tilted.facets).sum() == pytest.approx(1.25 * 6)
+    np.testing.assert_allclose(tilted.normals, np.tile([-0.6, 0.0, 0.8], (20, 1)), atol=1e-14)
+
+
+@pytest.mark.parametrize("corners", CORNERS)
+def test_shape_functions_add_up_to_one_and_their_slopes_are_right(corners: int) -> None:
+    local = np.random.default_rng(7).uniform(0, 0.5, (10, 2))
+    values, slopes = shape_functions(local, corners)
+    np.testing.assert_allclose(values.sum(axis=1), 1.0)
+    for direction in range(2):
+        step = np.eye(2)[direction] * 1e-6
+        numeric = (
+            shape_functions(local + step, corners)[0] - shape_functions(local - step, corners)[0]
+        ) / 2e-6
+        np.testing.assert_allclose(slopes[:, :, direction], numeric, atol=1e-9)

@@ -1,0 +1,103 @@
+"""Adjoint directional derivatives beside difference quotients along a line of designs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fenics_contact.contact import State, Status
+from fenics_contact.shape import DesignPoint, Objective, ShapeProblem
+
+
+class Remembering(ShapeProblem):
+    """Solves each design once, however many objectives judge it."""
+
+    def __init__(self, *arguments: Any, **more: Any) -> None:
+        super().__init__(*arguments, **more)
+        self._known: dict[bytes, State] = {}
+
+    def state_of(self, alpha: np.ndarray) -> State:
+        key = np.asarray(alpha, dtype=float).tobytes()
+        if key not in self._known:
+            self._known[key] = super().state_of(alpha)
+        return self._known[key]
+
+    def judged_by(self, objective: Objective) -> Remembering:
+        self.objective = objective
+        return self
+
+
+@dataclass(frozen=True)
+class Line:
+    """Designs α + s v of one problem.
+
+    Attributes:
+        problem: Solves them.
+        alpha: α, the design in the middle.
+        direction: v.
+        step: s of the difference quotients; Taylor remainders are taken at multiples of it.
+    """
+
+    problem: Remembering
+    alpha: np.ndarray
+    direction: np.ndarray
+    step: float = 1e-3
+    taylor: tuple[float, ...] = (4.0, 8.0)
+
+    def at(self, multiple: float) -> np.ndarray:
+        return self.alpha + multiple * self.step * self.direction
+
+    def state(self, multiple: float = 0.0) -> State:
+        return self.problem.state_of(self.at(multiple))
+
+    def value(self, objective: Objective, multiple: float = 0.0) -> float:
+        return self.problem.judged_by(objective).value_of(self.at(multiple))
+
+    def point(self, objective: Objective) -> DesignPoint:
+        return self.problem.judged_by(objective).evaluate(self.alpha)
+
+    def slope(self, objective: Objective) -> float:
+        """The adjoint's directional derivative."""
+        return float(self.point(objective).gradient @ self.direction)
+
+    def quotient(self, objective: Objective) -> float:
+        """The central difference quotient."""
+        return (self.value(objective, 1.0) - self.value(objective, -1.0)) / (2 * self.step)
+
+    def miss(self, objective: Objective) -> float:
+        """Relative difference of the two."""
+        quotient = self.quotient(objective)
+        return abs(self.slope(objective) - quotient) / abs(quotient)
+
+    def taylor_rate(self, objective: Objective) -> float:
+        """Order at which J(α + s v) − J(α) − s J'(α; v) vanishes with s."""
+        start, slope = self.value(objective), self.slope(objective)
+        near, far = (
+            abs(self.value(objective, m) - start - m * self.step * slope) for m in self.taylor
+        )
+        return float(np.log(far / near) / np.log(self.taylor[1] / self.taylor[0]))
+
+    def steepness(self, objective: Objective) -> float:
+        """Slope along v relative to the steepest: zero if the derivative says nothing."""
+        gradient = self.point(objective).gradient
+        return abs(self.slope(objective)) / float(np.linalg.norm(gradient) * np.linalg.norm(self.direction))
+
+    def multiples(self) -> tuple[float, ...]:
+        return (-1.0, 0.0, 1.0, *self.taylor)
+
+    def is_smooth(self) -> bool:
+        """Whether status, slave nodes and master facets are the same at all designs of the line."""
+        first = self.state().contact
+        others = [self.state(m).contact for m in self.multiples()]
+        return all(
+            np.array_equal(first.status, other.status)
+            and np.array_equal(first.points.slave, other.points.slave)
+            and np.array_equal(first.points.facet, other.points.facet)
+            for other in others
+        )
+
+    def counts(self) -> dict[str, int]:
+        """How many points have each status."""
+        return {status.name: self.state().contact.count(status) for status in Status}
