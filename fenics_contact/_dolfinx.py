@@ -184,22 +184,18 @@ def _with_ghosts(cells: np.ndarray, rank: np.ndarray, mine: np.ndarray, comm: MP
 
     dolfinx 0.5 does not find out that two ranks share a vertex unless a ghost cell tells it.
     """
-    n_nodes, vertices = int(cells.max()) + 1, cells.shape[1]
-    around = sp.csr_matrix((np.ones(cells.size), (cells.ravel(), np.repeat(rank, vertices))), shape=(n_nodes, comm.size))
-    incidence = sp.csr_matrix(
-        (np.ones(len(mine) * vertices), (np.repeat(np.arange(len(mine)), vertices), cells[mine].ravel())),
-        shape=(len(mine), n_nodes),
-    )
-    reached = (incidence @ around).tocoo()
-    others = reached.col != comm.rank
-    rows = np.concatenate([np.arange(len(mine)), reached.row[others]])
-    columns = np.concatenate([np.full(len(mine), comm.rank), reached.col[others]])
-    order = np.argsort(rows, kind="stable")  # the owner, listed first, stays first
-    offsets = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=len(mine)))])
-    return cpp.graph.AdjacencyList_int32(columns[order].astype(np.int32), offsets.astype(np.int32))
+    vertices = cells.shape[1]
+    touching = sp.csr_matrix((np.ones(cells.size), (cells.ravel(), np.repeat(rank, vertices))))
+    reached = touching[cells[mine].ravel()].tocoo()
+    cell, to = np.unique([reached.row // vertices, reached.col], axis=1)
+    order = np.lexsort((to, to != comm.rank, cell))  # the owner comes first
+    offsets = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=len(mine)))])
+    return cpp.graph.AdjacencyList_int32(to[order].astype(np.int32), offsets.astype(np.int32))
 
 
-def _create_mesh(comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, cell_type: str, destinations: Any) -> Any:
+def _create_mesh(
+    comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, cell_type: str, destinations: Any
+) -> Any:
     ordered = np.ascontiguousarray(cells[:, _VERTEX_ORDER[cell_type]], dtype=np.int64)
     points = np.ascontiguousarray(points, dtype=np.float64)
     if isinstance(destinations, np.ndarray):
@@ -211,22 +207,19 @@ def _create_mesh(comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, cell_typ
     return dolfinx.mesh.create_mesh(comm, cells=ordered, x=points, e=element, partitioner=partitioner)
 
 
-def _space(mesh: Any, shape: tuple[int, ...]) -> Any:
-    element = _element(mesh.topology.cell_name(), shape)
+def _space(mesh: Any, element: Any) -> Any:
     return dolfinx.fem.FunctionSpace(mesh, element) if _OLD else dolfinx.fem.functionspace(mesh, element)
 
 
 def coefficient(mesh: Any, name: str) -> Any:
     """Return a vector field on ``mesh`` with the given name (a C identifier)."""
-    return Function(_space(mesh, (3,)), name=name)
+    return Function(_space(mesh, _element(mesh.topology.cell_name(), (3,))), name=name)
 
 
 def scalar_space(mesh: Any, degree: int) -> Any:
     """Return the space of scalar fields of degree 0 (one value a cell) or 1 on ``mesh``."""
-    if degree == 1:
-        return _space(mesh, ())
-    element = _cellwise_element(mesh.topology.cell_name())
-    return dolfinx.fem.FunctionSpace(mesh, element) if _OLD else dolfinx.fem.functionspace(mesh, element)
+    cell_type = mesh.topology.cell_name()
+    return _space(mesh, _element(cell_type, ()) if degree == 1 else _cellwise_element(cell_type))
 
 
 def _table(adjacency: Any, rows: int) -> np.ndarray:
@@ -281,7 +274,7 @@ def match_facets(mesh: Any, surface: np.ndarray) -> tuple[np.ndarray, np.ndarray
     cell_type = mesh.topology.cell_name()
     local = np.array(_FACET_VERTICES[cell_type])
     faces = np.sort(cell_nodes(mesh)[:, local].reshape(-1, local.shape[1]), axis=1)
-    wanted = np.unique(np.sort(surface, axis=1), axis=0) if len(surface) else np.empty((0, local.shape[1]), int)
+    wanted = np.sort(surface, axis=1)
     # One integer key a facet: rows of both tables are numbered together.
     _, key = np.unique(np.vstack([wanted, faces]), axis=0, return_inverse=True)
     key = key.ravel()
@@ -296,10 +289,8 @@ class CompiledForm:
         """Compile ``form``. Collective on ``comm``: one rank compiles, the others read its cache."""
         self.form = form
         with _side_effects_undone():
-            if _OLD:
-                self._compiled = jit.ffcx_jit(comm, form)
-            else:
-                self._compiled = dolfinx.fem.compile_form(comm, form, jit_options={}, form_compiler_options={})
+            build = jit.ffcx_jit if _OLD else dolfinx.fem.compile_form
+            self._compiled = build(comm, form, {}, {})
 
     def bind(
         self,
@@ -320,16 +311,13 @@ class CompiledForm:
         """
         if _OLD:
             return self._bind_old(mesh, spaces, coefficients, constants, facets or {})
-        domains = {}
-        if facets:
-            pairs = [
-                (tag, np.column_stack(pair).astype(np.int32).ravel()) for tag, pair in sorted(facets.items())
-            ]
-            domains = {dolfinx.fem.IntegralType.exterior_facet: pairs}
+        tagged = sorted((facets or {}).items())
+        pairs = [(tag, np.column_stack(pair).astype(np.int32).ravel()) for tag, pair in tagged]
+        domains = {dolfinx.fem.IntegralType.exterior_facet: pairs} if pairs else {}
         # A symbol that dropped out of the form while UFL simplified it must not be handed over.
-        used = set(self.form.constants()), set(self.form.coefficients())
-        symbols = [{s: v for s, v in given.items() if s in u} for given, u in zip((constants, coefficients), used)]
-        return dolfinx.fem.create_form(self._compiled, list(spaces), mesh, domains, symbols[1], symbols[0])
+        functions = {symbol: coefficients[symbol] for symbol in self.form.coefficients()}
+        numbers = {symbol: constants[symbol] for symbol in self.form.constants()}
+        return dolfinx.fem.create_form(self._compiled, list(spaces), mesh, domains, functions, numbers)
 
     def _bind_old(self, mesh: Any, spaces: Any, coefficients: Any, constants: Any, facets: Any) -> Any:
         compiled, module, code = self._compiled
@@ -367,8 +355,7 @@ def _facet_tags(mesh: Any, facets: Mapping[int, tuple[np.ndarray, np.ndarray]]) 
 
 def assemble_csr(form: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Assemble a bilinear form on one rank; return the matrix as CSR arrays (indptr, indices, data)."""
-    matrix = dolfinx.fem.petsc.assemble_matrix(form)
-    matrix.assemble()
+    matrix = assemble_matrix(form)
     indptr, indices, data = matrix.getValuesCSR()
     matrix.destroy()
     return indptr, indices, data

@@ -7,4 +7,13 @@ from fenics_contact.contact.held import check_held
 from fenics_contact.contact.result import ContactResult, Status
 from fenics_contact.contact.state import State
 
-__all__ = ["ContactResult", "Energies", "FixedPoint", "State", "Status", "check_held", "find_state", "solve_scene"]
+__all__ = [
+    "ContactResult",
+    "Energies",
+    "FixedPoint",
+    "State",
+    "Status",
+    "check_held",
+    "find_state",
+    "solve_scene",
+]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +20,7 @@ from fenics_contact.qp import (
 )
 from fenics_contact.qp.iterate import Start
 
-#: How much more than an equilibrium's own friction the first Tresca problem may use, so that it has an answer.
+#: How much more than an equilibrium's own friction the first Tresca problem may use: it must have an answer.
 FIRST_MARGIN = 1.1
 
 
@@ -50,29 +51,26 @@ class FixedPoint:
             InfeasibleError: If a Tresca problem on the way has no equilibrium.
             ConvergenceError: If the fixed point was not reached; carries the history of all steps.
         """
-        history: list[SolverStep] = []
-        slip_bound = _first_slip_bound(problem, law, start)
         # The inner answers may be as bad as their tolerance; half of it is left to the fixed point.
         inner = replace(self.solver, tolerance=0.5 * self.tolerance)  # type: ignore[type-var]
-        solution: DualSolution | None = None
+        slip_bound = _first_slip_bound(problem, law, start)
+        earlier: DualSolution | np.ndarray | None = None if start.cold else start.iterate.multiplier
+        history: list[SolverStep] = []
         products, reached = start.operator.products, np.inf
         for _ in range(self.max_steps):
-            earlier = start.iterate.multiplier if solution is None and not start.cold else solution
-            solution = _solve_tresca(problem, slip_bound, inner, earlier, history, products)
+            try:
+                solution = solve(problem, slip_bound, inner, earlier)
+            except ConvergenceError as failure:
+                steps = _continued(history, failure.history, products)
+                raise ConvergenceError(str(failure), steps) from failure
+            history = _continued(history, solution.history, products)
             products += solution.products
-            feasible = law.feasible(solution.multiplier)
-            slip_bound = feasible.slip_bound
-            residuals = measure(problem, feasible, solution.multiplier, solution.product, solution.residual)
-            if residuals.within(self.tolerance):
-                return replace(
-                    solution,
-                    slip_bound=slip_bound,
-                    residuals=residuals,
-                    iterations=len(history),
-                    products=products,
-                    history=tuple(history),
-                )
-            reached = residuals.natural
+            solution = replace(
+                _judged(solution, law), iterations=len(history), products=products, history=tuple(history)
+            )
+            if solution.residuals.within(self.tolerance):
+                return solution
+            reached, slip_bound, earlier = solution.natural_residual, solution.slip_bound, solution
         raise ConvergenceError(
             f"the Coulomb fixed point needs a natural residual below {self.tolerance:.1e}, reached "
             f"{reached:.1e} after {self.max_steps} Tresca problems: raise max_steps, or use FaceNewton, "
@@ -91,26 +89,17 @@ def _first_slip_bound(problem: DualProblem, law: SlipLaw, start: Start) -> np.nd
     return FIRST_MARGIN * law.bound(find_equilibrium(problem, law).multiplier)
 
 
-def _solve_tresca(
-    problem: DualProblem,
-    slip_bound: np.ndarray,
-    solver: DualSolver,
-    start: DualSolution | np.ndarray | None,
-    history: list[SolverStep],
-    products: int,
-) -> DualSolution:
-    """Solve one Tresca problem and append its steps, products counted on. Collective."""
-    try:
-        solution = solve(problem, slip_bound, solver, start)
-        steps = solution.history
-    except ConvergenceError as failure:
-        steps = failure.history
-        raise ConvergenceError(str(failure), (*history, *_counted_on(steps, len(history), products))) from failure
-    history.extend(_counted_on(steps, len(history), products))
-    return solution
+def _judged(solution: DualSolution, law: SlipLaw) -> DualSolution:
+    """Return a Tresca solution with slip bound and residuals of its own normal forces. Collective."""
+    feasible = law.feasible(solution.multiplier)
+    residuals = measure(solution.problem, feasible, solution.multiplier, solution.product, solution.residual)
+    return replace(solution, slip_bound=feasible.slip_bound, residuals=residuals)
 
 
-def _counted_on(steps: tuple[SolverStep, ...], first: int, products: int) -> list[SolverStep]:
-    return [
-        replace(step, iteration=first + index, products=products + step.products) for index, step in enumerate(steps)
-    ]
+def _continued(history: Sequence[SolverStep], steps: Sequence[SolverStep], products: int) -> list[SolverStep]:
+    """Append the steps of another Tresca problem, numbers and products counted on."""
+    counted = (
+        replace(step, iteration=number, products=products + step.products)
+        for number, step in enumerate(steps, len(history))
+    )
+    return [*history, *counted]

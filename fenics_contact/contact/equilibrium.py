@@ -39,7 +39,8 @@ def solve_scene(
         ConvergenceError: If the solver does not reach its tolerance.
 
     Example:
-        >>> state = solve_scene(scene, {"block": box_partition(mesh, (2, 1, 1))}, MPI.COMM_WORLD)  # doctest: +SKIP
+        >>> parts = {"block": box_partition(mesh, (2, 1, 1))}  # doctest: +SKIP
+        >>> state = solve_scene(scene, parts, MPI.COMM_WORLD)  # doctest: +SKIP
     """
     timer = PhaseTimer()
     with timer.phase("decompose"):
@@ -102,8 +103,7 @@ def solve_dual(system: DualSystem, solver: DualSolver, start: np.ndarray | None 
         return solve(system.problem, tresca, solver, start)
     if isinstance(solver, Smalse):
         solver = FixedPoint(solver)
-    given = tresca if np.any(torn.tresca_bound > 0) else None
-    return solve(system.problem, given, solver, start, friction_coefficient=coefficient)
+    return solve(system.problem, tresca, solver, start, friction_coefficient=coefficient)
 
 
 def contact_result(system: DualSystem, solution: DualSolution) -> ContactResult:
@@ -113,9 +113,10 @@ def contact_result(system: DualSystem, solution: DualSolution) -> ContactResult:
     step = contact_step(problem.layout, problem.diagonal)
     gathered = [torn.numbering.gather(x, rows) for x in (solution.multiplier, solution.residual, step)]
     count, frictional = torn.points.count, torn.frictional
-    (normal, gap, _), (tau, minus_slip, _) = ([x[:count] for x in gathered], [x[count:].reshape(-1, 2) for x in gathered])
-    trial_normal = normal - gathered[2][:count] * gap
-    trial_tangential = tau - gathered[2][count:].reshape(-1, 2) * minus_slip
+    normal, gap, normal_step = (x[:count] for x in gathered)
+    tau, minus_slip, tangential_step = (x[count:].reshape(-1, 2) for x in gathered)
+    trial_normal = normal - normal_step * gap
+    trial_tangential = tau - tangential_step * minus_slip
     bound = torn.tresca_bound + torn.friction_coefficient * np.maximum(normal[frictional], 0)
     status = np.where(trial_normal > 0, Status.SLIP, Status.OPEN).astype(int)
     sticks = (np.linalg.norm(trial_tangential, axis=1) < bound) & (trial_normal[frictional] > 0)
@@ -127,4 +128,3 @@ def contact_result(system: DualSystem, solution: DualSolution) -> ContactResult:
         return full
 
     return ContactResult(torn.points, normal, spread(tau), spread(bound), gap, spread(-minus_slip), status)
-

@@ -8,12 +8,11 @@ import scipy.sparse as sp
 
 from fenics_contact.errors import ConvergenceError, InfeasibleError, together
 from fenics_contact.feti import TornSystem
+from fenics_contact.feti.dual import BALANCED
 from fenics_contact.scene import rigid_body_modes
 
 #: Support reactions below this fraction of the largest count as none: the motion is not resisted.
 RANK_TOLERANCE = 1e-9
-#: A resultant below this fraction of the loads' sum is rounding: the loads balance each other.
-BALANCED = 1e-12
 
 
 def check_held(torn: TornSystem) -> None:
@@ -120,12 +119,13 @@ def _infeasibility_ray(
         cones,
         settings,
     ).solve()
-    if solution.status in (clarabel.SolverStatus.PrimalInfeasible, clarabel.SolverStatus.AlmostPrimalInfeasible):
+    status = clarabel.SolverStatus
+    if solution.status in (status.PrimalInfeasible, status.AlmostPrimalInfeasible):
         return np.array(solution.z[: len(right)])
-    if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
+    if solution.status not in (status.Solved, status.AlmostSolved):
         raise ConvergenceError(
-            f"the check whether every body is held needs an answer, the conic solver ended with {solution.status}: "
-            "look at the scale of loads and lengths"
+            "the check whether every body is held needs an answer, the conic solver ended with "
+            f"{solution.status}: look at the scale of loads and lengths"
         )
     return None
 
@@ -139,7 +139,7 @@ def _describe(motion: np.ndarray, bodies: list[_RigidBody]) -> str:
         f"{kind} ({part[0]:.2g}, {part[1]:.2g}, {part[2]:.2g})" for kind, part in parts if np.any(part)
     )
     return (
-        f"every body must be held by supports, contact or friction, but body {bodies[worst].name!r} can move away "
-        f"under the load: {words} meets no resistance. Support it, let it touch something in the direction of "
-        "the load, or raise the friction coefficient"
+        f"every body must be held by supports, contact or friction, but body {bodies[worst].name!r} can move "
+        f"away under the load: {words} meets no resistance. Support it, let it touch something in the "
+        "direction of the load, or raise the friction coefficient"
     )

@@ -25,8 +25,8 @@ class ContactResult:
     Attributes:
         points: Where the contact points are and how they are directed.
         normal_force: λ_N ≥ 0, shape (n,), [force].
-        friction_force: τ in the points' tangents, zero without friction, shape (n, 2), [force]. It acts on the
-            master; the slave feels the opposite.
+        friction_force: τ in the points' tangents, zero without friction, shape (n, 2), [force]. It acts on
+            the master; the slave feels the opposite.
         slip_bound: Largest friction force, shape (n,), [force].
         gap: Distance after deformation, shape (n,), [length].
         slip: Relative tangential displacement in the points' tangents, shape (n, 2), [length].

@@ -60,7 +60,7 @@ class State:
         return {name: von_mises(self.displacement[name], body) for name, body in self.scene.bodies.items()}
 
     def gather_displacement(self, body: str) -> np.ndarray:
-        """Return the displacement of every node of a body on every rank, (n_nodes, 3), [length]. Collective."""
+        """Return the displacement of a body's nodes on every rank, (n_nodes, 3), [length]. Collective."""
         decomposition = self.system.torn.decomposition
         mine = nodal_displacement(decomposition, body, self.scene.bodies[body], self.torn_displacement)
         known = ~np.isnan(mine[:, 0])

@@ -9,7 +9,7 @@ from fenics_contact.qp import DualSolution
 
 
 def carried_over(old: DualSystem, solution: DualSolution, new: DualSystem) -> np.ndarray:
-    """Return a start for ``new``, owned: gluing forces as they were, contact forces turned into the new frames.
+    """Return a start for ``new``, owned: gluing forces as they were, contact forces in the new frames.
 
     Contact points are recognised by pair and slave node; a point that was not there before starts open.
     Collective.

@@ -1,4 +1,4 @@
-"""Contact points of a scene: which slave node meets the master where, in which direction, at which distance."""
+"""Contact points of a scene: which slave node meets the master where, in which direction, how far away."""
 
 from __future__ import annotations
 
@@ -99,13 +99,14 @@ def _points_of_pair(scene: Scene, tearing: Tearing, fixed: np.ndarray, index: in
         master = np.pad(facet_nodes, ((0, 0), (0, 4 - surface.corners)), mode="edge")
     if len(hit.point) == 0:
         raise InvalidInputError(
-            f"contact pair {index} needs slave nodes that face the master, but none of the {len(movable)} nodes of "
-            f"{pair.slave.name!r} projects onto it: check the surfaces' names and where the bodies lie"
+            f"contact pair {index} needs slave nodes that face the master, but none of the {len(movable)} "
+            f"nodes of {pair.slave.name!r} projects onto it: check the surfaces' names and where the bodies "
+            "lie"
         )
     chosen = movable[hit.point]
     return ContactPoints(
-        np.full(len(chosen), index), nodes[chosen], master, weight, hit.normal, tangent_frames(hit.normal), hit.gap,
-        slave.areas[chosen], hit.facet, hit.local,
+        np.full(len(chosen), index), nodes[chosen], master, weight, hit.normal, tangent_frames(hit.normal),
+        hit.gap, slave.areas[chosen], hit.facet, hit.local,
     )  # fmt: skip
 
 
@@ -153,7 +154,9 @@ def check_no_penetration(scene: Scene, points: ContactPoints) -> None:
         )
 
 
-def friction_data(pairs: Sequence[ContactPair], points: ContactPoints) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def friction_data(
+    pairs: Sequence[ContactPair], points: ContactPoints
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return what friction each contact point has.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Copies of nodes: where the torn system holds each node of the bodies, once for every subdomain around it."""
+"""Copies of nodes: the torn system holds each node of the bodies once for every subdomain around it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a scene's decomposition into subdomains keeps when the geometry changes: meshes, numbering, compiled forms."""
+"""What the decomposition of a scene keeps when the geometry changes: meshes, numbering, compiled forms."""
 
 from __future__ import annotations
 
@@ -72,8 +72,8 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
         tearing = tear(scene, partitions, comm.size)
         if tearing.n_subdomains < comm.size:
             raise InvalidInputError(
-                f"every rank needs a subdomain, but {comm.size} ranks share {tearing.n_subdomains} subdomains: "
-                "run on fewer ranks or cut the bodies finer"
+                f"every rank needs a subdomain, but {comm.size} ranks share {tearing.n_subdomains} "
+                "subdomains: run on fewer ranks or cut the bodies finer"
             )
     forms = FormLibrary(comm)
     forms.prepare(scene)
@@ -86,7 +86,9 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
         fixed, _ = prescribed_displacements(scene, tearing)
     block_offset = np.cumsum([0] + [len(mesh.nodes) for mesh in meshes])
     copy_block = _copy_blocks(tearing, meshes, block_offset)
-    return Decomposition(comm, tearing, dict(partitions), meshes, block_offset, copy_block, gluing, fixed, forms)
+    return Decomposition(
+        comm, tearing, dict(partitions), meshes, block_offset, copy_block, gluing, fixed, forms
+    )
 
 
 def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> None:
@@ -99,8 +101,8 @@ def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> Non
         partition = partitions[name]
         if partition.shape != (body.mesh.n_cells,):
             raise InvalidInputError(
-                f"the partition of body {name!r} must have shape ({body.mesh.n_cells},), one subdomain a cell, "
-                f"got {partition.shape}"
+                f"the partition of body {name!r} must have shape ({body.mesh.n_cells},), one subdomain a "
+                f"cell, got {partition.shape}"
             )
         check_face_connected(body.mesh, partition)
 

@@ -14,6 +14,11 @@ from fenics_contact.feti.numbering import DualNumbering
 from fenics_contact.feti.subdomain import Subdomain
 
 
+#: Share of its diagonal added to the contact block of B Bᵀ. A node in two contact pairs has more rows than
+#: displacements, which makes the block singular; elsewhere so small a share changes nothing.
+REGULARISATION = 1e-4
+
+
 class DirichletPreconditioner:
     """M = (B Bᵀ)⁻¹ B S Bᵀ (B Bᵀ)⁻¹, S the Schur complement of each K_s on the dofs that B touches.
 
@@ -36,7 +41,9 @@ class DirichletPreconditioner:
         start = 0
         for subdomain in subdomains:
             stop = start + subdomain.mesh.size
-            self._schur.append((slice(start, stop), _schur_complement(subdomain.stiffness, touched[start:stop])))
+            self._schur.append(
+                (slice(start, stop), _schur_complement(subdomain.stiffness, touched[start:stop]))
+            )
             start = stop
         self._contact = _ContactBlock(B, numbering, n_equality)
 
@@ -95,6 +102,9 @@ class _ContactBlock:
         shape = (len(rows), count)
         gram = numbering.sum_rows(sp.csr_matrix((gram.data, (mine[gram.row], place[gram.col])), shape=shape))
         gram = gram[self._owned].tocsr()
+        here = (np.arange(len(self._owned)), starts[comm.rank] + np.arange(len(self._owned)))
+        diagonal = np.asarray(gram[here]).ravel()
+        gram = (gram + sp.csr_matrix((REGULARISATION * diagonal, here), shape=gram.shape)).tocsr()
         size = (len(self._owned), count)
         csr = (gram.indptr.astype(PETSc.IntType), gram.indices.astype(PETSc.IntType), gram.data)
         matrix = PETSc.Mat().createAIJ((size, size), csr=csr, comm=comm)

@@ -12,6 +12,9 @@ from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp import CoarseSpace, ContactLayout, DualProblem
 from fenics_contact.timing import PhaseTimer
 
+#: A resultant below this fraction of the loads' sum is rounding: the loads balance each other.
+BALANCED = 1e-13
+
 
 class DualSystem:
     """The dual of a torn system: operators on multipliers, and the way back to displacements.
@@ -34,11 +37,9 @@ class DualSystem:
             self.inverse = GeneralizedInverse(torn.subdomains)
         with timer.phase("coarse space"):
             self.kernel = self._kernel(comm)
-            coarse = CoarseSpace(comm, self._coarse_columns(), comm.allreduce(self.kernel.T @ torn.load))
+            coarse = CoarseSpace(comm, self._coarse_columns(), self._resultants(comm))
         with timer.phase("preconditioner"):
-            preconditioner = DirichletPreconditioner(
-                torn.subdomains, torn.B, torn.numbering, torn.n_equality
-            )
+            preconditioner = DirichletPreconditioner(torn.subdomains, torn.B, torn.numbering, torn.n_equality)
             diagonal = self._diagonal()
         d = self.jump(self.inverse(torn.load)) - torn.right
         self.problem = DualProblem(comm, self.apply, d, coarse, self._layout(), diagonal, preconditioner)
@@ -65,7 +66,11 @@ class DualSystem:
         numbering = self.torn.numbering
         index = np.searchsorted(numbering.owned, rows)
         index = np.minimum(index, max(len(numbering.owned) - 1, 0))
-        return np.where(numbering.owned[index] == rows, index, -1) if len(numbering.owned) else np.full(rows.shape, -1)
+        return (
+            np.where(numbering.owned[index] == rows, index, -1)
+            if len(numbering.owned)
+            else np.full(rows.shape, -1)
+        )
 
     def _kernel(self, comm: MPI.Comm) -> sp.csr_matrix:
         counts = np.zeros(self.torn.decomposition.tearing.n_subdomains, dtype=np.int64)
@@ -74,6 +79,12 @@ class DualSystem:
         offset = np.concatenate([[0], np.cumsum(comm.allreduce(counts))])
         mine = offset[[subdomain.mesh.number for subdomain in self.torn.subdomains]]
         return kernel_matrix(self.torn.subdomains, int(offset[-1]), mine)
+
+    def _resultants(self, comm: MPI.Comm) -> np.ndarray:
+        """Return e = Rᵀ f, replicated; what is only rounding of balanced loads is set to zero."""
+        resultants = np.asarray(comm.allreduce(self.kernel.T @ self.torn.load))
+        resultants[np.abs(resultants) <= BALANCED * comm.allreduce(np.abs(self.torn.load).sum())] = 0.0
+        return resultants
 
     def _coarse_columns(self) -> sp.csr_matrix:
         """Return this rank's owned columns of G = Rᵀ Bᵀ, shape (n_modes, n_owned)."""

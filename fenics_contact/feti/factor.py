@@ -42,7 +42,9 @@ class Factor:
         columns = right.shape[1]
         if columns == 0:
             return np.zeros_like(right)
-        given = PETSc.Mat().createDense((self.size, columns), array=np.asfortranarray(right), comm=PETSc.COMM_SELF)
+        given = PETSc.Mat().createDense(
+            (self.size, columns), array=np.asfortranarray(right), comm=PETSc.COMM_SELF
+        )
         found = PETSc.Mat().createDense((self.size, columns), comm=PETSc.COMM_SELF)
         found.setUp()
         self._factor.matSolve(given, found)

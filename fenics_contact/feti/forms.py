@@ -13,7 +13,7 @@ from fenics_contact import _dolfinx
 from fenics_contact.feti.surface import quadrature_areas
 from fenics_contact.scene import BodyForce, Load, Material, Scene, Surface, TotalForce, Traction
 
-#: Gauss rule of the volume: two points a direction on hexahedra, one on tetrahedra integrate linear elasticity.
+#: Gauss rule of the volume: two points a direction on hexahedra, one on tetrahedra suit linear elasticity.
 QUADRATURE_DEGREE = {"hexahedron": 2, "tetrahedron": 1}
 #: Tag that every loaded surface gets inside a load form.
 LOADED = 1
@@ -22,13 +22,19 @@ LOADED = 1
 class Template:
     """A compiled form and its constants."""
 
-    def __init__(self, comm: MPI.Comm, form: Any, constants: Sequence[Any], coefficients: Sequence[Any] = ()) -> None:
+    def __init__(
+        self, comm: MPI.Comm, form: Any, constants: Sequence[Any], coefficients: Sequence[Any] = ()
+    ) -> None:
         """Compile ``form``. Collective on ``comm``."""
         self._form = _dolfinx.CompiledForm(comm, form)
         self._constants, self._coefficients = tuple(constants), tuple(coefficients)
 
     def bind(
-        self, spaces: Sequence[Any], values: Sequence[float], functions: Sequence[Any] = (), facets: Any = None,
+        self,
+        spaces: Sequence[Any],
+        values: Sequence[float],
+        functions: Sequence[Any] = (),
+        facets: Any = None,
         mesh: Any = None,
     ) -> Any:
         """Return the form on one mesh, with numbers for its constants and Functions for its coefficients."""
@@ -38,7 +44,9 @@ class Template:
             for symbol, value in zip(self._constants, values, strict=True)
         }
         coefficients = dict(zip(self._coefficients, functions, strict=True))
-        return self._form.bind(mesh, spaces, coefficients, constants, None if facets is None else {LOADED: facets})
+        return self._form.bind(
+            mesh, spaces, coefficients, constants, None if facets is None else {LOADED: facets}
+        )
 
 
 class FormLibrary:

@@ -32,9 +32,9 @@ def prescribed_displacements(scene: Scene, tearing: Tearing) -> tuple[np.ndarray
             clash = fixed[nodes, component] & (value[nodes, component] != given)
             if clash.any():
                 raise InvalidInputError(
-                    f"supports must agree where they meet: component {component} of {int(clash.sum())} nodes of "
-                    f"surface {support.surface!r} of body {support.body!r} already has another value than {given}: "
-                    "leave the component free (None) in one of them"
+                    f"supports must agree where they meet: component {component} of {int(clash.sum())} nodes "
+                    f"of surface {support.surface!r} of body {support.body!r} already has another value than "
+                    f"{given}: leave the component free (None) in one of them"
                 )
             fixed[nodes, component], value[nodes, component] = True, given
     return fixed, value
@@ -82,7 +82,9 @@ def _prescribed_entries(tearing: Tearing, fixed: np.ndarray, start: np.ndarray) 
     return row, copy, np.repeat(component, copies), np.ones(len(row))
 
 
-def _glued_entries(tearing: Tearing, fixed: np.ndarray, start: np.ndarray, copies: int) -> tuple[np.ndarray, ...]:
+def _glued_entries(
+    tearing: Tearing, fixed: np.ndarray, start: np.ndarray, copies: int
+) -> tuple[np.ndarray, ...]:
     node, component = np.nonzero(~fixed & (tearing.multiplicity == copies)[:, None])
     matrix = helmert(copies)
     k, j = np.nonzero(matrix)

@@ -42,7 +42,9 @@ class GeneralizedInverse:
         return flexibility
 
 
-def kernel_matrix(subdomains: Sequence[Subdomain], total_modes: int, mode_offset: np.ndarray) -> sp.csr_matrix:
+def kernel_matrix(
+    subdomains: Sequence[Subdomain], total_modes: int, mode_offset: np.ndarray
+) -> sp.csr_matrix:
     """Return R of this rank, shape (torn_size, total_modes): only columns of its own subdomains are filled.
 
     Args:

@@ -55,13 +55,19 @@ def interpolated_normal(weights: np.ndarray, normals: np.ndarray) -> tuple[np.nd
 
 
 def newton_matrix(
-    points: np.ndarray, normals: np.ndarray, derivatives: np.ndarray, gap: np.ndarray, normal: np.ndarray,
+    points: np.ndarray,
+    normals: np.ndarray,
+    derivatives: np.ndarray,
+    gap: np.ndarray,
+    normal: np.ndarray,
     length: np.ndarray,
 ) -> np.ndarray:
     """Return ∂(x(ξ) + g n(ξ))/∂(ξ, g), shape (n, 3, 3); see `project` for the symbols."""
     tangents = np.einsum("nka,nkd->nda", derivatives, points)
     turned = np.einsum("nka,nkd->nda", derivatives, normals)
-    turned = (turned - normal[:, :, None] * np.einsum("nd,nda->na", normal, turned)[:, None]) / length[:, None, None]
+    turned = (turned - normal[:, :, None] * np.einsum("nd,nda->na", normal, turned)[:, None]) / length[
+        :, None, None
+    ]
     return np.concatenate([tangents + gap[:, None, None] * turned, normal[:, :, None]], axis=2)
 
 
@@ -112,7 +118,7 @@ def _within_reach(
 def _solve(
     points: np.ndarray, normals: np.ndarray, master: FacetedSurface, point: np.ndarray, facet: np.ndarray
 ) -> Projection:
-    """Solve for each (point, facet) pair by Newton's method; keep the pairs with an answer inside the facet."""
+    """Solve for each (point, facet) pair by Newton's method; keep pairs with an answer inside the facet."""
     nodes = master.facets[facet]
     corners, corner_normals, target = master.points[nodes], master.normals[nodes], points[point]
     size = np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).max(axis=1)
@@ -140,7 +146,12 @@ def _solve(
 
 
 def _newton_step(
-    corners: np.ndarray, normals: np.ndarray, target: np.ndarray, local: np.ndarray, gap: np.ndarray, size: np.ndarray
+    corners: np.ndarray,
+    normals: np.ndarray,
+    target: np.ndarray,
+    local: np.ndarray,
+    gap: np.ndarray,
+    size: np.ndarray,
 ) -> np.ndarray:
     """Return the changes of (ξ, g), shape (n, 3); none where the facet and its normals are degenerate."""
     values, derivatives = shape_functions(local, corners.shape[1])
@@ -164,5 +175,7 @@ def _best(found: Projection) -> Projection:
 def _concatenated(parts: list[Projection]) -> Projection:
     point = np.concatenate([part.point for part in parts])
     order = np.argsort(point)
-    joined = [np.concatenate([getattr(p, n) for p in parts])[order] for n in ("facet", "local", "gap", "normal")]
+    joined = [
+        np.concatenate([getattr(p, n) for p in parts])[order] for n in ("facet", "local", "gap", "normal")
+    ]
     return Projection(point[order], *joined)

@@ -62,7 +62,9 @@ class Subdomain:
     kernel: np.ndarray
 
 
-def cut_out(number: int, body_name: str, body: Body, cells: np.ndarray, loads: Sequence[Load]) -> SubdomainMesh:
+def cut_out(
+    number: int, body_name: str, body: Body, cells: np.ndarray, loads: Sequence[Load]
+) -> SubdomainMesh:
     """Build the mesh of one subdomain.
 
     Args:

@@ -27,7 +27,7 @@ def shape_functions(local: np.ndarray, corners: int) -> tuple[np.ndarray, np.nda
 
 
 def shape_second_mixed(corners: int) -> np.ndarray:
-    """Return ∂²N/∂s∂t of each shape function, the only second derivative that is not zero, shape (corners,)."""
+    """Return ∂²N/∂s∂t of each shape function, the only second derivative not zero, shape (corners,)."""
     return 0.25 * np.array([1.0, -1.0, 1.0, -1.0]) if corners == 4 else np.zeros(3)
 
 
@@ -81,13 +81,15 @@ def faceted_surface(points: np.ndarray, facets: np.ndarray) -> FacetedSurface:
     np.add.at(summed, local, products)
     areas = np.zeros(len(nodes))
     # The corner products of a quadrilateral add up to four times its area vector, those of a triangle to six.
-    share = np.linalg.norm(products.sum(axis=1), axis=1) / (4 if facets.shape[1] == 4 else 6) / facets.shape[1]
+    share = (
+        np.linalg.norm(products.sum(axis=1), axis=1) / (4 if facets.shape[1] == 4 else 6) / facets.shape[1]
+    )
     np.add.at(areas, local, np.broadcast_to(share[:, None], local.shape))
     return FacetedSurface(nodes, local, own, summed / np.linalg.norm(summed, axis=1)[:, None], areas)
 
 
 def quadrature_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
-    """Integrate the area of each facet by two Gauss points a direction, as the load forms do, shape (n_facets,)."""
+    """Return facet areas by two Gauss points a direction, as the load forms integrate, shape (n_facets,)."""
     if facets.shape[1] == 3:
         return 0.5 * np.linalg.norm(corner_products(points, facets)[:, 0], axis=1)
     corners, total = points[facets], np.zeros(len(facets))

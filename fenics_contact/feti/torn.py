@@ -77,7 +77,9 @@ class TornSystem:
         return np.concatenate([subdomain.load for subdomain in self.subdomains])
 
 
-def build_torn_system(scene: Scene, decomposition: Decomposition, *, start_geometry: bool = True) -> TornSystem:
+def build_torn_system(
+    scene: Scene, decomposition: Decomposition, *, start_geometry: bool = True
+) -> TornSystem:
     """Assemble all numbers of the torn system for the scene's present coordinates. Collective.
 
     Args:
@@ -93,7 +95,8 @@ def build_torn_system(scene: Scene, decomposition: Decomposition, *, start_geome
     loads = as_tractions(scene)
     with together(comm):
         subdomains = tuple(
-            assemble(mesh, scene.bodies[mesh.body], loads, decomposition.forms) for mesh in decomposition.meshes
+            assemble(mesh, scene.bodies[mesh.body], loads, decomposition.forms)
+            for mesh in decomposition.meshes
         )
         points = no_contact_points()
         if scene.contacts:

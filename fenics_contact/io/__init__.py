@@ -1,6 +1,6 @@
 """Results as files that ParaView and other programs open; whole or not at all.
 
-On several ranks every function is collective, rank 0 writes (XDMF: all ranks together), and all raise if one fails.
+On several ranks rank 0 writes (XDMF: all ranks together), and all raise if one fails.
 """
 
 from fenics_contact.io.json_file import write_json

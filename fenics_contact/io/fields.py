@@ -21,12 +21,14 @@ def cell_values(function: Any, cells: np.ndarray) -> np.ndarray:
         One value for every cell, (n_cells,), replicated.
     """
     space = function.function_space
-    mine = _dolfinx.cell_nodes(space.mesh).reshape(-1, cells.shape[1])
+    topology = space.mesh.topology
+    owned = topology.index_map(topology.dim).size_local
+    mine = _dolfinx.cell_nodes(space.mesh).reshape(-1, cells.shape[1])[:owned]
     # dolfinx has its own order of cells: they are recognised by their nodes.
     _, key = np.unique(np.sort(np.vstack([cells, mine]), axis=1), axis=0, return_inverse=True)
     place = np.empty(len(cells), dtype=np.int64)
     place[key.ravel()[: len(cells)]] = np.arange(len(cells))
-    dofs = [int(space.dofmap.cell_dofs(cell)[0]) for cell in range(len(mine))]
+    dofs = [int(space.dofmap.cell_dofs(cell)[0]) for cell in range(owned)]
     values = np.zeros(len(cells))
     values[place[key.ravel()[len(cells) :]]] = function.x.array[dofs]
     return np.asarray(space.mesh.comm.allreduce(values))
@@ -40,10 +42,10 @@ def contact_fields(state: State, body: str) -> dict[str, np.ndarray]:
         body: Name of the body.
 
     Returns:
-        ``contact_status``, (n_nodes,) int: −1 on nodes that are no contact points, else the value of `Status`;
-        zero on those nodes: ``contact_pressure``, (n_nodes,), [force / length²], ``contact_force`` on the slave
-        and ``contact_slip``, (n_nodes, 3), [force] and [length]. A node that belongs to several pairs has the sum,
-        and the status of the last.
+        ``contact_status``, (n_nodes,) int: the value of `Status`, −1 on nodes that are no contact points;
+        and, zero on those, ``contact_pressure``, (n_nodes,), [force / length²], ``contact_force`` on the
+        slave and ``contact_slip``, (n_nodes, 3), [force] and [length]. A node that belongs to several pairs
+        has their sum, and the status of the last.
     """
     contact, tearing = state.contact, state.system.torn.decomposition.tearing
     start = int(tearing.node_offset[tearing.body_names.index(body)])

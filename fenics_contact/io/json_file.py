@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,9 +24,10 @@ def write_json(path: str | Path, data: Any, *, comm: MPI.Comm | None = None) -> 
     """Write data to a JSON file, indented, with the keys in the order given.
 
     Args:
-        path: File to write; its folder is created. A file of that name is replaced when the new one is complete.
-        data: Mappings, sequences, strings, numbers, truth values and None; also NumPy's arrays and numbers, paths
-            and enumerations (by their values).
+        path: File to write; its folder is created. A file of that name is replaced when the new one is
+            complete.
+        data: Mappings, sequences, strings, numbers, truth values and None; also NumPy's arrays and numbers,
+            paths, dataclasses (by their fields) and enumerations (by their values).
         comm: If given, only rank 0 writes, and all ranks learn of an error.
 
     Returns:
@@ -61,6 +63,10 @@ def plain(data: Any, place: str = "data") -> Any:
     """
     if isinstance(data, Enum):
         return plain(data.value, place)
+    if is_dataclass(data) and not isinstance(data, type):
+        return {
+            field.name: plain(getattr(data, field.name), f"{place}.{field.name}") for field in fields(data)
+        }
     if isinstance(data, np.ndarray | np.generic):
         return plain(data.tolist(), place)
     if isinstance(data, Mapping):

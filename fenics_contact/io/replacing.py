@@ -14,8 +14,8 @@ from pathlib import Path
 def replacing(*targets: Path) -> Iterator[tuple[Path, ...]]:
     """Hand out paths to write to, and put what was written in the targets' place at the end.
 
-    If the block raises, the targets stay as they were. Each file is replaced at once; several are replaced one
-    after the other in the order given, so one that names others belongs last.
+    If the block raises, the targets stay as they were. Each file is replaced at once; several are replaced
+    one after the other in the order given, so one that names others belongs last.
 
     Args:
         *targets: Files to write, all in one folder, which is created.

@@ -11,6 +11,7 @@ import numpy as np
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.io.fields import cell_values, contact_fields
+from fenics_contact.io.names import file_of_each
 from fenics_contact.io.replacing import replacing
 
 
@@ -23,8 +24,8 @@ def write_vtu(state: State, folder: str | Path, name: str = "state") -> Path:
     Args:
         state: The state.
         folder: Where to write; created.
-        name: What the files' names begin with: "state" gives "state.vtm" and, for a body "link1",
-            "state_link1.vtu". Files are replaced when the new ones are complete.
+        name: What the files' names begin with: "state" gives "state.vtm" and, for a body "link 1",
+            "state_link_1.vtu". Files are replaced when the new ones are complete.
 
     Returns:
         The multi-block file.
@@ -38,7 +39,7 @@ def write_vtu(state: State, folder: str | Path, name: str = "state") -> Path:
         )
     index = Path(folder) / f"{name}.vtm"
     meshes = {body: _gathered(state, body) for body in state.scene.bodies}
-    files = [index.with_name(f"{name}_{body}.vtu") for body in meshes]
+    files = list(file_of_each(meshes, index.parent, name, ".vtu").values())
     comm = state.system.torn.decomposition.comm
     with together(comm):
         if comm.rank == 0:

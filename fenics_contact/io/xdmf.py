@@ -10,18 +10,19 @@ from typing import Any
 from fenics_contact import _dolfinx
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError, agree, together
+from fenics_contact.io.names import file_of_each
 from fenics_contact.io.replacing import replace_all
 
 
 def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
-    """Write displacement and von Mises stress of every body to XDMF with HDF5, all ranks together. Collective.
+    """Write displacement and von Mises stress of every body to XDMF, all ranks together. Collective.
 
-    ParaView opens them with its reader "Xdmf3 Reader S".
+    The numbers are in HDF5 files beside them. ParaView opens them with its "Xdmf3 Reader S".
 
     Args:
         state: The state.
-        path: Name to derive the files from: "chain.xdmf" becomes "chain_link1.xdmf" and "chain_link1.h5" for
-            the body "link1". The folder is created; files are replaced when the new ones are complete.
+        path: Name to derive the files from: for the body "link 1" "chain.xdmf" becomes "chain_link_1.xdmf"
+            and "chain_link_1.h5". The folder is created; files are replaced when the new ones are complete.
 
     Returns:
         Body name -> its XDMF file.
@@ -34,11 +35,10 @@ def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
         raise InvalidInputError(
             f"the file must be an XDMF file, got the name {base.name!r}: let it end in '.xdmf'"
         )
-    written = {}
-    for name, displacement in state.displacement.items():
-        written[name] = base.with_name(f"{base.stem}_{name}.xdmf")
-        _write(written[name], displacement, state.von_mises[name])
-    return written
+    files = file_of_each(state.displacement, base.parent, base.stem, ".xdmf")
+    for name, target in files.items():
+        _write(target, state.displacement[name], state.von_mises[name])
+    return files
 
 
 def _write(target: Path, displacement: Any, von_mises: Any) -> None:

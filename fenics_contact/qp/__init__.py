@@ -8,11 +8,13 @@ distributed over the ranks of the problem's communicator.
 from __future__ import annotations
 
 from fenics_contact.qp.coarse import CoarseSpace
+from fenics_contact.qp.coupled import CoupledSystem
 from fenics_contact.qp.equilibrium import Equilibrium, find_equilibrium, require_equilibrium
 from fenics_contact.qp.face import Face, classify
 from fenics_contact.qp.face_newton import FaceNewton
 from fenics_contact.qp.face_system import FaceSystem, FaceSystems
 from fenics_contact.qp.feasible import FeasibleSet
+from fenics_contact.qp.gmres import projected_gmres
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.linear import ProjectedCG
 from fenics_contact.qp.mpgp import Mpgp
@@ -29,6 +31,7 @@ __all__ = [
     "ContactLayout",
     "Coulomb",
     "CountedOperator",
+    "CoupledSystem",
     "DualProblem",
     "DualSolution",
     "DualSolver",
@@ -53,6 +56,7 @@ __all__ = [
     "find_equilibrium",
     "measure",
     "projected_cg",
+    "projected_gmres",
     "require_equilibrium",
     "solve",
 ]

@@ -62,49 +62,86 @@ class ObliqueProjector:
 
 @dataclass(frozen=True, eq=False)
 class CoupledSystem:
-    """(Z_sᵀ F Z_u + κ) y = Z_sᵀ d + G_sᵀ α on {G Z_u y = e − G fixed}, unsymmetric where discs slip.
+    """(Wᵀ F Z + κ) y = Wᵀ d + (G W)ᵀ α on {G Z y = load}, unsymmetric where discs slip.
 
-    The multiplier is λ = fixed + Z_u y with Z_u = Z_s + growth: a column of a normal multiplier carries the
-    friction μ ŵ that slips with it.
+    Newton's step tests with the face's own basis W = Z_s and moves the multiplier along Z = Z_u = Z_s + growth:
+    a column of a normal multiplier carries the friction μ ŵ that slips with it. The adjoint swaps the two.
 
     Attributes:
-        system: The symmetric face system: tested basis Z_s, curvature κ, preconditioner.
-        coarse: Equilibrium of all multipliers, G λ = e.
-        moving: Z_u, shape (n_owned, n_face).
-        fixed: The part of the multiplier that does not grow, owned.
-        oblique: Projector that keeps equilibrium.
+        system: The symmetric system of the face: F, κ and the preconditioner.
+        tested: W, shape (n_owned, n_face).
+        moving: Z, shape (n_owned, n_face).
+        oblique: Projector that keeps G Z y and ignores what rigid motions absorb.
     """
 
     system: FaceSystem
-    coarse: CoarseSpace
+    tested: sp.csr_matrix
     moving: sp.csr_matrix
-    fixed: Vector
     oblique: ObliqueProjector
 
+    @classmethod
+    def build(
+        cls, system: FaceSystem, coarse: CoarseSpace, tested: sp.csr_matrix, moving: sp.csr_matrix
+    ) -> CoupledSystem | None:
+        """Join both bases; None where the face does not hold every body. Collective.
+
+        Args:
+            system: The symmetric system of the face.
+            coarse: Equilibrium of all multipliers.
+            tested: W, shape (n_owned, n_face).
+            moving: Z, shape (n_owned, n_face).
+        """
+        oblique = ObliqueProjector.build(sp.csr_matrix(coarse.matrix @ tested), coarse.restricted(moving))
+        return None if oblique is None else cls(system, tested, moving, oblique)
+
+    def operate(self, z: Vector, full: Vector) -> Vector:
+        """Return (Wᵀ F Z + κ) z, shape (n_face,), where full = F Z z."""
+        return self.tested.T @ full + self.system.face.curvature * z
+
+    def image(self, z: Vector, full: Vector) -> Vector:
+        """Return the projected image of z, shape (n_face,), where full = F Z z. Collective."""
+        return self.oblique(self.operate(z, full))
+
+    def precondition(self, residual: Vector) -> Vector:
+        """Apply the symmetric preconditioner and return to equilibrium, G Z z = 0. Collective."""
+        return self.oblique.moving.project(self.system.precondition(residual))
+
+    def balanced(self, y: Vector, load: Vector) -> Vector:
+        """Return y moved so that G Z y = load, shape (n_face,). Collective."""
+        missing = self.oblique.moving.apply(y) - load
+        return y - self.oblique.tested.T @ self.oblique.solve(missing)
+
+
+@dataclass(frozen=True, eq=False)
+class CoupledFace:
+    """A Newton step with growing friction: λ = fixed + Z_u y.
+
+    Attributes:
+        coupled: Its linear system.
+        coarse: Equilibrium of all multipliers, G λ = e.
+        fixed: The part of the multiplier that does not grow, owned.
+    """
+
+    coupled: CoupledSystem
+    coarse: CoarseSpace
+    fixed: Vector
+
     def enter(self, multiplier: Vector) -> Vector:
-        """Return the multiplier on the coupled face and in equilibrium that shares λ's coordinates. Collective."""
-        on_face = self.fixed + self.moving @ self.system.face.restrict(multiplier)
-        missing = self.coarse.residual(on_face)
-        return on_face - self.moving @ (self.oblique.tested.T @ self.oblique.solve(missing))
+        """Return the multiplier on the face and in equilibrium that shares λ's coordinates. Collective."""
+        load = self.coarse.load - self.coarse.apply(self.fixed)
+        y = self.coupled.balanced(self.coupled.system.face.restrict(multiplier), load)
+        return self.fixed + self.coupled.moving @ y
 
     def advance(self, step: Vector) -> Vector:
         """Return how the multiplier moves, Z_u δ, owned, for a step δ in face coordinates."""
-        return self.moving @ step
+        return self.coupled.moving @ step
 
     def motions(self, gradient: Vector) -> Vector:
         """Return α, the rigid motions of a gradient on the face, replicated. Collective."""
-        return self.oblique.coefficients(gradient)
-
-    def image(self, z: Vector, full: Vector) -> Vector:
-        """Return the projected image of z, shape (n_face,), where full = F Z_u z. Collective."""
-        return self.oblique(self.system.image(z, full))
-
-    def precondition(self, residual: Vector) -> Vector:
-        """Apply the symmetric preconditioner and return to equilibrium, G_u z = 0. Collective."""
-        return self.oblique.moving.project(self.system.precondition(residual))
+        return self.coupled.oblique.coefficients(gradient)
 
 
-def couple(system: FaceSystem, coarse: CoarseSpace, growth: Vector, multiplier: Vector) -> CoupledSystem | None:
+def couple(system: FaceSystem, coarse: CoarseSpace, growth: Vector, multiplier: Vector) -> CoupledFace | None:
     """Add the growth of friction to a face system. Collective.
 
     Args:
@@ -114,13 +151,13 @@ def couple(system: FaceSystem, coarse: CoarseSpace, growth: Vector, multiplier: 
         multiplier: λ at which the face was found, owned.
 
     Returns:
-        The coupled system; None where no disc grows, or where the face does not hold every body.
+        The coupled face; None where no disc grows, or where the face does not hold every body.
     """
     face = system.face
     if global_max(system.comm, float(np.any(growth[face.slip] > 0.0))) == 0.0:
         return None
     coupling = face.growth(growth)
-    moving = (face.restriction + coupling).tocsr()
-    fixed = face.fixed - coupling @ np.maximum(face.restrict(multiplier), 0.0)
-    oblique = ObliqueProjector.build(system.coarse.matrix, coarse.restricted(moving))
-    return None if oblique is None else CoupledSystem(system, coarse, moving, fixed, oblique)
+    coupled = CoupledSystem.build(system, coarse, face.restriction, (face.restriction + coupling).tocsr())
+    if coupled is None:
+        return None
+    return CoupledFace(coupled, coarse, face.fixed - coupling @ np.maximum(face.restrict(multiplier), 0.0))

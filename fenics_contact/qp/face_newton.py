@@ -8,11 +8,12 @@ import numpy as np
 
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp.certify import certify
-from fenics_contact.qp.coupled import CoupledSystem, couple
+from fenics_contact.qp.coupled import CoupledFace, couple
 from fenics_contact.qp.face import Face, classify
 from fenics_contact.qp.face_system import FaceSystem, FaceSystems
 from fenics_contact.qp.gmres import projected_gmres
 from fenics_contact.qp.iterate import Iterate, Start, apply_unless_zero, iterate_at
+from fenics_contact.qp.line_search import Damped, damp
 from fenics_contact.qp.pcg import FaceStep, Stop, projected_cg
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_sum
@@ -21,6 +22,7 @@ from fenics_contact.qp.residual import Residuals, contact_step
 from fenics_contact.qp.slip_law import SlipLaw
 from fenics_contact.qp.smalse import Smalse
 from fenics_contact.qp.solution import DualSolution, SolverStep
+from fenics_contact.qp.unheld import move_unheld
 
 
 @dataclass(frozen=True)
@@ -28,26 +30,30 @@ class FaceNewton:
     """Faces by the natural map w = λ − ρ r, each solved by projected preconditioned CG.
 
     On a face G λ = e holds exactly, so there is no loop for equilibrium. The inner tolerance follows the
-    outer residual. With Coulomb's law the slip bound is refreshed in every step: one loop for all.
+    outer residual, and the better the last face predicted it, the closer. With Coulomb's law the slip bound
+    is refreshed in every step, and the friction of slipping discs grows with the normal force already
+    within the step: one loop for all.
 
     Three things keep the active set from cycling. A disc whose friction force would turn by more than a
-    right angle has a ρ too large for it; its ρ is reduced until the force stays or the disc sticks. Steps
-    without progress are followed by SMALSE steps from the best iterate so far. And nothing is accepted
-    before its residuals were recomputed.
+    right angle has a ρ too large for it; its ρ is reduced until the force stays or the disc sticks. A step
+    that makes the residual worse is cut short, at no cost in products. Steps without progress are followed
+    by SMALSE steps from the best iterate so far. And nothing is accepted before its residuals were
+    recomputed.
 
     Attributes:
         tolerance: Every residual of `Residuals` ends below it.
         max_steps: Give up after that many Newton steps and rescues.
         max_products: Give up after that many F-products.
-        forcing: Inner tolerance relative to the outer residual.
-        loosest: Largest inner tolerance.
+        forcing: Largest inner tolerance relative to the outer residual.
+        loosest: Largest inner tolerance of all.
         patience: Steps in which the residual must halve before a rescue is called.
         rescue: Parameters of the fallback.
         rescue_products: Products that one rescue may spend.
 
     References:
         S. Hüeber, G. Stadler, B. Wohlmuth, A primal-dual active set algorithm for three-dimensional
-        contact problems with Coulomb friction, SIAM J. Sci. Comput. 30 (2008).
+        contact problems with Coulomb friction, SIAM J. Sci. Comput. 30 (2008). S. C. Eisenstat,
+        H. F. Walker, Choosing the forcing terms in an inexact Newton method, ibid. 17 (1996), choice 1.
     """
 
     tolerance: float = 1e-6
@@ -56,8 +62,6 @@ class FaceNewton:
     forcing: float = 0.2
     loosest: float = 0.1
     patience: int = 6
-    ew: bool = True
-    ls: bool = True
     rescue: Smalse = field(default_factory=Smalse)
     rescue_products: int = 300
 
@@ -114,7 +118,7 @@ class NewtonSteps:
         self._natural_step = contact_step(problem.layout, problem.diagonal)
         self._rho = self._natural_step.copy()
         self._face: Face | None = None
-        self._eta = parameters.loosest
+        self._mismatch = 1.0
 
     def step(self, iterate: Iterate, number: int) -> tuple[Iterate, SolverStep]:
         """Classify, solve the face, and return the new iterate with its line of history. Collective."""
@@ -130,21 +134,11 @@ class NewtonSteps:
         solved = self._solve(system, coupled, entered, product, iterate.residuals)
         multiplier, product = entered + linear.advance(solved.step), product + solved.product
         alpha = linear.motions(system.gradient(multiplier, product - self._problem.rhs))
+        alpha = move_unheld(self._problem, system, iterate, multiplier, alpha, self._rho)
         after = iterate_at(self._problem, self._law, multiplier, product, alpha)
-        b, a = (np.hypot(x.residuals.natural, x.residuals.gluing) for x in (iterate, after))
-        self._eta = abs(a - solved.measure) / b
-        self.t = 1.0
-        if self._parameters.ls and a > b:
-            def mix(t):
-                one, two = iterate, after
-                lam, prod, res = ((1 - t) * x + t * y for x, y in zip((one.multiplier, one.product, one.residual), (two.multiplier, two.product, two.residual)))
-                from fenics_contact.qp.residual import measure
-                return Iterate(lam, prod, res, measure(self._problem, self._law.feasible(lam), lam, prod, res))
-            tries = [after] + [mix(t) for t in (.5, .25, .1)]
-            k = int(np.argmin([x.residuals.worst for x in tries]))
-            self.t = (1, .5, .25, .1)[k]
-            after = tries[k]
-        return after, self._record(number, after, system, solved, changes)
+        self._mismatch = abs(after.residuals.size - solved.measure) / (iterate.residuals.size or 1.0)
+        damped = damp(self._problem, self._law, iterate, after)
+        return damped.iterate, self._record(number, damped, system, solved, changes)
 
     def _next_face(self, iterate: Iterate) -> Face:
         """Classify, with a smaller ρ for discs whose force would otherwise turn back."""
@@ -159,22 +153,23 @@ class NewtonSteps:
     def _solve(
         self,
         system: FaceSystem,
-        coupled: CoupledSystem | None,
+        coupled: CoupledFace | None,
         multiplier: Vector,
         product: Vector,
         residuals: Residuals,
     ) -> FaceStep:
-        wanted = min(self._parameters.loosest, self._parameters.forcing * residuals.worst)
+        forcing = min(self._parameters.forcing, self._mismatch)
+        wanted = min(self._parameters.loosest, forcing * residuals.worst)
         tolerance = max(wanted, 0.3 * self._parameters.tolerance)
         gradient = system.gradient(multiplier, product - self._problem.rhs)
         weights = residual_weights(system.face, residuals, self._natural_step)
         limit = max(self._parameters.max_products - self._operator.products, 1)
         if coupled is None:
             return projected_cg(system, gradient, weights, tolerance, limit)
-        return projected_gmres(coupled, gradient, weights, tolerance, limit)
+        return projected_gmres(coupled.coupled, gradient, weights, tolerance, limit)
 
     def _record(
-        self, number: int, after: Iterate, system: FaceSystem, solved: FaceStep, changes: int
+        self, number: int, damped: Damped, system: FaceSystem, solved: FaceStep, changes: int
     ) -> SolverStep:
         face, coarse = system.face, system.coarse
         counts = global_sum(
@@ -186,13 +181,21 @@ class NewtonSteps:
         )
         closed, stick, slip, changed = (round(float(count)) for count in counts)
         note = f"{solved.iterations} CG steps, {changed} status changes"
-        if self.t < 1: note += f", damped {self.t}"
+        if damped.fraction < 1.0:
+            note += f", cut to {damped.fraction:g} of the step"
         if solved.stop is not Stop.CONVERGED:
             note += f", {solved.stop.value}"
         if coarse.gram.rank < coarse.m:
             note += f", {coarse.m - coarse.gram.rank} rigid motions not held by the face"
         return SolverStep(
-            "face Newton", number, self._operator.products, after.residuals, closed, stick, slip, note
+            "face Newton",
+            number,
+            self._operator.products,
+            damped.iterate.residuals,
+            closed,
+            stick,
+            slip,
+            note,
         )
 
 

@@ -12,20 +12,20 @@ from fenics_contact.qp.reductions import Vector, global_sum
 def projected_gmres(
     coupled: CoupledSystem, gradient: Vector, weights: Vector, tolerance: float, max_iterations: int
 ) -> FaceStep:
-    """Solve (Z_sᵀ F Z_u + κ) δ = −g + G_sᵀ α with G Z_u δ = 0. Collective.
+    """Solve (Wᵀ F Z + κ) δ = −g + (G W)ᵀ α with G Z δ = 0. Collective.
 
     Right preconditioned, without restart, in the norm ‖weights · r‖ of the projected residual, which is what
     is minimised and compared with the tolerance.
 
     Args:
-        coupled: The face with growing friction.
-        gradient: g = Z_sᵀ(F λ − d) + κ y at the starting point, shape (n_face,), owned.
+        coupled: Tested and moving basis of a face.
+        gradient: g = Wᵀ(F λ − d) + κ y at the starting point, shape (n_face,), owned.
         weights: Positive weights, shape (n_face,), owned.
         tolerance: Stop when the weighted norm is at most this.
         max_iterations: Largest number of operator applications.
 
     Returns:
-        The step in face coordinates (the multiplier moves by Z_u δ) and why the iteration ended.
+        The step in face coordinates (the multiplier moves by Z δ) and why the iteration ended.
 
     References:
         Y. Saad, Iterative Methods for Sparse Linear Systems, 2nd ed. (2003), algorithms 6.9 and 9.5.
@@ -33,7 +33,7 @@ def projected_gmres(
     comm, operator = coupled.system.comm, coupled.system.operator
     first = -weights * coupled.oblique(gradient)
     size = float(np.sqrt(global_sum(comm, first @ first)[0]))
-    basis = _Basis(len(gradient), len(coupled.fixed))
+    basis = _Basis(len(gradient), coupled.moving.shape[0])
     small = _LeastSquares(size)
     stop = Stop.CONVERGED
     vector = first / size if size > 0.0 else first
@@ -55,7 +55,7 @@ def projected_gmres(
         vector = image / column[-1]
     factors = small.solution()
     step, product = factors @ basis.directions, factors @ basis.products
-    residual = coupled.oblique(gradient + coupled.system.image(step, product))
+    residual = coupled.oblique(gradient + coupled.operate(step, product))
     return FaceStep(step, product, residual, basis.count, small.residual, stop)
 
 
@@ -71,7 +71,7 @@ def _orthogonalised(comm: object, vectors: Vector, image: Vector) -> tuple[Vecto
 
 
 class _Basis:
-    """Krylov vectors v, preconditioned directions z and products F Z_u z as rows of growing blocks."""
+    """Krylov vectors v, preconditioned directions z and products F Z z as rows of growing blocks."""
 
     def __init__(self, n_face: int, n_owned: int) -> None:
         self.count = 0

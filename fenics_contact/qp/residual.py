@@ -40,6 +40,11 @@ class Residuals:
         """The largest of the natural, gluing and coarse residual, which steers the iteration."""
         return max(self.natural, self.gluing, self.coarse)
 
+    @property
+    def size(self) -> float:
+        """√(natural² + gluing²), the number that the solution of a face predicts."""
+        return float(np.hypot(self.natural, self.gluing))
+
     def within(self, tolerance: float) -> bool:
         """Tell whether every residual is at most ``tolerance``; NaN is not."""
         return all(value <= tolerance for value in (self.natural, self.gluing, self.coarse, self.violation))

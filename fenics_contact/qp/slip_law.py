@@ -62,37 +62,43 @@ class Tresca:
 
 @dataclass(frozen=True, eq=False)
 class Coulomb:
-    """Slip bounds Ψ = μ max(λ_N, 0).
+    """Slip bounds Ψ = Ψ₀ + μ max(λ_N, 0): a given part, zero by default, and one that follows λ_N.
+
+    With both parts the law is Mohr's and Coulomb's, or Tresca's on some discs and Coulomb's on others.
 
     Attributes:
         layout: Positions of the multipliers.
         friction_coefficient: μ per friction disc, shape (n_friction,), owned.
+        given: Ψ₀ per friction disc, shape (n_friction,), owned, or one number for all, [force].
 
     Raises:
-        InvalidInputError: A coefficient is negative or not finite, or their number is wrong.
+        InvalidInputError: A coefficient or given bound is negative or not finite, or their number is wrong.
     """
 
     layout: ContactLayout
     friction_coefficient: Vector
+    given: Vector | float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the coefficients."""
+        """Check coefficients and given bounds."""
         expected = (self.layout.n_friction,)
-        given = np.asarray(self.friction_coefficient)
-        if given.shape != expected:
+        coefficient = np.asarray(self.friction_coefficient)
+        if coefficient.shape != expected:
             raise InvalidInputError(
-                f"friction_coefficient must have shape {expected}, got {given.shape}: "
+                f"friction_coefficient must have shape {expected}, got {coefficient.shape}: "
                 "give one coefficient per friction disc"
             )
-        if not np.all((given >= 0) & np.isfinite(given)):
+        if not np.all((coefficient >= 0) & np.isfinite(coefficient)):
             raise InvalidInputError(
-                f"friction_coefficient must be finite and not negative, got {given.min()} to {given.max()}"
+                "friction_coefficient must be finite and not negative, got "
+                f"{coefficient.min()} to {coefficient.max()}"
             )
+        FeasibleSet(self.layout, self.given if np.ndim(self.given) else np.full(expected, self.given))
 
     def bound(self, multiplier: Vector) -> Vector:
-        """Return μ max(λ_N, 0)."""
+        """Return Ψ₀ + μ max(λ_N, 0)."""
         normal = multiplier[self.layout.tangential_frictional]
-        return self.friction_coefficient * np.maximum(normal, 0.0)
+        return self.given + self.friction_coefficient * np.maximum(normal, 0.0)
 
     @property
     def growth(self) -> Vector:
@@ -100,20 +106,21 @@ class Coulomb:
         return self.friction_coefficient
 
     def feasible(self, multiplier: Vector) -> FeasibleSet:
-        """Return Λ(μ λ_N)."""
+        """Return Λ(Ψ₀ + μ λ_N)."""
         return FeasibleSet(self.layout, self.bound(multiplier))
 
     def admit(self, multiplier: Vector) -> Vector:
-        """Return the projection on the friction cones ‖τ‖ ≤ μ λ_N, a convex set."""
+        """Return the projection on the friction cones ‖τ‖ ≤ Ψ₀ + μ λ_N, λ_N ≥ 0, a convex set."""
         layout, mu_f = self.layout, self.friction_coefficient
         admitted = np.array(multiplier)
         admitted[layout.normal] = np.maximum(multiplier[layout.normal], 0.0)
         normal = multiplier[layout.tangential_frictional]
         tau = multiplier[layout.tangential]
         length = np.linalg.norm(tau, axis=1)
-        outside = length > mu_f * normal
-        peak = np.maximum((normal + mu_f * length) / (1.0 + mu_f**2), 0.0)
-        shrink = np.divide(mu_f * peak, length, out=np.ones_like(length), where=outside)
+        outside = length > self.given + mu_f * normal
+        # The nearest point of the mantle; where it has no normal force, of the disc at the cone's end.
+        peak = np.maximum((normal + mu_f * (length - self.given)) / (1.0 + mu_f**2), 0.0)
+        shrink = np.divide(self.given + mu_f * peak, length, out=np.ones_like(length), where=outside)
         admitted[layout.tangential_frictional[outside]] = peak[outside]
-        admitted[layout.tangential] = shrink[:, None] * tau
+        admitted[layout.tangential] = np.minimum(shrink, 1.0)[:, None] * tau
         return admitted

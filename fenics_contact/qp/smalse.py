@@ -19,6 +19,9 @@ from fenics_contact.qp.residual import Residuals, measure
 from fenics_contact.qp.slip_law import SlipLaw, Tresca
 from fenics_contact.qp.solution import DualSolution, SmalseMemory, SolverStep
 
+#: A lack in the rise of the Lagrangian below this fraction of it says nothing about M.
+ROUNDING = 1e-13
+
 
 @dataclass(frozen=True)
 class Smalse:
@@ -126,7 +129,8 @@ def outer_iterations(
         )
         x, residual = minimum.x, lagrangian.norm * minimum.gradient
         value = lagrangian.value(minimum, v)
-        if value < previous + 0.5 * lagrangian.imbalance(x) ** 2:
+        rise = 0.5 * lagrangian.imbalance(x) ** 2
+        if value < previous + rise - ROUNDING * abs(value):
             balance *= parameters.balance_reduction
         previous = value
         v = v + lagrangian.drift(x)

@@ -39,12 +39,12 @@ def solve(
 
     Args:
         problem: Operators and layout.
-        slip_bound: Ψ, shape (n_friction,), owned; None where there is no friction or the bound
-            follows the normal force.
+        slip_bound: Ψ, or with a friction coefficient its given part Ψ₀, shape (n_friction,), owned; None
+            where there is no friction or the whole bound follows the normal force.
         solver: `FaceNewton`, `Smalse` or `ProjectedCG`, which hold only their parameters.
         start: An earlier solution (of this problem or of one with the same rows) or a multiplier, owned.
-        friction_coefficient: μ, shape (n_friction,), owned: Coulomb's law, Ψ = μ λ_N, in place of given
-            bounds; then λ is a fixed point and not a minimiser.
+        friction_coefficient: μ, shape (n_friction,), owned: Coulomb's law, Ψ = Ψ₀ + μ λ_N; then λ is a
+            fixed point and not a minimiser.
 
     Returns:
         The solution; its residuals were recomputed and are all below ``solver.tolerance``.
@@ -75,11 +75,8 @@ def _slip_law(
 ) -> SlipLaw:
     layout = problem.layout
     if friction_coefficient is not None:
-        if slip_bound is not None:
-            raise InvalidInputError(
-                "give slip_bound or friction_coefficient, got both: a bound is given or follows λ_N"
-            )
-        return Coulomb(layout, np.asarray(friction_coefficient, dtype=np.float64))
+        given = 0.0 if slip_bound is None else np.asarray(slip_bound, dtype=np.float64)
+        return Coulomb(layout, np.asarray(friction_coefficient, dtype=np.float64), given)
     if slip_bound is None:
         if layout.n_friction:
             raise InvalidInputError(

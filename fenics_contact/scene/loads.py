@@ -13,7 +13,9 @@ Vector = tuple[float, float, float]
 
 def _require_vector(name: str, value: Vector) -> None:
     if len(value) != 3 or not np.all(np.isfinite(value)):
-        raise InvalidInputError(f"{name} must be three finite numbers, got {value!r}: give one for x, y and z")
+        raise InvalidInputError(
+            f"{name} must be three finite numbers, got {value!r}: give one for x, y and z"
+        )
 
 
 @dataclass(frozen=True)
@@ -35,8 +37,8 @@ class Support:
         given = [component for component in self.value if component is not None]
         if len(self.value) != 3 or not given or not np.all(np.isfinite(given)):
             raise InvalidInputError(
-                f"Support.value must hold three entries, each a finite number or None, and at least one number; "
-                f"got {self.value!r}: use (0.0, 0.0, 0.0) to clamp, (None, None, 0.0) for a roller"
+                "Support.value must hold three entries, each a finite number or None, and at least one "
+                f"number, got {self.value!r}: use (0.0, 0.0, 0.0) to clamp, (None, None, 0.0) for a roller"
             )
 
 

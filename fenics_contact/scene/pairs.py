@@ -36,8 +36,8 @@ class RigidPlane:
         vectors = len(self.point) == len(self.normal) == 3 and np.all(np.isfinite(self.point))
         if not (vectors and np.isfinite(length) and length > 0):
             raise InvalidInputError(
-                "RigidPlane needs a point and a normal of three finite numbers, the normal not zero, got point "
-                f"{self.point!r} and normal {self.normal!r}: for a floor give normal (0, 0, 1)"
+                "RigidPlane needs a point and a normal of three finite numbers, the normal not zero, got "
+                f"point {self.point!r} and normal {self.normal!r}: for a floor give normal (0, 0, 1)"
             )
         object.__setattr__(self, "normal", tuple(float(c / length) for c in self.normal))
 

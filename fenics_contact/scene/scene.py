@@ -49,9 +49,13 @@ class Scene:
     def __post_init__(self) -> None:
         """Refuse names that point to nothing."""
         if not self.bodies:
-            raise InvalidInputError("a scene needs at least one body, got none: pass bodies={'name': Body(...)}")
+            raise InvalidInputError(
+                "a scene needs at least one body, got none: pass bodies={'name': Body(...)}"
+            )
         for part in (*self.supports, *self.loads):
-            self._require(part.body, None if isinstance(part, BodyForce) else part.surface, type(part).__name__)
+            self._require(
+                part.body, None if isinstance(part, BodyForce) else part.surface, type(part).__name__
+            )
         for pair in self.contacts:
             self._require(pair.slave.body, pair.slave.name, "ContactPair.slave")
             if isinstance(pair.master, Surface):
@@ -59,13 +63,16 @@ class Scene:
 
     def _require(self, body: str, surface: str | None, user: str) -> None:
         if body not in self.bodies:
-            raise InvalidInputError(f"{user} names body {body!r}, the scene has {sorted(self.bodies)}: use one of them")
+            raise InvalidInputError(
+                f"{user} names body {body!r}, the scene has {sorted(self.bodies)}: use one of them"
+            )
         if surface is None:
             return
         surfaces = self.bodies[body].mesh.surfaces
         if surface not in surfaces:
             raise InvalidInputError(
-                f"{user} names surface {surface!r} of body {body!r}, which has {sorted(surfaces)}: use one of them"
+                f"{user} names surface {surface!r} of body {body!r}, which has {sorted(surfaces)}: "
+                "use one of them"
             )
 
     @property

@@ -132,6 +132,9 @@ def subdomain_fields(torn: TornSystem, fields: Sequence[np.ndarray]) -> Any:
     start = 0
     for subdomain in torn.subdomains:
         mesh = subdomain.mesh
+        # Systems of several geometries share the meshes: another one may have moved them since.
+        points = torn.scene.bodies[mesh.body].mesh.points
+        _dolfinx.update_coordinates(mesh.space.mesh, points[np.sort(mesh.nodes)])
         functions = []
         for index, field in enumerate(fields):
             function = _dolfinx.Function(mesh.space, name=f"field{index}")

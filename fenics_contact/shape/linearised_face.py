@@ -70,46 +70,44 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
     system, solution = state.system, state.solution
     layout, comm = system.problem.layout, system.problem.comm
     step = contact_step(layout, system.problem.diagonal)
-    face = classify(layout, solution.slip_bound, solution.multiplier, solution.residual, step)
     trial = solution.multiplier - step * solution.residual
     scale = comm.allreduce(float(np.abs(solution.multiplier[layout.normal]).max(initial=0.0)), op=MPI.MAX)
-    weak_contact = np.abs(trial[layout.normal]) <= WEAK_TOLERANCE * scale
+    slack, bound = WEAK_TOLERANCE * scale, solution.slip_bound
+    coefficient = system.torn.friction_coefficient[system.owned_discs()]
     length = np.linalg.norm(trial[layout.tangential], axis=1)
-    bound = solution.slip_bound
-    weak_disc = (bound > 0) & (np.abs(length - bound) <= WEAK_TOLERANCE * scale)
-    held = choice is WeakChoice.HELD
-    closed = np.where(weak_contact, held, face.closed)
-    stick = np.where(weak_disc, held, face.stick)
-    slip = np.where(weak_disc, not held, face.slip)
-    if not held:
-        overshoot = np.where(weak_disc, 1.0, face.overshoot)
-        direction = _directions(face.direction, trial[layout.tangential], length, weak_disc)
-        face = replace(face, overshoot=overshoot, direction=direction)
-    face = replace(face, closed=closed, stick=stick, slip=slip)
-    counts = comm.allreduce(np.array([np.count_nonzero(weak_contact), np.count_nonzero(weak_disc)]))
+    contact = np.abs(trial[layout.normal]) <= slack
+    vanishing = contact[layout.friction_of] & (coefficient > 0)
+    disc = (bound > 0) & ~vanishing & (np.abs(length - bound) <= slack)
+    counts = comm.allreduce(np.array([np.count_nonzero(contact), np.count_nonzero(disc)]))
+
+    known = classify(layout, bound, solution.multiplier, solution.residual, step)
+    direction = _directions(known.direction, trial[layout.tangential], length, disc | vanishing)
+    held, at_rest = choice is WeakChoice.HELD, length <= slack
+    face = replace(
+        known,
+        closed=np.where(contact, held, known.closed),
+        stick=np.where(vanishing, held & at_rest, np.where(disc, held, known.stick)),
+        slip=~vanishing & np.where(disc, not held, known.slip),
+        direction=direction,
+        overshoot=np.where(disc, 1.0, known.overshoot),
+    )
+    starting = vanishing & held & ~at_rest
     tested = face.restriction
-    moving = tested + _friction_growth(state, face) if coupling else tested
-    slip_direction = np.where(face.slip[:, None], face.direction, 0.0)
+    moving = tested + _growth(face, starting, coefficient) if coupling else tested
+    slip_direction = np.where(face.slip[:, None], direction, 0.0)
     weak = WeakPoints(int(counts[0]), int(counts[1]), choice)
     return LinearisedFace(face, tested, moving.tocsr(), slip_direction, weak)
+
+
+def _growth(face: Face, starting: np.ndarray, coefficient: np.ndarray) -> sp.csr_matrix:
+    """Return how slipping forces grow with their normal forces, and those that start to, shape (n_owned, n_face).
+
+    A Coulomb disc has no radius where its contact is weak. When the contact closes, its force grows along the
+    slip: it has a direction and no offset, hence no column of its own; such columns come last.
+    """
+    return replace(face, slip=face.slip | starting).growth(coefficient)[:, : face.n_face]
 
 
 def _directions(known: np.ndarray, trial: np.ndarray, length: np.ndarray, weak: np.ndarray) -> np.ndarray:
     found = trial / np.where(length > 0, length, 1.0)[:, None]
     return np.where(weak[:, None], found, known)
-
-
-def _friction_growth(state: State, face: Face) -> sp.csr_matrix:
-    """Entries μ d in the tangential rows of a slipping disc, in the column of its normal multiplier."""
-    layout, system = face.layout, state.system
-    coefficient = system.torn.friction_coefficient[system.owned_discs()]
-    column_of_contact = np.full(layout.n_contact, -1)
-    n_equality = len(layout.equality)
-    column_of_contact[face.closed] = n_equality + np.arange(np.count_nonzero(face.closed))
-    column = column_of_contact[layout.friction_of]
-    growing = np.flatnonzero(face.slip & (column >= 0) & (coefficient > 0))
-    rows = layout.tangential[growing]
-    values = coefficient[growing, None] * face.direction[growing]
-    columns = np.broadcast_to(column[growing, None], rows.shape)
-    return sp.csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape=face.restriction.shape)
-

@@ -1,9 +1,10 @@
 """Pictures of scenes, states and optimisations as PNG files, drawn without a display.
 
-Three-dimensional parts are rendered by pyvista, everything around them (titles, colour bars, diagrams) is set by
-matplotlib. On several ranks the fields are gathered by all and drawn by rank 0.
+Three-dimensional parts are rendered by pyvista, everything around them (titles, colour bars, diagrams) is set
+by matplotlib. On several ranks the fields are gathered by all and drawn by rank 0.
 """
 
+from fenics_contact.viz._libraries import check_libraries
 from fenics_contact.viz.control_net import plot_control_net
 from fenics_contact.viz.convergence import plot_convergence
 from fenics_contact.viz.decomposition import plot_decomposition
@@ -14,6 +15,7 @@ from fenics_contact.viz.units import Units
 
 __all__ = [
     "Units",
+    "check_libraries",
     "check_renderer",
     "plot_contact_pressure",
     "plot_control_net",

@@ -1,8 +1,8 @@
 """Colours that remain apart for colour-blind readers, and their assignment to neighbouring subdomains.
 
 References:
-    M. Okabe and K. Ito, Color universal design (2008), for symbols; P. Tol, Colour schemes, SRON technical note
-    SRON/EPS/TN/09-002 (2021), scheme "light", for areas.
+    M. Okabe and K. Ito, Color universal design (2008), for symbols; P. Tol, Colour schemes, SRON technical
+    note SRON/EPS/TN/09-002 (2021), scheme "light", for areas.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ def colour_subdomains(shared: np.ndarray, family: int) -> list[str]:
     """Choose a colour for each subdomain so that neighbours differ.
 
     Subdomains with the fewest colours left choose first (Brélaz' rule). A body keeps to its family of colours
-    while it can; if a subdomain has more neighbours than there are colours, it repeats that of the neighbour with
-    which it shares the fewest nodes.
+    while it can; if a subdomain has more neighbours than there are colours, it repeats that of the neighbour
+    with which it shares the fewest nodes.
 
     Args:
         shared: Number of nodes that subdomains share, (S, S), see `neighbours`.

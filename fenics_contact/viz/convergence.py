@@ -60,8 +60,8 @@ def _checked(values: Sequence[float] | np.ndarray, kinds: Sequence[str]) -> tupl
     objective, kind = np.asarray(values, dtype=float), np.asarray(kinds, dtype=str)
     if objective.ndim != 1 or objective.shape != kind.shape:
         raise InvalidInputError(
-            f"values and kinds must have one entry for each evaluation, got {objective.shape} and {kind.shape}: "
-            "pass both from the same history"
+            f"values and kinds must have one entry for each evaluation, got {objective.shape} and "
+            f"{kind.shape}: pass both from the same history"
         )
     unknown = sorted(set(kind.tolist()) - set(KINDS))
     if unknown:

@@ -63,8 +63,8 @@ def _check_partition(name: str, mesh: BodyMesh, partitions: Mapping[str, np.ndar
     shape = np.shape(partitions[name]) if name in partitions else "none"
     if shape != (mesh.n_cells,):
         raise InvalidInputError(
-            f"partitions[{name!r}] must have shape ({mesh.n_cells},), one subdomain a cell, got {shape}: pass the "
-            "partitions that the scene was cut with"
+            f"partitions[{name!r}] must have shape ({mesh.n_cells},), one subdomain a cell, got {shape}: "
+            "pass the partitions that the scene was cut with"
         )
 
 

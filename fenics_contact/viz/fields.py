@@ -60,12 +60,14 @@ def cell_values(function: Any, cells: np.ndarray) -> np.ndarray:
         One value for every cell, (n_cells,), replicated.
     """
     space = function.function_space
-    mine = _dolfinx.cell_nodes(space.mesh).reshape(-1, cells.shape[1])
+    topology = space.mesh.topology
+    owned = topology.index_map(topology.dim).size_local
+    mine = _dolfinx.cell_nodes(space.mesh).reshape(-1, cells.shape[1])[:owned]
     # dolfinx has its own order of cells: they are recognised by their nodes.
     _, key = np.unique(np.sort(np.vstack([cells, mine]), axis=1), axis=0, return_inverse=True)
     place = np.empty(len(cells), dtype=np.int64)
     place[key.ravel()[: len(cells)]] = np.arange(len(cells))
-    dofs = [int(space.dofmap.cell_dofs(cell)[0]) for cell in range(len(mine))]
+    dofs = [int(space.dofmap.cell_dofs(cell)[0]) for cell in range(owned)]
     values = np.zeros(len(cells))
     values[place[key.ravel()[len(cells) :]]] = function.x.array[dofs]
     return np.asarray(space.mesh.comm.allreduce(values))

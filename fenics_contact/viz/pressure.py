@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,18 +10,16 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.ticker import FuncFormatter
-from matplotlib.tri import Triangulation
 
 from fenics_contact.contact import State, Status
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import BLUE, GREY, INK, ORANGE, PALE, PRESSURE_MAP
+from fenics_contact.viz.patch import ContactPatch, contact_patch, refined
 from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet
 from fenics_contact.viz.units import Units
-from fenics_contact.viz.view import View, axis_label, face_on, frame_around
+from fenics_contact.viz.view import axis_label
 from fenics_contact.viz.words import checked_range, headline, written
 
-#: Straight pieces by which the edge of a facet is cut to colour it.
-PIECES = 6
 #: Symbols of the points: how they are drawn and what the legend calls them.
 _SYMBOLS: dict[Status, dict[str, Any]] = {
     Status.OPEN: {"marker": "o", "facecolors": "none", "edgecolors": GREY, "s": 30},
@@ -51,8 +48,8 @@ def plot_contact_pressure(
         state: The state.
         path: PNG file to write.
         pair: Number of the contact pair in the scene.
-        clim: Range of the colours, [force / length²]; from zero to the largest pressure unless given. Give two
-            pictures the same range to compare them.
+        clim: Range of the colours, [force / length²]; from zero to the largest pressure unless given. Give
+            two pictures the same range to compare them.
         half_width: How far the picture reaches around the contact's middle, [length]; chosen unless given.
         title: What comes before the facts in the title.
         units: Names of the units, mm, N and MPa unless given.
@@ -67,8 +64,8 @@ def plot_contact_pressure(
     target = png_path(path)
     if not 0 <= pair < len(state.scene.contacts):
         raise InvalidInputError(
-            f"pair must number one of the scene's {len(state.scene.contacts)} contact pairs from 0, got {pair}: "
-            "draw a scene with contact"
+            f"pair must number one of the scene's {len(state.scene.contacts)} contact pairs from 0, got "
+            f"{pair}: draw a scene with contact"
         )
     if half_width is not None and not 0 < half_width < np.inf:
         raise InvalidInputError(
@@ -78,83 +75,13 @@ def plot_contact_pressure(
     units = units or Units()
     draw_on_one_rank(
         state.system.torn.decomposition.comm,
-        lambda: _draw(_patch(state, pair, half_width), target, given, title, units, width),
+        lambda: _draw(contact_patch(state, pair, half_width), target, given, title, units, width),
     )
     return target
 
 
-@dataclass(frozen=True)
-class _Patch:
-    """The slave surface projected to a plane, and its contact points.
-
-    Attributes:
-        view: The direction of view.
-        name: Body and surface.
-        places: All nodes of the surface in the picture, (n, 2).
-        facets: Rows of positions in ``places``.
-        pressure: On all nodes of the surface, zero where there is no contact point, (n,).
-        points: Positions of the contact points in ``places``.
-        status: Of the contact points.
-        slip: Of the contact points in the picture, (n_points, 2).
-        force: Normal force of the pair.
-        low: Lower left corner of what is shown.
-        high: Upper right corner.
-    """
-
-    view: View
-    name: str
-    places: np.ndarray
-    facets: np.ndarray
-    pressure: np.ndarray
-    points: np.ndarray
-    status: np.ndarray
-    slip: np.ndarray
-    force: float
-    low: np.ndarray
-    high: np.ndarray
-
-
-def _patch(state: State, pair: int, half_width: float | None) -> _Patch:
-    contact, slave = state.contact, state.scene.contacts[pair].slave
-    chosen = contact.on_pair(pair)
-    mesh = state.scene.bodies[slave.body].mesh
-    force, normals = contact.normal_force[chosen], contact.points.normal[chosen]
-    weight = force if np.any(force > 0) else np.ones(len(chosen))
-    view = face_on(-weight @ normals)
-    facets = state.scene.facets(slave)
-    corners = mesh.points[facets]
-    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    nodes, local = np.unique(facets[outward @ view.towards > 0], return_inverse=True)
-    tearing = state.system.torn.decomposition.tearing
-    points = np.searchsorted(tearing.global_nodes(slave.body, nodes), contact.points.slave[chosen])
-    pressure = np.zeros(len(nodes))
-    pressure[points] = contact.pressure[chosen]
-    slip = np.einsum("na,nad->nd", contact.slip[chosen], contact.points.tangents[chosen])
-    places = view.project(mesh.points[nodes])
-    low, high = _window(places[points], contact.points.area[chosen], force, half_width)
-    if half_width is None:
-        edge = frame_around(view, mesh.points[nodes], 0.05)
-        low, high = np.maximum(low, edge.low), np.minimum(high, edge.high)
-    return _Patch(
-        view, f"{slave.body}, {slave.name}", places, local.reshape(-1, facets.shape[1]), pressure, points,
-        contact.status[chosen], view.project(slip), float(force.sum()), low, high,
-    )  # fmt: skip
-
-
-def _window(
-    places: np.ndarray, area: np.ndarray, force: np.ndarray, half_width: float | None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the square around the closed points, with room for two facets beside them."""
-    closed = force > 0 if np.any(force > 0) else np.ones(len(force), dtype=bool)
-    low, high = places[closed].min(axis=0), places[closed].max(axis=0)
-    half = float(np.max(high - low)) / 2 + 2.5 * float(np.sqrt(area[closed].mean()))
-    middle = (low + high) / 2
-    half = half if half_width is None else half_width
-    return middle - half, middle + half
-
-
 def _draw(
-    patch: _Patch, target: Path, clim: tuple[float, float] | None, title: str, units: Units, width: int
+    patch: ContactPatch, target: Path, clim: tuple[float, float] | None, title: str, units: Units, width: int
 ) -> None:
     peak = float(patch.pressure.max())
     shown = clim or (0.0, peak or 1.0)
@@ -176,33 +103,15 @@ def _draw(
         figure.legend(handles, labels, loc="outside lower right", ncols=3, handletextpad=0.2)
 
 
-def _draw_pressure(axes: Any, patch: _Patch, clim: tuple[float, float]) -> None:
-    mesh, values = _refined(patch)
+def _draw_pressure(axes: Any, patch: ContactPatch, clim: tuple[float, float]) -> None:
+    mesh, values = refined(patch)
     axes.tripcolor(mesh, values, shading="gouraud", cmap=PRESSURE_MAP, vmin=clim[0], vmax=clim[1])
     outlines = {"facecolors": "none", "edgecolors": GREY, "linewidths": 0.5}
     axes.add_collection(PolyCollection(patch.places[patch.facets], **outlines))
     axes.set_title(f"pressure on {patch.name}")
 
 
-def _refined(patch: _Patch) -> tuple[Triangulation, np.ndarray]:
-    """Cut every facet into triangles so small that colours are bilinear on quadrilaterals and favour no diagonal."""
-    facets = patch.facets
-    if facets.shape[1] == 3:
-        return Triangulation(*patch.places.T, facets), patch.pressure
-    s, t = np.meshgrid(np.linspace(0, 1, PIECES + 1), np.linspace(0, 1, PIECES + 1), indexing="ij")
-    shape = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1).reshape(-1, 4)
-    places = np.einsum("kc,fcd->fkd", shape, patch.places[facets]).reshape(-1, 2)
-    number = np.arange(len(shape)).reshape(s.shape)
-    low, high = (
-        [number[:-1, :-1], number[1:, :-1], number[1:, 1:]],
-        [number[:-1, :-1], number[1:, 1:], number[:-1, 1:]],
-    )
-    small = np.concatenate([np.stack(corners, axis=-1).reshape(-1, 3) for corners in (low, high)])
-    triangles = (small + len(shape) * np.arange(len(facets))[:, None, None]).reshape(-1, 3)
-    return Triangulation(*places.T, triangles), (patch.pressure[facets] @ shape.T).ravel()
-
-
-def _draw_status(axes: Any, patch: _Patch, units: Units) -> None:
+def _draw_status(axes: Any, patch: ContactPatch, units: Units) -> None:
     axes.add_collection(PolyCollection(patch.places[patch.facets], facecolors=PALE, edgecolors="white"))
     places = patch.places[patch.points]
     for status, look in _SYMBOLS.items():
@@ -219,14 +128,14 @@ def _draw_status(axes: Any, patch: _Patch, units: Units) -> None:
     )
 
 
-def _draw_arrows(axes: Any, patch: _Patch, places: np.ndarray, slip: np.ndarray) -> None:
+def _draw_arrows(axes: Any, patch: ContactPatch, places: np.ndarray, slip: np.ndarray) -> None:
     reach = 0.1 * float(np.max(patch.high - patch.low))
     axes.quiver(
         *places.T, *(reach * slip).T, angles="xy", scale_units="xy", scale=1, color=INK, width=0.004, zorder=4
     )
 
 
-def _label(axes: Any, patch: _Patch, units: Units) -> None:
+def _label(axes: Any, patch: ContactPatch, units: Units) -> None:
     axes.set_aspect("equal")
     axes.set_xlim(patch.low[0], patch.high[0])
     axes.set_ylim(patch.low[1], patch.high[1])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import subprocess
 import sys
@@ -10,7 +9,7 @@ from functools import lru_cache
 
 from fenics_contact.errors import MissingRequirementError
 
-#: Renders a window of four pixels. VTK's choice of OpenGL depends on the environment and on shared libraries only.
+#: Renders a window of four pixels. Where VTK finds OpenGL depends on environment and shared libraries only.
 _PROBE = """
 from vtkmodules.vtkRenderingCore import vtkRenderWindow
 import vtkmodules.vtkRenderingOpenGL2
@@ -28,21 +27,15 @@ def check_renderer() -> None:
     """Make sure that pyvista can draw, with or without a display; takes half a second, once.
 
     Raises:
-        MissingRequirementError: If pyvista is not installed, or if there is neither EGL nor OSMesa nor an X
-            server to draw with.
+        MissingRequirementError: If there is neither EGL nor OSMesa nor an X server to draw with.
     """
-    for module in ("pyvista", "matplotlib"):
-        if importlib.util.find_spec(module) is None:
-            raise MissingRequirementError(
-                f"pictures need {module}, found none: pip install 'fenics_contact[viz]'", name=module
-            )
     ending = _probe(tuple(os.environ.get(name) for name in _DECIDING))
     if ending:
         window = os.environ.get("VTK_DEFAULT_OPENGL_WINDOW", "not set")
         raise MissingRequirementError(
             f"pictures need EGL, OSMesa or an X server to draw with, but a trial rendering {ending} "
-            f"(VTK_DEFAULT_OPENGL_WINDOW is {window}): install EGL (Debian: apt-get install libegl1; conda-forge: "
-            "conda install libegl mesa-libegl-devel-cos7-x86_64) and set VTK_DEFAULT_OPENGL_WINDOW=vtkEGLRenderWindow",
+            f"(VTK_DEFAULT_OPENGL_WINDOW is {window}): install EGL (Debian: apt-get install libegl1; "
+            "elsewhere what brings libEGL.so.1) and set VTK_DEFAULT_OPENGL_WINDOW=vtkEGLRenderWindow",
             name="libegl1",
         )
 

@@ -100,7 +100,7 @@ def draw_on_one_rank(comm: MPI.Comm | None, draw: Callable[[], None]) -> None:
 
 
 def place_image(figure: Any, image: np.ndarray, left: int, top: int, title: str = "") -> Any:
-    """Put an image onto the sheet, pixel on pixel, its title above it; return its axes.
+    """Put an image onto the sheet, pixel on pixel, its title above it; return axes that count its pixels.
 
     Args:
         figure: The sheet.
@@ -109,8 +109,9 @@ def place_image(figure: Any, image: np.ndarray, left: int, top: int, title: str 
         top: Pixels from the sheet's upper edge.
         title: Words above the image.
     """
-    axes = figure.add_axes(_box(figure, left, top, image.shape[1], image.shape[0]))
-    axes.imshow(image, aspect="auto", interpolation="nearest")
+    height, width = image.shape[:2]
+    figure.figimage(image, left, round(float(figure.bbox.height)) - top - height, origin="upper", zorder=-1)
+    axes = figure.add_axes(_box(figure, left, top, width, height), xlim=(0, width), ylim=(height, 0))
     axes.set_axis_off()
     axes.set_title(title)
     return axes

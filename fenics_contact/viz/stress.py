@@ -32,7 +32,7 @@ from fenics_contact.viz.words import checked_range, headline, nice_number, writt
 
 #: Fraction of the bodies' size that the largest displacement appears to have.
 VISIBLE = 0.03
-#: The colours end at this quantile of the cells' stresses: the peak under a contact would leave the rest in one shade.
+#: The colours end at this quantile of the cells: the peak under a contact would leave the rest in one shade.
 QUANTILE = 0.995
 #: Part of the width that the pictures take; the rest is the colour bar's.
 WIDE = 0.88

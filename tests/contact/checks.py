@@ -22,8 +22,8 @@ def residuals(state: State) -> dict[str, float]:
     """Recompute equilibrium, cone violation, gluing and natural residual of the multiplier.
 
     With r = F λ − d − Gᵀα: ‖G λ − e‖ relative to the sum of the forces in it; the largest tension or excess
-    of friction over its bound and ‖λ − P_Λ(λ − r/diag F)‖, both relative to ‖λ_N‖; and ‖r‖ on the gluing rows,
-    which is a jump of displacements, relative to the largest displacement.
+    of friction over its bound and ‖λ − P_Λ(λ − r/diag F)‖, both relative to ‖λ_N‖; and ‖r‖ on the gluing
+    rows, which is a jump of displacements, relative to the largest displacement.
     """
     problem, multiplier = state.system.problem, state.solution.multiplier
     G, layout, bound = problem.coarse.matrix, problem.layout, slip_bound(state)
@@ -41,9 +41,13 @@ def residuals(state: State) -> dict[str, float]:
     return {
         "equilibrium": float(np.abs(G @ multiplier - problem.coarse.load).max() / forces.max()),
         "cone": max(float(-normal.min(initial=0.0)), float(excess.max(initial=0.0))) / size,
-        "natural": float(np.hypot(np.linalg.norm(normal - mapped_normal), np.linalg.norm(tau - mapped_tau)) / size),
+        "natural": float(np.hypot(_norm(normal - mapped_normal), _norm(tau - mapped_tau)) / size),
         "gluing": float(np.abs(r[layout.equality]).max(initial=0.0) / np.abs(state.torn_displacement).max()),
     }
+
+
+def _norm(values: np.ndarray) -> float:
+    return float(np.linalg.norm(values))
 
 
 def assert_solved(state: State, tolerance: float) -> None:
@@ -75,14 +79,14 @@ def friction_law(state: State, reference: ConicReference) -> dict[str, float]:
     friction = contact.force - normal[:, None] * rows.normal  # on the slave, against its slip
     bound = rows.bound + rows.coefficient * np.maximum(normal, 0.0)
     length, size = np.abs(u).max(), np.abs(normal).max()
+    # Zero only where a point sticks, or its friction is as large as can be and points against the slip.
+    unopposed = bound * np.linalg.norm(slip, axis=1) + (friction * slip).sum(axis=1)
     return {
         "penetration": max(0.0, float(-gap.min())) / length,
         "tension": max(0.0, float(-normal.min())) / size,
         "complementarity": float(np.abs(normal * gap).max()) / (size * length),
         "friction beyond its bound": max(0.0, float((np.linalg.norm(friction, axis=1) - bound).max())) / size,
-        # Zero only if the point sticks or its friction is as large as can be and points against the slip.
-        "slip not opposed": float((bound * np.linalg.norm(slip, axis=1) + (friction * slip).sum(axis=1)).max())
-        / (size * length),
+        "slip not opposed": float(unopposed.max()) / (size * length),
     }
 
 

@@ -1,7 +1,7 @@
 """The same contact problem written down a second time, on whole bodies, and given to a conic solver.
 
-Nothing is shared with the package but the scene: elements, loads and contact rows are integrated and projected
-here with NumPy, nodes are not torn, supports are eliminated, and Clarabel minimises
+Nothing is shared with the package but the scene: elements, loads and contact rows are integrated and
+projected here with NumPy, nodes are not torn, supports are eliminated, and Clarabel minimises
 
     ½ uᵀK u − fᵀu + Σ Ψ_i s_i    over    N u ≤ gap,    ‖T_i u‖ ≤ s_i .
 
@@ -35,7 +35,7 @@ CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0
 
 
 def quadrature(mesh: BodyMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return shape functions (q, k), their gradients (q, cells, k, 3) and weights (q, cells) at Gauss points."""
+    """Return shape functions (q, k), gradients (q, cells, k, 3) and weights (q, cells) at Gauss points."""
     if mesh.cell_type == "tetrahedron":
         values = np.full((1, 4), 0.25)
         local = np.vstack([[-1.0, -1.0, -1.0], np.eye(3)])[None]
@@ -45,7 +45,8 @@ def quadrature(mesh: BodyMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         factors = np.where(CORNERS[None] == 1, points[:, None], 1 - points[:, None])
         values = factors.prod(axis=2)
         slopes = np.where(CORNERS == 1, 1.0, -1.0)
-        local = np.stack([slopes[:, a] * np.delete(factors, a, axis=2).prod(axis=2) for a in range(3)], axis=2)
+        others = [np.delete(factors, a, axis=2).prod(axis=2) for a in range(3)]
+        local = slopes * np.stack(others, axis=2)
         share = 1 / 8
     jacobian = np.einsum("qka,ckd->qcda", local, mesh.points[mesh.cells])
     gradients = np.einsum("qka,qcad->qckd", local, np.linalg.inv(jacobian))
@@ -67,7 +68,7 @@ def stiffness(mesh: BodyMesh, material: IsotropicElasticity) -> sp.csr_matrix:
 
 
 def nodal_areas(mesh: BodyMesh, facets: np.ndarray) -> np.ndarray:
-    """Deal out the area of every facet to its corners in equal parts: exact for parallelograms and triangles."""
+    """Deal out facets' areas to their corners in equal parts: exact for parallelograms and triangles."""
     areas = np.zeros(mesh.n_nodes)
     sizes = np.linalg.norm(vector_areas(mesh.points, facets), axis=1)
     np.add.at(areas, facets, sizes[:, None] / facets.shape[1])
@@ -110,7 +111,7 @@ class ContactRows:
 
 
 def master_weights(points: np.ndarray, mesh: BodyMesh, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Interpolate a flat surface of parallelograms or triangles at the feet of points: nodes and weights, (n, k)."""
+    """Interpolate a flat surface of parallelograms or triangles below points: nodes and weights, (n, k)."""
     corners = mesh.points[facets]
     edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0]], axis=2)
     local = np.einsum("fad,nfd->nfa", np.linalg.pinv(edges), points[:, None] - corners[None, :, 0])
@@ -207,7 +208,8 @@ class ConicReference:
         joined = {}
         for name in ContactRows.__dataclass_fields__:
             values = [getattr(part, name) for part in parts]
-            joined[name] = sp.vstack(values, format="csr") if sp.issparse(values[0]) else np.concatenate(values)
+            stacked = sp.issparse(values[0])
+            joined[name] = sp.vstack(values, format="csr") if stacked else np.concatenate(values)
         return ContactRows(**joined)
 
     def reaction(self, displacement: np.ndarray) -> np.ndarray:
@@ -221,7 +223,7 @@ class ConicReference:
         free = np.isnan(self.prescribed)
         held = np.where(free, 0.0, self.prescribed)
         shifted = self.f - self.K @ held
-        n_free, n_discs = int(free.sum()), len(discs)
+        n_discs = len(discs)
         gap = self.rows.gap - self.rows.N @ held
         slip_rows = (3 * discs[:, None] + np.arange(3)).ravel()
         sliding, pulled = self.rows.T[slip_rows][:, free], self.rows.T[slip_rows] @ held
@@ -237,7 +239,8 @@ class ConicReference:
         P = sp.block_diag([self.K[free][:, free], sp.csc_matrix((n_discs, n_discs))], format="csc")
         cones = [clarabel.NonnegativeConeT(len(gap))] + [clarabel.SecondOrderConeT(4)] * n_discs
         q = np.concatenate([-shifted[free], bound[discs]])
-        solution = clarabel.DefaultSolver(sp.triu(P).tocsc(), q, A, np.concatenate(right), cones, _settings()).solve()
+        upper, b = sp.triu(P).tocsc(), np.concatenate(right)
+        solution = clarabel.DefaultSolver(upper, q, A, b, cones, _settings()).solve()
         assert str(solution.status) in ("Solved", "AlmostSolved"), solution.status
         return self._answer(solution, free, held, shifted, discs)
 

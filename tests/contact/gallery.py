@@ -37,7 +37,7 @@ def crowned(mesh: BodyMesh, rise: float) -> BodyMesh:
 
 
 def block_on_plane(friction: Friction, cell: str = "hexahedron", *, push: float = 1.0) -> Scene:
-    """A crowned block on a rigid floor that nothing else holds: pressed on top, pushed along x and a little y.
+    """A crowned block that only a rigid floor holds: pressed on top, pushed along x and a little along y.
 
     The push tips the block: its heel lifts off, its toe is pressed hardest. Load: 4 down, 2 ``push`` along x.
     """
@@ -48,7 +48,7 @@ def block_on_plane(friction: Friction, cell: str = "hexahedron", *, push: float 
 
 
 def two_blocks(friction: Friction, cell: str = "hexahedron", *, push: float = 0.6) -> Scene:
-    """A crowned block pressed on another with a mesh that does not match; nothing else holds the upper one."""
+    """A crowned block pressed on another one whose mesh does not match; nothing else holds it."""
     lower = block((0.0, 0.0, -1.0), (2.0, 1.0, 0.0), (5, 3, 2), cell)
     upper = crowned(block((0.1, 0.05, 0.0), (1.9, 0.95, 0.8), (6, 4, 2), cell), 0.04)
     return Scene(
@@ -57,6 +57,16 @@ def two_blocks(friction: Friction, cell: str = "hexahedron", *, push: float = 0.
         [Traction("upper", "z1", (push, 0.2 * push, -2.0)), BodyForce("upper", (0.0, 0.0, -0.1))],
         [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), friction)],
     )
+
+
+def cornered_block(friction: Friction) -> Scene:
+    """The block on the plane pushed against a rigid wall, with nodes on an edge that touch both.
+
+    They have six contact multipliers for three displacements: their forces are not unique.
+    """
+    scene = block_on_plane(friction)
+    wall = ContactPair(Surface("block", "x1"), RigidPlane((2.0, 0.0, 0.0), (-1.0, 0.0, 0.0)), friction)
+    return replace(scene, contacts=[*scene.contacts, wall])
 
 
 def pressed_block(friction: Friction, cell: str = "hexahedron", *, push: float = 0.01) -> Scene:
@@ -80,7 +90,7 @@ def partitions(scene: Scene, boxes: tuple[int, int, int] = (2, 1, 1)) -> dict[st
 
 
 def guided(scene: Scene, body: str) -> Scene:
-    """Keep one side of a body from moving along x and one from moving along y: without friction it would slide."""
+    """Keep one side of a body from moving along x and one along y: without friction it would slide."""
     guides = [Support(body, "x0", (0.0, None, None)), Support(body, "y0", (None, 0.0, None))]
     return replace(scene, supports=[*scene.supports, *guides])
 

@@ -1,4 +1,4 @@
-"""Everything that must not depend on the number of ranks, in one script: run it under mpirun, or call `collect`."""
+"""What must not depend on the number of ranks, in one script: run it under mpirun, or call `collect`."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def uniaxial(cell: str) -> Scene:
 
 
 def field_error(state: State) -> float:
-    """Return the largest difference between displacement Functions and gathered nodal values, on this rank."""
+    """Return by how much displacement Functions differ from gathered nodal values, on this rank."""
     worst = 0.0
     for name, function in state.displacement.items():
         nodes, dofs = _dolfinx.node_dofs(function.function_space)
@@ -110,7 +110,8 @@ def refusals(comm: MPI.Comm) -> list[str]:
     loose = block_on_plane(Coulomb(0.3))
     lifted = replace(loose, loads=[Traction("block", "z1", (0.0, 0.0, 1.0))])
     said = []
-    for scene, solver in ((loose, None), (lifted, None), (two_blocks(Coulomb(0.38)), FaceNewton(max_steps=1))):
+    hasty = FaceNewton(max_steps=1)
+    for scene, solver in ((loose, None), (lifted, None), (two_blocks(Coulomb(0.38)), hasty)):
         try:
             solve_scene(scene, partitions(scene, (4, 1, 1)), comm, solver=solver)
             said.append("nothing")

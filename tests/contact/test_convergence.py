@@ -23,7 +23,8 @@ HASTY: dict[str, tuple[DualSolver, Coulomb | Tresca]] = {
 def test_a_solver_stopped_too_early_raises_with_its_history(name: str) -> None:
     solver, friction = HASTY[name]
     scene = two_blocks(friction)
-    with pytest.raises(ConvergenceError, match=r"needs (a natural residual|residuals) below \S+e-(09|10)\b") as caught:
+    message = r"needs (a natural residual|residuals) below \S+e-(09|10)\b"
+    with pytest.raises(ConvergenceError, match=message) as caught:
         solve_scene(scene, partitions(scene), MPI.COMM_SELF, solver=solver)
     assert len(caught.value.history) > 0
     assert all(step.products > 0 for step in caught.value.history)

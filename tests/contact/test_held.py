@@ -25,7 +25,7 @@ def check(scene: Scene) -> None:
 
 def refused(scene: Scene) -> tuple[str, np.ndarray, np.ndarray]:
     """Return the body named in the refusal, its translation and its rotation."""
-    with pytest.raises(InfeasibleError, match=r"every body must be held .* can move away under the load") as caught:
+    with pytest.raises(InfeasibleError, match=r"every body must be held .* can move away under") as caught:
         check(scene)
     message = str(caught.value)
     body = re.search(r"body '(\w+)'", message)
@@ -49,7 +49,7 @@ def test_a_body_pulled_off_its_floor_is_named_with_the_way_it_goes() -> None:
 
 
 @pytest.mark.parametrize("direction", [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.6, -0.8)])
-def test_a_body_pushed_harder_than_friction_holds_slides_where_it_is_pushed(direction: tuple[float, float]) -> None:
+def test_a_body_pushed_harder_than_friction_holds_slides_where_it_is_pushed(direction) -> None:
     x, y = direction
     body, translation, _ = refused(pulled(block_on_plane(Coulomb(0.3)), "block", (0.31 * x, 0.31 * y, -1.0)))
     assert body == "block"

@@ -1,11 +1,11 @@
 """Hertz: a ball and a cylinder on a rigid plane, without friction, against the analytic pressure.
 
 Both are pressed by a total force for which the contact ends at a node of the coarsest mesh, hence at one of
-every finer mesh: errors then fall smoothly. The contact is small beside the body (1 % to 3 % of its radius), so
-that the half space of the theory is a good model. Peak pressure is the nodal force over the nodal area at the
-first point of contact. The radius of contact comes from the second moment of the nodal forces λ_i at distance
-r_i, which for the pressure p0 √(1 − r²/a²) is Σ λ_i r_i² / Σ λ_i = 2a²/5 (ball) or a²/4 (cylinder): unlike the
-area of the closed nodes it does not jump by whole cells.
+every finer mesh: errors then fall smoothly. The contact is small beside the body (1 % to 3 % of its radius),
+so that the half space of the theory is a good model. Peak pressure is the nodal force over the nodal area at
+the first point of contact. The radius of contact comes from the second moment of the nodal forces λ_i at
+distance r_i, which for the pressure p0 √(1 − r²/a²) is Σ λ_i r_i² / Σ λ_i = 2a²/5 (ball) or a²/4 (cylinder):
+unlike the area of the closed nodes it does not jump by whole cells.
 """
 
 from __future__ import annotations
@@ -20,7 +20,16 @@ from mpi4py import MPI
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.geometry import BodyMesh, bisection_partition, half_cylinder, hemisphere
 from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, RigidPlane, Scene, Support, Surface, TotalForce
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    IsotropicElasticity,
+    RigidPlane,
+    Scene,
+    Support,
+    Surface,
+    TotalForce,
+)
 from tests.contact.checks import assert_solved
 
 YOUNG, POISSON = 1000.0, 0.3
@@ -50,7 +59,7 @@ def cylinder(radius: float) -> Hertz:
 
 
 def edge(grading: float) -> float:
-    """Return the distance from the axis of the first node of the mesh with n = 4, a quarter of the way out."""
+    """Return how far from the axis the mesh with n = 4 has its first node, a quarter of the way out."""
     return float(np.sin(np.pi / 4 * np.expm1(grading / 4) / np.expm1(grading)))
 
 
@@ -98,7 +107,8 @@ def cylinder_errors(n: int, grading: float = 5.0) -> tuple[float, float]:
 
 def table(name: str, sizes: Sequence[int], found: np.ndarray) -> np.ndarray:
     """Print errors and rates of peak and radius; return the rates, (n − 1, 2)."""
-    rates = np.log(np.abs(found[:-1] / found[1:])) / np.log(np.array(sizes[1:]) / np.array(sizes[:-1]))[:, None]
+    refinement = np.log(np.array(sizes[1:]) / np.array(sizes[:-1]))
+    rates = np.log(np.abs(found[:-1] / found[1:])) / refinement[:, None]
     print(f"\n{name}: cells to the edge | error of peak pressure, rate | error of contact radius, rate")
     for n, error, rate in zip(sizes, found, np.vstack([[np.nan] * 2, rates]), strict=True):
         print(f"  {n:3d} | {error[0]:+.5f} {rate[0]:5.2f} | {error[1]:+.5f} {rate[1]:5.2f}")

@@ -92,7 +92,8 @@ def test_the_master_feels_the_opposite_of_the_slave(state: State) -> None:
     start = 0
     for subdomain in state.system.torn.subdomains:
         stop = start + subdomain.mesh.size
-        np.add.at(found, subdomain.mesh.nodes + offsets[subdomain.mesh.body], -torn[start:stop].reshape(-1, 3))
+        nodes = subdomain.mesh.nodes + offsets[subdomain.mesh.body]
+        np.add.at(found, nodes, -torn[start:stop].reshape(-1, 3))
         start = stop
     expected = np.zeros((count, 3))
     np.add.at(expected, points.slave, force)

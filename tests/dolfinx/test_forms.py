@@ -62,8 +62,7 @@ def test_a_surface_integral_covers_the_facets_it_is_given(cell: str) -> None:
 
 @pytest.mark.parametrize("cell", CELLS)
 def test_constants_and_coefficients_reach_their_own_places(cell: str) -> None:
-    space = _dolfinx.displacement_space(cell)
-    u, v = ufl.Coefficient(space), ufl.Coefficient(space)
+    u, v = _dolfinx.field_symbols(cell, 2)
     a, b = constants(cell, 2)
     dx = ufl.dx(domain=_dolfinx.template(cell), metadata={"quadrature_degree": 2})
     form = _dolfinx.CompiledForm(MPI.COMM_SELF, (a * u[0] + b * b * v[1]) * dx)

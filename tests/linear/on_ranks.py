@@ -11,8 +11,9 @@ from mpi4py import MPI
 
 from fenics_contact import _dolfinx
 from fenics_contact.contact import State, solve_scene
-from fenics_contact.scene import Scene
-from tests.feti.scenes import CELLS
+from fenics_contact.geometry import block, box_partition
+from fenics_contact.scene import Body, Scene, Support, Traction
+from tests.feti.scenes import CELLS, STEEL
 from tests.linear import monolithic
 from tests.linear.scenes import BOXES, cut, error, loaded_block, two_materials
 
@@ -77,7 +78,18 @@ def bodies(comm: MPI.Comm) -> dict[str, Any]:
     return found
 
 
+def bar(comm: MPI.Comm) -> dict[str, Any]:
+    """Solve a clamped bar in one subdomain a rank: the last rank owns no multiplier."""
+    mesh = block((0, 0, 0), (1, 1, 4), (2, 2, 4))
+    supports, loads = [Support("bar", "z0")], [Traction("bar", "z1", (1.0, 0.0, 1.0))]
+    scene = Scene({"bar": Body(mesh, STEEL)}, supports, loads)
+    state = solve_scene(scene, {"bar": box_partition(mesh, (1, 1, comm.size))}, comm)
+    owned = comm.allgather(len(state.system.torn.numbering.owned))
+    return {"error": error(state, "bar", reference(scene, "bar", comm)), "owned": owned}
+
+
 if __name__ == "__main__":
-    answer = {"blocks": blocks(MPI.COMM_WORLD), "bodies": bodies(MPI.COMM_WORLD)}
-    if MPI.COMM_WORLD.rank == 0:
+    world = MPI.COMM_WORLD
+    answer = {"blocks": blocks(world), "bodies": bodies(world), "bar": bar(world)}
+    if world.rank == 0:
         sys.stdout.write("\n" + json.dumps(answer))

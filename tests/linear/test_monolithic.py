@@ -9,8 +9,9 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
+from fenics_contact.contact.equilibrium import default_solver
 from fenics_contact.geometry import bisection_partition
-from fenics_contact.qp import FaceNewton, Smalse
+from fenics_contact.qp import FaceNewton, ProjectedCG, Smalse
 from fenics_contact.scene import Support
 from tests.feti.scenes import CELLS
 from tests.linear.scenes import BOXES, TOLERANCE, cut, error, loaded_block, two_materials
@@ -67,6 +68,7 @@ def test_a_scene_without_contact_is_solved_by_conjugate_gradients_alone() -> Non
     scene = loaded_block("hexahedron")
     state = solve_scene(scene, cut(scene, 8), MPI.COMM_SELF)
     assert state.counts["normal_multipliers"] == state.counts["tangential_multipliers"] == 0
+    assert isinstance(default_solver(state.system.torn), ProjectedCG)
     assert state.solution.iterations == 1, "one linear solve is enough"
     assert state.solution.residuals.gluing < 1e-10
     assert state.contact.points.count == 0

@@ -39,6 +39,11 @@ def test_iterations_and_energy_do_not_depend_on_the_ranks(answer: dict[str, Any]
         assert case["energy"] == pytest.approx(alone.energies.primal, rel=1e-10)
 
 
+def test_a_rank_may_own_no_multiplier(answer: dict[str, Any]) -> None:
+    assert answer["bar"]["owned"][-1] == 0
+    assert answer["bar"]["error"] < TOLERANCE
+
+
 def test_fields_are_complete_where_ranks_have_no_cell_of_a_body(answer: dict[str, Any]) -> None:
     both = [answer["bodies"][name] for name in ("soft", "stiff")]
     assert min(min(body["cells"]) for body in both) == 0, "every rank has cells of both: nothing was tested"

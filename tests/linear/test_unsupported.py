@@ -48,6 +48,15 @@ def test_a_body_without_support_and_load_stays_free_of_stress() -> None:
     assert np.abs(state.von_mises["right"].x.array).max() < 1e-8
 
 
+def test_a_scene_without_a_single_multiplier_is_solved() -> None:
+    mesh = block((0, 0, 0), (1, 1, 4), (2, 2, 4), "tetrahedron")
+    loads = [Traction("bar", "z1", (0.0, 0.0, 1.3)), Traction("bar", "z0", (0.0, 0.0, -1.3))]
+    scene = Scene({"bar": Body(mesh, STEEL)}, loads=loads)
+    state = solve_scene(scene, {"bar": np.zeros(mesh.n_cells, dtype=int)}, MPI.COMM_SELF)
+    assert state.counts["equality_multipliers"] == 0
+    np.testing.assert_allclose(state.von_mises["bar"].x.array, 1.3, rtol=1e-9)
+
+
 def test_loads_in_balance_need_no_support() -> None:
     pull = 7.0
     state = bars(Traction("right", "z1", (0.0, 0.0, pull)), Traction("right", "z0", (0.0, 0.0, -pull)))

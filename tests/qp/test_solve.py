@@ -103,7 +103,8 @@ def test_unusable_problem_is_refused(change, message):
     ("slip_bound", "mu_f", "message"),
     [
         (None, None, "12 friction discs need a slip_bound or a friction_coefficient, got neither"),
-        (np.ones(12), np.ones(12), "give slip_bound or friction_coefficient, got both"),
+        (np.ones(11), np.ones(12), r"slip_bound must have shape \(12,\)"),
+        (np.ones(12), -np.ones(12), "friction_coefficient must be finite and not negative"),
         (np.ones(11), None, r"slip_bound must have shape \(12,\)"),
         (-np.ones(12), None, "slip_bound must be finite and not negative"),
     ],

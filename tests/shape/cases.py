@@ -42,8 +42,8 @@ from fenics_contact.shape import (
 )
 from tests.shape.quotients import Remembering
 
-#: Tight enough for difference quotients.
-SOLVER = FaceNewton(tolerance=1e-10)
+#: Tight enough for difference quotients with steps of 1e-5.
+SOLVER = FaceNewton(tolerance=1e-11)
 Friction = Coulomb | Tresca | None
 
 #: A short-link chain, coarse; soft enough that ten nodes touch.

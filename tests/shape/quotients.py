@@ -17,6 +17,7 @@ class Remembering(ShapeProblem):
     def __init__(self, *arguments: Any, **more: Any) -> None:
         super().__init__(*arguments, **more)
         self._known: dict[bytes, State] = {}
+        self._judged: dict[tuple[bytes, Objective], DesignPoint] = {}
 
     def state_of(self, alpha: np.ndarray) -> State:
         key = np.asarray(alpha, dtype=float).tobytes()
@@ -24,9 +25,16 @@ class Remembering(ShapeProblem):
             self._known[key] = super().state_of(alpha)
         return self._known[key]
 
-    def judged_by(self, objective: Objective) -> Remembering:
+    def value_by(self, objective: Objective, alpha: np.ndarray) -> float:
         self.objective = objective
-        return self
+        return self.value_of(alpha)
+
+    def evaluate_by(self, objective: Objective, alpha: np.ndarray) -> DesignPoint:
+        self.objective = objective
+        key = (alpha.tobytes(), objective)
+        if key not in self._judged:
+            self._judged[key] = self.evaluate(alpha)
+        return self._judged[key]
 
 
 @dataclass(frozen=True)
@@ -53,10 +61,10 @@ class Line:
         return self.problem.state_of(self.at(multiple))
 
     def value(self, objective: Objective, multiple: float = 0.0) -> float:
-        return self.problem.judged_by(objective).value_of(self.at(multiple))
+        return self.problem.value_by(objective, self.at(multiple))
 
     def point(self, objective: Objective) -> DesignPoint:
-        return self.problem.judged_by(objective).evaluate(self.alpha)
+        return self.problem.evaluate_by(objective, self.alpha)
 
     def slope(self, objective: Objective) -> float:
         """The adjoint's directional derivative."""

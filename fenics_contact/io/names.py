@@ -1,0 +1,30 @@
+"""Names of files made from names of bodies."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+
+def file_of_each(bodies: Iterable[str], folder: Path, stem: str, suffix: str) -> dict[str, Path]:
+    """Name one file for each body: "state_link_1.vtu" for the body "link 1".
+
+    Args:
+        bodies: Names of the bodies, any text.
+        folder: Folder of the files.
+        stem: What their names begin with.
+        suffix: What they end in, with the dot.
+
+    Returns:
+        Body name -> file. Names that differ in special characters only get a number.
+    """
+    files: dict[str, Path] = {}
+    for body in bodies:
+        plain = f"{stem}_{re.sub(r'[^A-Za-z0-9.-]+', '_', body)}"
+        path, number = folder / f"{plain}{suffix}", 1
+        while path in files.values():
+            number += 1
+            path = folder / f"{plain}_{number}{suffix}"
+        files[body] = path
+    return files

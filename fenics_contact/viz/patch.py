@@ -1,0 +1,109 @@
+"""A contact surface laid flat as its master sees it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.tri import Triangulation
+
+from fenics_contact.contact import State
+from fenics_contact.viz.view import View, face_on
+
+#: Straight pieces by which the edge of a facet is cut to colour it.
+PIECES = 6
+
+
+@dataclass(frozen=True)
+class ContactPatch:
+    """The slave surface projected to a plane, and its contact points.
+
+    Attributes:
+        view: The direction of view.
+        name: Body and surface.
+        places: All nodes of the surface in the picture, (n, 2).
+        facets: Rows of positions in ``places``.
+        pressure: On all nodes of the surface, zero where there is no contact point, (n,).
+        points: Positions of the contact points in ``places``.
+        status: Of the contact points.
+        slip: Of the contact points in the picture, (n_points, 2).
+        force: Normal force of the pair.
+        low: Lower left corner of what is shown.
+        high: Upper right corner.
+    """
+
+    view: View
+    name: str
+    places: np.ndarray
+    facets: np.ndarray
+    pressure: np.ndarray
+    points: np.ndarray
+    status: np.ndarray
+    slip: np.ndarray
+    force: float
+    low: np.ndarray
+    high: np.ndarray
+
+
+def contact_patch(state: State, pair: int, half_width: float | None) -> ContactPatch:
+    """Lay the slave surface of a pair flat; facets that turn their back to the viewer are left out.
+
+    Args:
+        state: The state.
+        pair: Number of the contact pair.
+        half_width: How far the picture reaches around the contact's middle, [length], or None.
+    """
+    contact, slave = state.contact, state.scene.contacts[pair].slave
+    mesh, facets = state.scene.bodies[slave.body].mesh, state.scene.facets(slave)
+    chosen = contact.on_pair(pair)
+    force = float(contact.normal_force[chosen].sum())
+    weight = contact.normal_force[chosen] if force > 0 else np.ones(len(chosen))
+    view = face_on(-weight @ contact.points.normal[chosen])
+    corners = mesh.points[facets]
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    nodes, local = np.unique(facets[outward @ view.towards > 0], return_inverse=True)
+    numbers = state.system.torn.decomposition.tearing.global_nodes(slave.body, nodes)
+    chosen = chosen[np.isin(contact.points.slave[chosen], numbers)]
+    points = np.searchsorted(numbers, contact.points.slave[chosen])
+    pressure = np.zeros(len(nodes))
+    pressure[points] = contact.pressure[chosen]
+    slip = np.einsum("na,nad->nd", contact.slip[chosen], contact.points.tangents[chosen])
+    places = view.project(mesh.points[nodes])
+    window = _window(places, points, pressure[points], contact.points.area[chosen], half_width)
+    return ContactPatch(
+        view, f"{slave.body}, {slave.name}", places, local.reshape(-1, facets.shape[1]), pressure, points,
+        contact.status[chosen], view.project(slip), force, *window,
+    )  # fmt: skip
+
+
+def _window(
+    places: np.ndarray, points: np.ndarray, pressure: np.ndarray, area: np.ndarray, half_width: float | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners of a square around the closed points with room for two facets beside them.
+
+    Unless its size is given, it ends a little beyond the surface.
+    """
+    closed = pressure > 0 if np.any(pressure > 0) else np.ones(len(points), dtype=bool)
+    low, high = places[points[closed]].min(axis=0), places[points[closed]].max(axis=0)
+    middle = (low + high) / 2
+    if half_width is not None:
+        return middle - half_width, middle + half_width
+    half = float(np.max(high - low)) / 2 + 2.5 * float(np.sqrt(area[closed].mean()))
+    border = 0.05 * float(np.ptp(places, axis=0).max())
+    low, high = places.min(axis=0) - border, places.max(axis=0) + border
+    return np.maximum(middle - half, low), np.minimum(middle + half, high)
+
+
+def refined(patch: ContactPatch) -> tuple[Triangulation, np.ndarray]:
+    """Cut quadrilaterals into triangles so small that colours are bilinear and favour no diagonal."""
+    facets = patch.facets
+    if facets.shape[1] == 3:
+        return Triangulation(*patch.places.T, facets), patch.pressure
+    s, t = np.meshgrid(np.linspace(0, 1, PIECES + 1), np.linspace(0, 1, PIECES + 1), indexing="ij")
+    shape = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1).reshape(-1, 4)
+    places = np.einsum("kc,fcd->fkd", shape, patch.places[facets]).reshape(-1, 2)
+    number = np.arange(len(shape)).reshape(s.shape)
+    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    small = np.concatenate([np.stack(corners, axis=-1).reshape(-1, 3) for corners in ((a, b, c), (a, c, d))])
+    triangles = (small + len(shape) * np.arange(len(facets))[:, None, None]).reshape(-1, 3)
+    return Triangulation(*places.T, triangles), (patch.pressure[facets] @ shape.T).ravel()

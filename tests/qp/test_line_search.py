@@ -1,0 +1,61 @@
+"""Cutting a Newton step short costs nothing and never makes things worse."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fenics_contact.qp import FaceNewton, Tresca, solve
+from fenics_contact.qp.iterate import Iterate, iterate_at
+from fenics_contact.qp.line_search import damp
+from tests.qp.random_problems import DenseProblem, random_problem
+from tests.qp.torn_bricks import Bricks, torn_problem
+
+
+def no_product(x):
+    raise AssertionError("all products on a segment are known")
+
+
+def iterate(problem: DenseProblem, multiplier: np.ndarray, alpha: np.ndarray) -> Iterate:
+    law = Tresca(problem.layout, problem.slip_bound)
+    return iterate_at(problem.dual, law, multiplier, problem.F @ multiplier, alpha)
+
+
+def test_solution_between_two_iterates_is_found():
+    problem = random_problem(3)
+    dual, law = replace(problem.dual, operator=no_product), Tresca(problem.layout, problem.slip_bound)
+    solution = solve(problem.dual, problem.slip_bound, FaceNewton(tolerance=1e-10))
+    offset = np.random.default_rng(0).standard_normal(len(problem.d))
+    before = iterate(problem, solution.multiplier - 0.1 * offset, solution.alpha - 0.1)
+    after = iterate(problem, solution.multiplier + 0.3 * offset, solution.alpha + 0.3)
+    damped = damp(dual, law, before, after)
+    assert damped.fraction == 0.25
+    assert damped.iterate.residuals.size < 1e-8 < before.residuals.size < after.residuals.size
+    np.testing.assert_allclose(damped.iterate.multiplier, solution.multiplier, atol=1e-8)
+    np.testing.assert_allclose(damped.iterate.product, problem.F @ damped.iterate.multiplier, atol=1e-12)
+
+
+def test_step_that_improves_is_kept_whole():
+    problem = random_problem(3)
+    law = Tresca(problem.layout, problem.slip_bound)
+    solution = solve(problem.dual, problem.slip_bound, FaceNewton(tolerance=1e-10))
+    worse = iterate(problem, 1.1 * solution.multiplier, solution.alpha)
+    better = iterate(problem, 1.01 * solution.multiplier, solution.alpha)
+    damped = damp(problem.dual, law, worse, better)
+    assert damped.fraction == 1.0
+    assert damped.iterate is better
+
+
+@pytest.mark.parametrize("friction_coefficient", [0.005, 0.3])
+def test_cut_steps_are_told_in_the_history(friction_coefficient):
+    dual, _ = torn_problem(Bricks(n=4, cubes=(3, 2), crown=2.0, shear=0.0, tilt=0.5))
+    mu_f = np.full(dual.layout.n_friction, friction_coefficient)
+    found = solve(dual, None, FaceNewton(), friction_coefficient=mu_f)
+    cut = [step for step in found.history if "of the step" in step.note]
+    sizes = [step.residuals.size for step in found.history]
+    assert cut
+    for step in cut:
+        if step.iteration:
+            assert step.residuals.size <= 1.5 * max(sizes[: step.iteration])

@@ -1,0 +1,55 @@
+"""Derivatives of scenes of blocks: rigid floors, Tresca friction, weight, tetrahedra, loads left in place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from fenics_contact.contact import Status
+from fenics_contact.scene import Coulomb, Scene, Tresca
+from tests.shape.blocks import block_on_block, block_on_floor, problem
+from tests.shape.cases import objectives
+from tests.shape.quotients import Line
+
+PUSH, DRAG = (0.35, 0.1, -2.0), (0.6, 0.12, -2.0)
+SCENES: dict[str, Callable[[], Scene]] = {
+    "floor": lambda: block_on_floor(Coulomb(0.3), load=PUSH),
+    "floor, Tresca": lambda: block_on_floor(Tresca(0.6), load=PUSH),
+    "floor, Tresca, tetrahedra": lambda: block_on_floor(Tresca(0.6), "tetrahedron", load=PUSH),
+    "blocks, Tresca": lambda: block_on_block(Tresca(0.8), load=DRAG),
+    "blocks, tetrahedra": lambda: block_on_block(Coulomb(0.38), "tetrahedron", load=DRAG),
+    "weight alone": lambda: block_on_block(Coulomb(0.12), load=(0.0, 0.0, 0.0)),
+}
+OBJECTIVES = {scene: objectives("block" if scene.startswith("floor") else "upper") for scene in SCENES}
+
+
+@lru_cache(maxsize=None)
+def line(name: str) -> Line:
+    blocks = problem(SCENES[name]())
+    rng = np.random.default_rng(1)
+    alpha = 0.01 * rng.standard_normal(blocks.size)
+    return Line(blocks, alpha, rng.standard_normal(blocks.size), 1e-5)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_points_stick_slip_and_lift_off_all_along_the_line(name: str) -> None:
+    contact = line(name).state().contact
+    assert all(contact.count(status) > 0 for status in Status)
+    assert line(name).is_smooth()
+
+
+@pytest.mark.parametrize("objective", ["energy", "stress", "displacement", "normal forces", "friction forces"])
+@pytest.mark.parametrize("name", SCENES)
+def test_the_adjoint_agrees_with_central_differences(name: str, objective: str) -> None:
+    here, judge = line(name), OBJECTIVES[name][objective]
+    assert here.steepness(judge) > 0.005
+    assert here.miss(judge) < 1e-5
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_taylor_remainders_are_quadratic(name: str) -> None:
+    for objective in ("energy", "normal forces"):
+        assert 1.9 < line(name).taylor_rate(OBJECTIVES[name][objective]) < 2.1

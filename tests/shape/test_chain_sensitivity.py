@@ -1,0 +1,87 @@
+"""Derivatives of a chain by both its crowns, in every regime of contact, beside difference quotients."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from fenics_contact.contact import Status
+from fenics_contact.scene import Coulomb
+from tests.shape.cases import Friction, chain_problem, objectives
+from tests.shape.quotients import Line
+
+#: Friction law and step of the difference quotients. Where every point slips, friction alone holds link 2 and
+#: everything depends on the design most nonlinearly.
+REGIMES: dict[str, tuple[Friction, float]] = {
+    "frictionless": (None, 3e-4),
+    "slip": (Coulomb(0.1), 1e-5),
+    "mixed": (Coulomb(0.3), 3e-4),
+    "stick": (Coulomb(4.0), 3e-4),
+}
+OBJECTIVES = objectives("link1")
+CASES = [
+    (regime, objective)
+    for regime in REGIMES
+    for objective in OBJECTIVES
+    if (regime, objective) != ("frictionless", "friction forces")
+]
+
+
+@lru_cache(maxsize=None)
+def line(regime: str) -> Line:
+    friction, step = REGIMES[regime]
+    problem = chain_problem(friction)
+    rng = np.random.default_rng(1)
+    alpha = 0.03 * rng.standard_normal(problem.size)
+    return Line(problem, alpha, rng.standard_normal(problem.size), step)
+
+
+@pytest.mark.parametrize("regime", REGIMES)
+def test_each_regime_is_what_its_name_says_all_along_the_line(regime: str) -> None:
+    contact = line(regime).state().contact
+    sticks, slips = contact.count(Status.STICK), contact.count(Status.SLIP)
+    assert contact.count(Status.OPEN) > 5
+    match regime:
+        case "frictionless":
+            assert slips > 5
+            assert np.all(contact.friction_force == 0.0)
+        case "slip":
+            assert (sticks, slips > 5) == (0, True)
+            assert np.abs(contact.friction_force).max() > 0.01 * contact.normal_force.max()
+        case "stick":
+            assert (sticks > 5, slips) == (True, 0)
+        case "mixed":
+            assert min(sticks, slips) > 1
+    assert line(regime).is_smooth()
+
+
+@pytest.mark.parametrize(("regime", "objective"), CASES)
+def test_the_adjoint_agrees_with_central_differences(regime: str, objective: str) -> None:
+    here, judge = line(regime), OBJECTIVES[objective]
+    assert here.point(judge).weak.contacts == here.point(judge).weak.discs == 0
+    assert here.steepness(judge) > 0.02
+    assert here.relative_slope(judge) > 1e-3
+    assert here.miss(judge) < 1e-5
+
+
+@pytest.mark.parametrize(("regime", "objective"), CASES)
+def test_taylor_remainders_are_quadratic(regime: str, objective: str) -> None:
+    assert 1.9 < line(regime).taylor_rate(OBJECTIVES[objective]) < 2.1
+
+
+def test_the_regimes_have_different_derivatives() -> None:
+    slopes = [line(regime).slope(OBJECTIVES["energy"]) for regime in REGIMES]
+    assert np.abs(np.diff(np.sort(slopes))).min() > 1e-2 * np.abs(slopes).min()
+
+
+def test_one_adjoint_gives_the_derivative_along_every_variable() -> None:
+    here, judge = line("mixed"), OBJECTIVES["stress"]
+    gradient = here.point(judge).gradient
+    assert gradient.shape == (18,)
+    # A variable of the master and one of the slave that matter.
+    for part in (slice(0, 12), slice(12, 18)):
+        variable = part.start + int(np.argmax(np.abs(gradient[part])))
+        alone = Line(here.problem, here.alpha, np.eye(18)[variable], here.step)
+        assert alone.quotient(judge) == pytest.approx(gradient[variable], rel=1e-5)

@@ -1,0 +1,39 @@
+"""States to draw: solved once, looked at by many tests."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from matplotlib.image import imread
+from mpi4py import MPI
+
+from fenics_contact.contact import State, Status, solve_scene
+from fenics_contact.scene import Coulomb
+from tests.contact.gallery import partitions, two_blocks
+
+
+@lru_cache(maxsize=2)
+def touching_blocks(cell: str = "hexahedron") -> State:
+    """Two blocks in frictional contact, with open, sticking and slipping points."""
+    scene = two_blocks(Coulomb(0.4), cell)
+    state = solve_scene(scene, partitions(scene), MPI.COMM_SELF)
+    assert all(state.contact.count(status) > 0 for status in Status), "some status is missing"
+    return state
+
+
+def pixels(path: Path) -> np.ndarray:
+    """Read a picture, (height, width, 3) in [0, 1]."""
+    return np.asarray(imread(path))[..., :3]
+
+
+def painted(image: np.ndarray) -> float:
+    """Return the fraction of pixels that are not white."""
+    return float(np.mean(np.any(image < 0.98, axis=-1)))
+
+
+def contains(image: np.ndarray, colour: str, tolerance: float = 0.02) -> bool:
+    """Whether a colour "#rrggbb" is found in more than ten pixels."""
+    wanted = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    return int(np.sum(np.all(np.abs(image - wanted) < tolerance, axis=-1))) > 10

@@ -1,0 +1,158 @@
+"""Pictures of subdomains, control nets and optimisations."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry import DesignSurface, block, box_partition
+from fenics_contact.scene import Body, IsotropicElasticity, Scene
+from fenics_contact.viz import plot_control_net, plot_convergence, plot_decomposition
+from fenics_contact.viz.curved_net import PIECES, curved_net
+from tests.viz.states import contains, painted, pixels
+
+SMALL = 320
+STEEL = IsotropicElasticity(2.1e5, 0.3)
+
+
+def two_bodies() -> tuple[Scene, dict[str, np.ndarray]]:
+    """Two blocks side by side, of four and two subdomains."""
+    first, second = block((0, 0, 0), (2, 1, 1), (4, 2, 2)), block((2.2, 0, 0), (4, 1, 1), (4, 2, 2))
+    partitions = {"first": box_partition(first, (2, 1, 2)), "second": box_partition(second, (2, 1, 1))}
+    return Scene({"first": Body(first, STEEL), "second": Body(second, STEEL)}), partitions
+
+
+def test_decomposition_shows_every_subdomain_in_the_colours_of_its_body(tmp_path: Path) -> None:
+    image = pixels(plot_decomposition(*two_bodies(), tmp_path / "parts.png", width=SMALL))
+    assert image.shape[1] == SMALL
+    assert painted(image) > 0.3
+    hues = image[np.ptp(image, axis=-1) > 0.25]
+    assert len(hues) > 100
+    cool, warm = np.mean(hues[:, 2] > hues[:, 0]), np.mean(hues[:, 0] > hues[:, 2])
+    assert cool > 0.2, "the first body is blue and green"
+    assert warm > 0.2, "the second is yellow, orange or red"
+
+
+def test_exploded_subdomains_show_what_is_behind_them(tmp_path: Path) -> None:
+    whole = pixels(plot_decomposition(*two_bodies(), tmp_path / "whole.png", width=SMALL))
+    exploded = pixels(plot_decomposition(*two_bodies(), tmp_path / "exploded.png", width=SMALL, explode=0.3))
+    assert painted(exploded) < painted(whole) - 0.05
+
+
+def test_decomposition_refuses_partitions_that_do_not_fit(tmp_path: Path) -> None:
+    scene, partitions = two_bodies()
+    with pytest.raises(InvalidInputError, match=r"partitions\['second'\] must have shape \(16,\).*got none"):
+        plot_decomposition(scene, {"first": partitions["first"]}, tmp_path / "parts.png")
+    with pytest.raises(InvalidInputError, match=r"partitions\['first'\] must have shape \(16,\).*got \(3,\)"):
+        plot_decomposition(scene, {**partitions, "first": np.zeros(3, int)}, tmp_path / "parts.png")
+    with pytest.raises(InvalidInputError, match=r"explode must be at least 0 and below 1, got 1"):
+        plot_decomposition(scene, partitions, tmp_path / "parts.png", explode=1.0)
+    assert not list(tmp_path.iterdir())
+
+
+def roof() -> tuple[DesignSurface, np.ndarray]:
+    """A bent sheet of 9 x 5 nodes as a design surface, and its points."""
+    s, t = (x.ravel() for x in np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 5), indexing="ij"))
+    points = np.column_stack([4 * s, 2 * t, np.sin(np.pi * s)])
+    normals = np.column_stack([-np.pi / 4 * np.cos(np.pi * s), 0 * s, np.ones(45)])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    return DesignSurface(np.arange(45), np.column_stack([s, t]), normals, (9, 5)), points
+
+
+def moved_roof() -> tuple[DesignSurface, tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """The sheet and a net of 5 x 3 control points, both before and after."""
+    design, points = roof()
+    bump = np.sin(np.pi * design.parameters[:, 0])[:, None] * design.directions
+    net = points.reshape(9, 5, 3)[::2, ::2]
+    return design, (points, points + 0.1 * bump), (net, net + 0.1 * bump.reshape(9, 5, 3)[::2, ::2])
+
+
+def test_control_net_is_drawn_before_and_after(tmp_path: Path) -> None:
+    image = pixels(plot_control_net(*moved_roof(), tmp_path / "net.png", width=600))
+    assert image.shape[1] == 600
+    before, after = image[:, :270], image[:, 270:540]
+    assert painted(before) > 0.1
+    violet = [np.mean(part[..., 2] - part[..., 1] > 0.1) for part in (before, after)]
+    assert violet[0] < 0.005, "nothing has moved before"
+    assert violet[1] > 0.03, "outward movement is violet"
+
+
+def test_magnified_movement_is_seen_larger(tmp_path: Path) -> None:
+    once, often = (
+        pixels(plot_control_net(*moved_roof(), tmp_path / f"{factor}.png", width=SMALL, magnify=factor))
+        for factor in (1.0, 10.0)
+    )
+    assert once.shape[0] < often.shape[0], "the frame holds the magnified movement"
+
+
+def test_a_net_that_does_not_move_is_drawn_too(tmp_path: Path) -> None:
+    design, points, net = moved_roof()
+    still = plot_control_net(design, (points[0],) * 2, (net[0],) * 2, tmp_path / "net.png", width=SMALL)
+    assert painted(pixels(still)) > 0.1
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda p, n: ((p[0], p[1] * np.nan), n), r"points\[1\] must be finite, got NaN"),
+        (lambda p, n: (p, (n[0][0], n[1])), r"net\[0\] must have shape \(n_s, n_t, 3\), got \(3, 3\)"),
+        (lambda p, n: (p, (n[0], n[1][:2])), r"before and after must have the same shapes.*\(2, 3, 3\)"),
+        (lambda p, n: ((p[0], p[1][:, :2]), n), r"points\[1\] must have shape \(n_nodes, 3\), got \(45, 2\)"),
+    ],
+)  # fmt: skip
+def test_control_net_refuses_arrays_that_do_not_fit(change: Any, message: str, tmp_path: Path) -> None:
+    design, points, net = moved_roof()
+    with pytest.raises(InvalidInputError, match=message):
+        plot_control_net(design, *change(points, net), tmp_path / "net.png")
+
+
+@pytest.mark.parametrize("counts", [(5, 3), (1, 3), (1, 1)])
+def test_bars_of_a_net_end_at_its_points_and_lie_on_a_surface_that_holds_them(
+    counts: tuple[int, int],
+) -> None:
+    _, points = roof()
+    grid = points.reshape(9, 5, 3)
+    rows, columns = (
+        np.linspace(0, size - 1, count).astype(int) if count > 1 else [size // 2]
+        for size, count in zip((9, 5), counts, strict=True)
+    )
+    net = grid[np.ix_(rows, columns)]
+    curve, pairs = curved_net(grid, net)
+    for place in net.reshape(-1, 3):
+        assert np.linalg.norm(curve - place, axis=1).min() < 1e-14
+    assert len(pairs) == PIECES * (counts[0] * (counts[1] - 1) + (counts[0] - 1) * counts[1])
+    height = np.interp(curve[:, 0], grid[:, 0, 0], grid[:, 0, 2])
+    np.testing.assert_allclose(curve[:, 2], height, atol=1e-14)
+
+
+HISTORY = [-100.0, -110.0, -105.0, np.nan, -112.0], ["start", "serious", "null", "rejected", "serious"]
+
+
+def test_convergence_marks_serious_and_null_steps(tmp_path: Path) -> None:
+    image = pixels(plot_convergence(*HISTORY, tmp_path / "history.png", width=600, title="Chain"))
+    assert image.shape[1] == 600
+    assert contains(image, "#0072b2"), "serious steps"
+    assert contains(image, "#d55e00", 0.1), "null steps"
+    plain = pixels(plot_convergence([3.0], ["start"], tmp_path / "start.png", width=600))
+    assert not contains(plain, "#d55e00", 0.1)
+
+
+@pytest.mark.parametrize(
+    ("values", "kinds", "message"),
+    [
+        ([1.0, 2.0], ["start"], r"one entry for each evaluation, got \(2,\) and \(1,\)"),
+        ([1.0], ["begin"], r"kinds must be among .* got \['begin'\]"),
+        ([1.0], ["null"], r'a history begins with its "start", got none'),
+        ([1.0, np.nan], ["start", "serious"], r"must be finite wherever it was not rejected"),
+    ],
+)
+def test_convergence_refuses_a_history_that_is_none(
+    values: list[float], kinds: list[str], message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        plot_convergence(values, kinds, tmp_path / "history.png")
+    assert not list(tmp_path.iterdir())
