@@ -13,7 +13,6 @@ from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.numbering import DualNumbering
 from fenics_contact.feti.subdomain import Subdomain
 
-
 #: Share of its diagonal added to the contact block of B Bᵀ. A node in two contact pairs has more rows than
 #: displacements, which makes the block singular; elsewhere so small a share changes nothing.
 REGULARISATION = 1e-4

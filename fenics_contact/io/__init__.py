@@ -4,7 +4,7 @@ On several ranks rank 0 writes (XDMF: all ranks together), and all raise if one 
 """
 
 from fenics_contact.io.json_file import write_json
-from fenics_contact.io.versions import versions
+from fenics_contact.io.provenance import versions
 from fenics_contact.io.vtu import write_vtu
 from fenics_contact.io.xdmf import write_xdmf
 

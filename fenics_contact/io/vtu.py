@@ -33,7 +33,7 @@ def write_vtu(state: State, folder: str | Path, name: str = "state") -> Path:
     Raises:
         InvalidInputError: If the name holds a folder.
     """
-    if not name or Path(name).name != name:
+    if not name.strip(".") or Path(name).name != name:
         raise InvalidInputError(
             f"name must be the beginning of a file's name, got {name!r}: put folders into folder"
         )

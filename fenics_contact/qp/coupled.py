@@ -64,7 +64,8 @@ class ObliqueProjector:
 class CoupledSystem:
     """(Wᵀ F Z + κ) y = Wᵀ d + (G W)ᵀ α on {G Z y = load}, unsymmetric where discs slip.
 
-    Newton's step tests with the face's own basis W = Z_s and moves the multiplier along Z = Z_u = Z_s + growth:
+    Newton's step tests with the face's own basis W = Z_s and moves the multiplier along Z = Z_u = Z_s +
+    growth:
     a column of a normal multiplier carries the friction μ ŵ that slips with it. The adjoint swaps the two.
 
     Attributes:

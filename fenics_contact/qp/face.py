@@ -103,7 +103,8 @@ class Face:
     def growth(self, rate: Vector) -> sp.csr_matrix:
         """Return how slipping forces grow with their normal forces, shape (size, n_face).
 
-        Entries ``rate`` · ŵ in the tangential rows of a slipping disc, in the column of its normal multiplier.
+        Entries ``rate`` · ŵ in the tangential rows of a slipping disc, in the column of its normal
+        multiplier.
 
         Args:
             rate: dΨ/dλ_N of each disc, shape (n_friction,), owned.

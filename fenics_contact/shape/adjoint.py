@@ -29,7 +29,12 @@ class Adjoint:
 
 
 def solve_adjoint(
-    state: State, partials: Partials, linearised: LinearisedFace, *, tolerance: float = 1e-9, max_iterations: int = 500
+    state: State,
+    partials: Partials,
+    linearised: LinearisedFace,
+    *,
+    tolerance: float = 1e-9,
+    max_iterations: int = 500,
 ) -> Adjoint:
     """Solve the transpose of the linearised state equations. Collective.
 
@@ -37,8 +42,8 @@ def solve_adjoint(
 
         K w + Bᵀ Z_s z = ∂J/∂u,      Z_uᵀ B w − κ z = Z_uᵀ ∂J/∂λ.
 
-    Eliminating w leaves (Z_uᵀ F Z_s + κ) z − (G Z_u)ᵀ β = Z_uᵀ (B K⁺ ∂J/∂u − ∂J/∂λ) under G Z_s z = Rᵀ ∂J/∂u: the
-    system of a Newton step with its two bases swapped.
+    Eliminating w leaves (Z_uᵀ F Z_s + κ) z − (G Z_u)ᵀ β = Z_uᵀ (B K⁺ ∂J/∂u − ∂J/∂λ) under G Z_s z = Rᵀ ∂J/∂u,
+    the system of a Newton step with its two bases swapped.
 
     Args:
         state: A converged state.
@@ -55,8 +60,8 @@ def solve_adjoint(
     transposed = CoupledSystem.build(face_system, problem.coarse, linearised.moving, linearised.tested)
     if transposed is None:
         raise ConvergenceError(
-            "the adjoint needs a contact face that holds every body, but some body can slide away without resistance "
-            "from this state: choose WeakChoice.HELD, or a design away from this one"
+            "the adjoint needs a contact face that holds every body, but from this state some body can slide "
+            "without resistance: choose WeakChoice.HELD, or a design away from this one"
         )
     flexed = system.inverse(partials.by_displacement)
     right = linearised.moving.T @ (system.jump(flexed) - partials.by_multiplier)
@@ -69,8 +74,9 @@ def solve_adjoint(
     solved = projected_gmres(transposed, gradient, weights, tolerance * scale, max_iterations)
     if solved.stop is not Stop.CONVERGED:
         raise ConvergenceError(
-            f"the adjoint needs a relative residual below {tolerance:.1e}, reached {solved.measure / scale:.1e} after "
-            f"{solved.iterations} iterations ({solved.stop.value}): raise max_iterations or loosen the tolerance"
+            f"the adjoint needs a relative residual below {tolerance:.1e}, reached "
+            f"{solved.measure / scale:.1e} after {solved.iterations} iterations ({solved.stop.value}): "
+            "raise max_iterations or loosen the tolerance"
         )
     multiplier = linearised.tested @ (start + solved.step)
     final = gradient + transposed.operate(solved.step, solved.product)

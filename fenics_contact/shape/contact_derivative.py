@@ -66,7 +66,10 @@ def contact_by_shape(state: State, adjoint: Adjoint, by_bound: np.ndarray) -> np
             continue
         master = surface_of(torn.scene, pair.master)
         by = PointDerivatives(
-            gap, derivatives.normal[mine], derivatives.tangents[mine], derivatives.weight[mine][:, : master.corners]
+            gap,
+            derivatives.normal[mine],
+            derivatives.tangents[mine],
+            derivatives.weight[mine][:, : master.corners],
         )
         by_slave, by_master = projection_pulled_back(
             master, points.facet[mine], points.local[mine], points.gap[mine], by
@@ -92,7 +95,9 @@ def _row_fields(state: State, adjoint: Adjoint) -> RowFields:
     system = state.system
     torn = system.torn
     points, tearing = torn.points, torn.decomposition.tearing
-    normal = np.stack([torn.numbering.gather(x, torn.normal_rows) for x in (state.solution.multiplier, adjoint.multiplier)])
+    normal = np.stack(
+        [torn.numbering.gather(x, torn.normal_rows) for x in (state.solution.multiplier, adjoint.multiplier)]
+    )
     friction = np.zeros((2, points.count, 2))
     for k, x in enumerate((state.solution.multiplier, adjoint.multiplier)):
         friction[k, torn.frictional] = torn.numbering.gather(x, torn.tangential_rows.ravel()).reshape(-1, 2)
@@ -122,10 +127,12 @@ def nodal_means(state: State, field: np.ndarray, nodes: np.ndarray) -> np.ndarra
 
 
 def _by_point(state: State, rows: RowFields) -> PointDerivatives:
-    """Differentiate −λᵀ B w − ζᵀ B u + ζ_N g with B_N v = −n·rel(v), B_T v = t·rel(v), rel(v) = v_s − Σ w_j v_j."""
+    """Differentiate −λᵀ B w − ζᵀ B u + ζ_N g; rows −n·rel(v) and t·rel(v), rel(v) = v_s − Σ w_j v_j."""
     points = state.system.torn.points
     normal = np.einsum("kn,knd->nd", rows.normal, rows.relative)
     tangents = -np.einsum("kna,knd->nad", rows.friction, rows.relative)
-    pulled = -rows.normal[:, :, None] * points.normal + np.einsum("kna,nad->knd", rows.friction, points.tangents)
+    pulled = -rows.normal[:, :, None] * points.normal + np.einsum(
+        "kna,nad->knd", rows.friction, points.tangents
+    )
     weight = np.einsum("knd,knjd->nj", pulled, rows.master)
     return PointDerivatives(rows.normal[1], normal, tangents, weight)

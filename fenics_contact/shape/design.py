@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
 from scipy.spatial import cKDTree
 
 from fenics_contact.errors import InvalidInputError
@@ -21,13 +20,15 @@ class SurfaceDesign:
     """A net of control points over a design surface; each moves along the surface's normals.
 
     Design variable k displaces the surface by B_k(s, t) times the outward unit normal of the reference
-    surface, B_k a tensor-product Bernstein polynomial. α = 0 is the reference shape, positive α adds material.
+    surface, B_k a tensor-product Bernstein polynomial. α = 0 is the reference shape, positive α adds
+    material.
 
     Attributes:
         body: Name of the body.
         surface: Nodes of the surface, their parameters and directions.
         net: Number of control points along s and t.
-        transition: Width of the strip of boundary around the surface that follows it smoothly; the rest of the
+        transition: Width of the strip of boundary around the surface that follows it smoothly; the rest of
+        the
             boundary keeps its place, [length]. By default 0.15 times the extent of the surface.
     """
 
@@ -39,7 +40,9 @@ class SurfaceDesign:
     def __post_init__(self) -> None:
         """Refuse a net without points or with more points than the surface has nodes."""
         if min(self.net) < 1:
-            raise InvalidInputError(f"a net needs at least one control point each way, got {self.net}: try (7, 4)")
+            raise InvalidInputError(
+                f"a net needs at least one control point each way, got {self.net}: try (7, 4)"
+            )
         if any(points > nodes for points, nodes in zip(self.net, self.surface.counts, strict=True)):
             raise InvalidInputError(
                 f"a net of {self.net} control points needs at least as many nodes each way, the surface has "

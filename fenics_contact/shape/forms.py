@@ -11,7 +11,7 @@ import ufl
 from fenics_contact import _dolfinx
 from fenics_contact.feti import TornSystem
 from fenics_contact.feti.forms import Template, as_tractions, load_work, scalar_constants, volume_measure
-from fenics_contact.scene import BodyForce, Body, Load, Material
+from fenics_contact.scene import Body, BodyForce, Load, Material
 
 #: Builds an integrand (UFL) from a displacement u, the coordinate x and the stress σ(u).
 Integrand = Callable[[Any, Any, Any], Any]
@@ -28,8 +28,10 @@ class ShapeForms:
         self._comm = torn.decomposition.comm
         self._templates: dict[tuple[Any, ...], Template] = {}
 
-    def get(self, key: tuple[Any, ...], build: Callable[[], tuple[Any, Sequence[Any], Sequence[Any]]]) -> Template:
-        """Return the template under ``key``, compiling what ``build`` returns (form, constants, coefficients)."""
+    def get(
+        self, key: tuple[Any, ...], build: Callable[[], tuple[Any, Sequence[Any], Sequence[Any]]]
+    ) -> Template:
+        """Return the template under ``key``; ``build`` gives form, constants, coefficients to compile."""
         if key not in self._templates:
             self._templates[key] = Template(self._comm, *build())
         return self._templates[key]
@@ -55,7 +57,9 @@ class ShapeForms:
 
         return self.get(("body force by shape", cell_type), build)
 
-    def functional(self, name: str, integrand: Integrand, material: Material, cell_type: str, by: str) -> Template:
+    def functional(
+        self, name: str, integrand: Integrand, material: Material, cell_type: str, by: str
+    ) -> Template:
         """∫ integrand(u, x, σ) dx itself (by="value"), or its derivative by="displacement" or by="shape"."""
 
         def build() -> tuple[Any, Sequence[Any], Sequence[Any]]:

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from fenics_contact.contact import State
 from fenics_contact.qp import Face, classify, contact_step
 
-#: A contact point is weakly active when its distance from the switch is below this fraction of the force scale.
+#: A contact point is weakly active when it is closer to the switch than this fraction of the force scale.
 WEAK_TOLERANCE = 1e-7
 
 
@@ -100,7 +100,7 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
 
 
 def _growth(face: Face, starting: np.ndarray, coefficient: np.ndarray) -> sp.csr_matrix:
-    """Return how slipping forces grow with their normal forces, and those that start to, shape (n_owned, n_face).
+    """Return how slipping forces grow with their normal forces, and those that start to.
 
     A Coulomb disc has no radius where its contact is weak. When the contact closes, its force grows along the
     slip: it has a direction and no offset, hence no column of its own; such columns come last.

@@ -40,7 +40,8 @@ class HarmonicExtension:
         both = np.intersect1d(moving, held)
         if len(both):
             raise InvalidInputError(
-                f"the design surface must keep away from supports and loads, but {len(both)} nodes of body {name!r} "
+                f"the design surface must keep away from supports and loads, but {len(both)} nodes of "
+                f"body {name!r} "
                 "lie on both: choose another surface"
             )
         self.moving = moving
@@ -71,7 +72,7 @@ class HarmonicExtension:
         return ksp
 
     def extend(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the displacement of all nodes, shape (n_nodes, 3), from that of the moving ones. Collective."""
+        """Return the displacement of all nodes, shape (n_nodes, 3), given the moving ones'. Collective."""
         prescribed, right = self._laplacian.createVecs()
         solution = right.duplicate()
         result = np.zeros((len(self._rows), 3))
@@ -114,4 +115,3 @@ class HarmonicExtension:
         """Return all entries of a distributed vector on every rank."""
         comm = vector.getComm().tompi4py()
         return np.concatenate(comm.allgather(vector.array_r))
-

@@ -102,7 +102,8 @@ class VolumeIntegral:
         body, torn, u = self._body(state), state.system.torn, state.torn_displacement
         cell_type = body.mesh.cell_type
         by_shape, by_displacement = (
-            forms.functional(self.name, self.integrand, body.material, cell_type, by) for by in ("shape", "displacement")
+            forms.functional(self.name, self.integrand, body.material, cell_type, by)
+            for by in ("shape", "displacement")
         )
 
         def assemble(template: Any, name: str, space: Any, functions: Any) -> np.ndarray:
@@ -113,7 +114,9 @@ class VolumeIntegral:
         def shape(_: Body, name: str, space: Any, functions: Any) -> np.ndarray:
             return assemble(by_shape, name, space, functions)
 
-        gradient = [assemble(by_displacement, name, space, fs) for name, space, _, fs in subdomain_fields(torn, [u])]
+        gradient = [
+            assemble(by_displacement, name, space, fs) for name, space, _, fs in subdomain_fields(torn, [u])
+        ]
         nothing = np.zeros(len(torn.numbering.owned))
         return Partials(
             self.value(state, forms), np.concatenate(gradient), nothing, sum_over_subdomains(torn, [u], shape)
@@ -123,7 +126,8 @@ class VolumeIntegral:
         bodies = state.scene.bodies
         if self.body not in bodies:
             raise InvalidInputError(
-                f"VolumeIntegral.body must name a body of the scene, got {self.body!r}, there are {sorted(bodies)}"
+                f"VolumeIntegral.body must name a body of the scene, got {self.body!r}, there are "
+                f"{sorted(bodies)}"
             )
         return bodies[self.body]
 
@@ -165,7 +169,9 @@ class ContactForces:
             position = system.positions(rows)
             by_multiplier[position[position >= 0]] = values[position >= 0]
         nodes = int(torn.decomposition.tearing.node_offset[-1])
-        return Partials(float(value), np.zeros(len(state.torn_displacement)), by_multiplier, np.zeros((nodes, 3)))
+        return Partials(
+            float(value), np.zeros(len(state.torn_displacement)), by_multiplier, np.zeros((nodes, 3))
+        )
 
 
 def _parts(state: State) -> Any:

@@ -124,7 +124,9 @@ class ShapeProblem:
         """Return the coordinates of the designed bodies, body name -> (n_nodes, 3), [length]. Collective."""
         alpha = np.asarray(alpha, dtype=float)
         if alpha.shape != (self.size,):
-            raise InvalidInputError(f"alpha must have shape ({self.size},), got {alpha.shape}: one number a control point")
+            raise InvalidInputError(
+                f"alpha must have shape ({self.size},), got {alpha.shape}: one number a control point"
+            )
         points: dict[str, np.ndarray] = {}
         for design, motion, part in zip(self.designs, self._motions, self._split(alpha), strict=True):
             start = points.get(design.body, self.scene.bodies[design.body].mesh.points)
@@ -179,7 +181,12 @@ class ShapeProblem:
         # Ranks must take the same decisions: rounding in sums over ranks may not tell them apart.
         value, gradient = comm.bcast((partials.value, gradient))
         point = DesignPoint(
-            np.array(alpha, dtype=float), value, gradient, state, linearised.weak, state.system.products - before
+            np.array(alpha, dtype=float),
+            value,
+            gradient,
+            state,
+            linearised.weak,
+            state.system.products - before,
         )
         logger.info("design %d: J = %.9g, %d products", self.evaluations, value, state.system.products)
         self.last = point
@@ -199,7 +206,9 @@ class ShapeProblem:
             by_points[tearing.global_nodes(name, np.arange(mesh.n_nodes))] = volume_by_points(mesh)
         return total, self._by_design(by_points)
 
-    def _by_points(self, state: State, adjoint: Adjoint, by_shape: np.ndarray, by_bound: np.ndarray) -> np.ndarray:
+    def _by_points(
+        self, state: State, adjoint: Adjoint, by_shape: np.ndarray, by_bound: np.ndarray
+    ) -> np.ndarray:
         """Sum the objective's own derivative, −wᵀ(δK u − δf) and the contact points' share over all ranks."""
         torn = state.system.torn
         work = work_by_shape(self._shape_forms(state), torn, state.torn_displacement, adjoint.displacement)
@@ -225,10 +234,16 @@ class ShapeProblem:
     def _motion(self, design: SurfaceDesign) -> HarmonicExtension:
         scene, name = self.scene, design.body
         if name not in scene.bodies:
-            raise InvalidInputError(f"a design names body {name!r}, the scene has {sorted(scene.bodies)}: use one of them")
+            raise InvalidInputError(
+                f"a design names body {name!r}, the scene has {sorted(scene.bodies)}: use one of them"
+            )
         body = scene.bodies[name]
         surfaces = {part.surface for part in scene.supports if part.body == name}
-        surfaces |= {load.surface for load in scene.loads if load.body == name and not isinstance(load, BodyForce)}
+        surfaces |= {
+            load.surface for load in scene.loads if load.body == name and not isinstance(load, BodyForce)
+        }
         held = [body.mesh.surfaces[surface].ravel() for surface in sorted(surfaces)]
         held.append(design.nodes_beyond_transition(body.mesh))
-        return HarmonicExtension(self.decomposition, name, body, design.surface.nodes, np.unique(np.concatenate(held)))
+        return HarmonicExtension(
+            self.decomposition, name, body, design.surface.nodes, np.unique(np.concatenate(held))
+        )

@@ -11,8 +11,8 @@ from fenics_contact.geometry import BodyMesh, boundary_faces
 def volume_by_points(mesh: BodyMesh) -> np.ndarray:
     """Return the derivative of the volume by every node, shape (n_nodes, 3), [length²].
 
-    Moving the boundary by v changes the volume by ∫ v·n dA, so that only boundary nodes count; two Gauss points
-    a direction integrate this exactly on bilinear faces.
+    Moving the boundary by v changes the volume by ∫ v·n dA, so that only boundary nodes count; two Gauss
+    points a direction integrate this exactly on bilinear faces.
     """
     faces, _ = boundary_faces(mesh.cells)
     corners, result = mesh.points[faces], np.zeros_like(mesh.points)

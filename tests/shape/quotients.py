@@ -92,6 +92,10 @@ class Line:
         gradient = self.point(objective).gradient
         return abs(self.slope(objective)) / float(np.linalg.norm(gradient) * np.linalg.norm(self.direction))
 
+    def relative_slope(self, objective: Objective) -> float:
+        """By how much of itself the objective changes along a unit of length of v."""
+        return abs(self.slope(objective) / self.value(objective)) / float(np.linalg.norm(self.direction))
+
     def multiples(self) -> tuple[float, ...]:
         return (-1.0, 0.0, 1.0, *self.taylor)
 

@@ -133,11 +133,11 @@ HISTORY = [-100.0, -110.0, -105.0, np.nan, -112.0], ["start", "serious", "null",
 
 
 def test_convergence_marks_serious_and_null_steps(tmp_path: Path) -> None:
-    image = pixels(plot_convergence(*HISTORY, tmp_path / "history.png", width=600, title="Chain"))
-    assert image.shape[1] == 600
+    image = pixels(plot_convergence(*HISTORY, tmp_path / "history.png", width=1200, title="Chain"))
+    assert image.shape[1] == 1200
     assert contains(image, "#0072b2"), "serious steps"
     assert contains(image, "#d55e00", 0.1), "null steps"
-    plain = pixels(plot_convergence([3.0], ["start"], tmp_path / "start.png", width=600))
+    plain = pixels(plot_convergence([3.0], ["start"], tmp_path / "start.png", width=1200))
     assert not contains(plain, "#d55e00", 0.1)
 
 

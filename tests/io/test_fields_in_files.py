@@ -1,0 +1,190 @@
+"""What VTU and XDMF files hold is what the state holds, read back by VTK's own readers and by meshio."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+import pyvista as pv
+
+from fenics_contact.contact import State, Status
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.io import write_vtu, write_xdmf
+from fenics_contact.io.names import file_of_each
+from tests.contact.gallery import partitions
+from tests.io.states import touching_blocks
+
+CELLS = ("hexahedron", "tetrahedron")
+VTK_CELLS = {"hexahedron": pv.CellType.HEXAHEDRON, "tetrahedron": pv.CellType.TETRA}
+
+
+def assert_same_field(
+    places: np.ndarray, values: np.ndarray, other_places: np.ndarray, others: np.ndarray
+) -> None:
+    """Compare two fields that list the same places in different orders."""
+    first, second = (np.lexsort(np.round(x, 5).T) for x in (places, other_places))
+    np.testing.assert_allclose(places[first], other_places[second], atol=1e-6)
+    np.testing.assert_allclose(values[first], others[second], rtol=1e-6, atol=1e-9)
+
+
+def assert_stress_of(state: State, body: str, grid: pv.DataSet) -> None:
+    """Compare the stress of a file with the state's own, cell by cell."""
+    function = state.von_mises[body]
+    middle = function.function_space.tabulate_dof_coordinates()
+    assert function.x.array.min() > 0
+    stress = grid.cell_data["von_mises"].ravel()
+    assert_same_field(grid.cell_centers().points, stress, middle, function.x.array)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_vtu_files_hold_mesh_displacement_and_stress(cell: str, tmp_path: Path) -> None:
+    state = touching_blocks(cell)
+    read = pv.read(write_vtu(state, tmp_path / "new"))
+    assert read.keys() == ["lower", "upper block"]
+    for name, body in state.scene.bodies.items():
+        np.testing.assert_array_equal(read[name].points, body.mesh.points)
+        np.testing.assert_array_equal(read[name].cells_dict[VTK_CELLS[cell]], body.mesh.cells)
+        displacement = state.gather_displacement(name)
+        assert np.abs(displacement).max() > 0
+        np.testing.assert_array_equal(read[name].point_data["displacement"], displacement)
+        assert_stress_of(state, name, read[name])
+
+
+def test_vtu_files_number_the_subdomains_of_all_bodies(tmp_path: Path) -> None:
+    state = touching_blocks()
+    read = pv.read(write_vtu(state, tmp_path))
+    for first, (name, partition) in zip((0, 2), partitions(state.scene).items(), strict=True):
+        np.testing.assert_array_equal(read[name].cell_data["subdomain"], first + partition)
+        assert len(np.unique(partition)) == 2
+
+
+def test_vtu_files_hold_the_contact_of_the_slave(tmp_path: Path) -> None:
+    state = touching_blocks()
+    contact = state.contact
+    read = pv.read(write_vtu(state, tmp_path))
+    lower, upper = read["lower"].point_data, read["upper block"].point_data
+    for status in Status:
+        assert np.count_nonzero(upper["contact_status"] == status) == contact.count(status) > 0
+    assert np.count_nonzero(upper["contact_status"] >= 0) == contact.points.count
+    np.testing.assert_allclose(upper["contact_force"].sum(axis=0), contact.force.sum(axis=0))
+    np.testing.assert_allclose(np.sort(upper["contact_pressure"])[-5:], np.sort(contact.pressure)[-5:])
+    assert np.all(upper["contact_pressure"][upper["contact_status"] < Status.STICK] < 1e-9)
+    slips = np.linalg.norm(upper["contact_slip"], axis=1)
+    assert slips[upper["contact_status"] == Status.SLIP].min() > 0
+    assert set(lower["contact_status"]) == {-1}
+    assert not np.any(lower["contact_force"])
+
+
+def test_vtu_files_are_read_by_meshio_too(tmp_path: Path) -> None:
+    state = touching_blocks()
+    write_vtu(state, tmp_path, "chain")
+    mesh = meshio.read(tmp_path / "chain_upper_block.vtu")
+    np.testing.assert_array_equal(mesh.point_data["displacement"], state.gather_displacement("upper block"))
+    assert mesh.cells[0].type == "hexahedron"
+
+
+def test_writing_again_replaces_all_files_and_leaves_no_others(tmp_path: Path) -> None:
+    wanted = {"state.vtm", "state_lower.vtu", "state_upper_block.vtu"}
+    for name in wanted:
+        (tmp_path / name).write_text("old")
+    pv.read(write_vtu(touching_blocks(), tmp_path))
+    assert {path.name for path in tmp_path.iterdir()} == wanted
+
+
+@pytest.mark.parametrize("name", ["", "folder/state", ".."])
+def test_a_name_with_a_folder_is_refused(name: str, tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match=r"name must be the beginning of a file's name"):
+        write_vtu(touching_blocks(), tmp_path, name)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_xdmf_files_hold_displacement_and_stress(cell: str, tmp_path: Path) -> None:
+    state = touching_blocks(cell)
+    files = write_xdmf(state, tmp_path / "new" / "state.xdmf")
+    assert {path.name for path in (tmp_path / "new").iterdir()} == {
+        f"state_{body}.{suffix}" for body in ("lower", "upper_block") for suffix in ("xdmf", "h5")
+    }
+    for name, body in state.scene.bodies.items():
+        found = {field: grid for grid in pv.read(files[name]) for field in grid.array_names}
+        assert_stress_of(state, name, found["von_mises"])
+        grid = found["displacement"]
+        displacement = state.gather_displacement(name)
+        assert_same_field(grid.points, grid.point_data["displacement"], body.mesh.points, displacement)
+
+
+def test_xdmf_needs_its_suffix(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match=r"must be an XDMF file, got the name 'state.h5'"):
+        write_xdmf(touching_blocks(), tmp_path / "state.h5")
+    assert not list(tmp_path.iterdir())
+
+
+def test_names_of_bodies_become_different_names_of_files() -> None:
+    files = file_of_each(["a b", "a/b", "ä", "plain-1"], Path("folder"), "s", ".vtu")
+    assert [path.as_posix() for path in files.values()] == [
+        "folder/s_a_b.vtu",
+        "folder/s_a_b_2.vtu",
+        "folder/s__.vtu",
+        "folder/s_plain-1.vtu",
+    ]
+
+
+RANKS = """
+    import sys
+    from pathlib import Path
+    from mpi4py import MPI
+    from fenics_contact.contact import solve_scene
+    from fenics_contact.io import write_json, write_vtu, write_xdmf
+    from tests.contact.gallery import partitions
+    from tests.io.states import blocks
+
+    comm, folder = MPI.COMM_WORLD, Path(sys.argv[1])
+    scene = blocks()
+    state = solve_scene(scene, partitions(scene), comm)
+    write_vtu(state, folder)
+    write_xdmf(state, folder / "state.xdmf")
+    write_json(folder / "ranks.json", {"ranks": comm.size}, comm=comm)
+
+    (folder / "file").touch()
+    comm.barrier()
+    def fails(write):
+        try:
+            write()
+        except Exception as error:
+            return type(error).__name__
+    caught = [
+        fails(lambda: write_vtu(state, folder / "file")),
+        fails(lambda: write_xdmf(state, folder / "file" / "state.xdmf")),
+        fails(lambda: write_json(folder / "nan.json", [float("nan")], comm=comm)),
+    ]
+    everyone = comm.gather(caught)
+    if comm.rank == 0:
+        print(everyone)
+"""
+
+
+def test_two_ranks_write_the_same_files_and_share_their_errors(
+    mpirun: Callable[..., str], tmp_path: Path
+) -> None:
+    answer = mpirun(RANKS, 2, tmp_path)
+    first = "['FileExistsError', 'NotADirectoryError', 'InvalidInputError']"
+    other = "['RemoteError', 'RemoteError', 'InvalidInputError']"
+    assert answer.strip() == f"[{first}, {other}]"
+    state, read = touching_blocks(), pv.read(tmp_path / "state.vtm")
+    for name in state.scene.bodies:
+        near = {"rtol": 1e-3, "atol": 1e-4 * np.abs(state.gather_displacement(name)).max()}
+        one = state.gather_displacement(name)
+        np.testing.assert_allclose(read[name].point_data["displacement"], one, **near)
+        middle = read[name].cell_centers().points
+        stress = {field: grid for grid in pv.read(tmp_path / f"state_{name.replace(' ', '_')}.xdmf")
+                  for field in grid.array_names}["von_mises"]  # fmt: skip
+        written = stress.cell_data["von_mises"].ravel()
+        assert_same_field(stress.cell_centers().points, written, middle, read[name].cell_data["von_mises"])
+    contact = pv.read(tmp_path / "state_upper_block.vtu").point_data["contact_status"]
+    assert [np.count_nonzero(contact == status) for status in Status] == [
+        state.contact.count(status) for status in Status
+    ]
+    assert (tmp_path / "ranks.json").read_text().split() == ["{", '"ranks":', "2", "}"]
+    assert not (tmp_path / "nan.json").exists()

@@ -1,0 +1,34 @@
+"""A result can say what it was computed with."""
+
+from __future__ import annotations
+
+from importlib import metadata
+
+import numpy as np
+import pytest
+
+from fenics_contact import _dolfinx
+from fenics_contact.io import provenance, versions, write_json
+
+
+def test_versions_name_everything_that_computed(tmp_path: object) -> None:
+    found = versions()
+    assert set(found) >= {
+        "python", "numpy", "scipy", "dolfinx", "petsc", "mpi", "gmsh", "pyvista", "fenics_contact"
+    }  # fmt: skip
+    assert found["numpy"] == np.__version__
+    assert found["dolfinx"] == ".".join(map(str, _dolfinx.VERSION))
+    assert found["petsc"].startswith("3.")
+    assert "MPI" in found["mpi"]
+    write_json(f"{tmp_path}/versions.json", found)
+
+
+def test_a_library_that_is_not_there_is_said_to_be_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def nothing(name: str) -> str:
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(metadata, "version", nothing)
+    found = versions()
+    assert found["numpy"] == np.__version__, "where there are no metadata the library itself is asked"
+    monkeypatch.setattr(provenance, "_MODULES", ("no_such_library",))
+    assert versions()["no_such_library"] == "not installed"

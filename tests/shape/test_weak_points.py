@@ -1,0 +1,118 @@
+"""On a switch of the contact law the objective has a slope on either side; each choice gives one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from fenics_contact.contact import ContactResult, Status
+from fenics_contact.scene import Coulomb
+from fenics_contact.shape import ContactForces, Objective, WeakChoice
+from tests.shape.cases import objectives
+from tests.shape.pressed import Pressed, about_to_close, about_to_slip, line
+from tests.shape.quotients import Line
+
+SWITCHES: dict[str, Callable[[], Pressed]] = {
+    "closing, frictionless": lambda: about_to_close(None),
+    "closing with friction": lambda: about_to_close(Coulomb(0.3)),
+    "slipping": about_to_slip,
+}
+#: Weak contacts, weak discs.
+COUNTS = {"closing, frictionless": (1, 0), "closing with friction": (1, 0), "slipping": (0, 1)}
+OBJECTIVES = objectives("block")
+JUDGES = ("stress", "displacement", "normal forces")
+CASES = [(switch, judge) for switch in SWITCHES for judge in JUDGES]
+
+
+@lru_cache(maxsize=None)
+def lines(switch: str) -> dict[WeakChoice, Line]:
+    return {choice: line(SWITCHES[switch](), choice) for choice in WeakChoice}
+
+
+def sided_quotient(here: Line, objective: Objective, sign: float) -> float:
+    """Second-order difference quotient from one side."""
+    start, near, far = (here.value(objective, sign * m) for m in (0.0, 1.0, 2.0))
+    return sign * (-3 * start + 4 * near - far) / (2 * here.step)
+
+
+def held_side(switch: str) -> float:
+    """Towards which side of the line, +1 or −1, the weak point closes or sticks."""
+    here = lines(switch)[WeakChoice.HELD]
+    ahead, behind = (here.state(sign).contact.status for sign in (1.0, -1.0))
+    changed = np.flatnonzero(ahead != behind)
+    assert len(changed) == 1
+    point = int(changed[0])
+    held = Status.STICK if switch == "slipping" else None
+    is_held = [status[point] == held if held else status[point] != Status.OPEN for status in (ahead, behind)]
+    assert sum(is_held) == 1
+    return 1.0 if is_held[0] else -1.0
+
+
+@pytest.mark.parametrize("choice", WeakChoice)
+@pytest.mark.parametrize("switch", SWITCHES)
+def test_weak_points_are_counted_and_their_branch_is_named(switch: str, choice: WeakChoice) -> None:
+    weak = lines(switch)[choice].point(OBJECTIVES["energy"]).weak
+    assert (weak.contacts, weak.discs) == COUNTS[switch]
+    assert weak.choice is choice
+
+
+@pytest.mark.parametrize("switch", SWITCHES)
+def test_away_from_the_switch_no_point_is_weak(switch: str) -> None:
+    here = lines(switch)[WeakChoice.HELD]
+    for side in (1.0, -1.0):
+        weak = here.problem.evaluate_by(OBJECTIVES["energy"], here.at(side)).weak
+        assert (weak.contacts, weak.discs) == (0, 0)
+
+
+@pytest.mark.parametrize(("switch", "judge"), CASES)
+def test_each_choice_gives_the_slope_on_its_side(switch: str, judge: str) -> None:
+    objective, side = OBJECTIVES[judge], held_side(switch)
+    for choice, sign in ((WeakChoice.HELD, side), (WeakChoice.RELEASED, -side)):
+        here = lines(switch)[choice]
+        assert here.slope(objective) == pytest.approx(sided_quotient(here, objective, sign), rel=2e-6)
+
+
+@pytest.mark.parametrize(("switch", "judge"), CASES)
+def test_the_two_slopes_differ(switch: str, judge: str) -> None:
+    held, released = (lines(switch)[choice].slope(OBJECTIVES[judge]) for choice in WeakChoice)
+    assert abs(held - released) > 1e-4 * abs(held)
+
+
+@pytest.mark.parametrize("switch", SWITCHES)
+def test_beside_the_switch_the_choice_does_not_matter(switch: str) -> None:
+    held, released = (
+        here.problem.evaluate_by(OBJECTIVES["stress"], here.at(1.0)).gradient for here in lines(switch).values()
+    )
+    assert held == pytest.approx(released, rel=1e-7)
+
+
+def test_without_friction_the_energy_itself_has_no_kink() -> None:
+    slopes = [here.slope(OBJECTIVES["energy"]) for here in lines("closing, frictionless").values()]
+    assert slopes[0] == pytest.approx(slopes[1], rel=1e-9)
+    assert abs(slopes[0]) > 0.1
+
+
+def resultant(contact: ContactResult) -> tuple[float, np.ndarray, np.ndarray]:
+    count = len(contact.normal_force)
+    return float(contact.normal_force.sum()), np.ones(count), np.zeros((count, 2))
+
+
+@pytest.mark.parametrize("friction", [None, Coulomb(0.3)])
+def test_where_nothing_is_loaded_every_touching_point_is_weak(friction: Coulomb | None) -> None:
+    points = {}
+    for choice in WeakChoice:
+        unloaded = Pressed(friction, 0.0, 0.0).problem(choice)
+        points[choice] = unloaded.evaluate_by(ContactForces(resultant), np.zeros(6))
+    touching = np.count_nonzero(points[WeakChoice.HELD].state.contact.gap == 0.0)
+    assert touching == 4
+    assert [point.weak.contacts for point in points.values()] == [touching, touching]
+    assert np.all(points[WeakChoice.RELEASED].gradient == 0.0)
+    # More material presses the block on the floor.
+    grown = Line(Pressed(friction, 0.0, 0.0).problem(), np.zeros(6), np.ones(6), 1e-6)
+    assert points[WeakChoice.HELD].gradient.sum() == pytest.approx(
+        sided_quotient(grown, ContactForces(resultant), 1.0), rel=1e-6
+    )
+    assert sided_quotient(grown, ContactForces(resultant), -1.0) == 0.0
