@@ -98,12 +98,10 @@ class _ContactBlock:
         place[numbering.owned[self._owned] - n_equality] = starts[comm.rank] + np.arange(len(self._owned))
         place = np.asarray(comm.allreduce(place))[rows[mine] - n_equality].astype(PETSc.IntType)
         gram = (B[mine] @ B[mine].T).tocoo()
+        gram.data[gram.row == gram.col] *= 1.0 + REGULARISATION
         shape = (len(rows), count)
         gram = numbering.sum_rows(sp.csr_matrix((gram.data, (mine[gram.row], place[gram.col])), shape=shape))
         gram = gram[self._owned].tocsr()
-        here = (np.arange(len(self._owned)), starts[comm.rank] + np.arange(len(self._owned)))
-        diagonal = np.asarray(gram[here]).ravel()
-        gram = (gram + sp.csr_matrix((REGULARISATION * diagonal, here), shape=gram.shape)).tocsr()
         size = (len(self._owned), count)
         csr = (gram.indptr.astype(PETSc.IntType), gram.indices.astype(PETSc.IntType), gram.data)
         matrix = PETSc.Mat().createAIJ((size, size), csr=csr, comm=comm)

@@ -41,6 +41,11 @@ def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
     return files
 
 
+#: The name by which readers know the rule that grids include the mesh, and what dolfinx 0.9 writes instead:
+#: ParaView finds no mesh then, and VTK's reader crashes.
+_XINCLUDE, _UNKNOWN = "http://www.w3.org/2001/XInclude", "https://www.w3.org/2001/XInclude"
+
+
 def _write(target: Path, displacement: Any, von_mises: Any) -> None:
     mesh = displacement.function_space.mesh
     comm = mesh.comm
@@ -55,6 +60,7 @@ def _write(target: Path, displacement: Any, von_mises: Any) -> None:
         _dolfinx.write_xdmf(hidden / target.name, mesh, [displacement, von_mises])
         comm.barrier()
         if comm.rank == 0:
+            _repair(hidden / target.name)
             replace_all([hidden / target.with_suffix(".h5").name, hidden / target.name], target.parent)
     except Exception as caught:
         error = caught
@@ -62,3 +68,8 @@ def _write(target: Path, displacement: Any, von_mises: Any) -> None:
         if comm.rank == 0:
             shutil.rmtree(hidden, ignore_errors=True)
     agree(comm, error)
+
+
+def _repair(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace(_UNKNOWN, _XINCLUDE), encoding="utf-8")

@@ -93,7 +93,8 @@ class Coulomb:
                 "friction_coefficient must be finite and not negative, got "
                 f"{coefficient.min()} to {coefficient.max()}"
             )
-        FeasibleSet(self.layout, self.given if np.ndim(self.given) else np.full(expected, self.given))
+        given = np.asarray(self.given, dtype=np.float64)
+        FeasibleSet(self.layout, given if given.ndim else np.full(expected, float(given)))
 
     def bound(self, multiplier: Vector) -> Vector:
         """Return Ψ₀ + μ max(λ_N, 0)."""

@@ -40,7 +40,14 @@ def move_unheld(
         return alpha
     basis, _ = np.linalg.qr(null)
     earlier = coarse.coefficients(before.product - problem.rhs - before.residual)
-    rows = coarse.matrix.T @ basis
-    sums = global_sum(problem.comm, rows.T @ (step[:, None] * rows), rows.T @ multiplier)
-    stiffness, missing = sums[: count**2].reshape(count, count), basis.T @ coarse.load - sums[count**2 :]
-    return alpha + basis @ (basis.T @ (earlier - alpha) + scipy.linalg.pinvh(stiffness) @ missing)
+    rows, m = coarse.matrix.T @ basis, coarse.m
+    sums = global_sum(
+        problem.comm,
+        coarse.matrix.power(2) @ step,
+        rows.T @ multiplier,
+        rows.T @ (step[:, None] * rows),
+    )
+    largest, resultant, stiffness = np.split(sums, (m, m + count))
+    # Motions that no contact row resists at all stay what they are.
+    inverse = scipy.linalg.pinvh(stiffness.reshape(count, count), atol=1e-10 * float(largest.max()))
+    return alpha + basis @ (basis.T @ (earlier - alpha) + inverse @ (basis.T @ coarse.load - resultant))

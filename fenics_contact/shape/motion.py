@@ -50,6 +50,7 @@ class HarmonicExtension:
         form = ufl.inner(ufl.grad(ufl.TrialFunction(V)), ufl.grad(ufl.TestFunction(V)))
         template = Template(mesh.comm, form * volume_measure(body.mesh.cell_type, 2), ())
         space = _dolfinx.scalar_space(mesh, 1)
+        self._space = space  # its mesh owns the matrix's communicator, which must not be freed before
         self._laplacian = _dolfinx.assemble_matrix(template.bind([space, space], ()))
         nodes, dofs = _dolfinx.node_dofs(space)
         self._rows = np.zeros(body.mesh.n_nodes, dtype=PETSc.IntType)

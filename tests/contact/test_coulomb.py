@@ -94,6 +94,18 @@ def test_half_a_symmetric_scene_has_half_the_energy_and_half_the_forces() -> Non
     assert 2 * force[[0, 2]] == pytest.approx(expected[[0, 2]], rel=1e-7)
 
 
+def test_a_body_that_starts_above_its_floor_comes_down_on_it() -> None:
+    low, _ = solved("block on plane")
+    points = low.scene.bodies["block"].mesh.points + np.array([0.0, 0.0, 0.5])
+    high = solve(low.scene.moved({"block": points}))
+    assert high.contact.points.gap.min() == pytest.approx(0.5)
+    assert high.contact.gap.min() > -1e-7
+    size = np.abs(low.contact.force).max()
+    assert np.abs(high.contact.force - low.contact.force).max() < 1e-6 * size
+    fall = high.gather_displacement("block") - low.gather_displacement("block")
+    assert fall == pytest.approx(np.broadcast_to([0.0, 0.0, -0.5], fall.shape), abs=1e-6)
+
+
 @pytest.mark.parametrize("name", ["block on plane", "two blocks, tetrahedra"])
 def test_the_check_of_the_law_notices_a_wrong_answer(name: str) -> None:
     state, reference = solved(name)

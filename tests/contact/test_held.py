@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import check_held, solve_scene
+from fenics_contact.contact import Status, check_held, solve_scene
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.scene import Coulomb, Scene, Support, TotalForce, Tresca
@@ -106,6 +106,16 @@ def test_supports_hold_what_contact_does_not() -> None:
 
 def test_a_scene_that_is_moved_without_any_load_needs_no_holding() -> None:
     check(pressed_block(None))
+
+
+def test_a_body_that_is_just_held_is_solved() -> None:
+    limit = np.hypot(1.0, 0.3) / 2.0  # push over weight
+    scene = block_on_plane(Coulomb(1.0002 * limit))
+    state = solve_scene(scene, partitions(scene), MPI.COMM_SELF)
+    assert state.contact.count(Status.STICK) == 0
+    assert state.contact.count(Status.SLIP) > 0
+    friction = np.linalg.norm(state.contact.force[:, :2].sum(axis=0))
+    assert friction == pytest.approx(limit * state.contact.normal_force.sum(), rel=1e-5)
 
 
 def test_solving_refuses_what_is_not_held() -> None:

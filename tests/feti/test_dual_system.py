@@ -9,8 +9,11 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
+from fenics_contact.feti.dirichlet import REGULARISATION
 from fenics_contact.feti.factor import regularised
-from tests.feti.scenes import CELLS, Cut, clamped_block, ragged_block, touching_blocks
+from fenics_contact.geometry import block, box_partition
+from fenics_contact.scene import Body, ContactPair, Coulomb, RigidPlane, Scene, Surface
+from tests.feti.scenes import CELLS, STEEL, Cut, clamped_block, ragged_block, touching_blocks
 
 
 def dual(cut: Cut) -> DualSystem:
@@ -104,11 +107,27 @@ def test_the_preconditioner_is_the_scaled_schur_complement(system: DualSystem) -
         S[np.ix_(here[b], here[b])] = K[np.ix_(b, b)] - inner
         start += subdomain.mesh.size
     scale = np.eye(len(B))
-    scale[n:, n:] = np.linalg.inv(B[n:] @ B[n:].T)
+    contact = B[n:] @ B[n:].T
+    scale[n:, n:] = np.linalg.inv(contact + REGULARISATION * np.diag(np.diag(contact)))
     expected = scale @ B @ S @ B.T @ scale
     assert system.problem.preconditioner is not None
     M = dense(system, system.problem.preconditioner)
     assert np.abs(M - expected).max() < 1e-10 * np.abs(expected).max()
+
+
+def test_nodes_with_more_rows_than_displacements_leave_the_preconditioner_bounded() -> None:
+    cube, law = block((0, 0, 0), (1, 1, 1), (2, 2, 2)), Coulomb(0.3)
+    walls = [("x0", (1, 0, 0)), ("y0", (0, 1, 0)), ("z0", (0, 0, 1))]
+    pairs = [ContactPair(Surface("cube", side), RigidPlane((0, 0, 0), normal), law) for side, normal in walls]
+    scene = Scene({"cube": Body(cube, STEEL)}, contacts=pairs)
+    system = dual((scene, {"cube": box_partition(cube, (2, 1, 1))}))
+    contact = system.torn.B[system.torn.n_equality :]
+    assert np.linalg.matrix_rank(contact.toarray()) < contact.shape[0] - 20
+    assert system.problem.preconditioner is not None
+    M = dense(system, system.problem.preconditioner)
+    stiffest = max(abs(subdomain.stiffness).max() for subdomain in system.torn.subdomains)
+    assert np.abs(M).max() < 3 * stiffest
+    assert np.abs(M - M.T).max() < 1e-8 * stiffest
 
 
 @pytest.mark.parametrize("cell", CELLS)

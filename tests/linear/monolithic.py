@@ -68,17 +68,11 @@ def _marked(mesh: Any, body: Body, surface: str) -> Any:
     corners = body.mesh.points[body.mesh.surfaces[surface]].mean(axis=1)
     mesh.topology.create_connectivity(2, 3)
     everywhere = dolfinx.mesh.locate_entities_boundary(mesh, 2, lambda x: np.full(x.shape[1], True))
-    midpoints = _midpoints(mesh, everywhere)
+    mesh.topology.create_connectivity(2, 0)
+    midpoints = np.asarray(dolfinx.mesh.compute_midpoints(mesh, 2, everywhere))
     near = np.linalg.norm(midpoints[:, None] - corners[None], axis=2).min(axis=1) < 1e-10
     assert near.sum() == len(corners)
     return dolfinx.mesh.meshtags(mesh, 2, np.sort(everywhere[near]), np.full(near.sum(), 1, dtype=np.int32))
-
-
-def _midpoints(mesh: Any, facets: np.ndarray) -> np.ndarray:
-    if _dolfinx.VERSION < (0, 7):
-        return np.asarray(dolfinx.mesh.compute_midpoints(mesh, 2, facets))
-    mesh.topology.create_connectivity(2, 0)
-    return np.asarray(dolfinx.mesh.compute_midpoints(mesh, 2, facets))
 
 
 def _prescribed(

@@ -8,10 +8,19 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.geometry import BodyMesh, DesignSurface, block
-from fenics_contact.scene import Body, BodyForce, ContactPair, IsotropicElasticity, Scene, Support, Surface, Traction
+from fenics_contact.scene import (
+    Body,
+    BodyForce,
+    ContactPair,
+    IsotropicElasticity,
+    Scene,
+    Support,
+    Surface,
+    Traction,
+)
 from fenics_contact.shape import SurfaceDesign, TotalPotential
 from tests.contact.gallery import FLOOR, Friction, crowned, partitions
-from tests.shape.cases import SOLVER
+from tests.shape.chains import SOLVER
 from tests.shape.quotients import Remembering
 
 RUBBER, PLASTIC = IsotropicElasticity(100.0, 0.3), IsotropicElasticity(300.0, 0.2)
@@ -29,7 +38,9 @@ def side(mesh: BodyMesh, name: str) -> DesignSurface:
     return DesignSurface(nodes[order], parameters[order], np.tile(outward, (len(nodes), 1)), counts)
 
 
-def block_on_floor(friction: Friction, cell: str = "hexahedron", *, load: tuple[float, float, float]) -> Scene:
+def block_on_floor(
+    friction: Friction, cell: str = "hexahedron", *, load: tuple[float, float, float]
+) -> Scene:
     """A crowned block that nothing but a rigid floor holds, loaded on top."""
     mesh = crowned(block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (6, 3, 3), cell), 0.02)
     return Scene(
@@ -39,8 +50,10 @@ def block_on_floor(friction: Friction, cell: str = "hexahedron", *, load: tuple[
     )
 
 
-def block_on_block(friction: Friction, cell: str = "hexahedron", *, load: tuple[float, float, float]) -> Scene:
-    """A heavy crowned block that nothing but the block under it holds; no node of one lies over an edge of the other."""
+def block_on_block(
+    friction: Friction, cell: str = "hexahedron", *, load: tuple[float, float, float]
+) -> Scene:
+    """A heavy crowned block that only the one under it holds; no node lies over an edge of a facet."""
     lower = block((0.0, 0.0, -1.0), (2.0, 1.2, 0.0), (5, 4, 2), cell)
     upper = crowned(block((0.13, 0.07, 0.0), (1.87, 1.09, 0.8), (6, 4, 2), cell), 0.04)
     return Scene(
@@ -54,10 +67,10 @@ def block_on_block(friction: Friction, cell: str = "hexahedron", *, load: tuple[
 def designs_of(scene: Scene) -> tuple[SurfaceDesign, ...]:
     """All contact surfaces of a scene of blocks move."""
     surfaces = [s for pair in scene.contacts for s in (pair.slave, pair.master) if isinstance(s, Surface)]
-    return tuple(
-        SurfaceDesign(s.body, side(scene.bodies[s.body].mesh, s.name), (3, 2)) for s in surfaces
-    )
+    return tuple(SurfaceDesign(s.body, side(scene.bodies[s.body].mesh, s.name), (3, 2)) for s in surfaces)
 
 
 def problem(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF, **more: Any) -> Remembering:
-    return Remembering(scene, partitions(scene), designs_of(scene), TotalPotential(), comm, solver=SOLVER, **more)
+    return Remembering(
+        scene, partitions(scene), designs_of(scene), TotalPotential(), comm, solver=SOLVER, **more
+    )

@@ -1,9 +1,9 @@
-"""A crowned block pressed on a floor so far that one point lies on a switch of the contact law, to rounding."""
+"""A crowned block pressed on a floor so that one point lies on a switch of the contact law, to rounding."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 
@@ -45,7 +45,7 @@ DESIGN = 0.003 * np.random.default_rng(1).standard_normal(6)
 DIRECTION = np.random.default_rng(4).standard_normal(6)
 
 
-@lru_cache(maxsize=None)
+@cache
 def about_to_close(friction: Friction) -> Pressed:
     """Press until the next open point touches without force: the secant method on its gap."""
     start = Pressed(friction, 0.025, 0.004)
@@ -62,9 +62,9 @@ def about_to_close(friction: Friction) -> Pressed:
     raise AssertionError(f"the gap of point {point} must vanish, got {gap}")
 
 
-@lru_cache(maxsize=None)
+@cache
 def about_to_slip() -> Pressed:
-    """Let everything stick and lower the friction coefficient to the largest ratio of friction to normal force."""
+    """Let everything stick, then lower the friction coefficient to the largest ratio of the forces."""
     contact = Pressed(Coulomb(5.0), 0.03, 0.002).contact()
     assert contact.count(Status.SLIP) == 0
     closed = contact.status == Status.STICK

@@ -82,9 +82,7 @@ class Line:
     def taylor_rate(self, objective: Objective) -> float:
         """Order at which J(α + s v) − J(α) − s J'(α; v) vanishes with s."""
         start, slope = self.value(objective), self.slope(objective)
-        near, far = (
-            abs(self.value(objective, m) - start - m * self.step * slope) for m in self.taylor
-        )
+        near, far = (abs(self.value(objective, m) - start - m * self.step * slope) for m in self.taylor)
         return float(np.log(far / near) / np.log(self.taylor[1] / self.taylor[0]))
 
     def steepness(self, objective: Objective) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ import pytest
 from fenics_contact.contact import Status
 from fenics_contact.scene import Coulomb, Scene, Tresca
 from tests.shape.blocks import block_on_block, block_on_floor, problem
-from tests.shape.cases import objectives
+from tests.shape.objectives import objectives
 from tests.shape.quotients import Line
 
 PUSH, DRAG = (0.35, 0.1, -2.0), (0.6, 0.12, -2.0)
@@ -21,17 +21,16 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "floor, Tresca, tetrahedra": lambda: block_on_floor(Tresca(0.6), "tetrahedron", load=PUSH),
     "blocks, Tresca": lambda: block_on_block(Tresca(0.8), load=DRAG),
     "blocks, tetrahedra": lambda: block_on_block(Coulomb(0.38), "tetrahedron", load=DRAG),
-    "weight alone": lambda: block_on_block(Coulomb(0.12), load=(0.0, 0.0, 0.0)),
+    "weight alone": lambda: block_on_block(Coulomb(0.25), load=(0.0, 0.0, 0.0)),
 }
 OBJECTIVES = {scene: objectives("block" if scene.startswith("floor") else "upper") for scene in SCENES}
 
 
-@lru_cache(maxsize=None)
+@cache
 def line(name: str) -> Line:
     blocks = problem(SCENES[name]())
-    rng = np.random.default_rng(1)
-    alpha = 0.01 * rng.standard_normal(blocks.size)
-    return Line(blocks, alpha, rng.standard_normal(blocks.size), 1e-5)
+    alpha = 0.01 * np.random.default_rng(1).standard_normal(blocks.size)
+    return Line(blocks, alpha, np.random.default_rng(6).standard_normal(blocks.size), 1e-5)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -41,15 +40,15 @@ def test_points_stick_slip_and_lift_off_all_along_the_line(name: str) -> None:
     assert line(name).is_smooth()
 
 
-@pytest.mark.parametrize("objective", ["energy", "stress", "displacement", "normal forces", "friction forces"])
+@pytest.mark.parametrize("objective", OBJECTIVES["floor"])
 @pytest.mark.parametrize("name", SCENES)
 def test_the_adjoint_agrees_with_central_differences(name: str, objective: str) -> None:
     here, judge = line(name), OBJECTIVES[name][objective]
-    assert here.steepness(judge) > 0.005
+    assert here.steepness(judge) > 0.02
     assert here.miss(judge) < 1e-5
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_taylor_remainders_are_quadratic(name: str) -> None:
     for objective in ("energy", "normal forces"):
-        assert 1.9 < line(name).taylor_rate(OBJECTIVES[name][objective]) < 2.1
+        assert line(name).taylor_rate(OBJECTIVES[name][objective]) > 1.9

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 import pytest
@@ -12,7 +12,11 @@ from fenics_contact.feti.contact_search import tangent_frames
 from fenics_contact.feti.projection import project
 from fenics_contact.feti.surface import FacetedSurface, faceted_surface, outside, shape_functions
 from fenics_contact.geometry import block
-from fenics_contact.shape.projection_derivative import PointDerivatives, frames_pulled_back, projection_pulled_back
+from fenics_contact.shape.projection_derivative import (
+    PointDerivatives,
+    frames_pulled_back,
+    projection_pulled_back,
+)
 
 CELLS = ("hexahedron", "tetrahedron")
 STEP = 1e-6
@@ -40,11 +44,11 @@ class Setting:
         hit = project(self.slave, np.tile([0.0, 0.0, -1.0], (len(self.slave), 1)), master)
         assert np.array_equal(hit.point, np.arange(len(self.slave)))
         weight, _ = shape_functions(hit.local, master.corners)
-        found = {"gap": hit.gap, "normal": hit.normal, "tangents": tangent_frames(hit.normal), "weight": weight}
-        return hit.facet, found
+        frames = tangent_frames(hit.normal)
+        return hit.facet, {"gap": hit.gap, "normal": hit.normal, "tangents": frames, "weight": weight}
 
 
-@lru_cache(maxsize=None)
+@cache
 def setting(cell: str) -> Setting:
     rng = np.random.default_rng(7)
     mesh = block((0.0, 0.0, -1.0), (2.0, 1.5, 0.0), (5, 4, 1), cell)

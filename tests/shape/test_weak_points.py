@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ import pytest
 from fenics_contact.contact import ContactResult, Status
 from fenics_contact.scene import Coulomb
 from fenics_contact.shape import ContactForces, Objective, WeakChoice
-from tests.shape.cases import objectives
+from tests.shape.objectives import objectives
 from tests.shape.pressed import Pressed, about_to_close, about_to_slip, line
 from tests.shape.quotients import Line
 
@@ -27,7 +27,7 @@ JUDGES = ("stress", "displacement", "normal forces")
 CASES = [(switch, judge) for switch in SWITCHES for judge in JUDGES]
 
 
-@lru_cache(maxsize=None)
+@cache
 def lines(switch: str) -> dict[WeakChoice, Line]:
     return {choice: line(SWITCHES[switch](), choice) for choice in WeakChoice}
 
@@ -84,7 +84,8 @@ def test_the_two_slopes_differ(switch: str, judge: str) -> None:
 @pytest.mark.parametrize("switch", SWITCHES)
 def test_beside_the_switch_the_choice_does_not_matter(switch: str) -> None:
     held, released = (
-        here.problem.evaluate_by(OBJECTIVES["stress"], here.at(1.0)).gradient for here in lines(switch).values()
+        here.problem.evaluate_by(OBJECTIVES["stress"], here.at(1.0)).gradient
+        for here in lines(switch).values()
     )
     assert held == pytest.approx(released, rel=1e-7)
 
