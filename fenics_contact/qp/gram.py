@@ -8,7 +8,7 @@ from scipy.linalg import lapack
 
 from fenics_contact.qp.reductions import Vector
 
-RANK_TOLERANCE = 1e-11
+RANK_TOLERANCE = 1e-8
 
 
 class GramInverse:

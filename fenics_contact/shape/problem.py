@@ -127,6 +127,9 @@ class ShapeProblem:
             raise InvalidInputError(
                 f"alpha must have shape ({self.size},), got {alpha.shape}: one number a control point"
             )
+        if not np.isfinite(alpha).all():
+            first = int(np.flatnonzero(~np.isfinite(alpha))[0])
+            raise InvalidInputError(f"alpha must be finite, got {alpha[first]} in entry {first}: give lengths")
         points: dict[str, np.ndarray] = {}
         for design, motion, part in zip(self.designs, self._motions, self._split(alpha), strict=True):
             start = points.get(design.body, self.scene.bodies[design.body].mesh.points)

@@ -45,13 +45,13 @@ class ContactPatch:
     high: np.ndarray
 
 
-def contact_patch(state: State, pair: int, half_width: float | None) -> ContactPatch:
+def contact_patch(state: State, pair: int, reach: float | None) -> ContactPatch:
     """Lay the slave surface of a pair flat; facets that turn their back to the viewer are left out.
 
     Args:
         state: The state.
         pair: Number of the contact pair.
-        half_width: How far the picture reaches around the contact's middle, [length], or None.
+        reach: How far the picture reaches around the contact's middle, [length], or None.
     """
     contact, slave = state.contact, state.scene.contacts[pair].slave
     mesh, facets = state.scene.bodies[slave.body].mesh, state.scene.facets(slave)
@@ -69,7 +69,7 @@ def contact_patch(state: State, pair: int, half_width: float | None) -> ContactP
     pressure[points] = contact.pressure[chosen]
     slip = np.einsum("na,nad->nd", contact.slip[chosen], contact.points.tangents[chosen])
     places = view.project(mesh.points[nodes])
-    window = _window(places, points, pressure[points], contact.points.area[chosen], half_width)
+    window = _window(places, points, pressure[points], contact.points.area[chosen], reach)
     return ContactPatch(
         view, f"{slave.body}, {slave.name}", places, local.reshape(-1, facets.shape[1]), pressure, points,
         contact.status[chosen], view.project(slip), force, *window,
@@ -77,7 +77,7 @@ def contact_patch(state: State, pair: int, half_width: float | None) -> ContactP
 
 
 def _window(
-    places: np.ndarray, points: np.ndarray, pressure: np.ndarray, area: np.ndarray, half_width: float | None
+    places: np.ndarray, points: np.ndarray, pressure: np.ndarray, area: np.ndarray, reach: float | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners of a square around the closed points with room for two facets beside them.
 
@@ -86,8 +86,8 @@ def _window(
     closed = pressure > 0 if np.any(pressure > 0) else np.ones(len(points), dtype=bool)
     low, high = places[points[closed]].min(axis=0), places[points[closed]].max(axis=0)
     middle = (low + high) / 2
-    if half_width is not None:
-        return middle - half_width, middle + half_width
+    if reach is not None:
+        return middle - reach, middle + reach
     half = float(np.max(high - low)) / 2 + 2.5 * float(np.sqrt(area[closed].mean()))
     border = 0.05 * float(np.ptp(places, axis=0).max())
     low, high = places.min(axis=0) - border, places.max(axis=0) + border

@@ -18,7 +18,7 @@ from fenics_contact.viz.patch import ContactPatch, contact_patch, refined
 from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.view import axis_label
-from fenics_contact.viz.words import checked_range, headline, written
+from fenics_contact.viz.words import checked_range, checked_reach, headline, written
 
 #: Symbols of the points: how they are drawn and what the legend calls them.
 _SYMBOLS: dict[Status, dict[str, Any]] = {
@@ -34,7 +34,7 @@ def plot_contact_pressure(
     *,
     pair: int = 0,
     clim: tuple[float, float] | None = None,
-    half_width: float | None = None,
+    reach: float | None = None,
     title: str = "",
     units: Units | None = None,
     width: int = 1600,
@@ -50,7 +50,7 @@ def plot_contact_pressure(
         pair: Number of the contact pair in the scene.
         clim: Range of the colours, [force / length²]; from zero to the largest pressure unless given. Give
             two pictures the same range to compare them.
-        half_width: How far the picture reaches around the contact's middle, [length]; chosen unless given.
+        reach: How far the picture reaches around the contact's middle, [length]; chosen unless given.
         title: What comes before the facts in the title.
         units: Names of the units, mm, N and MPa unless given.
         width: Width of the picture in pixels.
@@ -67,15 +67,12 @@ def plot_contact_pressure(
             f"pair must number one of the scene's {len(state.scene.contacts)} contact pairs from 0, got "
             f"{pair}: draw a scene with contact"
         )
-    if half_width is not None and not 0 < half_width < np.inf:
-        raise InvalidInputError(
-            f"half_width must be positive, got {half_width}: leave it out to have it chosen"
-        )
+    checked_reach(reach)
     given = None if clim is None else checked_range(clim)
     units = units or Units()
     draw_on_one_rank(
         state.system.torn.decomposition.comm,
-        lambda: _draw(contact_patch(state, pair, half_width), target, given, title, units, width),
+        lambda: _draw(contact_patch(state, pair, reach), target, given, title, units, width),
     )
     return target
 

@@ -72,18 +72,19 @@ def section_views(spot: Spot, main: View) -> list[View]:
     return sorted(views, key=lambda view: -float(view.towards @ main.towards))
 
 
-def section_frame(view: View, spot: Spot, points: np.ndarray) -> Frame:
+def section_frame(view: View, spot: Spot, points: np.ndarray, reach: float | None = None) -> Frame:
     """Return the frame around a contact, not wider than what there is to see.
 
     Args:
         view: View onto the section.
         spot: Middle and size of the contact.
         points: All nodes of the bodies, (n, 3).
+        reach: How far it reaches up and down, [length]; by default five times the radius of the contact.
     """
     bodies = frame_around(view, points)
     middle = view.project(spot.centre[None])[0]
-    reach = REACH * spot.radius * np.array([PROPORTION, 1.0])
-    return Frame(np.maximum(middle - reach, bodies.low), np.minimum(middle + reach, bodies.high))
+    half = (REACH * spot.radius if reach is None else reach) * np.array([PROPORTION, 1.0])
+    return Frame(np.maximum(middle - half, bodies.low), np.minimum(middle + half, bodies.high))
 
 
 def section_layers(

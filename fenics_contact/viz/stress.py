@@ -28,7 +28,7 @@ from fenics_contact.viz.sheet import (
 from fenics_contact.viz.stage import Layer, render, surface
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.view import View, axis_label, frame_around, oblique_view
-from fenics_contact.viz.words import checked_range, headline, nice_number, written
+from fenics_contact.viz.words import checked_range, checked_reach, headline, nice_number, written
 
 #: Fraction of the bodies' size that the largest displacement appears to have.
 VISIBLE = 0.03
@@ -47,6 +47,7 @@ def plot_stress(
     clim: tuple[float, float] | None = None,
     scale: float | None = None,
     sections: bool = True,
+    reach: float | None = None,
     smooth: bool = True,
     title: str = "",
     units: Units | None = None,
@@ -64,6 +65,7 @@ def plot_stress(
             pictures the same range to compare them.
         scale: Factor of the displacement in the upper picture; chosen and stated unless given.
         sections: Draw the sections too, if a contact carries force.
+        reach: How far sections reach up and down from the contact's middle, [length]; chosen unless given.
         smooth: Show nodal means instead of the cells' own values.
         title: What comes before the facts in the title.
         units: Names of the units, mm, N and MPa unless given.
@@ -73,7 +75,7 @@ def plot_stress(
         The path.
 
     Raises:
-        InvalidInputError: If the range, the scale or the name of the file cannot be used.
+        InvalidInputError: If an option or the name of the file cannot be used.
         MissingRequirementError: If this machine cannot render.
     """
     target = png_path(path)
@@ -81,10 +83,11 @@ def plot_stress(
         raise InvalidInputError(
             f"scale must be finite, got {scale}: give the factor of the displacement, such as 10"
         )
+    checked_reach(reach)
     given = None if clim is None else checked_range(clim)
     bodies = gather(state)
     factor = chosen_scale(bodies) if scale is None else float(scale)
-    look = _Look(given or stress_range(bodies), factor, smooth, title, units or Units(), width)
+    look = _Look(given or stress_range(bodies), factor, smooth, reach, title, units or Units(), width)
     spot = None
     if sections and np.any(state.contact.normal_force > 0):
         places = contact_places(state, {name: body.deformed(1.0) for name, body in bodies.items()})
@@ -114,6 +117,7 @@ class _Look:
     clim: tuple[float, float]
     scale: float
     smooth: bool
+    reach: float | None
     title: str
     units: Units
     width: int
@@ -187,7 +191,7 @@ def _sections(bodies: Mapping[str, BodyFields], spot: Spot, main: View, look: _L
     points = np.concatenate([body.deformed(1.0) for body in bodies.values()])
     scalars = {name: look.scalars(body) for name, body in bodies.items()}
     views = section_views(spot, main)
-    frames = [section_frame(view, spot, points) for view in views]
+    frames = [section_frame(view, spot, points, look.reach) for view in views]
     # All are equally high and together as wide as the picture, but not higher than half of that.
     proportions = [float(frame.size[0] / frame.size[1]) for frame in frames]
     height = look.width * min((WIDE - GAP) / sum(proportions), 0.4)

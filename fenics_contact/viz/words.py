@@ -35,6 +35,12 @@ def written(value: float, digits: int = 4) -> str:
     return text.replace(",", "\u202f").replace("-", "\u2212")
 
 
+def checked_reach(reach: float | None) -> None:
+    """Refuse a reach of a picture that is given and not positive."""
+    if reach is not None and not 0 < reach < np.inf:
+        raise InvalidInputError(f"reach must be positive, got {reach}: leave it out to have it chosen")
+
+
 def nice_number(value: float) -> float:
     """Round down to 1, 2 or 5 times a power of ten; 1 for what is not positive."""
     if not value > 0:

@@ -91,13 +91,14 @@ def friction_law(state: State, reference: ConicReference) -> dict[str, float]:
 
 
 def balance(state: State, reference: ConicReference, body: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the resultant and the moment about the origin of load and contact force on a slave body.
+    """Return resultant and moment about the origin of load and contact forces on a body that is only a slave.
 
     Loads and coordinates come from the reference and the mesh. Both are relative to the sum of all forces.
     """
     start, mesh = reference.offset[body], state.scene.bodies[body].mesh
     nodes = slice(start, start + mesh.n_nodes)
     force = reference.f.reshape(-1, 3)[nodes].copy()
-    np.add.at(force, reference.rows.slave - start, state.contact.force)
+    own = (reference.rows.slave >= nodes.start) & (reference.rows.slave < nodes.stop)
+    np.add.at(force, reference.rows.slave[own] - start, state.contact.force[own])
     total = np.abs(force).sum()
     return force.sum(axis=0) / total, np.cross(mesh.points, force).sum(axis=0) / total

@@ -1,7 +1,7 @@
 """Hertz: a ball and a cylinder on a rigid plane, without friction, against the analytic pressure.
 
 Both are pressed by a total force for which the contact ends at a node of the coarsest mesh, hence at one of
-every finer mesh: errors then fall smoothly. The contact is small beside the body (1 % to 3 % of its radius),
+every finer mesh: errors then fall smoothly. The contact is small beside the body (1 % to 5 % of its radius),
 so that the half space of the theory is a good model. Peak pressure is the nodal force over the nodal area at
 the first point of contact. The radius of contact comes from the second moment of the nodal forces λ_i at
 distance r_i, which for the pressure p0 √(1 − r²/a²) is Σ λ_i r_i² / Σ λ_i = 2a²/5 (ball) or a²/4 (cylinder):
@@ -89,7 +89,7 @@ def errors(state: State, theory: Hertz, axes: Sequence[int], moment: float) -> t
     return peak / theory.peak - 1, radius / theory.radius - 1
 
 
-def ball_errors(n: int, grading: float = 4.0) -> tuple[float, float]:
+def ball_errors(n: int, *, grading: float) -> tuple[float, float]:
     theory = ball(edge(grading))
     guides = {"x0": (0.0, None, None), "y0": (None, 0.0, None)}
     state = pressed(hemisphere(1.0, n, grading=grading), guides, theory.force / 4)
@@ -97,7 +97,7 @@ def ball_errors(n: int, grading: float = 4.0) -> tuple[float, float]:
     return errors(state, theory, (0, 1), 2 / 5)
 
 
-def cylinder_errors(n: int, grading: float = 5.0) -> tuple[float, float]:
+def cylinder_errors(n: int, *, grading: float) -> tuple[float, float]:
     theory = cylinder(edge(grading))
     guides = {"x0": (0.0, None, None), "y0": (None, 0.0, None), "y1": (None, 0.0, None)}
     state = pressed(half_cylinder(1.0, LENGTH, n, grading=grading), guides, theory.force * LENGTH / 2)
@@ -121,7 +121,7 @@ def assert_falling(found: np.ndarray) -> None:
 
 def test_a_cylinder_converges_to_the_pressure_of_hertz() -> None:
     sizes = (4, 8, 16, 32)
-    found = np.array([cylinder_errors(n) for n in sizes])
+    found = np.array([cylinder_errors(n, grading=5.0) for n in sizes])
     rates = table("cylinder", sizes, found)
     assert_falling(found)
     assert np.abs(found[-1]).max() < 0.005
@@ -131,17 +131,18 @@ def test_a_cylinder_converges_to_the_pressure_of_hertz() -> None:
 
 def test_a_ball_converges_to_the_pressure_of_hertz() -> None:
     sizes = (4, 8, 12)
-    found = np.array([ball_errors(n) for n in sizes])
-    table("ball", sizes, found)
+    found = np.array([ball_errors(n, grading=3.0) for n in sizes])
+    rates = table("ball", sizes, found)
     assert_falling(found)
-    assert np.abs(found[-1]).max() < 0.01
+    assert np.abs(found[-1]).max() < 0.015
+    assert rates.min() > 1.0
     assert np.abs(found[0]).min() > 0.05, "the coarsest mesh is too good to show convergence"
 
 
 @pytest.mark.slow
 def test_a_ball_converges_further_on_a_fine_mesh() -> None:
     sizes = (4, 8, 16)
-    found = np.array([ball_errors(n) for n in sizes])
+    found = np.array([ball_errors(n, grading=4.0) for n in sizes])
     rates = table("ball, fine", sizes, found)
     assert_falling(found)
     assert np.abs(found[-1]).max() < 0.01

@@ -27,6 +27,7 @@ from fenics_contact.scene import (
     Support,
     Surface,
     TotalForce,
+    Tresca,
 )
 from fenics_contact.shape import (
     SurfaceDesign,
@@ -89,6 +90,7 @@ REGIMES: dict[str, tuple[Friction, float]] = {
     "slip": (Coulomb(0.1), 1e-5),
     "mixed": (Coulomb(0.3), 3e-4),
     "stick": (Coulomb(4.0), 3e-4),
+    "Tresca": (Tresca(50.0), 1e-4),
 }
 
 

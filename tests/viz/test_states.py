@@ -66,6 +66,7 @@ def test_chosen_scale_and_range_are_round_and_fit() -> None:
     [
         ({"scale": np.nan}, r"scale must be finite, got nan"),
         ({"clim": (1.0, 0.0)}, r"clim must be a finite range"),
+        ({"reach": -1.0}, r"reach must be positive, got -1.0"),
     ],
 )
 def test_stress_refuses_options_that_cannot_be_drawn(
@@ -93,6 +94,7 @@ def test_sections_cut_through_the_middle_of_the_contact_along_its_normal() -> No
         inside = view.project(spot.centre[None])[0]
         assert np.all(inside > frame.low)
         assert np.all(inside < frame.high)
+        np.testing.assert_allclose(section_frame(view, spot, everything, 0.1).size, [0.28, 0.2])
 
 
 def test_pressure_and_status_are_drawn(tmp_path: Path) -> None:
@@ -138,7 +140,7 @@ def test_refined_patch_keeps_the_integral_of_the_pressure(cell: str) -> None:
     ("options", "message"),
     [
         ({"pair": 1}, r"pair must number one of the scene's 1 contact pairs from 0, got 1"),
-        ({"half_width": 0.0}, r"half_width must be positive, got 0"),
+        ({"reach": 0.0}, r"reach must be positive, got 0"),
         ({"clim": (0.0, 0.0)}, r"clim must be a finite range"),
     ],
 )

@@ -1,0 +1,108 @@
+"""Designs whose answers must not depend on the number of ranks: run it under mpirun, or call `collect`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_contact.errors import InvalidDesignError, InvalidInputError
+from fenics_contact.scene import Coulomb, Tresca
+from fenics_contact.shape import HarmonicExtension
+from tests.shape.blocks import block_on_block, problem
+from tests.shape.chains import chain_problem
+from tests.shape.objectives import objectives
+from tests.shape.quotients import Remembering
+
+#: Four subdomains, two of each body: on four ranks every rank lacks a body. A chain of eight subdomains.
+PROBLEMS: dict[str, Callable[[MPI.Comm], Remembering]] = {
+    "blocks, tetrahedra": lambda comm: problem(
+        block_on_block(Coulomb(0.38), "tetrahedron", load=(0.6, 0.12, -2.0)), comm
+    ),
+    "blocks, Tresca": lambda comm: problem(block_on_block(Tresca(0.8), load=(0.6, 0.12, -2.0)), comm),
+    "chain": lambda comm: chain_problem(Coulomb(0.3), comm),
+}
+#: Who judges: between them they ask everything of a state.
+JUDGES = {
+    "blocks, tetrahedra": ("stress", "friction forces"),
+    "blocks, Tresca": ("displacement",),
+    "chain": ("energy", "normal forces"),
+}
+BODY = {"chain": "link2"}
+SIZE = {"chain": 0.03}
+
+
+def same_bits(comm: MPI.Comm, *arrays: np.ndarray | float) -> bool:
+    """Whether all ranks hold the same numbers, bit by bit."""
+    mine = b"".join(np.asarray(array).tobytes() for array in arrays)
+    return len(set(comm.allgather(mine))) == 1
+
+
+def design_case(name: str, comm: MPI.Comm) -> dict[str, Any]:
+    """Value and gradient for some objectives, and the volume."""
+    moving = PROBLEMS[name](comm)
+    alpha = SIZE.get(name, 0.01) * np.random.default_rng(1).standard_normal(moving.size)
+    found: dict[str, Any] = {"same bits": True}
+    for judge in JUDGES[name]:
+        objective = objectives(BODY.get(name, "upper"))[judge]
+        point = moving.evaluate_by(objective, alpha)
+        found[judge] = [point.value, point.gradient.tolist()]
+        found["same bits"] &= same_bits(comm, point.value, point.gradient, moving.value_by(objective, alpha))
+    volume, gradient = moving.volume(alpha)
+    found["same bits"] &= same_bits(comm, volume, gradient, *moving.points_of(alpha).values())
+    found["volume"] = [volume, gradient.tolist()]
+    found["status"] = point.state.contact.status.tolist()
+    found["weak"] = [point.weak.contacts, point.weak.discs]
+    return found
+
+
+def motion_case(comm: MPI.Comm) -> dict[str, Any]:
+    """The extension of one displacement into each block, and of one derivative back."""
+    moving = PROBLEMS["blocks, tetrahedra"](comm)
+    rng, found = np.random.default_rng(2), {}
+    bodies = {mesh.body for mesh in moving.decomposition.meshes}
+    motion: HarmonicExtension
+    for design, motion in zip(moving.designs, moving._motions, strict=True):
+        given = rng.standard_normal((len(motion.moving), 3))
+        by_points = rng.standard_normal((moving.scene.bodies[design.body].mesh.n_nodes, 3))
+        moved, pulled = motion.extend(given), motion.pull_back(by_points)
+        found[design.body] = {
+            "moved": moved.tolist(),
+            "pulled": pulled.tolist(),
+            "forth and back": [float(np.sum(moved * by_points)), float(np.sum(given * pulled))],
+            "ranks without it": comm.allreduce(int(design.body not in bodies)),
+        }
+    return found
+
+
+def refusals(comm: MPI.Comm) -> list[str]:
+    """What each rank is told of a design that inverts cells and of one that is no design."""
+    moving = PROBLEMS["blocks, Tresca"](comm)
+    said = []
+    for alpha in (np.full(moving.size, -2.0), np.zeros(moving.size + 1), np.full(moving.size, np.nan)):
+        try:
+            moving.evaluate(alpha)
+            said.append("nothing")
+        except (InvalidDesignError, InvalidInputError) as error:
+            said.append(f"{type(error).__name__}: {error}")
+    return [words for rank in comm.allgather(said) for words in rank]
+
+
+def collect(comm: MPI.Comm) -> dict[str, Any]:
+    """Run all cases. Collective."""
+    return {
+        "ranks": comm.size,
+        "designs": {name: design_case(name, comm) for name in PROBLEMS},
+        "motion": motion_case(comm),
+        "refusals": refusals(comm),
+    }
+
+
+if __name__ == "__main__":
+    answer = collect(MPI.COMM_WORLD)
+    if MPI.COMM_WORLD.rank == 0:
+        sys.stdout.write(json.dumps(answer))

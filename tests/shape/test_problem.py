@@ -1,0 +1,147 @@
+"""What a design problem refuses, counts and remembers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.contact import ContactResult
+from fenics_contact.errors import InvalidDesignError, InvalidInputError
+from fenics_contact.scene import Coulomb, Scene
+from fenics_contact.shape import ContactForces, ShapeProblem, SurfaceDesign, TotalPotential, VolumeIntegral
+from tests.contact.gallery import partitions
+from tests.shape.blocks import block_on_block, designs_of, problem, side
+from tests.shape.chains import SOLVER
+from tests.shape.objectives import misfit, objectives
+from tests.shape.quotients import Remembering
+
+
+@cache
+def scene() -> Scene:
+    return block_on_block(Coulomb(0.38), load=(0.6, 0.12, -2.0))
+
+
+@cache
+def solved() -> Remembering:
+    return problem(scene())
+
+
+def fresh(**more: object) -> ShapeProblem:
+    designs = designs_of(scene())
+    return ShapeProblem(scene(), partitions(scene()), designs, TotalPotential(), MPI.COMM_SELF, **more)
+
+
+DESIGN = 0.01 * np.random.default_rng(1).standard_normal(12)
+
+
+@pytest.mark.parametrize("shape", [(11,), (13,), (12, 1), ()])
+def test_a_design_of_the_wrong_shape_is_refused(shape: tuple[int, ...]) -> None:
+    for ask in (solved().evaluate, solved().volume, solved().points_of):
+        with pytest.raises(InvalidInputError, match=r"alpha must have shape \(12,\), got \("):
+            ask(np.zeros(shape))
+
+
+def test_a_design_of_an_unknown_body_is_refused() -> None:
+    design = SurfaceDesign("middle", side(scene().bodies["upper"].mesh, "z0"), (2, 2))
+    with pytest.raises(InvalidInputError, match=r"names body 'middle', the scene has \['lower', 'upper'\]"):
+        ShapeProblem(scene(), partitions(scene()), design, TotalPotential(), MPI.COMM_SELF)
+
+
+@pytest.mark.parametrize(("body", "face"), [("lower", "z0"), ("upper", "z1")])
+def test_a_surface_that_is_held_or_loaded_may_not_move(body: str, face: str) -> None:
+    design = SurfaceDesign(body, side(scene().bodies[body].mesh, face), (2, 2))
+    with pytest.raises(
+        InvalidInputError, match=f"keep away from supports and loads, but .* of body '{body}'"
+    ):
+        ShapeProblem(scene(), partitions(scene()), design, TotalPotential(), MPI.COMM_SELF)
+
+
+def test_an_integral_over_an_unknown_body_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match=r"got 'middle', there are \['lower', 'upper'\]"):
+        solved().evaluate_by(VolumeIntegral("misfit", misfit, "middle"), DESIGN)
+
+
+def test_force_derivatives_of_the_wrong_shape_are_refused() -> None:
+    def short(contact: ContactResult) -> tuple[float, np.ndarray, np.ndarray]:
+        return 0.0, contact.normal_force[1:], contact.friction_force
+
+    count = solved().state_of(DESIGN).contact.points.count
+    with pytest.raises(
+        InvalidInputError, match=rf"shapes \({count},\) and \({count}, 2\), got \({count - 1},\)"
+    ):
+        solved().evaluate_by(ContactForces(short), DESIGN)
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf])
+def test_a_design_that_is_no_number_is_refused(number: float) -> None:
+    with pytest.raises(InvalidInputError, match=f"alpha must be finite, got {number} in entry 3"):
+        solved().evaluate(np.where(np.arange(12) == 3, number, 0.0))
+
+
+def test_a_design_that_inverts_a_cell_is_refused_and_the_next_one_is_solved() -> None:
+    before = solved().value_of(DESIGN)
+    for ask in (solved().evaluate, solved().value_of, solved().volume):
+        with pytest.raises(InvalidDesignError, match=r"the design cannot be meshed: .* move the nodes less"):
+            ask(np.full(12, -2.0))
+    nearby = solved().value_of(DESIGN + 1e-9)
+    assert nearby == pytest.approx(before, rel=1e-6)
+
+
+def test_the_volume_agrees_with_central_differences() -> None:
+    direction, step = np.random.default_rng(3).standard_normal(12), 1e-5
+    value, gradient = solved().volume(DESIGN)
+    bodies = solved().scene_of(DESIGN).bodies
+    assert value == pytest.approx(sum(body.mesh.volume for body in bodies.values()))
+    up, down = (solved().volume(DESIGN + sign * step * direction)[0] for sign in (1, -1))
+    assert abs(gradient @ direction) > 0.1
+    assert gradient @ direction == pytest.approx((up - down) / (2 * step), rel=1e-8)
+    # Every variable adds material.
+    assert gradient.min() > 0.0
+
+
+def test_two_designs_of_one_body_add_up() -> None:
+    free = replace(scene(), loads=[])
+    mesh = free.bodies["upper"].mesh
+    both = tuple(SurfaceDesign("upper", side(mesh, face), (2, 2), 0.1) for face in ("z0", "z1"))
+    blocks = ShapeProblem(free, partitions(free), both, TotalPotential(), MPI.COMM_SELF)
+    lower, upper = np.concatenate([np.full(4, 0.05), np.zeros(4)]), np.concatenate([np.zeros(4), np.ones(4)])
+    moved = [blocks.points_of(alpha)["upper"] - mesh.points for alpha in (lower, upper, lower + upper)]
+    assert np.abs(moved[0]).max() == pytest.approx(0.05)
+    assert np.abs(moved[1]).max() == pytest.approx(1.0)
+    assert moved[0] + moved[1] == pytest.approx(moved[2], abs=1e-13)
+    assert set(blocks.points_of(lower)) == {"upper"}
+
+
+def test_an_earlier_state_is_judged_in_its_own_shape() -> None:
+    judges = objectives("upper")
+    blocks = fresh(solver=SOLVER)
+    state = blocks.state_of(DESIGN)
+    forms = blocks._shape_forms(state)
+    at_once = {name: judge.partials(state, forms) for name, judge in judges.items()}
+    blocks.state_of(5 * DESIGN)
+    for name, judge in judges.items():
+        later = judge.partials(state, forms)
+        assert judge.value(state, forms) == later.value == at_once[name].value
+        assert np.array_equal(later.by_displacement, at_once[name].by_displacement)
+        assert np.array_equal(later.by_shape, at_once[name].by_shape)
+
+
+def test_evaluations_and_products_are_counted_and_the_best_design_is_kept() -> None:
+    blocks = fresh()
+    points = [blocks.evaluate(factor * DESIGN) for factor in (0.0, 3.0, -3.0)]
+    assert blocks.evaluations == 3
+    assert blocks.products == sum(point.state.system.products for point in points)
+    assert all(0 < point.adjoint_iterations < point.state.system.products for point in points)
+    assert blocks.first is points[0]
+    assert blocks.last is points[-1]
+    values = [point.value for point in points]
+    assert blocks.best is points[int(np.argmin(values))]
+    assert len(set(values)) == 3
+    value, gradient = blocks(0.0 * DESIGN)
+    assert value == pytest.approx(values[0], rel=1e-5)
+    assert gradient.shape == (12,)
+    assert {"decompose", "mesh motion", "solve", "adjoint", "gradient"} <= set(blocks.seconds)
