@@ -20,7 +20,6 @@ import numpy as np
 import scipy.sparse as sp
 import ufl
 from mpi4py import MPI
-from petsc4py import PETSc
 
 
 @contextmanager
@@ -62,6 +61,7 @@ __all__ = [
     "assemble_matrix",
     "assemble_scalar",
     "assemble_vector",
+    "cell_dofs",
     "cell_nodes",
     "cellwise_space",
     "coefficient",
@@ -243,6 +243,11 @@ def cell_nodes(mesh: Any) -> np.ndarray:
     return _input_nodes(mesh)[dofmap]
 
 
+def cell_dofs(space: Any) -> np.ndarray:
+    """Return the blocked dofs of this rank's cells, ghosts included, shape (n_cells, n_dofs of a cell)."""
+    return _table(space.dofmap.list, _cell_count(space.mesh))
+
+
 def node_dofs(space: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return (input nodes, blocked dofs): dof ``dofs[i]`` of ``space`` sits on input node ``nodes[i]``.
 
@@ -392,6 +397,3 @@ def write_xdmf(path: Any, mesh: Any, functions: Sequence[Any]) -> None:
         file.write_mesh(mesh)
         for function in functions:
             file.write_function(function)
-
-
-_ = PETSc  # petsc4py must be initialised before dolfinx hands out PETSc objects

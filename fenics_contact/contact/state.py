@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 
 from fenics_contact.contact.energies import Energies
-from fenics_contact.contact.fields import body_mesh, displacement_function, nodal_displacement, von_mises
+from fenics_contact.contact.fields import (
+    body_mesh,
+    cell_values,
+    displacement_function,
+    nodal_displacement,
+    von_mises,
+)
 from fenics_contact.contact.result import ContactResult
 from fenics_contact.feti import DualSystem
 from fenics_contact.qp import DualSolution
@@ -67,6 +73,10 @@ class State:
         total = decomposition.comm.allreduce(np.where(known[:, None], mine, 0.0))
         count = decomposition.comm.allreduce(known.astype(float))
         return np.asarray(total / count[:, None])
+
+    def gather_von_mises(self, body: str) -> np.ndarray:
+        """Return the von Mises stress of a body's cells on every rank, shape (n_cells,). Collective."""
+        return cell_values(self.von_mises[body], self.scene.bodies[body].mesh.cells)
 
     @property
     def counts(self) -> dict[str, int]:

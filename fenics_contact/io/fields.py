@@ -2,36 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from fenics_contact import _dolfinx
 from fenics_contact.contact import State
-
-
-def cell_values(function: Any, cells: np.ndarray) -> np.ndarray:
-    """Collect a cellwise constant Function in the order of a body's cells. Collective on its mesh.
-
-    Args:
-        function: Function on the body's own mesh, one value a cell.
-        cells: Node numbers of all cells of the body, (n_cells, 8 | 4).
-
-    Returns:
-        One value for every cell, (n_cells,), replicated.
-    """
-    space = function.function_space
-    topology = space.mesh.topology
-    owned = topology.index_map(topology.dim).size_local
-    mine = _dolfinx.cell_nodes(space.mesh).reshape(-1, cells.shape[1])[:owned]
-    # dolfinx has its own order of cells: they are recognised by their nodes.
-    _, key = np.unique(np.sort(np.vstack([cells, mine]), axis=1), axis=0, return_inverse=True)
-    place = np.empty(len(cells), dtype=np.int64)
-    place[key.ravel()[: len(cells)]] = np.arange(len(cells))
-    dofs = [int(space.dofmap.cell_dofs(cell)[0]) for cell in range(owned)]
-    values = np.zeros(len(cells))
-    values[place[key.ravel()[len(cells) :]]] = function.x.array[dofs]
-    return np.asarray(space.mesh.comm.allreduce(values))
 
 
 def contact_fields(state: State, body: str) -> dict[str, np.ndarray]:

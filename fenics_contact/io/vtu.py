@@ -10,7 +10,7 @@ import numpy as np
 
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.io.fields import cell_values, contact_fields
+from fenics_contact.io.fields import contact_fields
 from fenics_contact.io.names import file_of_each
 from fenics_contact.io.replacing import replacing
 
@@ -62,7 +62,7 @@ def _gathered(state: State, body: str) -> meshio.Mesh:
         mesh.points,
         [(kind, mesh.cells)],
         point_data={"displacement": state.gather_displacement(body), **contact_fields(state, body)},
-        cell_data={"von_mises": [cell_values(state.von_mises[body], mesh.cells)], "subdomain": [subdomain]},
+        cell_data={"von_mises": [state.gather_von_mises(body)], "subdomain": [subdomain]},
     )
 
 

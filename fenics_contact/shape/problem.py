@@ -129,7 +129,7 @@ class ShapeProblem:
             )
         if not np.isfinite(alpha).all():
             first = int(np.flatnonzero(~np.isfinite(alpha))[0])
-            raise InvalidInputError(f"alpha must be finite, got {alpha[first]} in entry {first}: give lengths")
+            raise InvalidInputError(f"alpha must be finite, got {alpha[first]} in entry {first}")
         points: dict[str, np.ndarray] = {}
         for design, motion, part in zip(self.designs, self._motions, self._split(alpha), strict=True):
             start = points.get(design.body, self.scene.bodies[design.body].mesh.points)

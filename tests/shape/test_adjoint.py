@@ -1,0 +1,92 @@
+"""The adjoint solves the transposed equations of the linearised state, or says why it does not."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from fenics_contact.errors import ConvergenceError
+from fenics_contact.scene import Coulomb
+from fenics_contact.shape import WeakChoice, linearise_face, solve_adjoint
+from fenics_contact.shape.adjoint import Adjoint
+from fenics_contact.shape.linearised_face import LinearisedFace
+from fenics_contact.shape.objective import Partials
+from tests.shape.blocks import block_on_floor, problem
+from tests.shape.chains import line
+from tests.shape.objectives import objectives
+
+
+@cache
+def solved(regime: str, objective: str) -> tuple[Partials, LinearisedFace, Adjoint]:
+    here = line(regime)
+    state = here.state()
+    partials = objectives("link1")[objective].partials(state, here.problem._shape_forms(state))
+    linearised = linearise_face(state, WeakChoice.RELEASED)
+    return partials, linearised, solve_adjoint(state, partials, linearised)
+
+
+@pytest.mark.parametrize("objective", ["energy", "stress", "friction forces"])
+@pytest.mark.parametrize("regime", ["slip", "mixed", "stick"])
+def test_bodies_are_in_equilibrium_with_the_adjoint_multiplier(regime: str, objective: str) -> None:
+    partials, _, adjoint = solved(regime, objective)
+    system = line(regime).state().system
+    start, internal = 0, np.zeros_like(adjoint.displacement)
+    for subdomain in system.torn.subdomains:
+        part = slice(start, start + subdomain.mesh.size)
+        internal[part] = subdomain.stiffness @ adjoint.displacement[part]
+        start = part.stop
+    force = system.force(adjoint.multiplier)
+    assert np.abs(force).max() > 0.0
+    rest = internal + force - partials.by_displacement
+    assert np.abs(rest).max() < 1e-6 * max(np.abs(force).max(), np.abs(partials.by_displacement).max())
+
+
+@pytest.mark.parametrize("objective", ["stress", "friction forces"])
+@pytest.mark.parametrize("regime", ["slip", "mixed", "stick"])
+def test_moving_directions_see_the_derivative_by_the_multiplier(regime: str, objective: str) -> None:
+    partials, linearised, adjoint = solved(regime, objective)
+    system = line(regime).state().system
+    # Z_s has orthonormal columns: z comes back from ζ = Z_s z.
+    z = linearised.tested.T @ adjoint.multiplier
+    assert linearised.tested @ z == pytest.approx(adjoint.multiplier, abs=1e-9 * np.abs(z).max())
+    left = linearised.moving.T @ system.jump(adjoint.displacement) - linearised.face.curvature * z
+    right = linearised.moving.T @ partials.by_multiplier
+    size = max(np.abs(linearised.face.curvature * z).max(), np.abs(system.jump(adjoint.displacement)).max())
+    assert size > 0.0
+    assert np.abs(left - right).max() < 1e-6 * max(size, np.abs(right).max())
+
+
+def test_the_two_bases_differ_where_friction_grows_with_the_normal_force() -> None:
+    for regime, friction in (("slip", 0.1), ("mixed", 0.3)):
+        _, linearised, _ = solved(regime, "stress")
+        growth = (linearised.moving - linearised.tested).tocoo()
+        lengths = np.sqrt(np.bincount(growth.col, growth.data**2))
+        assert lengths[lengths > 0] == pytest.approx(
+            np.full(np.count_nonzero(linearised.face.slip), friction)
+        )
+    _, linearised, _ = solved("stick", "stress")
+    assert abs(linearised.moving - linearised.tested).max() == 0.0
+
+
+def test_without_slip_the_adjoint_of_the_energy_is_known() -> None:
+    _, _, adjoint = solved("stick", "energy")
+    multiplier = line("stick").state().solution.multiplier
+    assert adjoint.multiplier == pytest.approx(-multiplier, abs=1e-6 * np.abs(multiplier).max())
+    assert adjoint.iterations < 10
+
+
+def test_too_few_iterations_are_an_error() -> None:
+    partials, linearised, _ = solved("mixed", "stress")
+    with pytest.raises(ConvergenceError, match=r"after 3 iterations .*: raise max_iterations or loosen"):
+        solve_adjoint(line("mixed").state(), partials, linearised, max_iterations=3)
+
+
+def test_a_body_that_can_slide_away_has_no_adjoint() -> None:
+    sliding = problem(block_on_floor(None, load=(0.0, 0.0, -2.0)))
+    assert sliding.value_of(np.zeros(6)) < 0.0
+    with pytest.raises(ConvergenceError, match="some body can slide without resistance: choose"):
+        sliding.evaluate(np.zeros(6))
+    held = problem(block_on_floor(Coulomb(0.3), load=(0.0, 0.0, -2.0)))
+    assert np.abs(held.evaluate(np.zeros(6)).gradient).max() > 0.1
