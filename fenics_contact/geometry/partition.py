@@ -79,7 +79,7 @@ def bisection_partition(mesh: BodyMesh, parts: int) -> np.ndarray:
         )
     centres = mesh.points[mesh.cells].mean(axis=1)
     partition = np.zeros(mesh.n_cells, dtype=np.int64)
-    pending = [(np.arange(mesh.n_cells), 0, parts)]
+    pending: list[tuple[np.ndarray, int, int]] = [(np.arange(mesh.n_cells), 0, parts)]
     while pending:
         cells, first, count = pending.pop()
         if count == 1:

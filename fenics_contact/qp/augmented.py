@@ -51,7 +51,7 @@ class AugmentedLagrangian:
 
     def first_multiplier(self, residual: Vector) -> Vector:
         """Return v for which the gradient of L, times ‖PFP‖, is a given residual r. Collective."""
-        return (residual - self._coarse.project(residual)) / self.norm
+        return np.asarray((residual - self._coarse.project(residual)) / self.norm, dtype=np.float64)
 
     def drift(self, x: Vector) -> Vector:
         """Return Q x − λ₀, owned. Collective."""

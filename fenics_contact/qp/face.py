@@ -165,5 +165,5 @@ def classify(
         slip_bound=slip_bound,
         direction=np.where(slip[:, None], tangential / divisor[:, None], 0.0),
         overshoot=np.divide(length, slip_bound, out=np.ones_like(length), where=slip),
-        flexibility=1.0 / step[layout.tangential[:, 0]],
+        flexibility=np.asarray(1.0 / step[layout.tangential[:, 0]], dtype=np.float64),
     )

@@ -36,7 +36,7 @@ def projected_gmres(
     basis = _Basis(len(gradient), coupled.moving.shape[0])
     small = _LeastSquares(size)
     stop = Stop.CONVERGED
-    vector = first / size if size > 0.0 else first
+    vector: Vector = np.asarray(first / (size or 1.0), dtype=np.float64)
     while not small.residual <= tolerance:
         if basis.count == max_iterations:
             stop = Stop.ITERATION_LIMIT
@@ -75,7 +75,7 @@ class _Basis:
 
     def __init__(self, n_face: int, n_owned: int) -> None:
         self.count = 0
-        self._blocks = [np.empty((32, n_face)), np.empty((32, n_face)), np.empty((32, n_owned))]
+        self._blocks: list[Vector] = [np.empty((32, n_face)), np.empty((32, n_face)), np.empty((32, n_owned))]
 
     def append(self, *rows: Vector) -> None:
         if self.count == len(self._blocks[0]):

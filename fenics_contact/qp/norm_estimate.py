@@ -30,7 +30,7 @@ def largest_eigenvalue(
         The estimate, the same on every rank; 0 for an operator that maps the start to zero.
     """
     start = np.random.default_rng(comm.rank).standard_normal(size)
-    basis = [start / (_norm(comm, start) or 1.0)]
+    basis: list[Vector] = [np.asarray(start / (_norm(comm, start) or 1.0), dtype=np.float64)]
     diagonal: list[float] = []
     beside: list[float] = []
     for _ in range(max_products):

@@ -51,9 +51,9 @@ class DirectionStore:
 
     def __init__(self, size: int) -> None:
         """Start empty for vectors of this rank's length ``size``."""
-        self._p = np.empty((32, size))
-        self._q = np.empty((32, size))
-        self._curvature = np.empty(32)
+        self._p: Vector = np.empty((32, size))
+        self._q: Vector = np.empty((32, size))
+        self._curvature: Vector = np.empty(32)
         self._count = 0
 
     def append(self, p: Vector, q: Vector, curvature: float) -> None:

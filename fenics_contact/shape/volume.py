@@ -16,6 +16,7 @@ def volume_by_points(mesh: BodyMesh) -> np.ndarray:
     """
     faces, _ = boundary_faces(mesh.cells)
     corners, result = mesh.points[faces], np.zeros_like(mesh.points)
+    positions: np.ndarray
     if faces.shape[1] == 4:
         grid = np.array([-1.0, 1.0]) / np.sqrt(3)
         positions, weight = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2), 1.0

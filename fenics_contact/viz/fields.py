@@ -40,8 +40,6 @@ class BodyFields:
 def gather(state: State) -> dict[str, BodyFields]:
     """Collect displacement and stress of all bodies on every rank. Collective."""
     return {
-        name: BodyFields(
-            body.mesh, state.gather_displacement(name), state.gather_von_mises(name)
-        )
+        name: BodyFields(body.mesh, state.gather_displacement(name), state.gather_von_mises(name))
         for name, body in state.scene.bodies.items()
     }
