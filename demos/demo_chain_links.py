@@ -176,6 +176,7 @@ record = {
     "design": result.x,
     "weak_contacts": after.weak.contacts,
     "weak_discs": after.weak.discs,
+    "points_on_facet_edges": after.weak.edges,
     "weak_choice": after.weak.choice.name,
     "reason": result.reason.value,
     "versions": versions(),

@@ -39,6 +39,14 @@ def outside(local: np.ndarray, corners: int) -> np.ndarray:
     return np.maximum(np.maximum.reduce([-s, -t, s + t - 1]), 0)
 
 
+def edge_distance(local: np.ndarray, corners: int) -> np.ndarray:
+    """Return how far points inside a facet are from its edges, in local coordinates, shape (n,)."""
+    s, t = local[:, 0], local[:, 1]
+    if corners == 4:
+        return 1 - np.maximum(np.abs(s), np.abs(t))
+    return np.minimum.reduce([s, t, 1 - s - t])
+
+
 def corner_products(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
     """Return the cross product of the two edges at each corner, outward, shape (n_facets, corners, 3)."""
     x = points[facets]

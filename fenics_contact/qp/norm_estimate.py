@@ -46,7 +46,7 @@ def largest_eigenvalue(
         if bound - values[-1] <= accuracy * values[-1] or length <= 1e-14 * abs(bound):
             break
         beside.append(length)
-        basis.append(image / length)
+        basis.append(np.asarray(image / length, dtype=np.float64))
     return bound
 
 

@@ -10,10 +10,14 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 from fenics_contact.contact import State
+from fenics_contact.feti.surface import edge_distance
 from fenics_contact.qp import Face, classify, contact_step
+from fenics_contact.scene import Surface
 
 #: A contact point is weakly active when it is closer to the switch than this fraction of the force scale.
 WEAK_TOLERANCE = 1e-7
+#: A projection this close to the edge of its facet, in local coordinates, lies on it.
+EDGE_TOLERANCE = 1e-6
 
 
 class WeakChoice(Enum):
@@ -30,11 +34,13 @@ class WeakPoints:
     Attributes:
         contacts: Points with neither force nor gap.
         discs: Friction discs at their bound without slip.
-        choice: The branch they were given.
+        edges: Closed points that project on an edge between facets; they count as inside the facet found.
+        choice: The branch that contacts and discs were given.
     """
 
     contacts: int
     discs: int
+    edges: int
     choice: WeakChoice
 
 
@@ -95,8 +101,20 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
     tested = face.restriction
     moving = tested + _growth(face, starting, coefficient) if coupling else tested
     slip_direction = np.where(face.slip[:, None], direction, 0.0)
-    weak = WeakPoints(int(counts[0]), int(counts[1]), choice)
+    weak = WeakPoints(int(counts[0]), int(counts[1]), _points_on_edges(state), choice)
     return LinearisedFace(face, tested, moving.tocsr(), slip_direction, weak)
+
+
+def _points_on_edges(state: State) -> int:
+    """Count the closed contact points over an edge of their master facet, where the normal field has a kink."""
+    points = state.system.torn.points
+    total = 0
+    for index, pair in enumerate(state.scene.contacts):
+        if isinstance(pair.master, Surface):
+            closed = (points.pair == index) & (state.contact.normal_force > 0)
+            corners = state.scene.facets(pair.master).shape[1]
+            total += int(np.count_nonzero(edge_distance(points.local[closed], corners) < EDGE_TOLERANCE))
+    return total
 
 
 def _growth(face: Face, starting: np.ndarray, coefficient: np.ndarray) -> sp.csr_matrix:

@@ -7,10 +7,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
-from fenics_contact.contact import ContactResult, Status
-from fenics_contact.scene import Coulomb
-from fenics_contact.shape import ContactForces, Objective, WeakChoice
+from fenics_contact.contact import ContactResult, Status, solve_scene
+from fenics_contact.geometry import block
+from fenics_contact.scene import Body, ContactPair, Coulomb, IsotropicElasticity, Scene, Support, Surface
+from fenics_contact.shape import ContactForces, Objective, WeakChoice, linearise_face
 from tests.shape.objectives import objectives
 from tests.shape.pressed import Pressed, about_to_close, about_to_slip, line
 from tests.shape.quotients import Line
@@ -119,3 +121,23 @@ def test_where_nothing_is_loaded_every_touching_point_is_weak(friction: Coulomb 
 def grown_by(friction: Coulomb | None, height: float) -> float:
     """Normal force on the unloaded block after all its control points moved by ``height``."""
     return Pressed(friction, 0.0, 0.0).problem().value_by(ContactForces(resultant), np.full(6, height))
+
+
+def test_points_over_facet_edges_are_counted() -> None:
+    """Equal lattices one above the other: every closed slave node lies over a corner of the master's facets."""
+    lower, upper = block((0, 0, 0), (1, 1, 0.5), (2, 2, 1)), block((0, 0, 0.5), (1, 1, 1), (2, 2, 1))
+    shifted = block((0.1, 0.1, 0.5), (0.9, 0.9, 1), (1, 1, 1))
+    edges = []
+    for above in (upper, shifted):
+        soft = IsotropicElasticity(1, 0.3)
+        bodies = {"lower": Body(lower, soft), "upper": Body(above, soft)}
+        scene = Scene(
+            bodies,
+            [Support("lower", "z0"), Support("upper", "z1", (0.0, 0.0, -0.01))],
+            contacts=[ContactPair(Surface("upper", "z0"), Surface("lower", "z1"))],
+        )
+        cuts = {name: np.zeros(body.mesh.n_cells, dtype=int) for name, body in bodies.items()}
+        state = solve_scene(scene, cuts, MPI.COMM_SELF)
+        assert state.contact.count(Status.SLIP) > 0
+        edges.append(linearise_face(state, WeakChoice.RELEASED).weak.edges)
+    assert edges == [9, 0]
