@@ -106,7 +106,7 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
 
 
 def _points_on_edges(state: State) -> int:
-    """Count the closed contact points over an edge of their master facet, where the normal field has a kink."""
+    """Count the closed points over an edge of their master facet, where the normal field has a kink."""
     points = state.system.torn.points
     total = 0
     for index, pair in enumerate(state.scene.contacts):

@@ -124,7 +124,7 @@ def grown_by(friction: Coulomb | None, height: float) -> float:
 
 
 def test_points_over_facet_edges_are_counted() -> None:
-    """Equal lattices one above the other: every closed slave node lies over a corner of the master's facets."""
+    """Equal lattices one above the other: every closed slave node lies over a corner of a master facet."""
     lower, upper = block((0, 0, 0), (1, 1, 0.5), (2, 2, 1)), block((0, 0, 0.5), (1, 1, 1), (2, 2, 1))
     shifted = block((0.1, 0.1, 0.5), (0.9, 0.9, 1), (1, 1, 1))
     edges = []
