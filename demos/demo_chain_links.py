@@ -123,8 +123,8 @@ peak = max(float(point.state.contact.pressure.max()) for point in points.values(
 with timer.phase("pictures"):
     plot_decomposition(scene, partitions, output / "decomposition.png", comm=comm)
     for name, point in points.items():
-        plot_stress(point.state, output / f"stress_{name}.png", clim=(0, 1500), title=f"Stress {name}")
-        title = f"Contact pressure {name}"
+        title = name.capitalize()
+        plot_stress(point.state, output / f"stress_{name}.png", clim=(0, 1500), reach=12.0, title=title)
         plot_contact_pressure(point.state, output / f"pressure_{name}.png", clim=(0, peak), title=title)
 
 # The control points, and the surface that they move.
