@@ -48,7 +48,7 @@ class FaceNewton:
         loosest: Largest inner tolerance of all.
         patience: Steps in which the residual must halve before a rescue is called.
         rescue: Parameters of the fallback.
-        rescue_products: Products that one rescue may spend.
+        rescue_products: Products that a rescue may spend; twice as many each time Newton fails again.
 
     References:
         S. Hüeber, G. Stadler, B. Wohlmuth, A primal-dual active set algorithm for three-dimensional
@@ -58,7 +58,7 @@ class FaceNewton:
 
     tolerance: float = 1e-6
     max_steps: int = 200
-    max_products: int = 5000
+    max_products: int = 20_000
     forcing: float = 0.2
     loosest: float = 0.1
     patience: int = 6
@@ -75,6 +75,7 @@ class FaceNewton:
         newton = NewtonSteps(problem, law, start, self)
         history: list[SolverStep] = []
         iterate, best, since_best = start.iterate, start.iterate, 0
+        rescued, budget = None, self.rescue_products
         while len(history) < self.max_steps and operator.products < self.max_products:
             iterate, line = newton.step(iterate, len(history))
             history.append(line)
@@ -88,17 +89,18 @@ class FaceNewton:
             else:
                 since_best += 1
             if since_best >= self.patience or not np.isfinite(iterate.residuals.worst):
-                stuck = Start(best, operator, memory, cold=False)
+                # Where Newton could do nothing with the last rescue, the next one must go further.
+                budget = 2 * budget if best is rescued else self.rescue_products
                 iterate, memory = rescue(
                     problem,
                     law,
-                    stuck,
+                    Start(best, operator, memory, cold=False),
                     self.rescue,
                     reduction=0.1,
-                    budget=self.rescue_products,
+                    budget=budget,
                     history=history,
                 )
-                best, since_best = iterate, 0
+                rescued, best, since_best = iterate, iterate, 0
         raise ConvergenceError(
             f"face Newton needs residuals below {self.tolerance:.1e}, got after {operator.products} "
             f"products and {len(history)} steps: {history[-1]}; raise max_products, start from a "
