@@ -81,7 +81,7 @@ def find_state(
         contact = contact_result(system, solution)
         friction = float(np.sum(contact.slip_bound * np.linalg.norm(contact.slip, axis=1)))
         energies = compute_energies(system, displacement, solution.multiplier, friction)
-    return State(system, solution, displacement, contact, energies, timer.seconds)
+    return State(system, solution, displacement, contact, energies, dict(timer.seconds))
 
 
 def default_solver(torn: TornSystem) -> DualSolver:

@@ -35,7 +35,7 @@ class State:
         torn_displacement: This rank's torn displacement, shape (torn_size,), [length].
         contact: What happens on the contact surfaces, replicated.
         energies: Energies of all bodies.
-        seconds: Wall time of this rank by phase.
+        seconds: Wall time of this rank by phase, of all work up to this state that shares its timer.
     """
 
     system: DualSystem

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
@@ -54,27 +56,22 @@ class Factor:
         return solution
 
 
+@lru_cache(maxsize=1)
 def _solver() -> str:
     """Name the factorisation library that this PETSc was built with.
 
     PETSc's own answer about CHOLMOD is wrong in some distributions, so a 1 x 1 matrix is factored.
     """
-    global _SOLVER
-    if _SOLVER is None:
-        one = PETSc.Mat().createAIJ((1, 1), csr=([0, 1], [0], [1.0]), comm=PETSc.COMM_SELF)
-        pc = PETSc.PC().create(PETSc.COMM_SELF)
-        pc.setOperators(one)
-        pc.setType(PETSc.PC.Type.CHOLESKY)
-        pc.setFactorSolverType("cholmod")
-        try:
-            pc.setUp()
-            _SOLVER = "cholmod"
-        except PETSc.Error:
-            _SOLVER = "mumps"
-    return _SOLVER
-
-
-_SOLVER: str | None = None
+    one = PETSc.Mat().createAIJ((1, 1), csr=([0, 1], [0], [1.0]), comm=PETSc.COMM_SELF)
+    pc = PETSc.PC().create(PETSc.COMM_SELF)
+    pc.setOperators(one)
+    pc.setType(PETSc.PC.Type.CHOLESKY)
+    pc.setFactorSolverType("cholmod")
+    try:
+        pc.setUp()
+    except PETSc.Error:
+        return "mumps"
+    return "cholmod"
 
 
 def fixing_nodes(points: np.ndarray, count: int = FIXING_NODES) -> np.ndarray:
