@@ -63,16 +63,23 @@ def find_state(
         scene: The scene, with the coordinates to use.
         decomposition: Its decomposition; only topology and numbering are taken from it.
         solver: Dual solver with its tolerance; `default_solver` chooses if it is None.
-        previous: State of a neighbouring geometry to start from.
+        previous: State of a neighbouring geometry or load to start from; what did not change is not
+            assembled and factored again.
         start_geometry: Refuse bodies that overlap before they are loaded.
         timer: Collects the seconds.
     """
     timer = timer or PhaseTimer()
     with timer.phase("assemble"):
-        torn = build_torn_system(scene, decomposition, start_geometry=start_geometry)
+        known = None if previous is None else previous.system
+        torn = build_torn_system(
+            scene,
+            decomposition,
+            start_geometry=start_geometry,
+            previous=None if known is None else known.torn,
+        )
         if previous is None:
             check_held(torn)
-    system = DualSystem(torn, timer)
+    system = DualSystem(torn, timer, previous=known)
     with timer.phase("solve"):
         start = None if previous is None else carried_over(previous.system, previous.solution, system)
         solution = solve_dual(system, solver or default_solver(torn), start)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.feti.condensation import Condensations
 from fenics_contact.feti.copies import Tearing, tear
 from fenics_contact.feti.forms import FormLibrary
 from fenics_contact.feti.gluing import gluing_rows, prescribed_displacements
@@ -32,6 +33,7 @@ class Decomposition:
         gluing: Gluing and Dirichlet rows of all subdomains.
         fixed: Whether a component of a node is prescribed, shape (n_nodes, 3).
         forms: Compiled forms.
+        condensations: Symbolic factorisations of this rank's subdomains.
     """
 
     comm: MPI.Comm
@@ -43,6 +45,7 @@ class Decomposition:
     gluing: Rows
     fixed: np.ndarray
     forms: FormLibrary
+    condensations: Condensations = field(default_factory=Condensations)
 
     @property
     def torn_size(self) -> int:

@@ -2,88 +2,73 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Protocol
-
 import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
-from fenics_contact.feti.factor import Factor
+from fenics_contact.feti.inverse import TornInverse
 from fenics_contact.feti.numbering import DualNumbering
-from fenics_contact.feti.subdomain import Subdomain
 
-#: Share of its diagonal added to the contact block of B Bᵀ. A node in two contact pairs has more rows than
+#: Share of its diagonal added to the contact block of B D⁻¹ Bᵀ. A node in two contact pairs has more rows than
 #: displacements, which makes the block singular; elsewhere so small a share changes nothing.
 REGULARISATION = 1e-4
 
 
 class DirichletPreconditioner:
-    """M = (B Bᵀ)⁻¹ B S Bᵀ (B Bᵀ)⁻¹, S the Schur complement of each K_s on the dofs that B touches.
+    """M = (B D⁻¹ Bᵀ)⁻¹ B D⁻¹ S D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹, S the Schur complement of each K_s on its interface.
 
-    Gluing and Dirichlet rows are orthonormal, so that B Bᵀ differs from the identity only on the contact
-    rows, where it is factored.
+    D is a typical stiffness of each body, so that of two bodies in contact the softer one gives way. Gluing
+    and Dirichlet rows are orthonormal and stay within a body: B D⁻¹ Bᵀ is diagonal but for the contact rows,
+    where it is factored.
 
     References:
         Farhat, Roux: An unconventional domain decomposition method for an efficient parallel solution of
         large-scale finite element systems. SIAM J. Sci. Stat. Comput. 13 (1992) 379-396.
+        Klawonn, Widlund: FETI and Neumann-Neumann iterative substructuring methods: connections and new
+        results. Comm. Pure Appl. Math. 54 (2001) 57-90.
     """
 
     def __init__(
-        self, subdomains: Sequence[Subdomain], B: sp.csr_matrix, numbering: DualNumbering, n_equality: int
+        self,
+        inverse: TornInverse,
+        B: sp.csr_matrix,
+        compliance: np.ndarray,
+        numbering: DualNumbering,
+        n_equality: int,
     ) -> None:
-        """Factor the interior of every subdomain and the contact block of B Bᵀ. Collective."""
-        self._B, self._Bt, self._numbering = B, B.T.tocsr(), numbering
-        touched = np.zeros(B.shape[1], dtype=bool)
-        touched[np.unique(B.indices)] = True
-        self._schur = []
-        start = 0
-        for subdomain in subdomains:
-            stop = start + subdomain.mesh.size
-            self._schur.append(
-                (slice(start, stop), _schur_complement(subdomain.stiffness, touched[start:stop]))
-            )
-            start = stop
-        self._contact = _ContactBlock(B, numbering, n_equality)
+        """Factor the contact block of B D⁻¹ Bᵀ. Collective.
+
+        Args:
+            inverse: The factored subdomains.
+            B: This rank's part of B on the interface, shape (n_local_rows, n_interface).
+            compliance: Diagonal of D⁻¹, shape (n_interface,), the same for all copies of a node.
+            numbering: Owners and exchange of multipliers.
+            n_equality: Number of gluing and Dirichlet rows; contact rows have the higher numbers.
+        """
+        self._inverse, self._numbering = inverse, numbering
+        self._B = (B @ sp.diags(compliance)).tocsr()
+        self._Bt = self._B.T.tocsr()
+        diagonal = numbering.to_owned(B.multiply(self._B).sum(axis=1).A1)
+        self._equality = 1.0 / np.where(numbering.owned < n_equality, diagonal, 1.0)
+        self._contact = _ContactBlock(B, self._B, numbering, n_equality)
 
     def __call__(self, residual: np.ndarray) -> np.ndarray:
         """Return M r for an owned vector. Collective."""
-        jump = self._Bt @ self._numbering.to_local(self._contact.solve(residual))
-        force = np.empty_like(jump)
-        for part, schur in self._schur:
-            force[part] = schur(jump[part])
-        return self._contact.solve(self._numbering.to_owned(self._B @ force))
+        jump = self._Bt @ self._numbering.to_local(self._unweighted(residual))
+        force = self._B @ self._inverse.stiffen(jump)
+        return self._unweighted(self._numbering.to_owned(force))
 
-
-class _Apply(Protocol):
-    def __call__(self, displacement: np.ndarray) -> np.ndarray: ...
-
-
-def _schur_complement(stiffness: sp.csr_matrix, boundary: np.ndarray) -> _Apply:
-    """Return v ↦ S v, S = K_bb − K_bi K_ii⁻¹ K_ib, for vectors that vanish inside."""
-    b, i = np.flatnonzero(boundary), np.flatnonzero(~boundary)
-    Kb = stiffness[b]
-    Kbb, Kbi = Kb[:, b].tocsr(), Kb[:, i].tocsr()
-    Kib = Kbi.T.tocsr()
-    interior = Factor(stiffness[i][:, i].tocsr()) if len(i) else None
-    inner = np.zeros(len(i))
-
-    def apply(displacement: np.ndarray) -> np.ndarray:
-        force = np.zeros_like(displacement)
-        v = displacement[b]
-        force[b] = Kbb @ v
-        if interior is not None:
-            interior.solve(Kib @ v, inner)
-            force[b] -= Kbi @ inner
-        return force
-
-    return apply
+    def _unweighted(self, x: np.ndarray) -> np.ndarray:
+        """Return (B D⁻¹ Bᵀ)⁻¹ x, owned. Collective."""
+        return self._contact.solve(self._equality * x)
 
 
 class _ContactBlock:
-    """(B Bᵀ)⁻¹: the identity on equality rows, a sparse factor on contact rows."""
+    """(B D⁻¹ Bᵀ)⁻¹ on contact rows by a sparse factor; other rows stay as they are."""
 
-    def __init__(self, B: sp.csr_matrix, numbering: DualNumbering, n_equality: int) -> None:
+    def __init__(
+        self, B: sp.csr_matrix, weighted: sp.csr_matrix, numbering: DualNumbering, n_equality: int
+    ) -> None:
         comm = numbering.comm
         rows = numbering.local_rows
         mine = np.flatnonzero(rows >= n_equality)
@@ -97,7 +82,7 @@ class _ContactBlock:
         place = np.zeros(count)
         place[numbering.owned[self._owned] - n_equality] = starts[comm.rank] + np.arange(len(self._owned))
         place = np.asarray(comm.allreduce(place))[rows[mine] - n_equality].astype(PETSc.IntType)
-        gram = (B[mine] @ B[mine].T).tocoo()
+        gram = (B[mine] @ weighted[mine].T).tocoo()
         gram.data[gram.row == gram.col] *= 1.0 + REGULARISATION
         shape = (len(rows), count)
         gram = numbering.sum_rows(sp.csr_matrix((gram.data, (mine[gram.row], place[gram.col])), shape=shape))

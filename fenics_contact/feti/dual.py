@@ -6,8 +6,9 @@ import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
 
+from fenics_contact.errors import together
 from fenics_contact.feti.dirichlet import DirichletPreconditioner
-from fenics_contact.feti.inverse import GeneralizedInverse, kernel_matrix
+from fenics_contact.feti.inverse import LocalKind, TornInverse, kernel_matrix
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.qp import CoarseSpace, ContactLayout, DualProblem
 from fenics_contact.timing import PhaseTimer
@@ -27,19 +28,40 @@ class DualSystem:
         products: F-products so far.
     """
 
-    def __init__(self, torn: TornSystem, timer: PhaseTimer | None = None) -> None:
-        """Factor the subdomains and assemble d, G, e. Collective."""
+    def __init__(
+        self,
+        torn: TornSystem,
+        timer: PhaseTimer | None = None,
+        *,
+        kind: LocalKind = LocalKind.AUTOMATIC,
+        previous: DualSystem | None = None,
+    ) -> None:
+        """Factor the subdomains and assemble d, G, e. Collective.
+
+        Args:
+            torn: The torn system.
+            timer: Collects the seconds.
+            kind: How the subdomains are kept; the cost model chooses by default.
+            previous: System of another geometry; the factors of subdomains that stay are taken over.
+        """
         timer = timer or PhaseTimer()
         comm = torn.numbering.comm
         self.torn, self.products = torn, 0
         self._B, self._Bt = torn.B, torn.B.T.tocsr()
         with timer.phase("factor"):
-            self.inverse = GeneralizedInverse(torn.subdomains)
+            known = None if previous is None else previous.inverse
+            condensations = torn.decomposition.condensations
+            with together(comm):
+                self.inverse = TornInverse(torn.subdomains, torn.B, condensations, kind=kind, previous=known)
+            self._B_interface = torn.B[:, self.inverse.interface].tocsr()
+            self._Bt_interface = self._B_interface.T.tocsr()
         with timer.phase("coarse space"):
             self.kernel = self._kernel(comm)
             coarse = CoarseSpace(comm, self._coarse_columns(), self._resultants(comm))
         with timer.phase("preconditioner"):
-            preconditioner = DirichletPreconditioner(torn.subdomains, torn.B, torn.numbering, torn.n_equality)
+            preconditioner = DirichletPreconditioner(
+                self.inverse, self._B_interface, self._compliance(), torn.numbering, torn.n_equality
+            )
             diagonal = self._diagonal()
         d = self.jump(self.inverse(torn.load)) - torn.right
         self.problem = DualProblem(comm, self.apply, d, coarse, self._layout(), diagonal, preconditioner)
@@ -47,7 +69,9 @@ class DualSystem:
     def apply(self, multiplier: np.ndarray) -> np.ndarray:
         """Return F λ = B K⁺ Bᵀ λ for an owned vector. Collective."""
         self.products += 1
-        return self.jump(self.inverse(self.force(multiplier)))
+        numbering = self.torn.numbering
+        force = self._Bt_interface @ numbering.to_local(multiplier)
+        return numbering.to_owned(self._B_interface @ self.inverse.flex(force))
 
     def force(self, multiplier: np.ndarray) -> np.ndarray:
         """Return Bᵀλ on this rank's torn dofs, [force]. Collective."""
@@ -105,12 +129,27 @@ class DualSystem:
         """Return which frictional points' discs this rank owns, positions in ``torn.frictional``."""
         return np.flatnonzero(self.positions(self.torn.tangential_rows)[:, 0] >= 0)
 
+    def _compliance(self) -> np.ndarray:
+        """Return 1 / the mean diagonal stiffness of its body at each interface dof. Collective."""
+        tearing = self.torn.decomposition.tearing
+        body_of = np.searchsorted(tearing.subdomain_offset, np.arange(tearing.n_subdomains), side="right") - 1
+        sums = np.zeros((2, len(tearing.body_names)))
+        for subdomain in self.torn.subdomains:
+            sums[:, body_of[subdomain.mesh.number]] += subdomain.stiffness.diagonal().sum(), subdomain.mesh.size
+        total, count = self.torn.numbering.comm.allreduce(sums)
+        # Only the ratios between bodies matter.
+        weight = (count / total) / (count / total).max()
+        of_dof = np.repeat(
+            weight[body_of[[s.mesh.number for s in self.torn.subdomains]]], np.diff(self.inverse.offset)
+        )
+        return np.asarray(of_dof[self.inverse.interface])
+
     def _diagonal(self) -> np.ndarray:
         """Return the diagonal of F on contact rows, one elsewhere, owned. Collective."""
         numbering = self.torn.numbering
         local = np.zeros(self._B.shape[0])
         contact = np.flatnonzero(numbering.local_rows >= self.torn.n_equality)
-        local[contact] = self.inverse.row_flexibility(self._B[contact])
+        local[contact] = self.inverse.row_flexibility(self._B_interface[contact])
         diagonal = numbering.to_owned(local)
         diagonal[numbering.owned < self.torn.n_equality] = 1.0
         return diagonal

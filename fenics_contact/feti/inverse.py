@@ -1,45 +1,130 @@
-"""The generalised inverse of the torn stiffness and its kernel, subdomain by subdomain."""
+"""The factored subdomains of one rank together: generalised inverse, interface operators and kernel."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from enum import Enum
 
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.feti.factor import Factor, regularised
+from fenics_contact.feti.condensation import Condensations
+from fenics_contact.feti.cost_model import prefers_explicit
+from fenics_contact.feti.explicit import ExplicitOperator
+from fenics_contact.feti.implicit import ImplicitOperator
+from fenics_contact.feti.local import LocalOperator, interface_dofs
 from fenics_contact.feti.subdomain import Subdomain
 
 
-class GeneralizedInverse:
-    """K⁺ of this rank's subdomains: a Cholesky factor each, applied one after the other.
+class LocalKind(Enum):
+    """How subdomains are kept."""
+
+    AUTOMATIC = "automatic"
+    IMPLICIT = "implicit"
+    EXPLICIT = "explicit"
+
+
+class TornInverse:
+    """K⁺ of this rank's subdomains and their operators on the interface, one after the other.
+
+    Vectors on the interface hold the interface dofs of all subdomains in their order.
 
     Attributes:
         offset: First dof of each subdomain in the torn vector, and the total, shape (n + 1,).
+        interface: Interface dofs in the torn vector, shape (n_interface,).
+        operators: The factored subdomains.
+        factored: How many of them were factored anew, the others being taken over.
     """
 
-    def __init__(self, subdomains: Sequence[Subdomain]) -> None:
-        """Factor every regularised K_s."""
+    def __init__(
+        self,
+        subdomains: Sequence[Subdomain],
+        B: sp.csr_matrix,
+        condensations: Condensations,
+        *,
+        kind: LocalKind = LocalKind.AUTOMATIC,
+        previous: TornInverse | None = None,
+    ) -> None:
+        """Factor the subdomains.
+
+        Args:
+            subdomains: This rank's subdomains.
+            B: This rank's part of B, shape (n_local_rows, torn_size).
+            condensations: Symbolic factorisations to reuse.
+            kind: Sparse factors, dense matrices, or whichever the cost model expects to be faster.
+            previous: Operators of another geometry; those of subdomains that did not change are taken over.
+        """
         self.offset = np.cumsum([0] + [subdomain.mesh.size for subdomain in subdomains])
-        self._factors = [Factor(regularised(s.stiffness, s.kernel, s.points)) for s in subdomains]
+        self._subdomains, self._kind = tuple(subdomains), kind
+        touched = np.zeros(self.offset[-1], dtype=bool)
+        touched[B.indices] = True
+        self.operators: list[LocalOperator] = []
+        self._local: list[np.ndarray] = []
+        self.factored = 0
+        for index, subdomain in enumerate(subdomains):
+            marks = touched[self.offset[index] : self.offset[index + 1]]
+            local = interface_dofs(marks, subdomain.kernel, subdomain.points)
+            known = None if previous is None else previous._operator_of(index, subdomain, local, kind)
+            self.factored += known is None
+            self.operators.append(known or _factored(subdomain, local, condensations, kind))
+            self._local.append(local)
+        starts = np.cumsum([0] + [len(local) for local in self._local])
+        self._parts = [slice(a, b) for a, b in zip(starts[:-1], starts[1:], strict=True)]
+        shifted = [local + start for local, start in zip(self._local, self.offset[:-1], strict=True)]
+        self.interface = np.concatenate(shifted) if shifted else np.zeros(0, dtype=np.int64)
 
     def __call__(self, right: np.ndarray) -> np.ndarray:
         """Return K⁺ times a torn vector, shape (torn_size,)."""
-        result = np.empty_like(right)
-        for factor, start, stop in zip(self._factors, self.offset[:-1], self.offset[1:], strict=True):
-            factor.solve(right[start:stop], result[start:stop])
-        return result
+        parts = zip(self.operators, self.offset[:-1], self.offset[1:], strict=True)
+        return np.concatenate([operator.invert(right[start:stop]) for operator, start, stop in parts])
+
+    def flex(self, force: np.ndarray) -> np.ndarray:
+        """Return (K⁺)_bb times an interface force, shape (n_interface,)."""
+        return self._each(lambda operator: operator.flex, force)
+
+    def stiffen(self, displacement: np.ndarray) -> np.ndarray:
+        """Return S times an interface displacement, shape (n_interface,)."""
+        return self._each(lambda operator: operator.stiffen, displacement)
 
     def row_flexibility(self, rows: sp.csr_matrix) -> np.ndarray:
-        """Return bᵀ K⁺ b for each row b of a matrix with torn columns, shape (n_rows,)."""
+        """Return bᵀ K⁺ b for each row b of a matrix with interface columns, shape (n_rows,)."""
         flexibility = np.zeros(rows.shape[0])
         columns = rows.tocsc()
-        for factor, start, stop in zip(self._factors, self.offset[:-1], self.offset[1:], strict=True):
-            block = columns[:, start:stop].tocsr()
+        for operator, part in zip(self.operators, self._parts, strict=True):
+            block = columns[:, part].tocsr()
             touched = np.flatnonzero(np.diff(block.indptr))
-            dense = block[touched].toarray().T
-            flexibility[touched] += np.einsum("nk,nk->k", dense, factor.solve_many(dense))
+            if len(touched):
+                flexibility[touched] += operator.row_flexibility(block[touched])
         return flexibility
+
+    def _each(
+        self,
+        method: Callable[[LocalOperator], Callable[[np.ndarray, np.ndarray], None]],
+        given: np.ndarray,
+    ) -> np.ndarray:
+        found = np.empty_like(given)
+        for operator, part in zip(self.operators, self._parts, strict=True):
+            method(operator)(given[part], found[part])
+        return found
+
+    def _operator_of(
+        self, index: int, subdomain: Subdomain, interface: np.ndarray, kind: LocalKind
+    ) -> LocalOperator | None:
+        """Return the operator of a subdomain that is the same object as here, with the same interface."""
+        same = self._subdomains[index] is subdomain and self._kind is kind
+        return self.operators[index] if same and np.array_equal(self._local[index], interface) else None
+
+
+def _factored(
+    subdomain: Subdomain, interface: np.ndarray, condensations: Condensations, kind: LocalKind
+) -> LocalOperator:
+    if kind is LocalKind.AUTOMATIC:
+        explicit = prefers_explicit(subdomain.mesh.size, len(interface))
+    else:
+        explicit = kind is LocalKind.EXPLICIT
+    if explicit:
+        return ExplicitOperator(subdomain, interface, condensations)
+    return ImplicitOperator(subdomain, interface)
 
 
 def kernel_matrix(

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from fenics_contact import _dolfinx
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.forms import FormLibrary
-from fenics_contact.scene import Body, BodyForce, Load
+from fenics_contact.scene import Body, BodyForce, Load, Material
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,8 @@ class Subdomain:
 
     Attributes:
         mesh: Mesh and numbering.
+        material: Material it was assembled for.
+        loads: Loads on it that it was assembled for.
         points: Coordinates by block, shape (n, 3), [length].
         stiffness: K_s, shape (3 n, 3 n).
         load: f_s, shape (3 n,), [force].
@@ -56,6 +58,8 @@ class Subdomain:
     """
 
     mesh: SubdomainMesh
+    material: Material
+    loads: tuple[Load, ...]
     points: np.ndarray
     stiffness: sp.csr_matrix
     load: np.ndarray
@@ -93,7 +97,13 @@ def cut_out(
     return SubdomainMesh(number, body_name, cells, nodes, space, facets)
 
 
-def assemble(mesh: SubdomainMesh, body: Body, loads: Sequence[Load], forms: FormLibrary) -> Subdomain:
+def assemble(
+    mesh: SubdomainMesh,
+    body: Body,
+    loads: Sequence[Load],
+    forms: FormLibrary,
+    earlier: Subdomain | None = None,
+) -> Subdomain:
     """Assemble K_s, f_s and R_s for the present coordinates of ``body``.
 
     Args:
@@ -101,28 +111,37 @@ def assemble(mesh: SubdomainMesh, body: Body, loads: Sequence[Load], forms: Form
         body: Its body, with the coordinates to use.
         loads: Loads of the scene, resultants already spread.
         forms: Compiled forms.
+        earlier: The same subdomain in another state, returned as it is if coordinates, material and loads
+            are equal.
 
     Raises:
         InvalidInputError: If a matrix or load entry is not a number.
     """
     space, cell_type = mesh.space, body.mesh.cell_type
     points = body.mesh.points[mesh.nodes]
+    acting = [
+        (index, load)
+        for index, load in enumerate(loads)
+        if load.body == mesh.body and (isinstance(load, BodyForce) or index in mesh.facets)
+    ]
+    own_loads = tuple(load for _, load in acting)
+    if (
+        earlier is not None
+        and (earlier.material, earlier.loads) == (body.material, own_loads)
+        and np.array_equal(earlier.points, points)
+    ):
+        return earlier
     used = np.sort(mesh.nodes)
     _dolfinx.update_coordinates(space.mesh, body.mesh.points[used])
     indptr, indices, data = _dolfinx.assemble_csr(forms.stiffness(body.material, cell_type, space))
     stiffness = sp.csr_matrix((data, indices, indptr), shape=(mesh.size, mesh.size))
     force = np.zeros(mesh.size)
-    for index, load in enumerate(loads):
-        if load.body != mesh.body:
-            continue
-        if isinstance(load, BodyForce):
-            force += _dolfinx.assemble_vector(forms.load(load, cell_type, space))
-        elif index in mesh.facets:
-            force += _dolfinx.assemble_vector(forms.load(load, cell_type, space, mesh.facets[index]))
+    for index, load in acting:
+        force += _dolfinx.assemble_vector(forms.load(load, cell_type, space, mesh.facets.get(index)))
     if not (np.isfinite(data).all() and np.isfinite(force).all()):
         raise InvalidInputError(
             f"stiffness and load of subdomain {mesh.number} of body {mesh.body!r} must be finite, got NaN or "
             "infinity: check the material parameters, the loads and the coordinates"
         )
     kernel = body.material.kernel(points)
-    return Subdomain(mesh, points, stiffness, force, kernel.reshape(mesh.size, -1))
+    return Subdomain(mesh, body.material, own_loads, points, stiffness, force, kernel.reshape(mesh.size, -1))

@@ -78,7 +78,11 @@ class TornSystem:
 
 
 def build_torn_system(
-    scene: Scene, decomposition: Decomposition, *, start_geometry: bool = True
+    scene: Scene,
+    decomposition: Decomposition,
+    *,
+    start_geometry: bool = True,
+    previous: TornSystem | None = None,
 ) -> TornSystem:
     """Assemble all numbers of the torn system for the scene's present coordinates. Collective.
 
@@ -87,6 +91,7 @@ def build_torn_system(
         decomposition: Meshes and numbering.
         start_geometry: Refuse bodies that overlap. A shape being optimised may overlap its partner: the gap
             is then negative and the state presses the bodies apart.
+        previous: System of another geometry or load; subdomains for which nothing changed are taken over.
 
     Raises:
         InvalidInputError: If the bodies overlap at the start, or matrices are not finite.
@@ -94,9 +99,10 @@ def build_torn_system(
     comm = decomposition.comm
     loads = as_tractions(scene)
     with together(comm):
+        known = (None,) * len(decomposition.meshes) if previous is None else previous.subdomains
         subdomains = tuple(
-            assemble(mesh, scene.bodies[mesh.body], loads, decomposition.forms)
-            for mesh in decomposition.meshes
+            assemble(mesh, scene.bodies[mesh.body], loads, decomposition.forms, earlier)
+            for mesh, earlier in zip(decomposition.meshes, known, strict=True)
         )
         points = no_contact_points()
         if scene.contacts:

@@ -9,6 +9,13 @@ from mpi4py import MPI
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.qp.gram import GramInverse
 from fenics_contact.qp.reductions import Vector, global_sum
+from fenics_contact.qp.sparse_gram import SparseGramInverse
+
+#: Up to so many rigid motions the small matrices are dense, and every rank factors them.
+DENSE_LIMIT = 600
+
+#: A matrix of size m: dense and summed over the ranks, or beyond the limit sparse, this rank's share alone.
+Gram = Vector | sp.csr_matrix
 
 
 class CoarseSpace:
@@ -16,18 +23,19 @@ class CoarseSpace:
 
     Column j of G holds the resultants of the j-th multiplier on every rigid motion. Columns are
     distributed like the multipliers; everything of length m (right side, coefficients) is replicated. The
-    small matrix G G^T is dense, replicated and factored on every rank; `GramInverse` is the one place to
-    exchange when m grows beyond a few thousand. With m = 0 all methods are cheap and do nothing.
+    matrix G G^T is dense and factored on every rank while it is small; beyond `DENSE_LIMIT` it is sparse and
+    factored on a few ranks, and every solution is a message to all. With m = 0 all methods are cheap and do
+    nothing.
 
     Attributes:
         comm: Communicator over which the multipliers are distributed.
         matrix: This rank's columns of G, shape (m, n_owned), CSR.
         load: Right side e, shape (m,), replicated.
-        gram: Generalised inverse of G G^T, replicated.
+        gram: Generalised inverse of G G^T.
     """
 
     def __init__(
-        self, comm: MPI.Comm, G: sp.spmatrix | sp.sparray, e: Vector, *, gram: Vector | None = None
+        self, comm: MPI.Comm, G: sp.spmatrix | sp.sparray, e: Vector, *, gram: Gram | None = None
     ) -> None:
         """Take this rank's columns and factor G G^T. Collective on ``comm``.
 
@@ -35,7 +43,7 @@ class CoarseSpace:
             comm: Communicator over which the multipliers are distributed.
             G: This rank's columns, sparse, shape (m, n_owned).
             e: Right side, shape (m,), the same on every rank.
-            gram: The matrix G G^T of all ranks, shape (m, m), where the caller knows it already.
+            gram: The matrix G G^T as `gram_matrix` returns it, where the caller knows it already.
 
         Raises:
             InvalidInputError: The shapes of G and e disagree.
@@ -49,8 +57,10 @@ class CoarseSpace:
                 "assemble both from the same list of floating subdomains"
             )
         self._transposed = self.matrix.T.tocsr()
-        self.gram_matrix = gram_matrix(comm, self.matrix) if gram is None else gram
-        self.gram = GramInverse(self.gram_matrix)
+        gram = gram_matrix(comm, self.matrix) if gram is None else gram
+        self.gram: GramInverse | SparseGramInverse = (
+            GramInverse(gram) if isinstance(gram, np.ndarray) else SparseGramInverse(comm, gram)
+        )
 
     @property
     def m(self) -> int:
@@ -70,7 +80,7 @@ class CoarseSpace:
         return self._transposed @ alpha
 
     def solve(self, right_side: Vector) -> Vector:
-        """Return (G G^T)^-1 times an array of shape (m,), replicated."""
+        """Return (G G^T)^-1 times an array of shape (m,), replicated. Collective."""
         return self.gram.solve(right_side)
 
     def coefficients(self, x: Vector) -> Vector:
@@ -106,21 +116,27 @@ class CoarseSpace:
         return basis @ (basis.T @ self.load)
 
     def restricted(
-        self, Z: sp.spmatrix | sp.sparray, load: Vector | None = None, *, gram: Vector | None = None
+        self, Z: sp.spmatrix | sp.sparray, load: Vector | None = None, *, gram: Gram | None = None
     ) -> CoarseSpace:
         """Return the coarse space G Z of a face with dofs y, multiplier = fixed + Z y. Collective.
 
         Args:
             Z: This rank's restriction, sparse, shape (n_owned, n_face).
             load: Right side for the face, e - G fixed, shape (m,), replicated; e itself by default.
-            gram: The matrix G Z Z^T G^T of all ranks, where known.
+            gram: The matrix G Z Z^T G^T as `gram_matrix` returns it, where known.
         """
         return CoarseSpace(self.comm, self.matrix @ Z, self.load if load is None else load, gram=gram)
 
 
-def gram_matrix(comm: MPI.Comm, columns: sp.csr_matrix) -> Vector:
-    """Return the sum over the ranks of C C^T for owned columns C, shape (m, m). Collective."""
-    m = columns.shape[0]
-    if m == 0:
-        return np.zeros((0, 0))
-    return global_sum(comm, (columns @ columns.T).toarray()).reshape(m, m)
+def gram_matrix(comm: MPI.Comm, columns: sp.csr_matrix) -> Gram:
+    """Return C C^T for owned columns C: the sum over the ranks, or beyond `DENSE_LIMIT` this rank's share.
+
+    Matrices of the same size can be added whichever they are. Collective.
+    """
+    return summed_if_small(comm, (columns @ columns.T).tocsr())
+
+
+def summed_if_small(comm: MPI.Comm, share: sp.csr_matrix) -> Gram:
+    """Return the sum over the ranks, dense, of a square matrix up to `DENSE_LIMIT`, else the share. Collective."""
+    m = share.shape[0]
+    return global_sum(comm, share.toarray()).reshape(m, m) if m <= DENSE_LIMIT else share

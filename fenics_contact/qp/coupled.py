@@ -5,15 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 import scipy.sparse as sp
-from scipy.linalg import lapack
 
 from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.face_system import FaceSystem
-from fenics_contact.qp.reductions import Vector, global_max
-
-RANK_TOLERANCE = 1e-10
+from fenics_contact.qp.reductions import Vector, global_max, global_sum
+from fenics_contact.qp.square_inverse import SquareInverse, invert_square
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,33 +20,24 @@ class ObliqueProjector:
     Attributes:
         tested: G_s, this rank's columns on the tested basis, shape (m, n_face).
         moving: Coarse space of G_u on the moving basis.
-        factor: LU factors of the scaled G_u G_sᵀ and the scale, None for m = 0.
+        inverse: (G_u G_sᵀ)⁻¹.
     """
 
     tested: sp.csr_matrix
     moving: CoarseSpace
-    factor: tuple[tuple[Vector, Vector], Vector] | None
+    inverse: SquareInverse
 
     @classmethod
     def build(cls, tested: sp.csr_matrix, moving: CoarseSpace) -> ObliqueProjector | None:
         """Factor G_u G_sᵀ; None if it is singular: then the face does not hold every body. Collective."""
-        mixed = np.asarray(moving.comm.allreduce((moving.matrix @ tested.T).toarray()))
-        if len(mixed) == 0:
-            return cls(tested, moving, None)
-        scale = 1.0 / np.sqrt(np.maximum(np.abs(mixed).max(axis=1), np.finfo(float).tiny))
-        scaled = scale[:, None] * mixed * scale
-        lu, pivots, info = lapack.dgetrf(scaled)
-        condition, _ = lapack.dgecon(lu, np.abs(scaled).sum(axis=0).max())
-        if info != 0 or not condition > RANK_TOLERANCE:
-            return None
-        return cls(tested, moving, ((lu, pivots), scale))
+        diagonal = global_sum(moving.comm, moving.matrix.power(2).sum(axis=1))
+        scale = 1.0 / np.sqrt(np.maximum(diagonal, np.finfo(float).tiny))
+        inverse = invert_square(moving.comm, (moving.matrix @ tested.T).tocsr(), scale)
+        return None if inverse is None else cls(tested, moving, inverse)
 
     def solve(self, resultant: Vector) -> Vector:
-        """Return (G_u G_sᵀ)⁻¹ times a replicated array of shape (m,)."""
-        if self.factor is None:
-            return resultant
-        factor, scale = self.factor
-        return np.asarray(scale * scipy.linalg.lu_solve(factor, scale * resultant, check_finite=False))
+        """Return (G_u G_sᵀ)⁻¹ times a replicated array of shape (m,). Collective."""
+        return self.inverse.solve(resultant)
 
     def coefficients(self, v: Vector) -> Vector:
         """Return (G_u G_sᵀ)⁻¹ G_u v, replicated. Collective."""

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh, DesignSurface, boundary_faces
+from fenics_contact.geometry import BodyMesh, DesignSurface
 from fenics_contact.shape.bernstein import tensor_bernstein
 
-#: Default width of the transition strip, relative to the extent of the design surface.
+#: Default width of the transition zone, relative to the extent of the design surface.
 TRANSITION = 0.15
 
 
@@ -27,9 +27,8 @@ class SurfaceDesign:
         body: Name of the body.
         surface: Nodes of the surface, their parameters and directions.
         net: Number of control points along s and t.
-        transition: Width of the strip of boundary around the surface that follows it smoothly; the rest of
-        the
-            boundary keeps its place, [length]. By default 0.15 times the extent of the surface.
+        transition: Width of the zone around the surface that follows it smoothly; the rest of the body keeps
+            its place, [length]. By default 0.15 times the extent of the surface.
     """
 
     body: str
@@ -79,7 +78,9 @@ class SurfaceDesign:
         return self.basis.T @ np.einsum("nd,nd->n", gradient, self.surface.directions)
 
     def nodes_beyond_transition(self, mesh: BodyMesh) -> np.ndarray:
-        """Return the boundary nodes of the body that do not follow the surface.
+        """Return the nodes of the body that do not follow the surface.
+
+        Only subdomains with other nodes are assembled and factored again for a new design.
 
         Args:
             mesh: The body in its reference shape.
@@ -88,10 +89,8 @@ class SurfaceDesign:
         width = self.transition
         if width is None:
             width = TRANSITION * float(np.linalg.norm(np.ptp(surface, axis=0)))
-        facets, _ = boundary_faces(mesh.cells)
-        nodes = np.setdiff1d(facets, self.surface.nodes)
-        distance, _ = cKDTree(surface).query(mesh.points[nodes])
-        return nodes[distance > width]
+        distance, _ = cKDTree(surface).query(mesh.points)
+        return np.flatnonzero(distance > width)
 
     def control_points(self, points: np.ndarray, alpha: np.ndarray) -> np.ndarray:
         """Return where to draw the control points, shape (net[0], net[1], 3), [length].

@@ -14,7 +14,7 @@ FLOORS = [
     {"errors"},
     {"_requirements", "timing"},
     {"_dolfinx"},
-    {"geometry"},
+    {"geometry", "linalg"},
     {"scene", "qp"},
     {"feti"},
     {"contact"},
@@ -25,7 +25,7 @@ FLOOR = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
 BESIDE = {"viz", "io", "study"}
 #: Rooms that are tested with small dense matrices, and what they never meet.
 WITHOUT_FENICS = {
-    "qp": {"dolfinx", "ufl", "basix", "ffcx", "gmsh", "petsc4py"},
+    "qp": {"dolfinx", "ufl", "basix", "ffcx", "gmsh"},
     "optimize": {"dolfinx", "ufl", "basix", "ffcx", "gmsh", "petsc4py", "mpi4py"},
 }
 

@@ -7,7 +7,18 @@ from mpi4py import MPI
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.qp import CoarseSpace
+from fenics_contact.qp import coarse as coarse_module
 from fenics_contact.qp.gram import GramInverse
+from fenics_contact.qp.sparse_gram import SparseGramInverse
+from fenics_contact.qp.square_inverse import invert_square
+
+
+@pytest.fixture(params=["dense", "sparse"], autouse=True)
+def kind(request, monkeypatch):
+    """Run every test with the small matrices dense on every rank, and sparse on a few ranks."""
+    if request.param == "sparse":
+        monkeypatch.setattr(coarse_module, "DENSE_LIMIT", 0)
+    return request.param
 
 
 @pytest.fixture
@@ -50,7 +61,8 @@ def test_dependent_rows_are_found_and_projected_out(G):
     x = np.arange(15.0)
     assert coarse.gram.rank == 4
     np.testing.assert_allclose(coarse.project(x), full.project(x), atol=1e-12)
-    np.testing.assert_allclose(coarse.gram_matrix @ coarse.gram.null_space, 0.0, atol=1e-12)
+    gram = dependent @ dependent.T
+    np.testing.assert_allclose(gram @ coarse.gram.null_space, 0.0, atol=1e-11)
 
 
 def test_load_on_a_motion_without_rows_is_unresisted(G):
@@ -94,3 +106,29 @@ def test_gram_inverse_of_several_columns(G):
     singular = np.pad(S, (0, 1))
     padded = np.vstack([rhs, np.zeros(2)])
     np.testing.assert_allclose(singular @ GramInverse(singular).solve(padded), padded, atol=1e-12)
+
+
+def test_the_limit_decides_what_is_built(G, monkeypatch):
+    for limit, expected in ((3, SparseGramInverse), (4, GramInverse)):
+        monkeypatch.setattr(coarse_module, "DENSE_LIMIT", limit)
+        assert type(coarse_space(G, np.ones(4)).gram) is expected
+
+
+def test_more_null_vectors_than_the_first_block_are_all_found():
+    G = np.random.default_rng(5).standard_normal((10, 60))
+    dependent = np.vstack([G, G + 1.0 * G[::-1]])
+    rank = np.linalg.matrix_rank(dependent)
+    coarse = coarse_space(dependent, np.zeros(20))
+    assert coarse.gram.rank == rank == 10
+    x = np.random.default_rng(6).standard_normal(60)
+    np.testing.assert_allclose(dependent @ coarse.project(x), 0.0, atol=1e-10)
+
+
+def test_an_unsymmetric_matrix_is_inverted_and_a_singular_one_refused():
+    matrix = np.random.default_rng(7).standard_normal((6, 6)) + 3 * np.eye(6)
+    right = np.arange(6.0)
+    inverse = invert_square(MPI.COMM_SELF, sp.csr_matrix(matrix), np.full(6, 0.5))
+    assert inverse is not None
+    np.testing.assert_allclose(inverse.solve(right), np.linalg.solve(matrix, right), rtol=1e-11)
+    matrix[5] = matrix[0] + 2 * matrix[1]
+    assert invert_square(MPI.COMM_SELF, sp.csr_matrix(matrix), np.full(6, 0.5)) is None

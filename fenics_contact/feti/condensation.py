@@ -1,0 +1,108 @@
+"""Schur complements of subdomain matrices, one symbolic factorisation for all that share a sparsity pattern."""
+
+from __future__ import annotations
+
+import ctypes
+from collections import OrderedDict
+from functools import lru_cache
+
+import numpy as np
+import scipy.sparse as sp
+from petsc4py import PETSc
+
+#: Symbolic factorisations kept. Each holds the numbers of its last matrix as well: a few MB.
+KEPT = 24
+#: MUMPS control parameter and its value for nested dissection by METIS.
+ORDERING, METIS = 7, 5
+
+
+class Condensation:
+    """S = K_bb − K_bi K_ii⁻¹ K_ib by MUMPS, which factors K_ii and forms S in one pass.
+
+    The ordering and the symbolic factorisation are made once; each call only refills the numbers.
+    """
+
+    def __init__(self, pattern: sp.csr_matrix, interface: np.ndarray) -> None:
+        """Prepare for symmetric matrices with the sparsity of ``pattern``.
+
+        Args:
+            pattern: Any matrix with the pattern, shape (n, n).
+            interface: The dofs b, shape (n_b,).
+        """
+        self._size = len(interface)
+        self._structure = (pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType))
+        csr = (*self._structure, pattern.data)
+        self._matrix = PETSc.Mat().createAIJ(pattern.shape, csr=csr, comm=PETSc.COMM_SELF)
+        self._matrix.setOption(PETSc.Mat.Option.SPD, True)
+        self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        self._pc = PETSc.PC().create(PETSc.COMM_SELF)
+        self._pc.setOperators(self._matrix)
+        self._pc.setType(PETSc.PC.Type.CHOLESKY)
+        self._pc.setFactorSolverType("mumps")
+        self._pc.setFactorSetUpSolverType()
+        self._factor = self._pc.getFactorMatrix()
+        self._factor.setMumpsIcntl(ORDERING, METIS)
+        self._rows = PETSc.IS().createGeneral(interface.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+        _call("MatFactorSetSchurIS", self._factor.handle, self._rows.handle)
+
+    def __call__(self, stiffness: sp.csr_matrix) -> np.ndarray:
+        """Return S of a matrix with the pattern, shape (n_b, n_b), Fortran order."""
+        self._matrix.setValuesCSR(*self._structure, stiffness.data)
+        self._matrix.assemble()
+        self._pc.setUp()
+        return self._schur_complement()
+
+    def _schur_complement(self) -> np.ndarray:
+        # petsc4py has no name for this yet, PETSc's own library has.
+        matrix, status = ctypes.c_void_p(), ctypes.c_int()
+        values = ctypes.POINTER(ctypes.c_double)()
+        factor = self._factor.handle
+        _call("MatFactorGetSchurComplement", factor, ctypes.byref(matrix), ctypes.byref(status))
+        _call("MatDenseGetArrayRead", matrix, ctypes.byref(values))
+        schur = np.array(np.ctypeslib.as_array(values, shape=(self._size, self._size))).T
+        _call("MatDenseRestoreArrayRead", matrix, ctypes.byref(values))
+        _call("MatFactorRestoreSchurComplement", factor, ctypes.byref(matrix), status)
+        return schur
+
+
+class Condensations:
+    """Keeps the condensations used last, by pattern and interface.
+
+    Subdomains of a regular partition share one pattern and a handful of interfaces, and a new geometry
+    changes neither.
+
+    Attributes:
+        analysed: Symbolic factorisations made so far.
+    """
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._kept: OrderedDict[tuple[bytes, bytes, bytes], Condensation] = OrderedDict()
+        self.analysed = 0
+
+    def schur_complement(self, stiffness: sp.csr_matrix, interface: np.ndarray) -> np.ndarray:
+        """Return the Schur complement of ``stiffness`` on the dofs ``interface``, shape (n_b, n_b)."""
+        if len(interface) == stiffness.shape[0]:
+            return stiffness[interface][:, interface].toarray(order="F")
+        key = (stiffness.indptr.tobytes(), stiffness.indices.tobytes(), interface.tobytes())
+        if key not in self._kept:
+            self._kept[key] = Condensation(stiffness, interface)
+            self.analysed += 1
+        self._kept.move_to_end(key)
+        if len(self._kept) > KEPT:
+            self._kept.popitem(last=False)
+        return self._kept[key](stiffness)
+
+
+@lru_cache(maxsize=1)
+def _petsc() -> ctypes.CDLL:
+    # The symbols of libpetsc are found through the extension module that is linked with it.
+    return ctypes.CDLL(PETSc.__file__)
+
+
+def _call(name: str, *arguments: object) -> None:
+    """Call a function of PETSc's C interface."""
+    wrapped = [ctypes.c_void_p(a) if isinstance(a, int) else a for a in arguments]
+    code = getattr(_petsc(), name)(*wrapped)
+    if code:
+        raise PETSc.Error(code)

@@ -1,0 +1,85 @@
+"""Sparse factors or dense matrices for a subdomain? What either costs, from measured rates.
+
+The choice depends on sizes alone, never on a clock, so that a run can be repeated. `python -m
+benchmarks.local_operators` measures the rates anew and compares them with the predictions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+#: Products that a factored subdomain is expected to serve: a state with contact and friction, and its adjoint.
+PRODUCTS = 100
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Rates of one core with OpenBLAS, other cores idle, caches cold.
+
+    Attributes:
+        factor: Seconds to factor a sparse matrix of n dofs of a solid, divided by n^1.37.
+        substitution: Seconds to substitute forth and back, divided by n^1.3.
+        condensation: Time to form a Schur complement relative to that of factoring the whole matrix.
+        dense: Floating point operations a second of a dense factorisation and inversion.
+        stream: Bytes a second that the product with a packed triangle reads.
+    """
+
+    factor: float = 0.9e-6
+    substitution: float = 2.8e-8
+    condensation: float = 1.3
+    dense: float = 25e9
+    stream: float = 15e9
+
+
+#: Rates measured as `Rates` describes.
+MEASURED = Rates()
+
+
+@dataclass(frozen=True)
+class LocalCost:
+    """Cost of one subdomain.
+
+    Attributes:
+        setup: Seconds to factor it.
+        product: Seconds to apply K⁺ and S once each on the interface.
+    """
+
+    setup: float
+    product: float
+
+    def total(self, products: int) -> float:
+        """Return the seconds of the set-up and of so many products."""
+        return self.setup + products * self.product
+
+
+def implicit_cost(size: int, interface: int, rates: Rates = MEASURED) -> LocalCost:
+    """Predict the cost of sparse factors of a subdomain with ``size`` dofs, ``interface`` of them shared."""
+    blocks = (size, size - interface)
+    return LocalCost(
+        rates.factor * sum(n**1.37 for n in blocks), rates.substitution * sum(n**1.3 for n in blocks)
+    )
+
+
+def explicit_cost(size: int, interface: int, rates: Rates = MEASURED) -> LocalCost:
+    """Predict the cost of dense interface matrices of a subdomain."""
+    sparse = rates.condensation * size**1.37 + (size - interface) ** 1.37
+    # K⁺ in double precision and S in single, each a triangle.
+    triangles = (4 + 2) * interface**2
+    return LocalCost(rates.factor * sparse + interface**3 / rates.dense, triangles / rates.stream)
+
+
+def prefers_explicit(size: int, interface: int, *, products: int = PRODUCTS, rates: Rates = MEASURED) -> bool:
+    """Tell whether dense interface matrices are expected to be faster than sparse factors.
+
+    Args:
+        size: Dofs of the subdomain.
+        interface: Dofs that B touches.
+        products: Expected products with the dual operator, as many with the preconditioner.
+        rates: Rates of the machine.
+
+    Example:
+        >>> prefers_explicit(2079, 729), prefers_explicit(10125, 3534)
+        (True, False)
+    """
+    explicit, implicit = (cost(size, interface, rates) for cost in (explicit_cost, implicit_cost))
+    return explicit.total(products) < implicit.total(products)

@@ -1,0 +1,51 @@
+"""What the dual method asks of one subdomain: flexibility and stiffness seen from its interface."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact.feti.factor import fixing_nodes
+
+#: Singular values of the kernel's trace on an interface below this count as zero: the modes have length one.
+RANK_TOLERANCE = 1e-6
+
+
+class LocalOperator(Protocol):
+    """A factored subdomain. Its *interface* are the dofs that B touches.
+
+    With K⁺ a symmetric generalised inverse of the stiffness K and S the Schur complement of K on the
+    interface b.
+    """
+
+    def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
+        """Write (K⁺)_bb times an interface force, shape (n_b,), into ``displacement``."""
+
+    def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
+        """Write S, or a close approximation, times an interface displacement into ``force``."""
+
+    def invert(self, right: np.ndarray) -> np.ndarray:
+        """Return K⁺ times a vector, shape (n,)."""
+
+    def row_flexibility(self, rows: sp.csr_matrix) -> np.ndarray:
+        """Return bᵀ (K⁺)_bb b for each row b of a matrix with interface columns, shape (n_rows,)."""
+
+
+def interface_dofs(touched: np.ndarray, kernel: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return the dofs that B touches, and a few more where these let the subdomain move without resistance.
+
+    Holding the interface must leave the inside with no rigid motion, or K_ii would be singular.
+
+    Args:
+        touched: Marks of the dofs, shape (n,).
+        kernel: Columns that span the kernel of K, shape (n, n_modes).
+        points: Coordinates by block of three dofs, shape (n / 3, 3).
+    """
+    modes, _ = np.linalg.qr(kernel)
+    trace = np.linalg.svd(modes[touched], compute_uv=False)
+    if np.count_nonzero(trace > RANK_TOLERANCE) < kernel.shape[1]:
+        touched = touched.copy()
+        touched.reshape(-1, 3)[fixing_nodes(points)] = True
+    return np.flatnonzero(touched)

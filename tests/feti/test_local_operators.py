@@ -1,0 +1,179 @@
+"""Sparse factors and dense interface matrices are two ways to keep one subdomain, and say the same of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from mpi4py import MPI
+
+from fenics_contact.feti import DualSystem, build_torn_system, decompose
+from fenics_contact.feti.condensation import Condensations
+from fenics_contact.feti.cost_model import LocalCost, explicit_cost, implicit_cost, prefers_explicit
+from fenics_contact.feti.explicit import ExplicitOperator
+from fenics_contact.feti.implicit import ImplicitOperator
+from fenics_contact.feti.inverse import LocalKind
+from fenics_contact.feti.local import LocalOperator, interface_dofs
+from fenics_contact.feti.subdomain import Subdomain
+from fenics_contact.geometry import block, box_partition
+from fenics_contact.qp import FaceNewton, solve
+from fenics_contact.scene import Body, IsotropicElasticity, Scene, Support, TotalForce
+from tests.feti.scenes import CELLS, STEEL, touching_blocks
+
+KINDS = (ImplicitOperator, ExplicitOperator)
+
+
+def piece(cell: str, cells: int = 3) -> Subdomain:
+    mesh = block((0, 0, 0), (1, 1.2, 0.9), (cells, cells, cells), cell)
+    scene = Scene({"block": Body(mesh, STEEL)})
+    parts = {"block": np.zeros(mesh.n_cells, dtype=int)}
+    return build_torn_system(scene, decompose(scene, parts, MPI.COMM_SELF)).subdomains[0]
+
+
+def surface(subdomain: Subdomain) -> np.ndarray:
+    """Marks of the dofs on two sides, but for one component of one side."""
+    points = subdomain.points
+    left, right = (np.isclose(points[:, 0], x) for x in (0.0, 1.0))
+    marks = np.repeat((left | right)[:, None], 3, axis=1)
+    marks[right, 1] = False
+    return marks.ravel()
+
+
+def keep(kind: type, subdomain: Subdomain, interface: np.ndarray) -> LocalOperator:
+    if kind is ExplicitOperator:
+        return ExplicitOperator(subdomain, interface, Condensations())
+    return ImplicitOperator(subdomain, interface)
+
+
+def columns(method: object, size: int) -> np.ndarray:
+    found = np.empty((size, size))
+    for k, unit in enumerate(np.eye(size)):
+        method(unit, out := np.empty(size))  # type: ignore[operator]
+        found[:, k] = out
+    return found
+
+
+@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_inverse_is_a_symmetric_generalised_one(cell: str, kind: type) -> None:
+    subdomain = piece(cell)
+    operator = keep(kind, subdomain, np.flatnonzero(surface(subdomain)))
+    K = subdomain.stiffness.toarray()
+    inverse = np.column_stack([operator.invert(unit) for unit in np.eye(len(K))])
+    assert abs(inverse - inverse.T).max() < 1e-9 * abs(inverse).max()
+    assert abs(K @ inverse @ K - K).max() < 1e-9 * abs(K).max()
+
+
+@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_flexing_is_the_inverse_seen_from_the_interface(cell: str, kind: type) -> None:
+    subdomain = piece(cell)
+    b = np.flatnonzero(surface(subdomain))
+    operator = keep(kind, subdomain, b)
+    inverse = np.column_stack([operator.invert(unit)[b] for unit in np.eye(subdomain.mesh.size)[b]])
+    F = columns(operator.flex, len(b))
+    assert abs(F - inverse).max() < 1e-10 * abs(inverse).max()
+    rows = sp.random(7, len(b), density=0.1, random_state=3, format="csr")
+    expected = np.einsum("ij,jk,ik->i", rows.toarray(), F, rows.toarray())
+    np.testing.assert_allclose(operator.row_flexibility(rows), expected, rtol=1e-9, atol=1e-12 * abs(F).max())
+
+
+@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize(("kind", "rounding"), [(ImplicitOperator, 1e-10), (ExplicitOperator, 1e-6)])
+def test_stiffening_is_the_schur_complement(cell: str, kind: type, rounding: float) -> None:
+    subdomain = piece(cell)
+    marks = surface(subdomain)
+    b, i = np.flatnonzero(marks), np.flatnonzero(~marks)
+    K = subdomain.stiffness.toarray()
+    expected = K[np.ix_(b, b)] - K[np.ix_(b, i)] @ np.linalg.solve(K[np.ix_(i, i)], K[np.ix_(i, b)])
+    S = columns(keep(kind, subdomain, b).stiffen, len(b))
+    assert abs(S - expected).max() < rounding * abs(expected).max()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_interface_that_is_everything_leaves_no_inside(kind: type) -> None:
+    subdomain = piece("hexahedron", cells=1)
+    operator = keep(kind, subdomain, np.arange(subdomain.mesh.size))
+    S = columns(operator.stiffen, subdomain.mesh.size)
+    K = subdomain.stiffness.toarray()
+    assert abs(S - K).max() < 1e-6 * abs(K).max()
+    right = K @ np.random.default_rng(1).standard_normal(len(K))
+    np.testing.assert_allclose(K @ operator.invert(right), right, atol=1e-9 * abs(right).max())
+
+
+@pytest.mark.parametrize("touched", [0, 1, 2])
+def test_an_interface_that_holds_nothing_is_completed(touched: int) -> None:
+    subdomain = piece("hexahedron")
+    marks = np.zeros(subdomain.mesh.size, dtype=bool)
+    marks[: 3 * touched] = True
+    b = interface_dofs(marks, subdomain.kernel, subdomain.points)
+    assert np.isin(np.flatnonzero(marks), b).all()
+    inside = np.setdiff1d(np.arange(subdomain.mesh.size), b)
+    stiffness = subdomain.stiffness.toarray()[np.ix_(inside, inside)]
+    values = np.linalg.eigvalsh(stiffness)
+    assert values.min() > 1e-4 * values.max()
+
+
+def test_subdomains_alike_share_one_symbolic_factorisation() -> None:
+    mesh = block((0, 0, 0), (6, 1, 1), (12, 2, 2))
+    scene = Scene(
+        {"bar": Body(mesh, STEEL)}, [Support("bar", "x0")], [TotalForce("bar", "x1", (0.0, 0.0, -1.0))]
+    )
+    decomposition = decompose(scene, {"bar": box_partition(mesh, (6, 1, 1))}, MPI.COMM_SELF)
+    system = DualSystem(build_torn_system(scene, decomposition), kind=LocalKind.EXPLICIT)
+    assert system.inverse.factored == 6
+    # First, inner and last pieces have different interfaces.
+    assert decomposition.condensations.analysed <= 3
+    DualSystem(build_torn_system(scene, decomposition), kind=LocalKind.EXPLICIT)
+    assert decomposition.condensations.analysed <= 3
+
+
+def test_both_kinds_give_the_same_contact_forces() -> None:
+    scene, partitions = touching_blocks()
+    torn = build_torn_system(scene, decompose(scene, partitions, MPI.COMM_SELF))
+    answers = []
+    for kind in (LocalKind.IMPLICIT, LocalKind.EXPLICIT):
+        system = DualSystem(torn, kind=kind)
+        coefficient = torn.friction_coefficient[system.owned_discs()]
+        bound = torn.tresca_bound[system.owned_discs()]
+        answers.append(
+            solve(system.problem, bound, FaceNewton(tolerance=1e-9), friction_coefficient=coefficient)
+        )
+    first, second = (answer.multiplier[torn.n_equality :] for answer in answers)
+    np.testing.assert_allclose(first, second, atol=1e-6 * abs(first).max())
+
+
+def test_the_cost_model_prefers_dense_matrices_on_small_interfaces_and_for_many_products() -> None:
+    assert prefers_explicit(2000, 600)
+    assert not prefers_explicit(10_000, 5_000)
+    assert not prefers_explicit(2000, 1100, products=1)
+    assert prefers_explicit(2000, 1100, products=100_000)
+
+
+def test_predicted_costs_grow_with_size_and_products() -> None:
+    for cost in (implicit_cost, explicit_cost):
+        small, large = cost(1000, 300), cost(4000, 900)
+        assert 0 < small.setup < large.setup
+        assert 0 < small.product < large.product
+    assert LocalCost(setup=2.0, product=0.5).total(10) == 7.0
+
+
+def test_a_stiffer_partner_does_not_slow_the_linear_solve() -> None:
+    """Two glued-by-contact bodies whose stiffness differs a thousandfold: D⁻¹ must know it."""
+    counts = []
+    for factor in (1.0, 1e3):
+        scene, partitions = touching_blocks()
+        stiff = IsotropicElasticity(STEEL.young_modulus * factor, STEEL.poisson_ratio)
+        name = scene.body_names[0]
+        bodies = {**scene.bodies, name: Body(scene.bodies[name].mesh, stiff)}
+        scene = Scene(bodies, scene.supports, scene.loads, scene.contacts)
+        torn = build_torn_system(scene, decompose(scene, partitions, MPI.COMM_SELF))
+        system = DualSystem(torn)
+        answer = solve(
+            system.problem,
+            torn.tresca_bound,
+            FaceNewton(tolerance=1e-6),
+            friction_coefficient=torn.friction_coefficient,
+        )
+        counts.append(answer.products)
+    assert counts[1] < 1.5 * counts[0]
