@@ -3,6 +3,7 @@
 
 SIZE ?= small
 NP ?= 1
+BENCH ?= full
 PYTHON ?=
 
 ifeq ($(strip $(PYTHON)),)
@@ -16,7 +17,7 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow lint setup
+.PHONY: help demo test test-slow benchmark lint setup
 
 help: ## Show this list
 	@echo "Targets:"
@@ -24,6 +25,7 @@ help: ## Show this list
 	@echo "Settings:"
 	@echo "  SIZE=small|paper     size of the demo (small)"
 	@echo "  NP=2                 MPI ranks of the demo (1)"
+	@echo "  BENCH=quick|full     small cases once, or all of them (full)"
 	@echo "  PYTHON=/some/python  use this Python and its FEniCSx instead of setting up .venv"
 
 demo: $(prepare) ## Optimise the contact shape of two chain links; results in output/chain_links/
@@ -34,6 +36,9 @@ test: lint ## Check style and types, run the quick tests
 
 test-slow: $(prepare) ## Run the tests that take long
 	$(launch) 1 $(python) -m pytest -m slow
+
+benchmark: $(prepare) ## Measure time, memory and products; results in benchmarks/
+	$(python) -m benchmarks $(if $(filter quick,$(BENCH)),--quick)
 
 lint: $(prepare) ## Check style (ruff) and types (mypy)
 	$(python) -m ruff check .

@@ -1,0 +1,1 @@
+"""Benchmarks: what the solver costs, beside what a user would write instead. See README.md."""

@@ -1,0 +1,92 @@
+"""The chain from gmsh to its equilibrium: seconds by phase, products, memory, forces."""
+
+from __future__ import annotations
+
+import argparse
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from benchmarks.cases.block_data import Counts
+from benchmarks.cases.measuring import nodal_forces, run_case, slowest, state_record
+from benchmarks.cases.scenes import PAPER_BOXES, PAPER_CELLS, chain, chain_links
+from fenics_contact.contact import State, find_state
+from fenics_contact.errors import FenicsContactError
+from fenics_contact.feti import decompose
+from fenics_contact.geometry import BodyMesh, bisection_partition, box_partition
+from fenics_contact.qp import FaceNewton
+from fenics_contact.timing import PhaseTimer
+
+
+def cold_state(
+    comm: MPI.Comm,
+    cells: Counts = PAPER_CELLS,
+    boxes: Counts = PAPER_BOXES,
+    *,
+    parts: int | None = None,
+    friction_coefficient: float = 0.3,
+    tolerance: float = 1e-6,
+) -> tuple[State, float]:
+    """Mesh, decompose and solve the chain, with nothing prepared. Collective.
+
+    Args:
+        comm: Communicator.
+        cells: Cells of a link around, through and across.
+        boxes: Subdomains of a link in the same directions.
+        parts: If given, subdomains of a link by bisection instead of boxes.
+        friction_coefficient: Of the pair.
+        tolerance: Of every residual.
+
+    Returns:
+        The state and the wall seconds of the slowest rank.
+    """
+    comm.Barrier()
+    start, timer = perf_counter(), PhaseTimer()
+    with timer.phase("mesh"):
+        scene = chain(chain_links(cells, comm), friction_coefficient)
+
+    def cut(mesh: BodyMesh) -> np.ndarray:
+        return box_partition(mesh, boxes) if parts is None else bisection_partition(mesh, parts)
+
+    with timer.phase("decompose"):
+        decomposition = decompose(scene, {name: cut(body.mesh) for name, body in scene.bodies.items()}, comm)
+    state = find_state(scene, decomposition, solver=FaceNewton(tolerance=tolerance), timer=timer)
+    return state, comm.allreduce(perf_counter() - start, op=MPI.MAX)
+
+
+def measure(comm: MPI.Comm, *, forces: bool = False, **setting: Any) -> dict[str, Any]:
+    """Return the record of one cold state, or the name of the error that refuses it. Collective.
+
+    Args:
+        comm: Communicator.
+        forces: Add the force on every contact node.
+        **setting: As in `cold_state`.
+    """
+    try:
+        state, seconds = cold_state(comm, **setting)
+    except FenicsContactError as error:
+        return {"refused": type(error).__name__, "message": str(error)}
+    record = {
+        **state_record(state),
+        "seconds": seconds,
+        "phases": slowest(comm, state.seconds),
+    }
+    return {**record, "forces": nodal_forces(state)} if forces else record
+
+
+def settings() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cells", type=int, nargs=3, default=PAPER_CELLS)
+    parser.add_argument("--boxes", type=int, nargs=3, default=PAPER_BOXES)
+    parser.add_argument("--parts", type=int)
+    parser.add_argument("--friction-coefficient", type=float, default=0.3)
+    parser.add_argument("--tolerance", type=float, default=1e-6)
+    parser.add_argument("--forces", action="store_true")
+    return parser
+
+
+if __name__ == "__main__":
+    run_case(measure, settings())

@@ -1,0 +1,62 @@
+"""The block pressed and dragged over a rigid plane with friction, solved by this package."""
+
+from __future__ import annotations
+
+import argparse
+from time import perf_counter
+from typing import Any
+
+from mpi4py import MPI
+
+from benchmarks.cases.block_data import FRICTION_COEFFICIENT, Counts
+from benchmarks.cases.measuring import nodal_forces, run_case, slowest, state_record
+from benchmarks.cases.scenes import block_mesh, block_on_plane
+from fenics_contact.contact import solve_scene
+from fenics_contact.geometry import box_partition
+from fenics_contact.qp import FaceNewton
+
+
+def measure(
+    comm: MPI.Comm,
+    counts: Counts,
+    boxes: Counts,
+    friction_coefficient: float = FRICTION_COEFFICIENT,
+    tolerance: float = 1e-6,
+) -> dict[str, Any]:
+    """Return the record of the block's state. Collective.
+
+    Args:
+        comm: Communicator.
+        counts: Cells along x, y and z.
+        boxes: Subdomains along x, y and z.
+        friction_coefficient: Between block and plane.
+        tolerance: Of every residual.
+    """
+    comm.Barrier()
+    start = perf_counter()
+    mesh = block_mesh(counts)
+    scene = block_on_plane(mesh, friction_coefficient)
+    solver = FaceNewton(tolerance=tolerance)
+    state = solve_scene(scene, {"block": box_partition(mesh, boxes)}, comm, solver=solver)
+    seconds = comm.allreduce(perf_counter() - start, op=MPI.MAX)
+    record = state_record(state)
+    record["counts"]["unknowns"] = mesh.points.size
+    return {
+        **record,
+        "seconds": seconds,
+        "phases": slowest(comm, state.seconds),
+        "forces": nodal_forces(state),
+    }
+
+
+def settings() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--counts", type=int, nargs=3, required=True)
+    parser.add_argument("--boxes", type=int, nargs=3, required=True)
+    parser.add_argument("--friction-coefficient", type=float, default=FRICTION_COEFFICIENT)
+    return parser
+
+
+if __name__ == "__main__":
+    run_case(measure, settings())

@@ -1,0 +1,89 @@
+"""The picture of the results: the chain by phase, and the block beside other solvers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+
+from benchmarks.plan import BLOCKS
+from benchmarks.report import chain_sizes
+from benchmarks.row import Summaries, unknowns
+from benchmarks.targets import newton_names
+
+#: Phases from the bottom of a bar to its top, with colours that differ also in grey.
+COLOURS = {
+    "mesh": "#bab0ac",
+    "decompose": "#9ecae9",
+    "assemble": "#4c78a8",
+    "factor": "#54a24b",
+    "preconditioner": "#b6d77b",
+    "coarse space": "#b279a2",
+    "solve": "#f58518",
+    "state": "#e45756",
+}
+
+
+def plot_results(path: Path, summaries: Summaries) -> None:
+    """Write the picture as PNG."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.6), layout="constrained")
+    _plot_phases(left, summaries)
+    _plot_blocks(right, summaries)
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
+
+
+def _plot_phases(axes: Any, summaries: Summaries) -> None:
+    runs = chain_sizes(summaries)
+    bottom = [0.0] * len(runs)
+    labels = [f"{unknowns(run) / 1e3:,.0f} k".replace(",", " ") for run in runs.values()]
+    known = {phase: None for phase in COLOURS} | {p: None for run in runs.values() for p in run["phases"]}
+    for phase in known:
+        heights = [1e6 * run["phases"].get(phase, 0.0) / unknowns(run) for run in runs.values()]
+        axes.bar(labels, heights, 0.6, bottom=bottom, label=phase, color=COLOURS.get(phase))
+        bottom = [b + h for b, h in zip(bottom, heights, strict=True)]
+    for place, top in enumerate(bottom):
+        axes.annotate(f"{top:.0f} µs", (place, top), (0, 3), textcoords="offset points", ha="center")
+    axes.set_xlim(-0.6, len(runs) + 0.5)
+    axes.set_ylim(0, 1.15 * max(bottom, default=1.0))
+    axes.set_xlabel("torn unknowns of the chain")
+    axes.set_ylabel("wall time an unknown [µs]")
+    axes.set_title("Chain with friction, gmsh to state, 2 ranks")
+    handles, names = axes.get_legend_handles_labels()
+    axes.legend(handles[::-1], names[::-1], frameon=False, loc="center right", fontsize="small")
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _plot_blocks(axes: Any, summaries: Summaries) -> None:
+    series = {
+        "GetFEM, its contact brick": (["getfem-{}"], "s", "#b279a2"),
+        "monolithic Newton + MUMPS": (newton_names("{}"), "^", "#4c78a8"),
+        "fenics_contact": (["block-{}"], "o", "#f58518"),
+    }
+    for label, (names, marker, colour) in series.items():
+        points = []
+        for size in BLOCKS:
+            runs = [summaries.get(name.format(size), {}) for name in names]
+            seconds = [(run["seconds"], unknowns(run)) for run in runs if "seconds" in run]
+            points += [min(seconds)] if seconds else []
+        if points:
+            x, y = [n for _, n in points], [s for s, _ in points]
+            axes.loglog(x, y, marker=marker, color=colour, label=label, linewidth=2, markersize=7)
+            for n, s in zip(x, y, strict=True):
+                text = f"{s:.1f} s" if s < 10 else f"{s:.0f} s"
+                axes.annotate(text, (n, s), (0, 8), textcoords="offset points", ha="center", fontsize="small")
+    sizes = [unknowns(summaries[f"block-{s}"]) for s in BLOCKS if f"block-{s}" in summaries]
+    axes.set_xticks(sizes, [f"{size / 1e3:.0f} k" for size in sizes])
+    axes.minorticks_off()
+    axes.margins(0.12, 0.15)
+    axes.set_xlabel("unknowns of the block")
+    axes.set_ylabel("wall time, mesh to state [s]")
+    axes.set_title("Block sliding on a plane, two cores each")
+    axes.grid(True, which="major", alpha=0.3)
+    axes.spines[["top", "right"]].set_visible(False)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(frameon=False, loc="upper left", fontsize="small")

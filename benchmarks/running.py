@@ -1,0 +1,79 @@
+"""Runs a case in fresh processes and keeps what it measured, so that an interrupted benchmark can go on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from benchmarks.plan import Run
+
+ROOT = Path(__file__).resolve().parents[1]
+RAW = ROOT / "output" / "benchmarks" / "raw"
+MEASURED = ("fenics_contact", "benchmarks/cases", "demos")
+
+Record = dict[str, Any]
+
+
+class RunFailed(RuntimeError):
+    """A case ended with an error, without a record or not in time."""
+
+
+def fingerprint(root: Path = ROOT) -> str:
+    """Return a short hash of all code that is measured: raw results of other code are not used."""
+    digest = hashlib.sha256()
+    for folder in MEASURED:
+        for path in sorted((root / folder).rglob("*.py")):
+            digest.update(f"{path.relative_to(root)}\0".encode() + path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def measure(run: Run) -> Record:
+    """Run a case once.
+
+    Returns:
+        Its record, with the machine's load average over one minute before it.
+
+    Raises:
+        RunFailed: With the end of its output.
+    """
+    load = os.getloadavg()[0]
+    threads = ["env", f"OPENBLAS_NUM_THREADS={run.threads}"] if run.threads > 1 else []
+    module = [sys.executable, "-m", f"benchmarks.cases.{run.case}", *run.options]
+    command = [str(ROOT / "scripts" / "launch.sh"), str(run.ranks), *threads, *module]
+    process = subprocess.Popen(
+        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    try:
+        output, errors = process.communicate(timeout=run.seconds)
+    except BaseException as stopped:  # also an interrupt from the keyboard: the process has its own session
+        process.terminate()  # mpirun ends its ranks
+        process.communicate()
+        if isinstance(stopped, subprocess.TimeoutExpired):
+            raise RunFailed(f"{run.name} must end within {run.seconds:g} s, and did not") from None
+        raise
+    try:
+        record = json.loads(output.splitlines()[-1]) if process.returncode == 0 else None
+    except (IndexError, json.JSONDecodeError):
+        record = None
+    if not isinstance(record, dict):
+        raise RunFailed(
+            f"{run.name} must print one JSON object on its last line, got exit status {process.returncode} "
+            f"from {' '.join(command)} and:\n{(output + errors)[-3000:]}"
+        )
+    return {**record, "load_average": load}
+
+
+def raw_file(run: Run, mark: str, repeat: int, folder: Path = RAW) -> Path:
+    """Return where one measurement is kept."""
+    return folder / mark / f"{run.name}-{repeat}.json"
+
+
+def read(run: Run, mark: str, folder: Path = RAW) -> list[Record]:
+    """Return all measurements of a run that are there."""
+    found = (raw_file(run, mark, repeat, folder) for repeat in range(run.repeats))
+    return [json.loads(path.read_text()) for path in found if path.exists()]

@@ -1,0 +1,152 @@
+"""The rows of the results table: what each is computed from, and what it should be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from benchmarks.comparing import force_difference, potential_difference, require_agreement
+from benchmarks.row import Record, Row, Summaries, unknowns
+
+
+def monolithic(summaries: Summaries, size: str) -> tuple[Record, Record]:
+    """Return this package's and the faster Newton run of the block, which must agree."""
+    ours = summaries[f"block-{size}"]
+    newton = [summaries[name] for name in newton_names(size) if name in summaries]
+    if not newton:
+        raise KeyError(newton_names(size)[0])
+    fastest = min(newton, key=lambda run: run["seconds"])
+    require_agreement(f"block-{size}", ours, fastest)
+    return ours, fastest
+
+
+def newton_names(size: str) -> tuple[str, str]:
+    """Return the runs of monolithic Newton: two ranks, and one rank with two threads."""
+    return f"newton-{size}-ranks", f"newton-{size}-threads"
+
+
+def _products(run: str) -> Callable[[Summaries], float]:
+    return lambda summaries: summaries[run]["counts"]["f_products"]
+
+
+def _over_linear(summaries: Summaries) -> float:
+    counts = summaries["linear-face"]["counts"]
+    return counts["f_products"] / counts["linear_products"]
+
+
+def _converges_or_is_refused(run: str) -> Callable[[Summaries], float]:
+    def value(summaries: Summaries) -> float:
+        record = summaries[run]
+        return float("counts" in record or record["refused"] == "InfeasibleError")
+
+    return value
+
+
+def _ratio(one: str, other: str, figure: Callable[[Record], float]) -> Callable[[Summaries], float]:
+    return lambda summaries: figure(summaries[one]) / figure(summaries[other])
+
+
+def _against_newton(figure: Callable[[Record, Record], float]) -> Callable[[Summaries], float]:
+    return lambda summaries: figure(*monolithic(summaries, "92k"))
+
+
+def _largest(difference: Callable[[Record, Record], float], *others: str) -> Callable[[Summaries], float]:
+    return lambda summaries: max(
+        difference(summaries["chain-compared-1"], summaries[f"chain-compared-{other}"]) for other in others
+    )
+
+
+def _efficiency(figure: Callable[[Record], float]) -> Callable[[Summaries], float]:
+    return lambda summaries: figure(summaries["chain-1-rank"]) / (2 * figure(summaries["chain"]))
+
+
+def _seconds(run: Record) -> float:
+    return run["seconds"]
+
+
+ROWS = (
+    Row(
+        "products", "F-products, μ = 0.3, paper's chain, cold, residuals 1e-6", "products", 90, "lower",
+        _products("chain"), comparison="SMALSE-M with MPGP: about 2400; prototype 87",
+    ),
+    Row(
+        "products-friction-0.1", "F-products, μ = 0.1, link 2 floating", "products", 130, "lower",
+        _products("chain-friction-0.1"), "chain-friction-0.1", "prototype 250",
+    ),
+    Row(
+        "products-friction-0.6", "F-products, μ = 0.6, link 2 floating", "products", 130, "lower",
+        _products("chain-friction-0.6"), "chain-friction-0.6", "prototype 110",
+    ),
+    *(
+        Row(
+            f"friction-{mu}", f"μ = {mu} converges or is refused as not held", "1 = yes", 1, "higher",
+            _converges_or_is_refused(f"chain-friction-{mu}"), f"chain-friction-{mu}", comparison,
+        )
+        for mu, comparison in (("0.01", "prototype cycles"), ("0", ""))
+    ),
+    Row(
+        "products-refined", "F-products, chain refined twice", "products", 150, "lower",
+        _products("chain-refined-2"), "chain-refined-2", "prototype 153",
+    ),
+    Row(
+        "products-over-linear", "F-products of the state / of one linear solve with its final face", "ratio",
+        2, "lower", _over_linear, "linear-face",
+    ),
+    Row(
+        "products-frictionless", "F-products, frictionless block, residuals 1e-6", "products", 27, "lower",
+        _products("frictionless-block"), "frictionless-block",
+        "PERMON: 191 default, 83 best of 19 settings; prototype 36",
+    ),
+    Row("cold-state", "paper's chain, gmsh to state", "s", 6, "lower", lambda s: s["chain"]["seconds"]),
+    Row(
+        "design-step", "one more design / cold state of the same run", "ratio", 0.4, "lower",
+        lambda s: s["design-step"]["ratio"], "design-step",
+    ),
+    Row(
+        "optimisation", "whole shape optimisation at paper size", "s", 60, "lower",
+        lambda s: s["shape-optimisation"]["seconds"], "shape-optimisation",
+    ),
+    Row(
+        "newton-seconds", "monolithic Newton + MUMPS / this package, seconds, block 92k", "ratio", 15,
+        "higher", _against_newton(lambda ours, newton: newton["seconds"] / ours["seconds"]), "block-92k",
+        "alone on two threads: Newton + MUMPS 60 s, CalculiX 172 s; at 28k 7.2 s, GetFEM 14 s, CalculiX 21 s",
+    ),
+    Row(
+        "newton-memory", "this package / monolithic Newton + MUMPS, peak memory, block 92k", "ratio", 0.25,
+        "lower", _against_newton(lambda ours, newton: ours["peak_memory"] / newton["peak_memory"]),
+        "block-92k",
+        "alone on two threads: Newton + MUMPS 2.3 GB",
+    ),
+    Row(
+        "growth", "seconds an unknown, chain refined three times / not refined", "ratio", 1.5, "lower",
+        _ratio("chain-refined-3", "chain", lambda run: run["seconds"] / unknowns(run)), "chain-refined-3",
+    ),
+    Row(
+        "memory", "peak memory an unknown, chain refined three times", "kB", 6, "lower",
+        lambda s: s["chain-refined-3"]["peak_memory"] / 1000 / unknowns(s["chain-refined-3"]),
+        "chain-refined-3",
+    ),
+    Row(
+        "efficiency", "two ranks against one, whole cold state", "efficiency", 0.85, "higher",
+        _efficiency(_seconds),
+    ),
+    Row(
+        "efficiency-solve", "two ranks against one, solve phase", "efficiency", 0.85, "higher",
+        _efficiency(lambda run: run["phases"]["solve"]),
+    ),
+    Row(
+        "potential-ranks", "J on 1, 2 and 4 ranks, relative", "difference", 1e-8, "lower",
+        _largest(potential_difference, "2", "4"), "chain-compared-4",
+    ),
+    Row(
+        "forces-ranks", "contact forces on 1, 2 and 4 ranks, relative", "difference", 1e-6, "lower",
+        _largest(force_difference, "2", "4"), "chain-compared-4",
+    ),
+    Row(
+        "potential-partitions", "J with other partitions, relative", "difference", 1e-8, "lower",
+        _largest(potential_difference, "boxes", "bisection"), "chain-compared-boxes",
+    ),
+    Row(
+        "forces-partitions", "contact forces with other partitions, relative", "difference", 1e-6, "lower",
+        _largest(force_difference, "boxes", "bisection"), "chain-compared-boxes",
+    ),
+)  # fmt: skip

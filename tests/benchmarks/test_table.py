@@ -1,0 +1,109 @@
+"""The table of results: every row, in the agreed form, from whatever was measured."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from benchmarks.comparing import force_difference, potential_difference, require_agreement
+from benchmarks.report import results, write_results
+from benchmarks.summary import summarise
+from benchmarks.targets import ROWS
+from tests.benchmarks.small_records import all_summaries, record
+
+FIELDS = ["name", "quantity", "value", "unit", "target", "better", "ranks", "unknowns"]
+
+
+def test_every_row_has_a_record_in_the_agreed_form(tmp_path: Path) -> None:
+    assert write_results(tmp_path, all_summaries()) == []
+    records = json.loads((tmp_path / "results.json").read_text())
+    assert [entry["name"] for entry in records] == [row.name for row in ROWS]
+    for entry in records:
+        assert list(entry) == FIELDS
+        assert isinstance(entry["value"], float | int)
+        assert entry["better"] in ("lower", "higher")
+        assert entry["ranks"] > 0
+        assert entry["unknowns"] == 1000
+
+
+def test_the_targets_are_those_that_were_set() -> None:
+    targets = {row.name: (row.target, row.better) for row in ROWS}
+    assert len(targets) == len(ROWS)
+    assert targets == {
+        "products": (90, "lower"),
+        "products-friction-0.1": (130, "lower"),
+        "products-friction-0.6": (130, "lower"),
+        "friction-0.01": (1, "higher"),
+        "friction-0": (1, "higher"),
+        "products-refined": (150, "lower"),
+        "products-over-linear": (2, "lower"),
+        "products-frictionless": (27, "lower"),
+        "cold-state": (6, "lower"),
+        "design-step": (0.4, "lower"),
+        "optimisation": (60, "lower"),
+        "newton-seconds": (15, "higher"),
+        "newton-memory": (0.25, "lower"),
+        "growth": (1.5, "lower"),
+        "memory": (6, "lower"),
+        "efficiency": (0.85, "higher"),
+        "efficiency-solve": (0.85, "higher"),
+        "potential-ranks": (1e-8, "lower"),
+        "forces-ranks": (1e-6, "lower"),
+        "potential-partitions": (1e-8, "lower"),
+        "forces-partitions": (1e-6, "lower"),
+    }
+
+
+def test_a_row_is_met_on_the_right_side_of_its_target() -> None:
+    row = ROWS[0]
+    assert row.met(90)
+    assert not row.met(91)
+    assert replace(row, better="higher").met(91)
+
+
+def test_rows_whose_runs_are_missing_are_named_and_left_out(tmp_path: Path) -> None:
+    summaries = {name: run for name, run in all_summaries().items() if name in ("chain", "linear-face")}
+    found, missing = results(summaries)
+    assert [row.name for row, _ in found] == ["products", "products-over-linear", "cold-state"]
+    assert len(missing) == len(ROWS) - 3
+    write_results(tmp_path, summaries)
+    assert "Not measured: products-friction-0.1" in (tmp_path / "results.md").read_text()
+
+
+def test_the_table_says_what_was_not_met(tmp_path: Path) -> None:
+    summaries = all_summaries()
+    summaries["chain"]["counts"]["f_products"] = 91
+    write_results(tmp_path, summaries)
+    (line,) = (line for line in (tmp_path / "results.md").read_text().splitlines() if "μ = 0.3" in line)
+    assert "| 91 products | ≤ 90 | **no** |" in line
+
+
+def test_seconds_are_medians_and_the_rest_is_kept() -> None:
+    runs = [record(seconds=s, phases={"solve": s / 2}) for s in (3.0, 1.0, 2.0)]
+    summary = summarise("chain", runs)
+    assert summary["seconds"] == 2.0
+    assert summary["phases"] == {"solve": 1.0}
+    assert summary["total_potential"] == -2.0
+    assert summary["repeats"] == 3
+
+
+def test_counts_that_change_from_run_to_run_are_refused() -> None:
+    runs = [record(), record(counts={"f_products": 51})]
+    with pytest.raises(ValueError, match=r"counts of chain must be equal in all repetitions, got .*51"):
+        summarise("chain", runs)
+
+
+def test_differences_are_relative() -> None:
+    other = record(total_potential=-2.2, forces=[[0.0, 0.0, 3.0], [0.0, 3.0, 0.0]])
+    assert potential_difference(record(), other) == pytest.approx(0.1)
+    assert force_difference(record(), other) == pytest.approx(0.2)
+    with pytest.raises(ValueError, match="same contact nodes, got 2 and 1: use the same mesh"):
+        force_difference(record(), record(forces=[[0.0, 0.0, 1.0]]))
+
+
+def test_solvers_that_disagree_are_not_compared() -> None:
+    with pytest.raises(ValueError, match=r"both solvers of block must find .*the problems differ"):
+        require_agreement("block", record(), record(total_potential=-2.1))
