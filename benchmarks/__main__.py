@@ -12,6 +12,7 @@ from pathlib import Path
 from benchmarks.plan import WARM_UP, Run, all_runs, chosen
 from benchmarks.plot import plot_results
 from benchmarks.report import write_json, write_results
+from benchmarks.row import Summaries
 from benchmarks.running import ROOT, RunFailed, fingerprint, measure, raw_file, read
 from benchmarks.summary import summarise
 
@@ -40,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     # What one of several partial runs measured counts in all later reports.
     known = runs if settings.quick else all_runs()
     records = {run.name: read(run, mark) for run in known}
-    summaries = {name: summarise(name, found) for name, found in records.items() if found}
+    summaries = Summaries({name: summarise(name, found) for name, found in records.items() if found})
     if not summaries:
         sys.exit("a report needs measurements of the present code, found none: run without --report first")
     folder = ROOT / "output" / "benchmarks" / "quick" if settings.quick else Path(__file__).parent
@@ -49,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     plot_results(folder / "results.png", summaries)
     print(f"results in {folder.relative_to(ROOT)}/")
     if missing:
-        print(f"not measured: {', '.join(missing)}")
+        print(f"not measured or refused: {', '.join(missing)}")
     if failed:
         sys.exit(f"failed: {', '.join(failed)}")
 

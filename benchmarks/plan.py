@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-PAPER_CELLS, PAPER_BOXES = (48, 8, 20), (8, 1, 2)
+from benchmarks.cases.scene_data import PAPER_BOXES, PAPER_CELLS
 
 #: Cells of the block by a name for their number, and the boxes that were fastest.
 BLOCKS = {"28k": (32, 16, 16), "92k": (48, 24, 24), "212k": (64, 32, 32)}

@@ -10,6 +10,7 @@ import argparse
 from benchmarks.plan import Run
 from benchmarks.prices import coarse_prices, subdomain_prices
 from benchmarks.report import phases_table
+from benchmarks.row import Summaries
 from benchmarks.running import measure
 from benchmarks.summary import summarise
 
@@ -17,7 +18,7 @@ from benchmarks.summary import summarise
 def chain_profile(repeats: int = 3) -> str:
     """Return a table of the seconds by phase of the paper's chain on one rank and on two."""
     runs = (Run("chain-1-rank", "chain", 1), Run("chain", "chain", 2))
-    summaries = {run.name: summarise(run.name, [measure(run) for _ in range(repeats)]) for run in runs}
+    summaries = Summaries({r.name: summarise(r.name, [measure(r) for _ in range(repeats)]) for r in runs})
     return phases_table(summaries)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.row import Record, Row, Summaries, unknowns
+from benchmarks.row import NoValue, Record, Row, Summaries, unknowns
 from benchmarks.targets import ROWS, newton_names
 
 Result = tuple[Row, dict[str, Any]]
@@ -20,7 +20,7 @@ def results(summaries: Summaries) -> tuple[list[Result], list[str]]:
     for row in ROWS:
         try:
             found.append((row, row.record(summaries)))
-        except KeyError:
+        except NoValue:
             missing.append(row.name)
     return found, missing
 
@@ -46,7 +46,7 @@ def write_results(folder: Path, summaries: Summaries) -> list[str]:
         "# Results",
         "Written by `make benchmark`. Seconds and memory are medians; memory is the sum over the ranks.",
         targets_table(found),
-        f"Not measured: {', '.join(missing)}." if missing else "",
+        f"Not measured or refused: {', '.join(missing)}." if missing else "",
         "## Every run",
         runs_table(summaries),
         "## The chain by phase",

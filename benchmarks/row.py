@@ -7,7 +7,17 @@ from dataclasses import dataclass
 from typing import Any
 
 Record = Mapping[str, Any]
-Summaries = Mapping[str, Record]
+
+
+class NoValue(Exception):
+    """A row has no value: a run that it needs was not measured or was refused."""
+
+
+class Summaries(dict[str, Record]):
+    """Summaries of runs by name; asking for one that is not there raises `NoValue`."""
+
+    def __missing__(self, name: str) -> Record:
+        raise NoValue(name)
 
 
 @dataclass(frozen=True)
@@ -42,7 +52,7 @@ class Row:
         """Return the row as `results.json` has it.
 
         Raises:
-            KeyError: If a run that it needs is missing.
+            NoValue: If a run that it needs is missing or was refused.
         """
         run = summaries[self.of]
         return {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from benchmarks.comparing import force_difference, potential_difference, require_agreement
-from benchmarks.row import Record, Row, Summaries, unknowns
+from benchmarks.row import NoValue, Record, Row, Summaries, unknowns
 
 
 def monolithic(summaries: Summaries, size: str) -> tuple[Record, Record]:
@@ -13,7 +13,7 @@ def monolithic(summaries: Summaries, size: str) -> tuple[Record, Record]:
     ours = summaries[f"block-{size}"]
     newton = [summaries[name] for name in newton_names(size) if name in summaries]
     if not newton:
-        raise KeyError(newton_names(size)[0])
+        raise NoValue(newton_names(size)[0])
     fastest = min(newton, key=lambda run: run["seconds"])
     require_agreement(f"block-{size}", ours, fastest)
     return ours, fastest
@@ -25,7 +25,12 @@ def newton_names(size: str) -> tuple[str, str]:
 
 
 def _products(run: str) -> Callable[[Summaries], float]:
-    return lambda summaries: summaries[run]["counts"]["f_products"]
+    def value(summaries: Summaries) -> float:
+        if "refused" in summaries[run]:
+            raise NoValue(run)
+        return summaries[run]["counts"]["f_products"]
+
+    return value
 
 
 def _over_linear(summaries: Summaries) -> float:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from benchmarks.cases.block_data import Counts
 from benchmarks.cases.measuring import nodal_forces, run_case, slowest, state_record
-from benchmarks.cases.scenes import PAPER_BOXES, PAPER_CELLS, chain, chain_links
+from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, PAPER_BOXES, PAPER_CELLS, Counts
+from benchmarks.cases.scenes import chain, chain_links
 from fenics_contact.contact import State, find_state
 from fenics_contact.errors import FenicsContactError
 from fenics_contact.feti import decompose
@@ -26,7 +26,7 @@ def cold_state(
     boxes: Counts = PAPER_BOXES,
     *,
     parts: int | None = None,
-    friction_coefficient: float = 0.3,
+    friction_coefficient: float = FRICTION_COEFFICIENT,
     tolerance: float = 1e-6,
 ) -> tuple[State, float]:
     """Mesh, decompose and solve the chain, with nothing prepared. Collective.
@@ -82,7 +82,7 @@ def settings() -> argparse.ArgumentParser:
     parser.add_argument("--cells", type=int, nargs=3, default=PAPER_CELLS)
     parser.add_argument("--boxes", type=int, nargs=3, default=PAPER_BOXES)
     parser.add_argument("--parts", type=int)
-    parser.add_argument("--friction-coefficient", type=float, default=0.3)
+    parser.add_argument("--friction-coefficient", type=float, default=FRICTION_COEFFICIENT)
     parser.add_argument("--tolerance", type=float, default=1e-6)
     parser.add_argument("--forces", action="store_true")
     return parser

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from mpi4py import MPI
 
-from benchmarks.cases.scenes import PAPER_BOXES, PAPER_CELLS, chain, chain_links
+from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, PAPER_BOXES, PAPER_CELLS
+from benchmarks.cases.scenes import chain, chain_links
 from fenics_contact.geometry import box_partition
 from fenics_contact.shape import ShapeProblem, SurfaceDesign, TotalPotential
 
@@ -15,7 +16,7 @@ BOUND = 0.25
 def chain_shape_problem(comm: MPI.Comm) -> ShapeProblem:
     """Mesh the chain of the published experiment and make its crown designable. Collective."""
     links = chain_links(PAPER_CELLS, comm)
-    scene = chain(links, 0.3)
+    scene = chain(links, FRICTION_COEFFICIENT)
     partitions = {name: box_partition(body.mesh, PAPER_BOXES) for name, body in scene.bodies.items()}
     design = SurfaceDesign("link 1", links.first.crown, net=(7, 4))
     return ShapeProblem(scene, partitions, design, TotalPotential(), comm)

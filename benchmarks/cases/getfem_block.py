@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.cases.block_data import (
+from benchmarks.cases.memory import peak_memory
+from benchmarks.cases.scene_data import (
     FRICTION_COEFFICIENT,
     LOWER,
     PLANE_HEIGHT,
@@ -23,7 +24,6 @@ from benchmarks.cases.block_data import (
     YOUNG_MODULUS,
     Counts,
 )
-from benchmarks.cases.memory import peak_memory
 
 #: Numbers of the three sides of the mesh.
 CLAMPED, LOADED, CONTACT = 1, 2, 3

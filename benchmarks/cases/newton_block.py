@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from benchmarks.cases.block_data import FRICTION_COEFFICIENT, Counts
 from benchmarks.cases.measuring import run_case
 from benchmarks.cases.monolithic.elasticity import assemble_block
 from benchmarks.cases.monolithic.newton import solve_newton
+from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, Counts
 
 
 def measure(

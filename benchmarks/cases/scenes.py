@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mpi4py import MPI
 
-from benchmarks.cases.block_data import (
+from benchmarks.cases.scene_data import (
     LOWER,
     PLANE_HEIGHT,
     POISSON_RATIO,
@@ -26,9 +26,6 @@ from fenics_contact.scene import (
     TotalForce,
     Traction,
 )
-
-#: Cells of one link of the published experiment, and its boxes.
-PAPER_CELLS, PAPER_BOXES = (48, 8, 20), (8, 1, 2)
 
 
 def chain_links(cells: Counts, comm: MPI.Comm) -> TwoLinks:

@@ -8,8 +8,8 @@ from typing import Any
 
 from mpi4py import MPI
 
-from benchmarks.cases.block_data import FRICTION_COEFFICIENT, Counts
 from benchmarks.cases.measuring import nodal_forces, run_case, slowest, state_record
+from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, Counts
 from benchmarks.cases.scenes import block_mesh, block_on_plane
 from fenics_contact.contact import solve_scene
 from fenics_contact.geometry import box_partition

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from benchmarks.plan import all_runs
+from benchmarks.row import Summaries
 
 
 def record(**changes: Any) -> dict[str, Any]:
@@ -25,11 +26,12 @@ def record(**changes: Any) -> dict[str, Any]:
     }
 
 
-def all_summaries() -> dict[str, dict[str, Any]]:
+def all_summaries() -> Summaries:
     """Return a summary of every run."""
-    summaries = {run.name: record(ranks=run.ranks) for run in all_runs()}
-    refused = summaries["chain-friction-0"] = record(refused="InfeasibleError", message="not held")
+    summaries = Summaries({run.name: record(ranks=run.ranks) for run in all_runs()})
+    refused = record(refused="InfeasibleError", message="not held")
     for key in ("counts", "total_potential", "seconds", "phases", "forces"):
         refused.pop(key)
-    summaries["demo"].pop("counts")
+    summaries["chain-friction-0"] = refused
+    summaries["demo"] = {key: value for key, value in record().items() if key != "counts"}
     return summaries

@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks.comparing import force_difference, potential_difference, require_agreement
 from benchmarks.report import results, write_results
+from benchmarks.row import Summaries
 from benchmarks.summary import summarise
 from benchmarks.targets import ROWS
 from tests.benchmarks.small_records import all_summaries, record
@@ -65,17 +66,34 @@ def test_a_row_is_met_on_the_right_side_of_its_target() -> None:
 
 
 def test_rows_whose_runs_are_missing_are_named_and_left_out(tmp_path: Path) -> None:
-    summaries = {name: run for name, run in all_summaries().items() if name in ("chain", "linear-face")}
+    every = all_summaries()
+    summaries = Summaries({name: every[name] for name in ("chain", "linear-face")})
     found, missing = results(summaries)
     assert [row.name for row, _ in found] == ["products", "products-over-linear", "cold-state"]
     assert len(missing) == len(ROWS) - 3
     write_results(tmp_path, summaries)
-    assert "Not measured: products-friction-0.1" in (tmp_path / "results.md").read_text()
+    assert "Not measured or refused: products-friction-0.1" in (tmp_path / "results.md").read_text()
+
+
+def test_a_run_that_was_refused_has_no_products() -> None:
+    summaries = all_summaries()
+    summaries["chain-friction-0.1"] = summaries["chain-friction-0"]
+    _, missing = results(summaries)
+    assert missing == ["products-friction-0.1"]
+
+
+@pytest.mark.parametrize(("error", "value"), [("InfeasibleError", 1.0), ("ConvergenceError", 0.0)])
+def test_only_a_refusal_by_name_counts(error: str, value: float) -> None:
+    summaries = all_summaries()
+    summaries["chain-friction-0"] = {**summaries["chain-friction-0"], "refused": error}
+    values = {row.name: entry["value"] for row, entry in results(summaries)[0]}
+    assert values["friction-0"] == value
+    assert values["friction-0.01"] == 1.0
 
 
 def test_the_table_says_what_was_not_met(tmp_path: Path) -> None:
     summaries = all_summaries()
-    summaries["chain"]["counts"]["f_products"] = 91
+    summaries["chain"] = record(counts={"torn_unknowns": 1000, "f_products": 91})
     write_results(tmp_path, summaries)
     (line,) = (line for line in (tmp_path / "results.md").read_text().splitlines() if "μ = 0.3" in line)
     assert "| 91 products | ≤ 90 | **no** |" in line

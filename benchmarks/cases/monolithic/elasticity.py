@@ -13,7 +13,7 @@ import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from benchmarks.cases.block_data import (
+from benchmarks.cases.scene_data import (
     LOWER,
     PLANE_HEIGHT,
     POISSON_RATIO,
