@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks.comparing import force_difference
 from benchmarks.row import NoValue, Record, Row, Summaries, unknowns
 from benchmarks.targets import ROWS, newton_names
 
@@ -139,9 +140,12 @@ def blocks_table(summaries: Summaries) -> str:
             if run is None:
                 continue
             if "skipped" in run:
-                body.append((name, "", run["skipped"], ""))
+                body.append((name, "", run["skipped"], "", ""))
                 continue
             steps = run["counts"].get("newton_steps", run["counts"].get("solver_steps"))
             memory = f"{run['peak_memory'] / 1e6:.0f} MB"
-            body.append((name, str(unknowns(run)), f"{run['seconds']:.2f} s in {steps} steps", memory))
-    return table(("run", "unknowns", "seconds", "memory"), body) if body else "Not measured."
+            ours = summaries.get(f"block-{size}")
+            apart = f"{force_difference(ours, run):.1e}" if ours and "forces" in run else ""
+            body.append((name, str(unknowns(run)), f"{run['seconds']:.2f} s in {steps} steps", memory, apart))
+    head = ("run", "unknowns", "seconds", "memory", "forces differ by")
+    return table(head, body) if body else "Not measured."

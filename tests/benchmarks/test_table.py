@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.comparing import force_difference, potential_difference, require_agreement
+from benchmarks.plot import plot_results
 from benchmarks.report import results, write_results
 from benchmarks.row import Summaries
 from benchmarks.summary import summarise
@@ -125,3 +126,12 @@ def test_differences_are_relative() -> None:
 def test_solvers_that_disagree_are_not_compared() -> None:
     with pytest.raises(ValueError, match=r"both solvers of block must find .*the problems differ"):
         require_agreement("block", record(), record(total_potential=-2.1))
+
+
+@pytest.mark.parametrize("names", [None, ["chain", "block-28k"]])
+def test_the_picture_is_drawn_from_all_runs_and_from_few(tmp_path: Path, names: list[str] | None) -> None:
+    every = all_summaries()
+    plot_results(
+        tmp_path / "results.png", every if names is None else Summaries({n: every[n] for n in names})
+    )
+    assert (tmp_path / "results.png").stat().st_size > 10_000
