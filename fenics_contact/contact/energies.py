@@ -49,12 +49,7 @@ def compute_energies(
     """
     torn = dual.torn
     internal = torn.load - dual.force(multiplier)  # = K u
-    mine = np.array(
-        [
-            0.5 * internal @ displacement,
-            torn.load @ displacement,
-            -0.5 * (internal @ dual.inverse(internal)) - multiplier @ torn.right,
-        ]
-    )
-    total = torn.numbering.comm.allreduce(mine)
-    return Energies(float(total[0]), float(total[1]), friction, float(total[2]))
+    mine = np.array([0.5 * internal @ displacement, torn.load @ displacement, multiplier @ torn.right])
+    strain, load, prescribed = (float(total) for total in torn.numbering.comm.allreduce(mine))
+    # Of the displacement only K⁺(f − Bᵀλ) meets a force in equilibrium, rigid motions do no work.
+    return Energies(strain, load, friction, -strain - prescribed)

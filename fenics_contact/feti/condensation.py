@@ -1,4 +1,4 @@
-"""Schur complements of subdomain matrices, one symbolic factorisation for all that share a sparsity pattern."""
+"""Schur complements of subdomain matrices: one symbolic factorisation for all that share a pattern."""
 
 from __future__ import annotations
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact.feti.cost_model import expected_seconds
 from fenics_contact.scene import Scene
 
 
@@ -59,7 +60,7 @@ def tear(scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int) -> Tear
     Args:
         scene: The scene.
         partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
-        ranks: Number of ranks; each gets about equally many cells, of every body a run of consecutive
+        ranks: Number of ranks; each gets about equally much work, of every body a run of consecutive
             subdomains.
     """
     names = scene.body_names
@@ -67,23 +68,36 @@ def tear(scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int) -> Tear
     node_offset = np.cumsum([0] + [scene.bodies[name].mesh.n_nodes for name in names])
     subdomain_offset = np.cumsum([0, *counts])
     total = int(subdomain_offset[-1])
-    pairs, sizes = [], []
+    pairs = []
     for index, name in enumerate(names):
         cells = scene.bodies[name].mesh.cells
         subdomain = partitions[name].astype(np.int64) + subdomain_offset[index]
         keys = (cells + node_offset[index]) * total + subdomain[:, None]
         pairs.append(np.unique(keys))
-        sizes.append(np.bincount(partitions[name], minlength=counts[index]))
     keys = np.concatenate(pairs)
     multiplicity = np.bincount(keys // total, minlength=int(node_offset[-1]))
+    costs = _costs(keys % total, multiplicity[keys // total] > 1, total)
     return Tearing(
         names,
         node_offset,
         subdomain_offset,
-        _deal_out(sizes, ranks),
+        _deal_out(np.split(costs, subdomain_offset[1:-1]), ranks),
         np.concatenate([[0], np.cumsum(multiplicity)]),
         keys % total,
     )
+
+
+def _costs(copy_subdomain: np.ndarray, shared: np.ndarray, count: int) -> np.ndarray:
+    """Return what each subdomain is expected to cost, shape (n_subdomains,), [s].
+
+    Args:
+        copy_subdomain: Subdomain of each copy of a node.
+        shared: Whether other subdomains hold that node too.
+        count: Number of subdomains.
+    """
+    size = 3 * np.bincount(copy_subdomain, minlength=count)
+    interface = 3 * np.bincount(copy_subdomain[shared], minlength=count)
+    return np.array([expected_seconds(int(n), int(b)) for n, b in zip(size, interface, strict=True)])
 
 
 def _deal_out(costs: list[np.ndarray], ranks: int) -> np.ndarray:

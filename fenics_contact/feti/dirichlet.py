@@ -9,8 +9,8 @@ from petsc4py import PETSc
 from fenics_contact.feti.inverse import TornInverse
 from fenics_contact.feti.numbering import DualNumbering
 
-#: Share of its diagonal added to the contact block of B D⁻¹ Bᵀ. A node in two contact pairs has more rows than
-#: displacements, which makes the block singular; elsewhere so small a share changes nothing.
+#: Share of its diagonal added to the contact block of B D⁻¹ Bᵀ. A node in two contact pairs has more rows
+#: than displacements, which makes the block singular; elsewhere so small a share changes nothing.
 REGULARISATION = 1e-4
 
 

@@ -22,11 +22,13 @@ class DualSystem:
 
     Attributes:
         torn: The torn system.
-        inverse: K⁺.
+        inverse: K⁺ and the interface operators of the subdomains.
         kernel: This rank's R, shape (torn_size, n_modes).
         problem: What the dual solvers see.
         products: F-products so far.
     """
+
+    inverse: TornInverse
 
     def __init__(
         self,
@@ -135,7 +137,10 @@ class DualSystem:
         body_of = np.searchsorted(tearing.subdomain_offset, np.arange(tearing.n_subdomains), side="right") - 1
         sums = np.zeros((2, len(tearing.body_names)))
         for subdomain in self.torn.subdomains:
-            sums[:, body_of[subdomain.mesh.number]] += subdomain.stiffness.diagonal().sum(), subdomain.mesh.size
+            sums[:, body_of[subdomain.mesh.number]] += (
+                subdomain.stiffness.diagonal().sum(),
+                subdomain.mesh.size,
+            )
         total, count = self.torn.numbering.comm.allreduce(sums)
         # Only the ratios between bodies matter.
         weight = (count / total) / (count / total).max()

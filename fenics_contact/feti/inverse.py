@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from enum import Enum
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
@@ -69,14 +70,17 @@ class TornInverse:
             self.operators.append(known or _factored(subdomain, local, condensations, kind))
             self._local.append(local)
         starts = np.cumsum([0] + [len(local) for local in self._local])
-        self._parts = [slice(a, b) for a, b in zip(starts[:-1], starts[1:], strict=True)]
+        self._parts = [slice(int(a), int(b)) for a, b in pairwise(starts)]
         shifted = [local + start for local, start in zip(self._local, self.offset[:-1], strict=True)]
         self.interface = np.concatenate(shifted) if shifted else np.zeros(0, dtype=np.int64)
 
     def __call__(self, right: np.ndarray) -> np.ndarray:
         """Return K⁺ times a torn vector, shape (torn_size,)."""
-        parts = zip(self.operators, self.offset[:-1], self.offset[1:], strict=True)
-        return np.concatenate([operator.invert(right[start:stop]) for operator, start, stop in parts])
+        solution = np.zeros_like(right)
+        for operator, start, stop in zip(self.operators, self.offset[:-1], self.offset[1:], strict=True):
+            if right[start:stop].any():  # most subdomains bear no load
+                solution[start:stop] = operator.invert(right[start:stop])
+        return solution
 
     def flex(self, force: np.ndarray) -> np.ndarray:
         """Return (K⁺)_bb times an interface force, shape (n_interface,)."""

@@ -33,7 +33,7 @@ class DualNumbering:
         """
         self.comm = comm
         self.total = len(owner)
-        self._owner = owner
+        self._owner, self._touched = owner, touched
         order = np.argsort(owner, kind="stable")
         self._position = np.empty(self.total, dtype=np.int64)
         self._position[order] = np.arange(self.total)
@@ -44,6 +44,10 @@ class DualNumbering:
         self._vector = PETSc.Vec().createGhost(
             self._position[self.ghosts].astype(PETSc.IntType), (len(self.owned), self.total), comm=comm
         )
+
+    def serves(self, owner: np.ndarray, touched: np.ndarray) -> bool:
+        """Tell whether this rank's part is that of rows with these owners, touched as given."""
+        return np.array_equal(self._owner, owner) and np.array_equal(self._touched, touched)
 
     @property
     def local_rows(self) -> np.ndarray:

@@ -112,19 +112,24 @@ def build_torn_system(
     has_friction, coefficient, tresca = friction_data(scene.contacts, points)
     frictional = np.flatnonzero(has_friction)
     rows = stack([decomposition.gluing, contact_rows(points, decomposition.tearing, frictional)])
-    numbering, B = _own_part(rows, decomposition)
+    numbering, B = _own_part(rows, decomposition, None if previous is None else previous.numbering)
     return TornSystem(
         scene, decomposition, subdomains, points, frictional, coefficient[frictional], tresca[frictional],
         numbering, B, rows.right[numbering.owned],
     )  # fmt: skip
 
 
-def _own_part(rows: Rows, decomposition: Decomposition) -> tuple[DualNumbering, sp.csr_matrix]:
-    """Number the multipliers and pick the entries of B that act on this rank's subdomains."""
+def _own_part(
+    rows: Rows, decomposition: Decomposition, known: DualNumbering | None
+) -> tuple[DualNumbering, sp.csr_matrix]:
+    """Number the multipliers and pick the entries of B that act on this rank's subdomains. Collective."""
     block = decomposition.copy_block[rows.copy]
     here = block >= 0
     row, column = rows.row[here], 3 * block[here] + rows.component[here]
-    numbering = DualNumbering(decomposition.comm, rows.owner, np.unique(row))
-    shape = (len(numbering.local_rows), decomposition.torn_size)
-    B = sp.csr_matrix((rows.value[here], (numbering.local_index(row), column)), shape=shape)
-    return numbering, B
+    touched, comm = np.unique(row), decomposition.comm
+    # The pattern of communication stays as long as no rank's share of the rows changes.
+    stays = known is not None and known.serves(rows.owner, touched)
+    if comm.allreduce(int(not stays)) or known is None:
+        known = DualNumbering(comm, rows.owner, touched)
+    shape = (len(known.local_rows), decomposition.torn_size)
+    return known, sp.csr_matrix((rows.value[here], (known.local_index(row), column)), shape=shape)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
@@ -15,7 +17,7 @@ from fenics_contact.qp.sparse_gram import SparseGramInverse
 DENSE_LIMIT = 600
 
 #: A matrix of size m: dense and summed over the ranks, or beyond the limit sparse, this rank's share alone.
-Gram = Vector | sp.csr_matrix
+Gram: TypeAlias = Vector | sp.csr_matrix
 
 
 class CoarseSpace:
@@ -137,6 +139,6 @@ def gram_matrix(comm: MPI.Comm, columns: sp.csr_matrix) -> Gram:
 
 
 def summed_if_small(comm: MPI.Comm, share: sp.csr_matrix) -> Gram:
-    """Return the sum over the ranks, dense, of a square matrix up to `DENSE_LIMIT`, else the share. Collective."""
+    """Return the sum over the ranks, dense, up to `DENSE_LIMIT`; beyond it the share. Collective."""
     m = share.shape[0]
     return global_sum(comm, share.toarray()).reshape(m, m) if m <= DENSE_LIMIT else share

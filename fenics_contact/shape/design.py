@@ -8,11 +8,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh, DesignSurface
+from fenics_contact.geometry import BodyMesh, DesignSurface, boundary_faces
 from fenics_contact.shape.bernstein import tensor_bernstein
 
-#: Default width of the transition zone, relative to the extent of the design surface.
+#: Default width of the transition strip, relative to the extent of the design surface.
 TRANSITION = 0.15
+#: Distance from the surface, relative to its extent, beyond which nothing moves: behind a boundary that keeps
+#: its place a harmonic displacement has decayed by then.
+FAR = 0.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,8 +30,9 @@ class SurfaceDesign:
         body: Name of the body.
         surface: Nodes of the surface, their parameters and directions.
         net: Number of control points along s and t.
-        transition: Width of the zone around the surface that follows it smoothly; the rest of the body keeps
-            its place, [length]. By default 0.15 times the extent of the surface.
+        transition: Width of the strip of boundary around the surface that follows it smoothly; the rest of
+            the boundary keeps its place, [length]. By default 0.15 times the extent of the surface. What is
+            far from the surface keeps its place inside too.
     """
 
     body: str
@@ -86,11 +90,14 @@ class SurfaceDesign:
             mesh: The body in its reference shape.
         """
         surface = mesh.points[self.surface.nodes]
-        width = self.transition
-        if width is None:
-            width = TRANSITION * float(np.linalg.norm(np.ptp(surface, axis=0)))
+        extent = float(np.linalg.norm(np.ptp(surface, axis=0)))
+        width = TRANSITION * extent if self.transition is None else self.transition
         distance, _ = cKDTree(surface).query(mesh.points)
-        return np.flatnonzero(distance > width)
+        far = distance > max(FAR * extent, width)
+        facets, _ = boundary_faces(mesh.cells)
+        boundary = np.setdiff1d(facets, self.surface.nodes)
+        far[boundary] |= distance[boundary] > width
+        return np.flatnonzero(far)
 
     def control_points(self, points: np.ndarray, alpha: np.ndarray) -> np.ndarray:
         """Return where to draw the control points, shape (net[0], net[1], 3), [length].

@@ -21,11 +21,15 @@ class ShapeForms:
     """Compiled functionals of one or two displacement fields and their derivatives, by what they express.
 
     A functional is compiled when it is first asked for, by all ranks together.
+
+    Attributes:
+        moving: Marks of the nodes of all bodies that a design moves, or None for all; derivatives by other
+            nodes are not needed.
     """
 
-    def __init__(self, torn: TornSystem) -> None:
+    def __init__(self, torn: TornSystem, moving: np.ndarray | None = None) -> None:
         """Start empty."""
-        self._comm = torn.decomposition.comm
+        self._comm, self.moving = torn.decomposition.comm, moving
         self._templates: dict[tuple[Any, ...], Template] = {}
 
     def get(
@@ -108,13 +112,14 @@ def work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndar
                 result -= _dolfinx.assemble_vector(template.bind([space], load.value, functions[1:]))
         return result
 
-    return sum_over_subdomains(torn, [u, w], on_subdomain)
+    return sum_over_subdomains(torn, [u, w], on_subdomain, forms.moving)
 
 
 def sum_over_subdomains(
     torn: TornSystem,
     fields: Sequence[np.ndarray],
     evaluate: Callable[[Body, str, Any, Sequence[Any]], np.ndarray],
+    moving: np.ndarray | None = None,
 ) -> np.ndarray:
     """Add up vectors of nodal derivatives over this rank's subdomains, shape (n_nodes, 3) for all bodies.
 
@@ -122,20 +127,30 @@ def sum_over_subdomains(
         torn: The torn system.
         fields: Torn fields handed to ``evaluate`` as Functions.
         evaluate: Gets body, its name, the subdomain's space and the Functions; returns a vector by dof.
+        moving: Marks of nodes of all bodies; subdomains without one of them are left out.
     """
     tearing = torn.decomposition.tearing
     total = np.zeros((int(tearing.node_offset[-1]), 3))
-    for name, space, nodes, functions in subdomain_fields(torn, fields):
+    for name, space, nodes, functions in subdomain_fields(torn, fields, moving):
         vector = evaluate(torn.scene.bodies[name], name, space, functions)
         total[tearing.global_nodes(name, nodes)] += vector.reshape(-1, 3)
     return total
 
 
-def subdomain_fields(torn: TornSystem, fields: Sequence[np.ndarray]) -> Any:
-    """Yield (body name, space, nodes by block, Functions) of each of this rank's subdomains."""
-    start = 0
-    for subdomain in torn.subdomains:
+def subdomain_fields(torn: TornSystem, fields: Sequence[np.ndarray], moving: np.ndarray | None = None) -> Any:
+    """Yield (body name, space, nodes by block, Functions) of each of this rank's subdomains.
+
+    Args:
+        torn: The torn system.
+        fields: Torn fields to hand out as Functions.
+        moving: Marks of nodes of all bodies; subdomains without one of them are left out.
+    """
+    tearing = torn.decomposition.tearing
+    starts = np.cumsum([0] + [subdomain.mesh.size for subdomain in torn.subdomains])
+    for subdomain, start in zip(torn.subdomains, starts[:-1], strict=True):
         mesh = subdomain.mesh
+        if moving is not None and not moving[tearing.global_nodes(mesh.body, mesh.nodes)].any():
+            continue
         # Systems of several geometries share the meshes: another one may have moved them since.
         points = torn.scene.bodies[mesh.body].mesh.points
         _dolfinx.update_coordinates(mesh.space.mesh, points[np.sort(mesh.nodes)])
@@ -145,4 +160,3 @@ def subdomain_fields(torn: TornSystem, fields: Sequence[np.ndarray]) -> Any:
             function.x.array[:] = field[start : start + mesh.size]
             functions.append(function)
         yield mesh.body, mesh.space, mesh.nodes, functions
-        start += mesh.size

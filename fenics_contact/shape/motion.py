@@ -20,6 +20,10 @@ class HarmonicExtension:
 
     The matrix is that of the reference mesh: the extension is linear in the surface displacement, and one
     factorisation serves all designs and, transposed, all gradients.
+
+    Attributes:
+        moving: Nodes of the design surface.
+        held: Nodes that do not move.
     """
 
     def __init__(
@@ -44,7 +48,7 @@ class HarmonicExtension:
                 f"body {name!r} "
                 "lie on both: choose another surface"
             )
-        self.moving = moving
+        self.moving, self.held = moving, held
         mesh = body_mesh(decomposition, name, body)
         V = _dolfinx.nodal_space(body.mesh.cell_type)
         form = ufl.inner(ufl.grad(ufl.TrialFunction(V)), ufl.grad(ufl.TestFunction(V)))

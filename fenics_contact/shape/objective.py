@@ -29,7 +29,8 @@ class Partials:
         value: J, the same on every rank.
         by_displacement: ∂J/∂u on this rank's torn dofs, shape (torn_size,).
         by_multiplier: ∂J/∂λ, owned, shape (n_owned,).
-        by_shape: ∂J/∂X at fixed u and λ, this rank's share, shape (n_nodes, 3) for the nodes of all bodies.
+        by_shape: ∂J/∂X at fixed u and λ, this rank's share, shape (n_nodes, 3) for the nodes of all bodies;
+            what nodes that no design moves get is left open.
     """
 
     value: float
@@ -58,13 +59,11 @@ class TotalPotential:
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
         """∂J/∂u = K u − f, ∂J/∂X from UFL: half of a(u, u), all of L(u)."""
-        torn, u = state.system.torn, state.torn_displacement
-        internal = np.concatenate([s.stiffness @ u[part] for s, part in _parts(state)])
-        # a(u, w) − L(w) with w = u counts the strain energy twice; a(u, u/2) − L(u/2) twice over does not.
-        full, none = work_by_shape(forms, torn, u, u), work_by_shape(forms, torn, np.zeros_like(u), u)
-        by_shape = 0.5 * (full - none) + none
-        nothing = np.zeros(len(torn.numbering.owned))
-        return Partials(self.value(state, forms), internal - torn.load, nothing, by_shape)
+        system, u = state.system, state.torn_displacement
+        by_shape = work_by_shape(forms, system.torn, 0.5 * u, u)
+        nothing = np.zeros(len(system.torn.numbering.owned))
+        # In equilibrium K u − f = −Bᵀλ.
+        return Partials(self.value(state, forms), -system.force(state.solution.multiplier), nothing, by_shape)
 
 
 @dataclass(frozen=True)
@@ -119,7 +118,10 @@ class VolumeIntegral:
         ]
         nothing = np.zeros(len(torn.numbering.owned))
         return Partials(
-            self.value(state, forms), np.concatenate(gradient), nothing, sum_over_subdomains(torn, [u], shape)
+            self.value(state, forms),
+            np.concatenate(gradient),
+            nothing,
+            sum_over_subdomains(torn, [u], shape, forms.moving),
         )
 
     def _body(self, state: State) -> Body:
@@ -172,10 +174,3 @@ class ContactForces:
         return Partials(
             float(value), np.zeros(len(state.torn_displacement)), by_multiplier, np.zeros((nodes, 3))
         )
-
-
-def _parts(state: State) -> Any:
-    start = 0
-    for subdomain in state.system.torn.subdomains:
-        yield subdomain, slice(start, start + subdomain.mesh.size)
-        start += subdomain.mesh.size

@@ -24,6 +24,9 @@ from fenics_contact.shape.objective import Objective
 from fenics_contact.shape.volume import volume_by_points
 from fenics_contact.timing import PhaseTimer
 
+#: Tolerance of the adjoint relative to that of the state, and the smallest one asked for.
+ADJOINT_SHARE, ADJOINT_FLOOR = 1e-2, 1e-11
+
 logger = logging.getLogger(__name__)
 
 
@@ -89,6 +92,8 @@ class ShapeProblem:
         self.scene, self.objective, self.choice = scene, objective, choice
         self.designs = (designs,) if isinstance(designs, SurfaceDesign) else tuple(designs)
         self.solver = solver or FaceNewton()
+        # The subgradient may not be worse than the state it is taken at, down to what rounding allows.
+        self._adjoint_tolerance = max(ADJOINT_SHARE * self.solver.tolerance, ADJOINT_FLOOR)
         self._timer = PhaseTimer()
         self.evaluations, self.products = 0, 0
         self.first: DesignPoint | None = None
@@ -173,7 +178,7 @@ class ShapeProblem:
             partials = self.objective.partials(state, forms)
         with self._timer.phase("adjoint"):
             linearised = linearise_face(state, self.choice)
-            adjoint = solve_adjoint(state, partials, linearised)
+            adjoint = solve_adjoint(state, partials, linearised, tolerance=self._adjoint_tolerance)
         with self._timer.phase("gradient"):
             by_bound = bound_sensitivity(state, adjoint, partials, linearised)
             by_points = self._by_points(state, adjoint, partials.by_shape, by_bound)
@@ -231,7 +236,12 @@ class ShapeProblem:
 
     def _shape_forms(self, state: State) -> ShapeForms:
         if self._forms is None:
-            self._forms = ShapeForms(state.system.torn)
+            tearing = self.decomposition.tearing
+            moving = np.zeros(int(tearing.node_offset[-1]), dtype=bool)
+            for design, motion in zip(self.designs, self._motions, strict=True):
+                nodes = np.arange(self.scene.bodies[design.body].mesh.n_nodes)
+                moving[tearing.global_nodes(design.body, np.setdiff1d(nodes, motion.held))] = True
+            self._forms = ShapeForms(state.system.torn, moving)
         return self._forms
 
     def _motion(self, design: SurfaceDesign) -> HarmonicExtension:

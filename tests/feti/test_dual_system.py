@@ -15,7 +15,6 @@ from fenics_contact.geometry import block, box_partition
 from fenics_contact.scene import Body, ContactPair, Coulomb, RigidPlane, Scene, Surface
 from tests.feti.scenes import CELLS, STEEL, Cut, clamped_block, ragged_block, touching_blocks
 
-
 #: How close the preconditioner comes to its formula: explicit Schur complements are in single precision.
 ROUNDING = {LocalKind.IMPLICIT: 1e-11, LocalKind.EXPLICIT: 1e-6}
 

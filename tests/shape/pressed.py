@@ -56,7 +56,7 @@ def about_to_close(friction: Friction) -> Pressed:
     depth = depth + 0.3 * gap
     for _ in range(10):
         gap = float(Pressed(friction, depth, start.drag).contact().gap[point])
-        if abs(gap) < 1e-14:
+        if abs(gap) < 1e-12:
             return Pressed(friction, depth, start.drag)
         earlier, earlier_gap, depth = depth, gap, depth - gap * (depth - earlier) / (gap - earlier_gap)
     raise AssertionError(f"the gap of point {point} must vanish, got {gap}")
