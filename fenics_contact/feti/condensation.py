@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 #: Symbolic factorisations kept. Each holds the numbers of its last matrix as well: a few MB.
-KEPT = 24
+KEPT = 8
 #: MUMPS control parameter and its value for nested dissection by METIS.
 ORDERING, METIS = 7, 5
 

@@ -22,16 +22,19 @@ class Factor:
         """Factor ``matrix``, shape (n, n)."""
         self.size = matrix.shape[0]
         csr = (matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data)
-        self._matrix = PETSc.Mat().createAIJ(matrix.shape, csr=csr, comm=PETSc.COMM_SELF)
-        self._matrix.setOption(PETSc.Mat.Option.SPD, True)
-        self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        self._pc = PETSc.PC().create(PETSc.COMM_SELF)
-        self._pc.setOperators(self._matrix)
-        self._pc.setType(PETSc.PC.Type.CHOLESKY)
-        self._pc.setFactorSolverType(_solver())
-        self._pc.setUp()
-        self._factor = self._pc.getFactorMatrix()
-        self._right, self._left = self._matrix.createVecs()
+        given = PETSc.Mat().createAIJ(matrix.shape, csr=csr, comm=PETSc.COMM_SELF)
+        given.setOption(PETSc.Mat.Option.SPD, True)
+        given.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        pc = PETSc.PC().create(PETSc.COMM_SELF)
+        pc.setOperators(given)
+        pc.setType(PETSc.PC.Type.CHOLESKY)
+        pc.setFactorSolverType(_solver())
+        pc.setUp()
+        self._factor = pc.getFactorMatrix()
+        self._right, self._left = given.createVecs()
+        # Only the factor is kept: beside it the copy of the matrix would be a third of the memory.
+        pc.destroy()
+        given.destroy()
 
     def solve(self, right: np.ndarray, out: np.ndarray) -> None:
         """Write the solution for one right side, shape (n,), into ``out``."""
