@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -33,13 +34,12 @@ class CoarseSpace:
         comm: Communicator over which the multipliers are distributed.
         matrix: This rank's columns of G, shape (m, n_owned), CSR.
         load: Right side e, shape (m,), replicated.
-        gram: Generalised inverse of G G^T.
     """
 
     def __init__(
         self, comm: MPI.Comm, G: sp.spmatrix | sp.sparray, e: Vector, *, gram: Gram | None = None
     ) -> None:
-        """Take this rank's columns and factor G G^T. Collective on ``comm``.
+        """Take this rank's columns.
 
         Args:
             comm: Communicator over which the multipliers are distributed.
@@ -59,10 +59,13 @@ class CoarseSpace:
                 "assemble both from the same list of floating subdomains"
             )
         self._transposed = self.matrix.T.tocsr()
-        gram = gram_matrix(comm, self.matrix) if gram is None else gram
-        self.gram: GramInverse | SparseGramInverse = (
-            GramInverse(gram) if isinstance(gram, np.ndarray) else SparseGramInverse(comm, gram)
-        )
+        self._gram_matrix = gram
+
+    @cached_property
+    def gram(self) -> GramInverse | SparseGramInverse:
+        """Generalised inverse of G G^T, factored when first asked for. Collective then."""
+        gram = gram_matrix(self.comm, self.matrix) if self._gram_matrix is None else self._gram_matrix
+        return GramInverse(gram) if isinstance(gram, np.ndarray) else SparseGramInverse(self.comm, gram)
 
     @property
     def m(self) -> int:
@@ -120,7 +123,7 @@ class CoarseSpace:
     def restricted(
         self, Z: sp.spmatrix | sp.sparray, load: Vector | None = None, *, gram: Gram | None = None
     ) -> CoarseSpace:
-        """Return the coarse space G Z of a face with dofs y, multiplier = fixed + Z y. Collective.
+        """Return the coarse space G Z of a face with dofs y, multiplier = fixed + Z y.
 
         Args:
             Z: This rank's restriction, sparse, shape (n_owned, n_face).
