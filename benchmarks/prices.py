@@ -15,14 +15,17 @@ from mpi4py import MPI
 from benchmarks.cases.scenes import block_mesh, block_on_plane
 from benchmarks.report import table
 from fenics_contact.feti import build_torn_system, decompose
-from fenics_contact.feti.factor import Factor, regularised
+from fenics_contact.feti.condensation import Condensations
+from fenics_contact.feti.cost_model import explicit_cost, implicit_cost, prefers_explicit
+from fenics_contact.feti.explicit import ExplicitOperator
+from fenics_contact.feti.implicit import ImplicitOperator
 from fenics_contact.feti.subdomain import Subdomain
 from fenics_contact.qp import CoarseSpace
 
 #: Elements along an edge of a cubic subdomain.
 EDGES = (4, 5, 6, 7, 8, 10, 12)
 #: Numbers of subdomains, all cubes, for the coarse problem.
-SUBDOMAINS = (8, 27, 64, 125, 216, 343)
+SUBDOMAINS = (8, 27, 64, 125, 343, 1000, 2197, 4096)
 #: Bytes that are read between two solves so that no factor is left in the cache.
 FLUSH = 64 * 2**20
 
@@ -49,30 +52,45 @@ def cube(edge: int) -> Subdomain:
     return build_torn_system(scene, decomposition).subdomains[0]
 
 
+def glued_dofs(subdomain: Subdomain, sides: int) -> np.ndarray:
+    """Return the interface of a cube glued on its first ``sides`` sides (two: opposite ones; six: all)."""
+    points = subdomain.points
+    low, high = np.isclose(points, points.min(axis=0)), np.isclose(points, points.max(axis=0))
+    glued = (low | high)[:, : sides // 2].any(axis=1)
+    return np.flatnonzero(np.repeat(glued, 3))
+
+
 def subdomain_prices(edges: Sequence[int] = EDGES) -> str:
-    """Return a table of what one subdomain costs: factor, and a solve with warm and with cold caches."""
+    """Return a table of what one subdomain costs in both ways to keep it, measured and as predicted.
+
+    A product is one application of K⁺ and one of S on the interface, with cold caches.
+    """
     flush = np.zeros(FLUSH // 8)
     body = []
     for edge in edges:
         subdomain = cube(edge)
-        matrix = regularised(subdomain.stiffness, subdomain.kernel, subdomain.points)
-        factor = Factor(matrix)
-        right, left = np.ones(factor.size), np.empty(factor.size)
-        solve = partial(factor.solve, right, left)
-        factoring = seconds_of(partial(Factor, matrix), 3)
-        warm, cold = seconds_of(solve, 20), seconds_of(solve, 20, before=flush.sum)
-        body.append(
-            (
-                f"{edge}³",
-                str(factor.size),
-                f"{1e3 * factoring:.2f}",
-                f"{1e3 * warm:.3f}",
-                f"{1e3 * cold:.3f}",
-                f"{1e6 * cold / factor.size:.3f}",
-            )
-        )
-    head = ("elements", "dofs", "factor [ms]", "solve, warm [ms]", "solve, cold [ms]", "cold [µs a dof]")
-    return table(head, body)
+        size = subdomain.mesh.size
+        for sides in (2, 6):
+            interface = glued_dofs(subdomain, sides)
+            given, found = np.ones(len(interface)), np.empty(len(interface))
+            row = [f"{edge}³", str(size), str(len(interface))]
+            for keep, predict in (
+                (ImplicitOperator, implicit_cost),
+                (partial(ExplicitOperator, condensations=Condensations()), explicit_cost),
+            ):
+                predicted = predict(size, len(interface))
+                operator = keep(subdomain, interface)
+                setting_up = seconds_of(partial(keep, subdomain, interface), 3)
+                product = sum(
+                    seconds_of(partial(apply, given, found), 20, before=flush.sum)
+                    for apply in (operator.flex, operator.stiffen)
+                )
+                row.append(f"{1e3 * setting_up:.1f} ({1e3 * predicted.setup:.1f})")
+                row.append(f"{1e3 * product:.3f} ({1e3 * predicted.product:.3f})")
+            row.append("explicit" if prefers_explicit(size, len(interface)) else "implicit")
+            body.append(row)
+    costs = [f"{kind} {what} [ms]" for kind in ("implicit", "explicit") for what in ("set-up", "product")]
+    return table(("elements", "dofs", "interface", *costs, "chosen"), body)
 
 
 def cubes_in_a_lattice(count: int) -> sp.csr_matrix:
@@ -106,7 +124,7 @@ def coarse_prices(counts: Sequence[int] = SUBDOMAINS) -> str:
         G = cubes_in_a_lattice(count)
         load = np.ones(G.shape[0])
         coarse = CoarseSpace(MPI.COMM_SELF, G, load)
-        building = seconds_of(partial(CoarseSpace, MPI.COMM_SELF, G, load), 1)
+        building = seconds_of(lambda G=G, load=load: CoarseSpace(MPI.COMM_SELF, G, load).gram, 1)  # type: ignore[misc]
         solving = seconds_of(partial(coarse.solve, load), 20)
         body.append((str(count), str(G.shape[0]), f"{1e3 * building:.1f}", f"{1e3 * solving:.3f}"))
     return table(("subdomains", "rigid motions", "assemble and factor [ms]", "solve [ms]"), body)

@@ -1,7 +1,7 @@
 """Sparse factors or dense matrices for a subdomain? What either costs, from measured rates.
 
 The choice depends on sizes alone, never on a clock, so that a run can be repeated. `python -m
-benchmarks.local_operators` measures the rates anew and compares them with the predictions.
+benchmarks.profile --prices` measures anew and compares with the predictions.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ class Rates:
         stream: Bytes a second that the product with a packed triangle reads.
     """
 
-    factor: float = 0.9e-6
+    factor: float = 0.75e-6
     substitution: float = 2.8e-8
-    condensation: float = 1.3
-    dense: float = 25e9
+    condensation: float = 1.0
+    dense: float = 30e9
     stream: float = 15e9
 
 
