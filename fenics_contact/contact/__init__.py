@@ -5,10 +5,12 @@ from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.equilibrium import find_state, solve_scene
 from fenics_contact.contact.held import check_held
 from fenics_contact.contact.result import ContactResult, Status
+from fenics_contact.contact.slip_bounds import Damping
 from fenics_contact.contact.state import State
 
 __all__ = [
     "ContactResult",
+    "Damping",
     "Energies",
     "FixedPoint",
     "State",

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from fenics_contact.contact.slip_bounds import Damping, SlipBoundSequence
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp import (
     DualProblem,
@@ -28,16 +29,30 @@ FIRST_MARGIN = 1.1
 class FixedPoint:
     """Two loops: Ψ ← given bound + μ λ_N around a solver for given slip bounds.
 
+    A Tresca problem is solved no better than the slip bound deserves: its tolerance follows the natural
+    residual that its answer will have with its own slip bound. The bound is refreshed plainly; only where
+    the bounds cycle or the residual stops falling they are damped, and the history says so.
+
     Attributes:
         solver: Solver of the Tresca problems.
         max_steps: Give up after that many Tresca problems.
+        forcing: Tolerance of a Tresca problem relative to the last natural residual.
+        loosest: Largest tolerance of all, that of the first Tresca problem.
+        damping: What to do where the plain iteration cycles.
+
+    References:
+        J. Haslinger, Z. Dostál, R. Kučera, On a splitting type algorithm for the numerical realization of
+        contact problems with Coulomb friction, CMAME 191 (2002).
 
     Example:
         >>> state = solve_scene(scene, partitions, comm, solver=FixedPoint(Smalse()))  # doctest: +SKIP
     """
 
     solver: DualSolver
-    max_steps: int = 100
+    max_steps: int = 200
+    forcing: float = 0.1
+    loosest: float = 1e-2
+    damping: Damping = field(default_factory=Damping)
 
     @property
     def tolerance(self) -> float:
@@ -51,31 +66,56 @@ class FixedPoint:
             InfeasibleError: If a Tresca problem on the way has no equilibrium.
             ConvergenceError: If the fixed point was not reached; carries the history of all steps.
         """
-        # The inner answers may be as bad as their tolerance; half of it is left to the fixed point.
-        inner = replace(self.solver, tolerance=0.5 * self.tolerance)  # type: ignore[type-var]
-        slip_bound = _first_slip_bound(problem, law, start)
+        slip_bound, sequence = (
+            _first_slip_bound(problem, law, start),
+            SlipBoundSequence(problem.comm, self.damping),
+        )
         earlier: DualSolution | np.ndarray | None = None if start.cold else start.iterate.multiplier
         history: list[SolverStep] = []
         products, reached = start.operator.products, np.inf
-        for _ in range(self.max_steps):
+        for number in range(self.max_steps):
             try:
-                solution = solve(problem, slip_bound, inner, earlier)
+                solution = solve(problem, slip_bound, self._inner(sequence.fraction * reached), earlier)
             except ConvergenceError as failure:
                 steps = _continued(history, failure.history, products)
-                raise ConvergenceError(str(failure), steps) from failure
+                raise ConvergenceError(
+                    f"the Coulomb fixed point needs residuals below {self.tolerance:.1e}, but its Tresca "
+                    f"problem {number} failed: {failure}",
+                    steps,
+                ) from failure
             history = _continued(history, solution.history, products)
             products += solution.products
-            solution = replace(
-                _judged(solution, law), iterations=len(history), products=products, history=tuple(history)
-            )
+            solution = _judged(solution, law)
+            reached = solution.natural_residual
+            slip_bound, note = sequence.advance(slip_bound, solution.slip_bound, reached)
+            history[-1] = replace(history[-1], note=f"{history[-1].note}; {note}")
             if solution.residuals.within(self.tolerance):
-                return solution
-            reached, slip_bound, earlier = solution.natural_residual, solution.slip_bound, solution
-        raise ConvergenceError(
+                return replace(solution, iterations=len(history), products=products, history=tuple(history))
+            if sequence.exhausted:
+                break
+            earlier = solution
+        raise ConvergenceError(self._failure(sequence, reached), history)
+
+    def _inner(self, residual: float) -> DualSolver:
+        """Return the solver of the next Tresca problem, given the error that its slip bound has anyway."""
+        # The inner answers may be as bad as their tolerance; half of it is left to the fixed point.
+        tolerance = max(0.5 * self.tolerance, min(self.loosest, self.forcing * residual))
+        return replace(self.solver, tolerance=tolerance)  # type: ignore[type-var]
+
+    def _failure(self, sequence: SlipBoundSequence, reached: float) -> str:
+        needed = (
             f"the Coulomb fixed point needs a natural residual below {self.tolerance:.1e}, reached "
-            f"{reached:.1e} after {self.max_steps} Tresca problems: raise max_steps, or use FaceNewton, "
-            "which updates the slip bound in every step",
-            history,
+            f"{reached:.1e}"
+        )
+        if sequence.exhausted:
+            fractions = ", ".join(f"{fraction:g}" for fraction in self.damping.fractions)
+            return (
+                f"{needed}: it cycles or stands still with every θ of {fractions}; use FaceNewton, which "
+                "updates the slip bound in every step, or give Damping smaller fractions"
+            )
+        return (
+            f"{needed} after {self.max_steps} Tresca problems: raise max_steps, or use FaceNewton, which "
+            "updates the slip bound in every step"
         )
 
 

@@ -1,0 +1,65 @@
+"""Eleven friction problems of the literature: rank deficient, without unique forces, two of them cycling."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fenics_contact.contact import Damping, FixedPoint
+from fenics_contact.errors import ConvergenceError
+from fenics_contact.qp import DualSolver, FaceNewton, Smalse, solve
+from tests.qp.published_friction import CYCLING, SHARED, cone_residual, published
+
+TOLERANCE = 1e-8
+SOLVERS: dict[str, DualSolver] = {
+    "face Newton": FaceNewton(tolerance=TOLERANCE),
+    "fixed point of SMALSE": FixedPoint(Smalse(tolerance=TOLERANCE)),
+    "fixed point of face Newton": FixedPoint(FaceNewton(tolerance=TOLERANCE)),
+}
+CASES = sorted(SHARED.glob("*.npz"))
+PLAIN = Damping(fractions=(1.0,))
+
+
+def notes(history) -> str:
+    return " | ".join(step.note for step in history)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_published_problem_is_solved_by_every_solver(solver: str) -> None:
+    problem, mu_f = published(CYCLING)
+    assert np.linalg.matrix_rank(problem.operator(np.eye(problem.layout.size))) < problem.layout.size
+    found = solve(problem, None, SOLVERS[solver], friction_coefficient=mu_f)
+    assert cone_residual(problem, mu_f, found.multiplier) < TOLERANCE
+    assert cone_residual(problem, mu_f, 1.001 * found.multiplier) > 10 * TOLERANCE
+
+
+@pytest.mark.skipif(not CASES, reason="the published problems are not beside this checkout")
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("case", CASES, ids=lambda path: path.stem[:20])
+def test_all_published_problems_are_solved(case: Path, solver: str) -> None:
+    problem, mu_f = published(case)
+    found = solve(problem, None, SOLVERS[solver], friction_coefficient=mu_f)
+    assert cone_residual(problem, mu_f, found.multiplier) < TOLERANCE
+
+
+@pytest.mark.parametrize("inner", [Smalse(tolerance=TOLERANCE), FaceNewton(tolerance=TOLERANCE)])
+def test_damping_solves_what_makes_the_plain_fixed_point_cycle(inner: DualSolver) -> None:
+    problem, mu_f = published(CYCLING)
+    with pytest.raises(
+        ConvergenceError, match="cycles or stands still with every θ of 1; use FaceNewton"
+    ) as plain:
+        solve(problem, None, FixedPoint(inner, damping=PLAIN), friction_coefficient=mu_f)
+    assert "they cycle with period 2: no θ is left" in plain.value.history[-1].note
+    found = solve(problem, None, FixedPoint(inner), friction_coefficient=mu_f)
+    assert "they cycle with period 2: damping with θ = 0.6" in notes(found.history)
+    assert found.residuals.within(TOLERANCE)
+
+
+def test_an_easy_problem_is_not_damped_and_every_refresh_is_told() -> None:
+    problem, mu_f = published(CYCLING)
+    found = solve(problem, None, FixedPoint(Smalse()), friction_coefficient=0.1 * mu_f)
+    assert found.history[-1].slip > 0
+    assert "damping" not in notes(found.history)
+    assert 2 < notes(found.history).count("slip bounds changed by") < 15
