@@ -13,7 +13,8 @@ from fenics_contact.qp.reductions import Vector, global_sum
 RETURN_RATIO = 0.3
 #: A cycle is a return in that many steps in a row.
 RETURNS = 3
-#: Residuals have stopped falling when so many steps have not reduced the best one by this factor.
+#: Residuals have stopped falling when so many steps (of damped ones 1/θ times as many) have not reduced the
+#: best one by this factor.
 PATIENCE, PROGRESS = 10, 0.9
 #: How many earlier slip bounds are compared: the longest period that is recognised, plus one.
 MEMORY = 6
@@ -86,8 +87,8 @@ class SlipBoundSequence:
         """Return why the present θ does not lead on, empty if it does."""
         if self._returns >= RETURNS and self._since_best >= RETURNS:
             return f"they cycle with period {period}"
-        if self._since_best >= PATIENCE:
-            return f"the residual has not fallen in {PATIENCE} steps"
+        if self._since_best * self.fraction >= PATIENCE:
+            return f"the residual has not fallen in {self._since_best} steps"
         return ""
 
     def _returned(self, image: Vector) -> tuple[int, float]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fenics_contact.errors import ConvergenceError
-from fenics_contact.qp.certify import certify
+from fenics_contact.qp.certify import Certificate, certify
 from fenics_contact.qp.coupled import CoupledFace, couple
 from fenics_contact.qp.face import Face, classify
 from fenics_contact.qp.face_system import FaceSystem, FaceSystems
@@ -15,14 +15,17 @@ from fenics_contact.qp.gmres import projected_gmres
 from fenics_contact.qp.iterate import Iterate, Start, apply_unless_zero, iterate_at
 from fenics_contact.qp.line_search import Damped, damp
 from fenics_contact.qp.pcg import FaceStep, Stop, projected_cg
-from fenics_contact.qp.problem import DualProblem
+from fenics_contact.qp.problem import DualProblem, Operator
 from fenics_contact.qp.reductions import Vector, global_sum
 from fenics_contact.qp.rescue import rescue
 from fenics_contact.qp.residual import Residuals, contact_step
+from fenics_contact.qp.settling import Settling, keep_unheld
 from fenics_contact.qp.slip_law import SlipLaw
 from fenics_contact.qp.smalse import Smalse
 from fenics_contact.qp.solution import DualSolution, SolverStep
-from fenics_contact.qp.unheld import move_unheld
+
+#: The longest cycle of active sets that is recognised.
+LONGEST_CYCLE = 6
 
 
 @dataclass(frozen=True)
@@ -30,15 +33,16 @@ class FaceNewton:
     """Faces by the natural map w = λ − ρ r, each solved by projected preconditioned CG.
 
     On a face G λ = e holds exactly, so there is no loop for equilibrium. The inner tolerance follows the
-    outer residual, and the better the last face predicted it, the closer. With Coulomb's law the slip bound
-    is refreshed in every step, and the friction of slipping discs grows with the normal force already
-    within the step: one loop for all.
+    outer residual, and once no contact changes, the better the last face predicted it, the closer. With
+    Coulomb's law the slip bound is refreshed in every step, and the friction of slipping discs grows with
+    the normal force already within the step: one loop for all.
 
-    Three things keep the active set from cycling. A disc whose friction force would turn by more than a
-    right angle has a ρ too large for it; its ρ is reduced until the force stays or the disc sticks. A step
-    that makes the residual worse is cut short, at no cost in products. Steps without progress are followed
-    by SMALSE steps from the best iterate so far. And nothing is accepted before its residuals were
-    recomputed.
+    Floating bodies are settled after every step (`Settling`): their motions balance the load with the forces
+    of the next guess. Three more things keep the active set from cycling. A disc whose friction force would
+    turn by more than a right angle has a ρ too large for it; its ρ is reduced until the force stays or the
+    disc sticks. A step that makes the residual worse is cut short, at no cost in products. Steps without
+    progress are followed by SMALSE steps from the best iterate so far; the history says whether the active
+    set cycled or the residual stood still. And nothing is accepted before its residuals were recomputed.
 
     Attributes:
         tolerance: Every residual of `Residuals` ends below it.
@@ -59,7 +63,7 @@ class FaceNewton:
     tolerance: float = 1e-6
     max_steps: int = 200
     max_products: int = 20_000
-    forcing: float = 0.2
+    forcing: float = 0.25
     loosest: float = 0.1
     patience: int = 6
     rescue: Smalse = field(default_factory=Smalse)
@@ -74,16 +78,16 @@ class FaceNewton:
         operator, memory = start.operator, start.memory
         newton = NewtonSteps(problem, law, start, self)
         history: list[SolverStep] = []
-        iterate, best, since_best = start.iterate, start.iterate, 0
+        iterate = start.iterate if start.cold else newton.settled(start.iterate)
+        best, since_best = iterate, 0
         rescued, budget = None, self.rescue_products
         while len(history) < self.max_steps and operator.products < self.max_products:
             iterate, line = newton.step(iterate, len(history))
             history.append(line)
-            if iterate.residuals.within(self.tolerance):
-                answer = certify(problem, operator, law, iterate.multiplier, iterate.residual)
-                iterate = answer.iterate
-                if iterate.residuals.within(self.tolerance):
-                    return answer.solution(problem, history, operator.products, memory)
+            answer = self._accepted(problem, law, operator, iterate)
+            if answer is not None and answer.iterate.residuals.within(self.tolerance):
+                return answer.solution(problem, history, operator.products, memory)
+            iterate = iterate if answer is None else answer.iterate
             if iterate.residuals.worst < 0.5 * best.residuals.worst:
                 best, since_best = iterate, 0
             else:
@@ -91,15 +95,20 @@ class FaceNewton:
             if since_best >= self.patience or not np.isfinite(iterate.residuals.worst):
                 # Where Newton could do nothing with the last rescue, the next one must go further.
                 budget = 2 * budget if best is rescued else self.rescue_products
+                left = max(self.max_products - operator.products, 1)
                 iterate, memory = rescue(
                     problem,
                     law,
                     Start(best, operator, memory, cold=False),
                     self.rescue,
                     reduction=0.1,
-                    budget=budget,
+                    budget=min(budget, left),
+                    reason=newton.stall(),
                     history=history,
                 )
+                answer = self._accepted(problem, law, operator, iterate)
+                if answer is not None:
+                    return answer.solution(problem, history, operator.products, memory)
                 rescued, best, since_best = iterate, iterate, 0
         raise ConvergenceError(
             f"face Newton needs residuals below {self.tolerance:.1e}, got after {operator.products} "
@@ -107,6 +116,14 @@ class FaceNewton:
             "neighbouring solution, or use SMALSE",
             history,
         )
+
+    def _accepted(
+        self, problem: DualProblem, law: SlipLaw, operator: Operator, iterate: Iterate
+    ) -> Certificate | None:
+        """Return an iterate that claims to be the solution, recomputed, else None. Collective."""
+        if not iterate.residuals.within(self.tolerance):
+            return None
+        return certify(problem, operator, law, iterate.multiplier, iterate.residual)
 
 
 class NewtonSteps:
@@ -120,11 +137,21 @@ class NewtonSteps:
         self._natural_step = contact_step(problem.layout, problem.diagonal)
         self._rho = self._natural_step.copy()
         self._face: Face | None = None
+        self._earlier: list[Face] = []
         self._mismatch = 1.0
+        self._settling = Settling(problem, law)
+
+    def settled(self, iterate: Iterate) -> Iterate:
+        """Return an iterate of another load or position with its floating bodies at rest. Collective."""
+        problem = self._problem
+        alpha = problem.coarse.coefficients(iterate.product - problem.rhs - iterate.residual)
+        alpha = alpha + self._settling(iterate.multiplier, iterate.residual, self._rho)
+        return iterate_at(problem, self._law, iterate.multiplier, iterate.product, alpha)
 
     def step(self, iterate: Iterate, number: int) -> tuple[Iterate, SolverStep]:
         """Classify, solve the face, and return the new iterate with its line of history. Collective."""
         face = self._next_face(iterate)
+        self._earlier = [self._face, *self._earlier[: LONGEST_CYCLE - 1]] if self._face else []
         changes = 0 if self._face is None else face.changes(self._face)
         self._face = face
         system = self._systems.build(face)
@@ -133,14 +160,25 @@ class NewtonSteps:
         entered = linear.enter(iterate.multiplier)
         moved = apply_unless_zero(self._problem, self._operator, entered - iterate.multiplier)
         product = iterate.product + moved
-        solved = self._solve(system, coupled, entered, product, iterate.residuals)
+        solved = self._solve(system, coupled, entered, product, iterate.residuals, changes)
         multiplier, product = entered + linear.advance(solved.step), product + solved.product
-        alpha = linear.motions(system.gradient(multiplier, product - self._problem.rhs))
-        alpha = move_unheld(self._problem, system, iterate, multiplier, alpha, self._rho)
+        alpha = self._motions(system, linear, iterate, multiplier, product)
         after = iterate_at(self._problem, self._law, multiplier, product, alpha)
         self._mismatch = abs(after.residuals.size - solved.measure) / (iterate.residuals.size or 1.0)
         damped = damp(self._problem, self._law, iterate, after)
         return damped.iterate, self._record(number, damped, system, solved, changes)
+
+    def stall(self) -> str:
+        """Say why the last steps led nowhere: whether the active set cycles or stands still. Collective."""
+        if self._face is None or not self._earlier:
+            return "the residual stands still"
+        changes = [self._face.changes(face) for face in self._earlier]
+        changed = global_sum(self._problem.comm, *changes)
+        if changed[0] == 0.0:
+            return "the residual stands still on one face"
+        if not np.all(changed):
+            return f"the active set cycles with period {int(np.argmin(changed)) + 1}"
+        return "the active set does not settle"
 
     def _next_face(self, iterate: Iterate) -> Face:
         """Classify, with a smaller ρ for discs whose force would otherwise turn back."""
@@ -152,6 +190,22 @@ class NewtonSteps:
         self._rho[layout.tangential[turned]] *= 0.3
         return classify(layout, slip_bound, iterate.multiplier, iterate.residual, self._rho)
 
+    def _motions(
+        self,
+        system: FaceSystem,
+        linear: FaceSystem | CoupledFace,
+        before: Iterate,
+        multiplier: Vector,
+        product: Vector,
+    ) -> Vector:
+        """Return α after a step: from the rows of the face, then settled. Collective."""
+        problem, coarse = self._problem, self._problem.coarse
+        earlier = coarse.coefficients(before.product - problem.rhs - before.residual)
+        alpha = linear.motions(system.gradient(multiplier, product - problem.rhs))
+        alpha = keep_unheld(system.coarse, earlier, alpha)
+        residual = product - problem.rhs - coarse.transpose(alpha)
+        return np.asarray(alpha + self._settling(multiplier, residual, self._rho), dtype=np.float64)
+
     def _solve(
         self,
         system: FaceSystem,
@@ -159,8 +213,10 @@ class NewtonSteps:
         multiplier: Vector,
         product: Vector,
         residuals: Residuals,
+        changes: int,
     ) -> FaceStep:
-        forcing = min(self._parameters.forcing, self._mismatch)
+        changed = global_sum(self._problem.comm, changes)[0] > 0.0
+        forcing = self._parameters.forcing if changed else min(self._parameters.forcing, self._mismatch)
         wanted = min(self._parameters.loosest, forcing * residuals.worst)
         tolerance = max(wanted, 0.3 * self._parameters.tolerance)
         gradient = system.gradient(multiplier, product - self._problem.rhs)

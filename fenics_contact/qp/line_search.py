@@ -9,7 +9,7 @@ from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.residual import measure
 from fenics_contact.qp.slip_law import SlipLaw
 
-FRACTIONS = (0.5, 0.25, 0.1)
+FRACTIONS = (0.5, 0.25, 0.1, 0.01)
 
 
 @dataclass(frozen=True, eq=False)

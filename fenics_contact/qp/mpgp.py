@@ -120,7 +120,7 @@ def minimise(
             slope, curvature = global_sum(quadratic.comm, gradient @ direction, direction @ image)
             limit = global_min(quadratic.comm, quadratic.feasible.step_to_boundary(x, direction))
             length = slope / curvature if curvature > 0.0 else np.inf
-            if length <= limit:
+            if length <= limit and np.isfinite(length):
                 x, gradient = x - length * direction, gradient - length * image
                 split = _split(quadratic, x, gradient, step, parameters)
                 overlap = global_sum(quadratic.comm, split.free @ image)[0]

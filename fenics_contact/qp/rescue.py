@@ -20,6 +20,7 @@ def rescue(
     *,
     reduction: float,
     budget: int,
+    reason: str,
     history: list[SolverStep],
 ) -> tuple[Iterate, SmalseMemory]:
     """Improve an iterate by SMALSE with its slip bound held. Collective.
@@ -31,6 +32,7 @@ def rescue(
         parameters: SMALSE's.
         reduction: Stop when the residual has fallen by this factor.
         budget: Largest number of products to spend.
+        reason: Why Newton's method needs it, in words.
         history: Gets one record.
 
     Returns:
@@ -47,6 +49,6 @@ def rescue(
     improved = certify(problem, start.operator, law, state.multiplier, state.residual).iterate
     line = state.record(len(history), problem, start.operator.products)
     reached = "met its target" if state.residuals.within(target) else "used its budget"
-    note = f"rescue from {start.iterate.residuals.worst:.1e}, {reached}"
+    note = f"rescue from {start.iterate.residuals.worst:.1e} because {reason}: {reached}"
     history.append(replace(line, method="SMALSE rescue", residuals=improved.residuals, note=note))
     return improved, state.memory

@@ -64,7 +64,8 @@ def measure(
     """Compute all residuals. Collective.
 
     Contact forces below 1e-10 of ‖λ‖ count as none, so that a body that merely touches does not keep the
-    iteration alive; where no normal force acts at all, ‖λ‖ over all contact rows stands in for ‖λ_N‖.
+    iteration alive, and so do forces below 1e-10 of those that would close the gaps, ρ‖d‖: rounding of r
+    gives rise to such. Where no normal force acts at all, ‖λ‖ over all contact rows stands in for ‖λ_N‖.
 
     Args:
         problem: The dual problem.
@@ -74,7 +75,8 @@ def measure(
         residual: r = F λ − d − Gᵀα, owned.
     """
     layout, equality, contact = problem.layout, problem.layout.equality, problem.layout.contact
-    mapped = feasible.project(multiplier - contact_step(layout, problem.diagonal) * residual)
+    step = contact_step(layout, problem.diagonal)
+    mapped = feasible.project(multiplier - step * residual)
     sums = global_sum(
         problem.comm,
         *(_square(x[layout.normal]) for x in (multiplier, mapped)),
@@ -82,16 +84,16 @@ def measure(
         *(_square(x[equality]) for x in (residual, product - problem.rhs, problem.rhs)),
         _square(multiplier),
         _square(problem.rhs),
+        _square(step * problem.rhs),
         problem.coarse.local(multiplier),
     )
-    normal, normal_mapped, force, force_mapped, distance, jump, cancelled, load, everything, rhs = np.sqrt(
-        sums[:10]
-    )
-    unbalanced = problem.coarse.norm(sums[10:] - problem.coarse.load)
+    normal, normal_mapped, force, force_mapped, distance = np.sqrt(sums[:5])
+    jump, cancelled, load, everything, rhs, closing = np.sqrt(sums[5:11])
+    unbalanced = problem.coarse.norm(sums[11:] - problem.coarse.load)
     force_scale = max(normal, normal_mapped)
     if force_scale <= FORCE_FLOOR * max(force, force_mapped):
         force_scale = max(force, force_mapped)
-    force_scale = max(force_scale, FORCE_FLOOR * everything)
+    force_scale = max(force_scale, FORCE_FLOOR * max(everything, closing))
     gluing_scale = max(cancelled, load) or rhs
     return Residuals(
         natural=_ratio(distance, force_scale),

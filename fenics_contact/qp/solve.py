@@ -105,7 +105,14 @@ def _begin(problem: DualProblem, law: SlipLaw, start: DualSolution | Vector | No
     else:
         alpha = fit_rigid_motions(problem, law, multiplier, product)
     iterate = iterate_at(problem, law, multiplier, product, alpha)
-    return Start(iterate, operator, None if earlier is None else earlier.memory, cold=start is None)
+    memory = None if earlier is None else earlier.memory
+    if start is not None and problem.norm(coarse.particular()) == 0.0:
+        # No body is pushed: no force at all may be nearer than those of another load, and is known for free.
+        nothing = np.zeros_like(multiplier)
+        rest = iterate_at(problem, law, nothing, nothing, fit_rigid_motions(problem, law, nothing, nothing))
+        if rest.residuals.worst <= iterate.residuals.worst:
+            return Start(rest, operator, memory, cold=True)
+    return Start(iterate, operator, memory, cold=start is None)
 
 
 def _require_size(multiplier: Vector, size: int) -> None:

@@ -115,6 +115,9 @@ def test_impatient_newton_is_rescued_and_still_right():
     rescues = [step for step in found.history if step.method == "SMALSE rescue"]
     assert rescues
     assert "rescue from" in rescues[0].note
+    assert " because the " in rescues[0].note
+    after = found.history[rescues[0].iteration + 1 :]
+    assert any(step.method == "face Newton" for step in after)
     assert found.memory is not None
     np.testing.assert_allclose(found.multiplier, plain.multiplier, atol=1e-6 * plain.residuals.force_scale)
 

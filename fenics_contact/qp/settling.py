@@ -1,0 +1,256 @@
+"""Floating bodies at rest: they move until the trial forces of contact and friction balance their load."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact.qp.coarse import CoarseSpace
+from fenics_contact.qp.feasible import FeasibleSet
+from fenics_contact.qp.problem import DualProblem
+from fenics_contact.qp.reductions import Vector, global_max, global_sum
+from fenics_contact.qp.slip_law import SlipLaw
+
+#: Imbalance relative to the sum of all forces at which bodies count as settled.
+BALANCED = 1e-11
+#: The same where the bounds of friction were refreshed as often as allowed.
+NEARLY = 1e-6
+#: Steps of Newton's method, coupled or with frozen bounds, and refreshes of frozen bounds.
+COUPLED_STEPS, FROZEN_STEPS, REFRESHES = 30, 60, 30
+#: Motions that contact resists less than this, relative to the others, stay what they are.
+UNRESISTED = 1e-10
+
+
+class Settling:
+    """Chooses the rigid motions of floating bodies without a single F-product.
+
+    A body that nothing but contact holds moves by N β, Gᵀ N = 0 on the gluing rows. At a multiplier λ with
+    r = F λ − d − Gᵀα, each contact answers such a motion by the trial force P_Λ(λ − ρ(r − Gᵀ N β)): a spring
+    that opens, sticks or slips. `Settling` solves
+
+        Nᵀ G P_Λ(λ − ρ (r − Gᵀ N β)) = Nᵀ e,
+
+    six equations a body. The face that Newton's method finds next then holds the bodies: without this a body
+    that hardly anything holds overshoots its place in every step, and others are not held at all.
+
+    Newton's method with the bound that follows the trial normal force comes first. Where it does not halve
+    the imbalance in every step, the bound is frozen in turns; then β minimises a convex potential, the
+    sum of Huber functions of the slips for friction, and is found from anywhere. Where no motion balances
+    the load under these bounds, bodies move on as linear springs would.
+
+    Attributes:
+        motions: N, orthonormal motions of bodies that no equality row holds, shape (m, k), replicated.
+    """
+
+    def __init__(self, problem: DualProblem, law: SlipLaw) -> None:
+        """Find the floating bodies. Collective."""
+        self._problem, self._law = problem, law
+        self.motions = _floating_motions(problem)
+        self._rows = np.asarray(problem.coarse.matrix.T @ self.motions)
+
+    def __call__(self, multiplier: Vector, residual: Vector, step: Vector) -> Vector:
+        """Return δα = N β, shape (m,), replicated. Collective.
+
+        Args:
+            multiplier: λ, owned.
+            residual: r = F λ − d − Gᵀα, owned.
+            step: ρ, 0 on equality rows, owned.
+        """
+        if self.motions.shape[1] == 0:
+            return np.zeros(len(self.motions))
+        stiffness = self._problem.comm.allreduce(self._rows.T @ (step[:, None] * self._rows))
+        values, vectors = np.linalg.eigh(stiffness)
+        resisted = values > UNRESISTED * values.max(initial=0.0)
+        units = vectors[:, resisted] / np.sqrt(values[resisted])
+        springs = _Springs(
+            self._problem,
+            self._law,
+            start=multiplier - step * residual,
+            step=step,
+            rows=self._rows @ units,
+            load=units.T @ (self.motions.T @ self._problem.coarse.load),
+        )
+        return np.asarray(
+            self.motions @ (units @ _rest(springs, self._law.bound(multiplier))), dtype=np.float64
+        )
+
+
+def keep_unheld(face: CoarseSpace, earlier: Vector, alpha: Vector) -> Vector:
+    """Return α with the motions that a face says nothing about as they were.
+
+    Args:
+        face: Coarse space of the face.
+        earlier: α before the step, shape (m,), replicated.
+        alpha: α from the rows of the face, shape (m,), replicated.
+    """
+    if face.gram.null_space.shape[1] == 0:
+        return alpha
+    basis, _ = np.linalg.qr(face.gram.null_space)
+    return np.asarray(alpha + basis @ (basis.T @ (earlier - alpha)), dtype=np.float64)
+
+
+def _floating_motions(problem: DualProblem) -> Vector:
+    """Return N, orthonormal; no columns where there is no contact. Collective."""
+    equality, m = problem.layout.equality, problem.coarse.m
+    if global_max(problem.comm, float(problem.layout.n_contact)) == 0.0 or m == 0:
+        return np.zeros((m, 0))
+    columns = np.arange(len(equality))
+    selection = sp.csr_matrix(
+        (np.ones(len(equality)), (equality, columns)), shape=(problem.layout.size, len(equality))
+    )
+    null = problem.coarse.restricted(selection).gram.null_space
+    return np.asarray(np.linalg.qr(null)[0], dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class _Balance:
+    """The trial multiplier of a motion, its bound, what is missing to equilibrium and the potential."""
+
+    motion: Vector
+    trial: Vector
+    bound: Vector
+    imbalance: Vector
+    potential: float
+
+    @property
+    def size(self) -> float:
+        """Norm of the imbalance."""
+        return float(np.linalg.norm(self.imbalance))
+
+
+@dataclass(frozen=True, eq=False)
+class _Springs:
+    """Trial forces as functions of a motion z, in units in which all springs together have stiffness one.
+
+    Attributes:
+        problem: The dual problem.
+        law: Where the bound comes from.
+        start: w = λ − ρ r at z = 0, owned.
+        step: ρ, the stiffness of the springs, owned.
+        rows: Gᵀ N in the coordinates z, shape (n_owned, k).
+        load: Nᵀ e in the coordinates z, shape (k,).
+    """
+
+    problem: DualProblem
+    law: SlipLaw
+    start: Vector
+    step: Vector
+    rows: Vector
+    load: Vector
+
+    def at(self, z: Vector, bound: Vector | None = None) -> _Balance:
+        """Return the balance at a motion, with a frozen bound or that of the trial force. Collective."""
+        layout = self.problem.layout
+        contact = layout.contact
+        trial = self.start + self.step * (self.rows @ z)
+        bound = self.law.bound(trial) if bound is None else bound
+        force = FeasibleSet(layout, bound).project(trial)
+        w, p = trial[contact], force[contact]
+        # ½‖w‖² − ½‖w − p‖² without its cancellation; its derivative is p.
+        energy = (w - 0.5 * p) @ (p / self.step[contact])
+        sums = global_sum(self.problem.comm, self.rows[contact].T @ p, energy)
+        return _Balance(z, trial, bound, sums[:-1] - self.load, float(sums[-1] - self.load @ z))
+
+    def scale(self, balance: _Balance) -> float:
+        """Return the size of all forces taken together. Collective."""
+        contact = self.problem.layout.contact
+        force = FeasibleSet(self.problem.layout, balance.bound).project(balance.trial)
+        sizes = global_sum(self.problem.comm, np.abs(self.rows[contact]).T @ np.abs(force[contact]))
+        return float(max(np.linalg.norm(self.load), np.linalg.norm(sizes)))
+
+    def slope(self, balance: _Balance, growth: Vector | None) -> Vector:
+        """Return the derivative of the imbalance, shape (k, k). Collective.
+
+        Args:
+            balance: Where.
+            growth: dΨ/dλ_N where the bound follows the trial normal force, None where it is frozen.
+        """
+        normal, pairs = self.problem.layout.normal, self.problem.layout.tangential
+        closed = normal[balance.trial[normal] > 0.0]
+        local = self.rows[closed].T @ (self.step[closed, None] * self.rows[closed])
+        moved = self.step[pairs, None] * self.rows[pairs]
+        local += np.einsum("iak,ial->kl", self.rows[pairs], self._slipped(balance, growth, moved))
+        return np.asarray(self.problem.comm.allreduce(local), dtype=np.float64)
+
+    def _slipped(self, balance: _Balance, growth: Vector | None, moved: Vector) -> Vector:
+        """Return how the friction forces change where the trial ones change by ``moved``, (n, t, k)."""
+        layout = self.problem.layout
+        trial = balance.trial[layout.tangential]
+        length = np.linalg.norm(trial, axis=1)
+        slip = length > balance.bound
+        direction = np.where(slip[:, None], trial / np.where(slip, length, 1.0)[:, None], 0.0)
+        shrink = np.where(slip, balance.bound / np.where(slip, length, 1.0), 1.0)[:, None, None]
+        along = np.einsum("ia,iak->ik", direction, moved)
+        change = shrink * (moved - direction[:, :, None] * along[:, None, :])
+        if growth is not None:
+            rows = layout.tangential_frictional
+            rate = np.where(balance.trial[rows] > 0.0, growth * self.step[rows], 0.0)
+            change += direction[:, :, None] * (rate[:, None] * self.rows[rows])[:, None, :]
+        return np.asarray(change, dtype=np.float64)
+
+
+def _rest(springs: _Springs, bound: Vector) -> Vector:
+    """Return the motion that balances the load, or that of linear springs where none does. Collective.
+
+    Args:
+        springs: Trial forces.
+        bound: Friction that bodies may use while their trial forces say that they are apart, owned.
+    """
+    begin = springs.at(np.zeros(len(springs.load)))
+    target = BALANCED * springs.scale(begin)
+    balance = _coupled(springs, begin, target)
+    if balance.size <= target:
+        return balance.motion
+    balance, bound = begin, np.maximum(begin.bound, bound)
+    for _ in range(REFRESHES):
+        frozen = _minimise(springs, springs.at(balance.motion, bound), 0.1 * target)
+        balance = springs.at(frozen.motion)
+        bound = balance.bound
+        if frozen.size > target or balance.size <= target:
+            break
+    if balance.size <= NEARLY / BALANCED * target:
+        return balance.motion
+    return -np.linalg.solve(springs.slope(begin, None) + np.eye(len(springs.load)), begin.imbalance)
+
+
+def _coupled(springs: _Springs, balance: _Balance, target: float) -> _Balance:
+    """Take Newton steps as long as each halves the imbalance. Collective."""
+    for _ in range(COUPLED_STEPS):
+        if balance.size <= target:
+            break
+        step = np.linalg.lstsq(springs.slope(balance, springs.law.growth), balance.imbalance, rcond=None)[0]
+        following = springs.at(balance.motion - step)
+        if not following.size < 0.5 * balance.size:
+            break
+        balance = following
+    return balance
+
+
+def _minimise(springs: _Springs, balance: _Balance, target: float) -> _Balance:
+    """Minimise the convex potential of a frozen bound by Levenberg–Marquardt steps. Collective."""
+    bound, damping = balance.bound, 1e-10
+    for _ in range(FROZEN_STEPS):
+        if balance.size <= target or damping > 1e4:
+            break
+        slope = springs.slope(balance, None) + damping * np.eye(len(springs.load))
+        step = -np.linalg.solve(slope, balance.imbalance)
+        following = _descend(springs, balance, step, bound)
+        if following is None:
+            damping = max(100.0 * damping, 1e-8)
+        else:
+            balance, damping = following, max(0.1 * damping, 1e-12)
+    return balance
+
+
+def _descend(springs: _Springs, balance: _Balance, step: Vector, bound: Vector) -> _Balance | None:
+    """Return the first of ever shorter steps that lowers the potential or halves its slope. Collective."""
+    fraction = 1.0
+    while fraction > 1e-4:
+        following = springs.at(balance.motion + fraction * step, bound)
+        promised = 1e-4 * fraction * float(balance.imbalance @ step)
+        if following.potential <= balance.potential + promised or following.size < 0.5 * balance.size:
+            return following
+        fraction *= 0.5
+    return None

@@ -1,0 +1,117 @@
+"""Floating bodies come to rest between two Newton steps, without a product."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fenics_contact.qp import Coulomb, DualProblem, FaceNewton, Smalse, Tresca, contact_step, solve
+from fenics_contact.qp.settling import Settling
+from tests.qp.test_coulomb import coulomb_violations
+from tests.qp.torn_bricks import Bricks, torn_problem
+
+
+def settled(problem: DualProblem, law, multiplier, residual):
+    """Return δα, and the trial force after it."""
+    step = contact_step(problem.layout, problem.diagonal)
+    motion = Settling(problem, law)(multiplier, residual, step)
+    trial = multiplier - step * (residual - problem.coarse.transpose(motion))
+    return motion, law.feasible(trial).project(trial)
+
+
+def gallery(**parameters) -> tuple[DualProblem, np.ndarray, np.ndarray]:
+    """Two bricks, a multiplier far from their solution and its residual."""
+    dual, _ = torn_problem(Bricks(n=3, crown=0.1, tilt=0.5, **parameters))
+    rng = np.random.default_rng(1)
+    multiplier = dual.coarse.particular() + 1e-3 * rng.standard_normal(dual.layout.size)
+    return dual, multiplier, dual.operator(multiplier) - dual.rhs
+
+
+@pytest.mark.parametrize("law", ["Tresca", "Coulomb"])
+def test_trial_forces_balance_the_load_of_the_floating_brick(law: str):
+    dual, multiplier, residual = gallery()
+    ones = np.ones(dual.layout.n_friction)
+    law = Tresca(dual.layout, 1e-3 * ones) if law == "Tresca" else Coulomb(dual.layout, 0.4 * ones)
+    motions = Settling(dual, law).motions
+    assert motions.shape[1] == 6
+    missing = []
+    for given in (residual, residual + 1.0 * dual.coarse.transpose(motions.sum(axis=1))):
+        motion, force = settled(dual, law, multiplier, given)
+        assert np.linalg.norm(motion) > 1e-4
+        missing.append(motions.T @ (dual.coarse.matrix @ force - dual.coarse.load))
+    unsettled = law.feasible(multiplier).project(multiplier)
+    before = motions.T @ (dual.coarse.matrix @ unsettled - dual.coarse.load)
+    assert np.abs(missing).max() < 1e-6 * np.abs(before).max()
+
+
+def test_the_motion_strains_no_glue_and_costs_no_product():
+    dual, multiplier, residual = gallery()
+    law = Coulomb(dual.layout, np.full(dual.layout.n_friction, 0.4))
+
+    def no_product(x):
+        raise AssertionError("settling needs no product")
+
+    motion, _ = settled(replace(dual, operator=no_product), law, multiplier, residual)
+    moved = dual.coarse.transpose(motion)
+    assert np.abs(moved[dual.layout.equality]).max() < 1e-10 * np.abs(moved).max()
+
+
+def test_without_a_floating_body_nothing_moves():
+    dual, _ = torn_problem(Bricks(n=3, contact=False))
+    law = Tresca(dual.layout, np.zeros(0))
+    assert Settling(dual, law).motions.shape[1] == 0
+    motion, _ = settled(dual, law, dual.coarse.particular(), -dual.rhs)
+    assert not motion.any()
+
+
+def test_a_load_that_the_bounds_cannot_hold_moves_the_brick_along_it():
+    dual, multiplier, residual = gallery(shear=0.05)
+    law = Tresca(dual.layout, np.full(dual.layout.n_friction, 1e-6))
+    motion, _ = settled(dual, law, multiplier, residual)
+    assert np.isfinite(motion).all()
+    assert dual.coarse.load @ motion > 0.0
+
+
+@pytest.mark.parametrize("friction_coefficient", [0.01, 0.005, 0.001])
+def test_a_tilted_brick_on_a_round_one_that_hardly_anything_holds(friction_coefficient: float):
+    dual, _ = torn_problem(Bricks(n=4, cubes=(3, 2), crown=2.0, shear=0.0, tilt=0.5))
+    mu_f = np.full(dual.layout.n_friction, friction_coefficient)
+    found = solve(dual, None, FaceNewton(), friction_coefficient=mu_f)
+    assert found.history[-1].stick == 0 < found.history[-1].slip
+    assert max(coulomb_violations(dual.layout, found.multiplier, found.residual, mu_f).values()) < 1e-5
+    assert all(step.method == "face Newton" for step in found.history)
+    assert found.products < 100  # 6000 to more than 20 000 without settling
+
+
+SOLVERS = {"face Newton": FaceNewton(), "SMALSE": Smalse()}
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("apart", [0.0, 0.5])
+def test_a_start_from_a_loaded_state_finds_the_state_without_force(solver: str, apart: float):
+    loaded, _ = torn_problem(Bricks(n=3, crown=0.1, tilt=0.5))
+    unloaded, torn = torn_problem(Bricks(n=3, crown=0.1, press=0.0, shear=0.0))
+    gap = np.zeros(len(torn.c))
+    gap[unloaded.layout.normal] = apart
+    unloaded = replace(unloaded, rhs=unloaded.rhs - gap)
+    bound = np.full(loaded.layout.n_friction, 1e-3)
+    before = solve(loaded, bound, SOLVERS[solver])
+    assert before.multiplier[loaded.layout.normal].max() > 1e-4
+    for start in (before, None):
+        found = solve(unloaded, bound, SOLVERS[solver], start)
+        assert not found.multiplier.any()
+        assert found.products < 15
+
+
+def test_bodies_that_were_moved_apart_come_together_again():
+    dual, torn = torn_problem(Bricks(n=3, crown=0.1, tilt=0.5))
+    gap = np.zeros(len(torn.c))
+    gap[dual.layout.normal] = 0.5
+    apart = replace(dual, rhs=dual.rhs - gap)
+    mu_f = np.full(dual.layout.n_friction, 0.3)
+    before = solve(dual, None, FaceNewton(), friction_coefficient=mu_f)
+    found = solve(apart, None, FaceNewton(), before, friction_coefficient=mu_f)
+    assert np.abs(found.multiplier - before.multiplier).max() < 1e-5 * np.abs(before.multiplier).max()
+    assert found.products < 10
