@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from mpi4py import MPI
 
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.copies import Tearing
-from fenics_contact.feti.projection import Projection, project
+from fenics_contact.feti.projection import Projection, join, project
 from fenics_contact.feti.surface import FacetedSurface, faceted_surface, shape_functions
 from fenics_contact.scene import ContactPair, Coulomb, RigidPlane, Scene, Surface, Tresca
 
@@ -51,20 +52,24 @@ class ContactPoints:
         return len(self.slave)
 
 
-def find_contact_points(scene: Scene, tearing: Tearing, fixed: np.ndarray) -> ContactPoints:
-    """Project the slave nodes of every pair onto its master.
+def find_contact_points(
+    scene: Scene, tearing: Tearing, fixed: np.ndarray, comm: MPI.Comm = MPI.COMM_SELF
+) -> ContactPoints:
+    """Project the slave nodes of every pair onto its master. Collective on ``comm``.
 
-    Nodes whose displacement is prescribed in all components cannot move and are left out.
+    Each rank projects some of the nodes, and all receive all points. Nodes whose displacement is prescribed
+    in all components cannot move and are left out.
 
     Args:
         scene: The scene.
         tearing: Node numbering.
         fixed: Whether a component of a node is prescribed, shape (n_nodes, 3).
+        comm: Communicator of the ranks that share the work.
 
     Raises:
         InvalidInputError: If no node of a slave surface finds its master.
     """
-    parts = [_points_of_pair(scene, tearing, fixed, index) for index in range(len(scene.contacts))]
+    parts = [_points_of_pair(scene, tearing, fixed, index, comm) for index in range(len(scene.contacts))]
     joined = [np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(ContactPoints)]
     return ContactPoints(*joined)
 
@@ -83,7 +88,9 @@ def surface_of(scene: Scene, surface: Surface) -> FacetedSurface:
     return faceted_surface(scene.bodies[surface.body].mesh.points, scene.facets(surface))
 
 
-def _points_of_pair(scene: Scene, tearing: Tearing, fixed: np.ndarray, index: int) -> ContactPoints:
+def _points_of_pair(
+    scene: Scene, tearing: Tearing, fixed: np.ndarray, index: int, comm: MPI.Comm
+) -> ContactPoints:
     pair = scene.contacts[index]
     slave = surface_of(scene, pair.slave)
     nodes = tearing.global_nodes(pair.slave.body, slave.nodes)
@@ -92,7 +99,7 @@ def _points_of_pair(scene: Scene, tearing: Tearing, fixed: np.ndarray, index: in
         hit, master, weight = _on_plane(slave, movable, pair.master)
     else:
         surface = surface_of(scene, pair.master)
-        hit = project(slave.points[movable], slave.normals[movable], surface)
+        hit = _shared_projection(slave, movable, surface, comm)
         values, _ = shape_functions(hit.local, surface.corners)
         weight = np.pad(values, ((0, 0), (0, 4 - surface.corners)))
         facet_nodes = tearing.global_nodes(pair.master.body, surface.nodes[surface.facets[hit.facet]])
@@ -108,6 +115,19 @@ def _points_of_pair(scene: Scene, tearing: Tearing, fixed: np.ndarray, index: in
         np.full(len(chosen), index), nodes[chosen], master, weight, hit.normal, tangent_frames(hit.normal),
         hit.gap, slave.areas[chosen], hit.facet, hit.local,
     )  # fmt: skip
+
+
+def _shared_projection(
+    slave: FacetedSurface, movable: np.ndarray, master: FacetedSurface, comm: MPI.Comm
+) -> Projection:
+    """Project the movable nodes, each rank every so manieth. Collective."""
+    mine = np.arange(comm.rank, len(movable), comm.size)
+    found: Projection | None = None
+    with together(comm):
+        chosen = movable[mine]
+        hit = project(slave.points[chosen], slave.normals[chosen], master)
+        found = replace(hit, point=mine[hit.point])
+    return join([part for part in comm.allgather(found) if part is not None])
 
 
 def _on_plane(

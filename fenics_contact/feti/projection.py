@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,7 +91,7 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
     first = _best(_solve(points, normals, master, *_nearest(tree, points)))
     waiting = np.setdiff1d(np.arange(len(points)), first.point)
     second = _best(_solve(points, normals, master, *_within_reach(tree, radius, points, waiting)))
-    return _concatenated([first, second])
+    return join([first, second])
 
 
 def _nearest(tree: cKDTree, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -172,7 +173,8 @@ def _best(found: Projection) -> Projection:
     return Projection(*(getattr(found, name)[keep] for name in ("point", "facet", "local", "gap", "normal")))
 
 
-def _concatenated(parts: list[Projection]) -> Projection:
+def join(parts: Sequence[Projection]) -> Projection:
+    """Return the projections of several groups of points, ascending by point."""
     point = np.concatenate([part.point for part in parts])
     order = np.argsort(point)
     joined = [

@@ -104,11 +104,11 @@ def build_torn_system(
             assemble(mesh, scene.bodies[mesh.body], loads, decomposition.forms, earlier)
             for mesh, earlier in zip(decomposition.meshes, known, strict=True)
         )
-        points = no_contact_points()
-        if scene.contacts:
-            points = find_contact_points(scene, decomposition.tearing, decomposition.fixed)
-            if start_geometry:
-                check_no_penetration(scene, points)
+    points = no_contact_points()
+    if scene.contacts:
+        points = find_contact_points(scene, decomposition.tearing, decomposition.fixed, comm)
+        if start_geometry:
+            check_no_penetration(scene, points)
     has_friction, coefficient, tresca = friction_data(scene.contacts, points)
     frictional = np.flatnonzero(has_friction)
     rows = stack([decomposition.gluing, contact_rows(points, decomposition.tearing, frictional)])

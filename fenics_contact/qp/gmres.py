@@ -98,35 +98,38 @@ class _Basis:
 
 
 class _LeastSquares:
-    """min ‖β e₁ − H y‖ for a Hessenberg matrix that grows by columns; replicated."""
+    """min ‖β e₁ − H y‖ for a Hessenberg matrix that grows by columns, by Givens rotations; replicated."""
 
     def __init__(self, beta: float) -> None:
-        self._beta = beta
         self._columns: list[Vector] = []
+        self._rotations: list[tuple[float, float]] = []
+        self._right = [beta]
         self._best = beta
-        self.residual = beta
         self.last_progress = 0
 
+    @property
+    def residual(self) -> float:
+        return abs(self._right[-1])
+
     def append(self, column: Vector) -> None:
-        self._columns.append(column)
-        y = self.solution()
-        self.residual = float(np.linalg.norm(self._right() - self._matrix() @ y))
+        column = column.copy()
+        for i, (cosine, sine) in enumerate(self._rotations):
+            upper, lower = column[i], column[i + 1]
+            column[i], column[i + 1] = cosine * upper + sine * lower, cosine * lower - sine * upper
+        length = float(np.hypot(column[-2], column[-1]))
+        cosine, sine = (float(column[-2] / length), float(column[-1] / length)) if length > 0 else (1.0, 0.0)
+        column[-2] = length
+        self._columns.append(column[:-1])
+        self._rotations.append((cosine, sine))
+        last = self._right.pop()
+        self._right += [cosine * last, -sine * last]
         if self.residual < 0.9 * self._best:
             self._best, self.last_progress = self.residual, len(self._columns)
 
     def solution(self) -> Vector:
-        if not self._columns:
-            return np.zeros(0)
-        return np.asarray(np.linalg.lstsq(self._matrix(), self._right(), rcond=None)[0])
-
-    def _matrix(self) -> Vector:
         size = len(self._columns)
-        matrix = np.zeros((size + 1, size))
+        triangle = np.zeros((size, size))
         for j, column in enumerate(self._columns):
-            matrix[: len(column), j] = column
-        return matrix
-
-    def _right(self) -> Vector:
-        right = np.zeros(len(self._columns) + 1)
-        right[0] = self._beta
-        return right
+            triangle[: j + 1, j] = column
+        # A vanishing pivot belongs to a direction that the operator does not see; it is left out.
+        return np.asarray(np.linalg.lstsq(triangle, np.array(self._right[:size]), rcond=None)[0])

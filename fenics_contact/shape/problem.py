@@ -25,7 +25,7 @@ from fenics_contact.shape.volume import volume_by_points
 from fenics_contact.timing import PhaseTimer
 
 #: Tolerance of the adjoint relative to that of the state, and the smallest one asked for.
-ADJOINT_SHARE, ADJOINT_FLOOR = 1e-2, 1e-11
+ADJOINT_SHARE, ADJOINT_FLOOR = 1e-1, 1e-11
 
 logger = logging.getLogger(__name__)
 

@@ -100,4 +100,6 @@ def line(regime: str) -> Line:
     friction, step = REGIMES[regime]
     problem = chain_problem(friction)
     alpha = 0.03 * np.random.default_rng(1).standard_normal(problem.size)
-    return Line(problem, alpha, np.random.default_rng(5).standard_normal(problem.size), step)
+    direction = np.random.default_rng(5).standard_normal(problem.size)
+    # The small step of all slip would leave some remainders at the level of rounding.
+    return Line(problem, alpha, direction, step, (16.0, 32.0) if regime == "slip" else (4.0, 8.0))
