@@ -137,10 +137,8 @@ class DualSystem:
         body_of = np.searchsorted(tearing.subdomain_offset, np.arange(tearing.n_subdomains), side="right") - 1
         sums = np.zeros((2, len(tearing.body_names)))
         for subdomain in self.torn.subdomains:
-            sums[:, body_of[subdomain.mesh.number]] += (
-                subdomain.stiffness.diagonal().sum(),
-                subdomain.mesh.size,
-            )
+            size = subdomain.mesh.size
+            sums[:, body_of[subdomain.mesh.number]] += size * subdomain.typical_stiffness, size
         total, count = self.torn.numbering.comm.allreduce(sums)
         # Only the ratios between bodies matter.
         weight = (count / total) / (count / total).max()

@@ -34,14 +34,15 @@ class ExplicitOperator:
         Raises:
             InvalidInputError: If the stiffness is not positive semidefinite.
         """
-        self._stiffness, self._interface = subdomain.stiffness, interface
-        schur = condensations.schur_complement(subdomain.stiffness, interface)
+        stiffness, self._interface = subdomain.stiffness, interface
+        schur = condensations.schur_complement(stiffness, interface)
         self._stiff, _ = lapack.strttp(schur.astype(np.float32, order="F"), uplo="L")
         self._flexible = _packed_inverse(schur, subdomain.kernel[interface])
         self._size = len(interface)
         self._inside = np.setdiff1d(np.arange(subdomain.mesh.size), interface, assume_unique=True)
-        inner = subdomain.stiffness[self._inside][:, self._inside].tocsr()
-        self._inner = Factor(inner) if len(self._inside) else None
+        rows = stiffness[self._inside]
+        self._K_ib = rows[:, interface].tocsr()
+        self._inner = Factor(rows[:, self._inside].tocsr()) if len(self._inside) else None
 
     def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write (K⁺)_bb times an interface force into ``displacement``."""
@@ -53,12 +54,12 @@ class ExplicitOperator:
 
     def invert(self, right: np.ndarray) -> np.ndarray:
         """Return K⁺ times a vector, shape (n,)."""
-        b = self._interface
-        condensed = right[b] - (self._stiffness @ self._solve_inside(right))[b]
-        solution = np.zeros_like(right)
-        self.flex(condensed, trace := np.empty(self._size))
-        solution[b] = trace
-        return solution + self._solve_inside(right - self._stiffness @ solution)
+        relaxed = self._solve_inside(right[self._inside])
+        self.flex(right[self._interface] - self._K_ib.T @ relaxed, trace := np.empty(self._size))
+        solution = np.empty_like(right)
+        solution[self._interface] = trace
+        solution[self._inside] = relaxed - self._solve_inside(self._K_ib @ trace)
+        return solution
 
     def row_flexibility(self, rows: sp.csr_matrix) -> np.ndarray:
         """Return bᵀ (K⁺)_bb b for each row b of a matrix with interface columns, shape (n_rows,)."""
@@ -75,11 +76,10 @@ class ExplicitOperator:
         return np.bincount(row, rows.data[first] * rows.data[second] * entries, minlength=rows.shape[0])
 
     def _solve_inside(self, right: np.ndarray) -> np.ndarray:
-        """Return K_ii⁻¹ of the inner part of a vector, zero on the interface."""
+        """Return K_ii⁻¹ times a vector on the inside."""
         solution = np.zeros_like(right)
-        if self._inner is not None and np.any(right[self._inside]):
-            self._inner.solve(right[self._inside], found := np.empty(len(self._inside)))
-            solution[self._inside] = found
+        if self._inner is not None and right.any():
+            self._inner.solve(right, solution)
         return solution
 
 

@@ -27,8 +27,11 @@ class ImplicitOperator:
         self._factor = Factor(regularised(stiffness, subdomain.kernel, subdomain.points))
         self._right, self._left = np.zeros(size), np.zeros(size)
         inside = np.setdiff1d(np.arange(size), interface, assume_unique=True)
-        self._stiffness, self._inside = stiffness, inside
-        self._inner = Factor(stiffness[inside][:, inside].tocsr()) if len(inside) else None
+        rows = stiffness[interface]
+        self._K_bb, self._K_bi = rows[:, interface].tocsr(), rows[:, inside].tocsr()
+        self._K_ib = self._K_bi.T  # shares its memory
+        self._inside = Factor(stiffness[inside][:, inside].tocsr()) if len(inside) else None
+        self._inner = np.zeros(len(inside))
 
     def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
         """Write (K⁺)_bb times an interface force into ``displacement``."""
@@ -38,12 +41,10 @@ class ImplicitOperator:
 
     def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
         """Write S times an interface displacement into ``force``."""
-        moved = np.zeros_like(self._right)
-        moved[self._interface] = displacement
-        if self._inner is not None:
-            self._inner.solve((self._stiffness @ moved)[self._inside], relaxed := np.empty(len(self._inside)))
-            moved[self._inside] = -relaxed
-        force[:] = (self._stiffness @ moved)[self._interface]
+        force[:] = self._K_bb @ displacement
+        if self._inside is not None:
+            self._inside.solve(self._K_ib @ displacement, self._inner)
+            force -= self._K_bi @ self._inner
 
     def invert(self, right: np.ndarray) -> np.ndarray:
         """Return K⁺ times a vector, shape (n,)."""

@@ -68,6 +68,7 @@ class TornInverse:
             known = None if previous is None else previous._operator_of(index, subdomain, local, kind)
             self.factored += known is None
             self.operators.append(known or _factored(subdomain, local, condensations, kind))
+            subdomain.matrix.forget()
             self._local.append(local)
         starts = np.cumsum([0] + [len(local) for local in self._local])
         self._parts = [slice(int(a), int(b)) for a, b in pairwise(starts)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,18 +52,44 @@ class Subdomain:
         material: Material it was assembled for.
         loads: Loads on it that it was assembled for.
         points: Coordinates by block, shape (n, 3), [length].
-        stiffness: K_s, shape (3 n, 3 n).
         load: f_s, shape (3 n,), [force].
         kernel: R_s, shape (3 n, n_modes): zero-energy modes as columns.
+        typical_stiffness: Mean diagonal entry of K_s, [force / length].
+        matrix: K_s, forgotten when it is factored.
     """
 
     mesh: SubdomainMesh
     material: Material
     loads: tuple[Load, ...]
     points: np.ndarray
-    stiffness: sp.csr_matrix
     load: np.ndarray
     kernel: np.ndarray
+    typical_stiffness: float
+    matrix: Forgettable
+
+    @property
+    def stiffness(self) -> sp.csr_matrix:
+        """K_s, shape (3 n, 3 n); assembled again if it was forgotten."""
+        return self.matrix.get()
+
+
+class Forgettable:
+    """A matrix that can be made again, so that it need not be kept while nobody needs it."""
+
+    def __init__(self, make: Callable[[], sp.csr_matrix]) -> None:
+        """Make it for the first time."""
+        self._make = make
+        self._matrix: sp.csr_matrix | None = make()
+
+    def get(self) -> sp.csr_matrix:
+        """Return the matrix, made again if need be, and remember it."""
+        if self._matrix is None:
+            self._matrix = self._make()
+        return self._matrix
+
+    def forget(self) -> None:
+        """Free the memory."""
+        self._matrix = None
 
 
 def cut_out(
@@ -131,17 +157,24 @@ def assemble(
         and np.array_equal(earlier.points, points)
     ):
         return earlier
-    used = np.sort(mesh.nodes)
-    _dolfinx.update_coordinates(space.mesh, body.mesh.points[used])
-    indptr, indices, data = _dolfinx.assemble_csr(forms.stiffness(body.material, cell_type, space))
-    stiffness = sp.csr_matrix((data, indices, indptr), shape=(mesh.size, mesh.size))
+    order = np.argsort(mesh.nodes)
+
+    def stiffness() -> sp.csr_matrix:
+        _dolfinx.update_coordinates(space.mesh, points[order])
+        indptr, indices, data = _dolfinx.assemble_csr(forms.stiffness(body.material, cell_type, space))
+        return sp.csr_matrix((data, indices, indptr), shape=(mesh.size, mesh.size))
+
+    matrix = Forgettable(stiffness)
+    diagonal = matrix.get().diagonal()
     force = np.zeros(mesh.size)
     for index, load in acting:
         force += _dolfinx.assemble_vector(forms.load(load, cell_type, space, mesh.facets.get(index)))
-    if not (np.isfinite(data).all() and np.isfinite(force).all()):
+    if not (np.isfinite(matrix.get().data).all() and np.isfinite(force).all()):
         raise InvalidInputError(
             f"stiffness and load of subdomain {mesh.number} of body {mesh.body!r} must be finite, got NaN or "
             "infinity: check the material parameters, the loads and the coordinates"
         )
     kernel = body.material.kernel(points)
-    return Subdomain(mesh, body.material, own_loads, points, stiffness, force, kernel.reshape(mesh.size, -1))
+    return Subdomain(
+        mesh, body.material, own_loads, points, force, kernel.reshape(mesh.size, -1), diagonal.mean(), matrix
+    )
