@@ -10,6 +10,8 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
+from fenics_contact.linalg import dispose_with
+
 #: Symbolic factorisations kept. Each holds the numbers of its last matrix as well: a few MB.
 KEPT = 8
 #: MUMPS control parameter and its value for nested dissection by METIS.
@@ -44,6 +46,7 @@ class Condensation:
         self._factor.setMumpsIcntl(ORDERING, METIS)
         self._rows = PETSc.IS().createGeneral(interface.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
         _call("MatFactorSetSchurIS", self._factor.handle, self._rows.handle)
+        dispose_with(self, self._rows, self._factor, self._pc, self._matrix)
 
     def __call__(self, stiffness: sp.csr_matrix) -> np.ndarray:
         """Return S of a matrix with the pattern, shape (n_b, n_b), Fortran order."""

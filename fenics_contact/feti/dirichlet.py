@@ -8,6 +8,7 @@ from petsc4py import PETSc
 
 from fenics_contact.feti.inverse import TornInverse
 from fenics_contact.feti.numbering import DualNumbering
+from fenics_contact.linalg import dispose_with
 
 #: Share of its diagonal added to the contact block of B D⁻¹ Bᵀ. A node in two contact pairs has more rows
 #: than displacements, which makes the block singular; elsewhere so small a share changes nothing.
@@ -98,6 +99,7 @@ class _ContactBlock:
         pc.setFactorSolverType("mumps")
         self._ksp.setUp()
         self._right, self._left = matrix.createVecs()
+        dispose_with(self, self._right, self._left, pc, self._ksp, matrix, comm=comm)
 
     def solve(self, x: np.ndarray) -> np.ndarray:
         if self._ksp is None:

@@ -10,6 +10,7 @@ from fenics_contact.errors import together
 from fenics_contact.feti.dirichlet import DirichletPreconditioner
 from fenics_contact.feti.inverse import LocalKind, TornInverse, kernel_matrix
 from fenics_contact.feti.torn import TornSystem
+from fenics_contact.linalg import sweep
 from fenics_contact.qp import CoarseSpace, ContactLayout, DualProblem
 from fenics_contact.timing import PhaseTimer
 
@@ -48,6 +49,7 @@ class DualSystem:
         """
         timer = timer or PhaseTimer()
         comm = torn.numbering.comm
+        sweep(comm)
         self.torn, self.products = torn, 0
         self._B, self._Bt = torn.B, torn.B.T.tocsr()
         with timer.phase("factor"):

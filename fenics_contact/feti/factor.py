@@ -8,6 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
+from fenics_contact.linalg import dispose_with
+
 #: Enough nodes to fix all rigid motions of a body that is not a line, few enough to keep the factor sparse.
 FIXING_NODES = 4
 
@@ -35,6 +37,7 @@ class Factor:
         # Only the factor is kept: beside it the copy of the matrix would be a third of the memory.
         pc.destroy()
         given.destroy()
+        dispose_with(self, self._factor, self._right, self._left)
 
     def solve(self, right: np.ndarray, out: np.ndarray) -> None:
         """Write the solution for one right side, shape (n,), into ``out``."""

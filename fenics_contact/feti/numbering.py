@@ -7,6 +7,8 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from fenics_contact.linalg import dispose_with
+
 
 class DualNumbering:
     """Numbering of multipliers over ranks: each is owned by one rank and shared by those that touch it.
@@ -44,6 +46,7 @@ class DualNumbering:
         self._vector = PETSc.Vec().createGhost(
             self._position[self.ghosts].astype(PETSc.IntType), (len(self.owned), self.total), comm=comm
         )
+        dispose_with(self, self._vector, comm=comm)
 
     def serves(self, owner: np.ndarray, touched: np.ndarray) -> bool:
         """Tell whether this rank's part is that of rows with these owners, touched as given."""

@@ -8,6 +8,8 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from fenics_contact.linalg.disposal import dispose_with
+
 Vector = npt.NDArray[np.float64]
 
 #: Rows for which one more rank takes part in the factorisation.
@@ -110,6 +112,8 @@ class SharedFactor:
         self._ksp.setUp()
         self._right, self._left = self._matrix.createVecs()
         self._residual, self._correction = self._matrix.createVecs()
+        vectors = (self._right, self._left, self._residual, self._correction)
+        dispose_with(self, pc, self._ksp, shifted, self._matrix, *vectors, comm=self._subset)
 
 
 def _first_ranks(comm: MPI.Comm, count: int) -> MPI.Comm:

@@ -12,6 +12,7 @@ from fenics_contact.contact.fields import body_mesh
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import Decomposition
 from fenics_contact.feti.forms import Template, volume_measure
+from fenics_contact.linalg import dispose_with
 from fenics_contact.scene import Body
 
 
@@ -62,6 +63,7 @@ class HarmonicExtension:
         mine[nodes] = _dolfinx.global_dofs(space, dofs)
         mesh.comm.Allreduce(mine, everywhere := np.empty_like(mine), op=MPI.MAX)
         self._rows[:] = everywhere
+        dispose_with(self, self._laplacian, comm=decomposition.comm)
         self._ksp = self._factor(np.concatenate([moving, held]))
 
     def _factor(self, given: np.ndarray) -> PETSc.KSP:
@@ -74,6 +76,7 @@ class HarmonicExtension:
         ksp.getPC().setFactorSolverType("mumps")
         ksp.setUp()
         self._given = self._rows[given]
+        dispose_with(self, ksp.getPC(), ksp, matrix, comm=self._laplacian.getComm().tompi4py())
         return ksp
 
     def extend(self, displacement: np.ndarray) -> np.ndarray:
@@ -89,6 +92,8 @@ class HarmonicExtension:
             self._put(right, self._given, self._values(prescribed)[self._given])
             self._ksp.solve(right, solution)
             result[:, axis] = self._values(solution)[self._rows]
+        for vector in (prescribed, right, solution):
+            vector.destroy()
         return result
 
     def pull_back(self, gradient: np.ndarray) -> np.ndarray:
@@ -106,6 +111,8 @@ class HarmonicExtension:
             self._ksp.solve(right, adjoint)
             self._laplacian.mult(adjoint, image)
             result[:, axis] = gradient[self.moving, axis] - self._values(image)[self._rows[self.moving]]
+        for vector in (right, image, adjoint):
+            vector.destroy()
         return result
 
     @staticmethod

@@ -1,0 +1,87 @@
+"""PETSc objects go away together with the Python object that uses them."""
+
+from __future__ import annotations
+
+import gc
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from mpi4py import MPI
+
+from fenics_contact.feti.factor import Factor
+from fenics_contact.linalg import SharedFactor, disposal, dispose_with, sweep
+
+
+class Petsc:
+    """Stands for a PETSc object."""
+
+    def __init__(self) -> None:
+        self.destroyed = 0
+
+    def destroy(self) -> None:
+        self.destroyed += 1
+
+
+class Owner:
+    """Holds one."""
+
+
+class TwoRanks:
+    """A communicator of two ranks of which the other still uses what has the numbers given."""
+
+    size = 2
+
+    def __init__(self, *used: int) -> None:
+        self.used = used
+
+    def allgather(self, waiting: list[int]) -> list[list[int]]:
+        return [waiting, [number for number in waiting if number not in self.used]]
+
+
+def test_objects_of_one_rank_are_destroyed_with_their_owner() -> None:
+    owner, held = Owner(), (Petsc(), Petsc())
+    dispose_with(owner, *held)
+    assert [part.destroyed for part in held] == [0, 0]
+    del owner
+    assert [part.destroyed for part in held] == [1, 1]
+
+
+def test_shared_objects_wait_until_no_rank_uses_them() -> None:
+    owner, held = Owner(), Petsc()
+    dispose_with(owner, held, comm=TwoRanks())  # type: ignore[arg-type]
+    number = disposal._registered
+    del owner
+    assert held.destroyed == 0
+    sweep(TwoRanks(number))  # type: ignore[arg-type]
+    assert held.destroyed == 0
+    sweep(TwoRanks())  # type: ignore[arg-type]
+    assert held.destroyed == 1
+    sweep(TwoRanks())  # type: ignore[arg-type]
+    assert held.destroyed == 1
+
+
+def resident() -> float:
+    """Resident memory, [MB]."""
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * 4096 / 2**20
+
+
+@pytest.mark.parametrize("kind", ["Factor", "SharedFactor"])
+def test_memory_does_not_grow_with_the_number_of_factors(kind: str) -> None:
+    random = sp.random(1500, 1500, 0.01, random_state=1, format="csr")
+    matrix = (random + random.T + 100 * sp.eye(1500)).tocsr()
+
+    def build() -> None:
+        if kind == "Factor":
+            Factor(matrix)
+        else:
+            SharedFactor(MPI.COMM_SELF, matrix, np.ones(1500))
+        gc.collect()
+
+    for _ in range(3):
+        build()
+    before = resident()
+    for _ in range(8):
+        build()
+    assert resident() - before < 20  # one factor takes more than that
