@@ -1,7 +1,7 @@
 # `make demo` and `make test` do all the set-up they need on Debian 12 and 13; elsewhere name a Python that has FEniCSx:
 #     make demo PYTHON=/path/to/python
 
-SIZE ?= small
+SIZE ?= paper
 NP ?= 1
 BENCH ?= full
 PYTHON ?=
@@ -23,7 +23,7 @@ help: ## Show this list
 	@echo "Targets:"
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 20
 	@echo "Settings:"
-	@echo "  SIZE=small|paper     size of the demo (small)"
+	@echo "  SIZE=small|paper     size of the demo (paper)"
 	@echo "  NP=2                 MPI ranks of the demo (1)"
 	@echo "  BENCH=quick|full     small cases once, or all of them (full)"
 	@echo "  PYTHON=/some/python  use this Python and its FEniCSx instead of setting up .venv"

@@ -26,6 +26,7 @@ def dispose_with(owner: Any, *objects: Any, comm: MPI.Comm = MPI.COMM_SELF) -> N
             must be registered by all ranks in the same order.
     """
     global _registered
+    finalizer: Any
     if comm.size == 1:
         finalizer = weakref.finalize(owner, _destroy, objects)
     else:
