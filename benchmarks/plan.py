@@ -86,7 +86,7 @@ def block_runs() -> list[Run]:
         boxes = option("boxes", BLOCK_BOXES[size])
         runs += [
             Run(f"block-{size}", "sliding_block", options=(*counts, *boxes), quick=smallest),
-            Run(f"newton-{size}-ranks", "newton_block", 2, counts, repeats, seconds=seconds),
+            Run(f"newton-{size}-ranks", "newton_block", 2, counts, 1, seconds=seconds),
             Run(
                 f"newton-{size}-threads",
                 "newton_block",

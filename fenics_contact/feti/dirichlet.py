@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from petsc4py import PETSc
 
+from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.inverse import TornInverse
 from fenics_contact.feti.numbering import DualNumbering
-from fenics_contact.linalg import dispose_with
+from fenics_contact.qp.reductions import global_sum
 
 #: Share of its diagonal added to the contact block of B D⁻¹ Bᵀ. A node in two contact pairs has more rows
 #: than displacements, which makes the block singular; elsewhere so small a share changes nothing.
@@ -65,47 +65,37 @@ class DirichletPreconditioner:
 
 
 class _ContactBlock:
-    """(B D⁻¹ Bᵀ)⁻¹ on contact rows by a sparse factor; other rows stay as they are."""
+    """(B D⁻¹ Bᵀ)⁻¹ on contact rows by a sparse factor on every rank; other rows stay as they are.
+
+    Contact points are replicated as well; a message of one number a contact row is cheaper than the many of a
+    factor that is spread over the ranks.
+    """
 
     def __init__(
         self, B: sp.csr_matrix, weighted: sp.csr_matrix, numbering: DualNumbering, n_equality: int
     ) -> None:
-        comm = numbering.comm
-        rows = numbering.local_rows
-        mine = np.flatnonzero(rows >= n_equality)
+        self._comm = numbering.comm
         self._owned = np.flatnonzero(numbering.owned >= n_equality)
-        self._ksp = None
-        count = numbering.total - n_equality
-        if count == 0:
+        self._place = numbering.owned[self._owned] - n_equality
+        self._count = numbering.total - n_equality
+        if self._count == 0:
             return
-        # Columns are the contact rows' positions among themselves, rank by rank, as PETSc numbers them.
-        starts = np.cumsum([0, *comm.allgather(len(self._owned))])
-        place = np.zeros(count)
-        place[numbering.owned[self._owned] - n_equality] = starts[comm.rank] + np.arange(len(self._owned))
-        place = np.asarray(comm.allreduce(place))[rows[mine] - n_equality].astype(PETSc.IntType)
-        gram = (B[mine] @ weighted[mine].T).tocoo()
-        gram.data[gram.row == gram.col] *= 1.0 + REGULARISATION
-        shape = (len(rows), count)
-        gram = numbering.sum_rows(sp.csr_matrix((gram.data, (mine[gram.row], place[gram.col])), shape=shape))
-        gram = gram[self._owned].tocsr()
-        size = (len(self._owned), count)
-        csr = (gram.indptr.astype(PETSc.IntType), gram.indices.astype(PETSc.IntType), gram.data)
-        matrix = PETSc.Mat().createAIJ((size, size), csr=csr, comm=comm)
-        self._ksp = PETSc.KSP().create(comm)
-        self._ksp.setOperators(matrix)
-        self._ksp.setType(PETSc.KSP.Type.PREONLY)
-        pc = self._ksp.getPC()
-        pc.setType(PETSc.PC.Type.LU)
-        pc.setFactorSolverType("mumps")
-        self._ksp.setUp()
-        self._right, self._left = matrix.createVecs()
-        dispose_with(self, self._right, self._left, pc, self._ksp, matrix, comm=comm)
+        mine = np.flatnonzero(numbering.local_rows >= n_equality)
+        place = numbering.local_rows[mine] - n_equality
+        share = (B[mine] @ weighted[mine].T).tocoo()
+        entries = (share.data, place[share.row], place[share.col])
+        value, row, column = (
+            np.concatenate(part) for part in zip(*self._comm.allgather(entries), strict=True)
+        )
+        gram = sp.csr_matrix((value, (row, column)), shape=(self._count, self._count))
+        self._factor = Factor((gram + REGULARISATION * sp.diags(gram.diagonal())).tocsr())
 
     def solve(self, x: np.ndarray) -> np.ndarray:
-        if self._ksp is None:
+        if self._count == 0:
             return x
+        right, solution = np.zeros(self._count), np.empty(self._count)
+        right[self._place] = x[self._owned]
+        self._factor.solve(global_sum(self._comm, right), solution)
         result = x.copy()
-        self._right.array_w[:] = x[self._owned]
-        self._ksp.solve(self._right, self._left)
-        result[self._owned] = self._left.array_r
+        result[self._owned] = solution[self._place]
         return result
