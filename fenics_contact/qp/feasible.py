@@ -99,7 +99,8 @@ class FeasibleSet:
         """
         p, value = direction[self.layout.normal], x[self.layout.normal]
         falling = p > 0.0
-        steps = np.maximum(value[falling], 0.0) / p[falling]
+        with np.errstate(over="ignore"):  # beyond the largest number is as good as never
+            steps = np.maximum(value[falling], 0.0) / p[falling]
         return float(min(steps.min(initial=np.inf), self._disc_steps(x, direction).min(initial=np.inf)))
 
     def _disc_steps(self, x: Vector, direction: Vector) -> Vector:
