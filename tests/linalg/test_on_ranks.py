@@ -30,9 +30,7 @@ def test_null_vectors_are_found_from_the_shares_of_all_ranks(answer: dict[str, A
 
 
 @pytest.mark.parametrize("kept", ["one rank", "several ranks"])
-def test_contact_forces_do_not_depend_on_where_the_coarse_problem_is(
-    answer: dict[str, Any], kept: str
-) -> None:
+def test_contact_forces_do_not_depend_on_the_coarse_problem(answer: dict[str, Any], kept: str) -> None:
     dense, sparse = answer["dense"], answer[kept]
     assert (dense["kind"], sparse["kind"]) == ("GramInverse", "SparseGramInverse")
     assert sparse["potential"] == pytest.approx(dense["potential"], rel=1e-8)
