@@ -83,7 +83,7 @@ ROWS = (
     ),
     *(
         Row(
-            f"friction-{mu}", f"μ = {mu} converges or is refused as not held", "1 = yes", 1, "higher",
+            f"friction-{mu}", f"μ = {mu} converges or is refused as not held", "(1 = yes)", 1, "higher",
             _converges_or_is_refused(f"chain-friction-{mu}"), f"chain-friction-{mu}", comparison,
         )
         for mu, comparison in (("0.01", "prototype cycles"), ("0", ""))
