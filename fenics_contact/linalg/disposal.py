@@ -7,13 +7,17 @@ shared by several ranks by all of them in the same order.
 from __future__ import annotations
 
 import weakref
+from collections import Counter
 from typing import Any
 
 from mpi4py import MPI
 
-#: Objects of several ranks whose owner is gone on this rank, by the order in which they were registered.
-_waiting: dict[int, tuple[Any, ...]] = {}
-_registered = 0
+#: Size of the communicator and place in the order of registration there: the same on all its ranks.
+Key = tuple[int, int]
+
+#: Objects of several ranks whose owner is gone on this rank.
+_waiting: dict[Key, tuple[Any, ...]] = {}
+_registered: Counter[int] = Counter()
 
 
 def dispose_with(owner: Any, *objects: Any, comm: MPI.Comm = MPI.COMM_SELF) -> None:
@@ -22,16 +26,15 @@ def dispose_with(owner: Any, *objects: Any, comm: MPI.Comm = MPI.COMM_SELF) -> N
     Args:
         owner: The Python object that holds them.
         *objects: PETSc objects. They must not refer to the owner.
-        comm: Communicator they live on. Objects of one rank are destroyed at once, others by `sweep`; they
-            must be registered by all ranks in the same order.
+        comm: Communicator they live on: that of the scene or of its first ranks. Objects of one rank are
+            destroyed at once, others by `sweep`; they must be registered by all ranks in the same order.
     """
-    global _registered
     finalizer: Any
     if comm.size == 1:
         finalizer = weakref.finalize(owner, _destroy, objects)
     else:
-        _registered += 1
-        finalizer = weakref.finalize(owner, _retire, _registered, objects)
+        _registered[comm.size] += 1
+        finalizer = weakref.finalize(owner, _retire, (comm.size, _registered[comm.size]), objects)
     finalizer.atexit = False
 
 
@@ -39,13 +42,14 @@ def sweep(comm: MPI.Comm) -> None:
     """Destroy the shared objects that no rank uses any more. Collective on ``comm``."""
     if comm.size == 1:
         return
-    everywhere = set.intersection(*map(set, comm.allgather(sorted(_waiting))))
-    for number in sorted(everywhere):
-        _destroy(_waiting.pop(number))
+    waiting = [set(keys) for keys in comm.allgather(sorted(_waiting))]
+    for key in sorted(waiting[0]):
+        if all(key in keys for keys in waiting[: key[0]]) and key in _waiting:
+            _destroy(_waiting.pop(key))
 
 
-def _retire(number: int, objects: tuple[Any, ...]) -> None:
-    _waiting[number] = objects
+def _retire(key: Key, objects: tuple[Any, ...]) -> None:
+    _waiting[key] = objects
 
 
 def _destroy(objects: tuple[Any, ...]) -> None:

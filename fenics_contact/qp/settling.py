@@ -212,7 +212,8 @@ def _rest(springs: _Springs, bound: Vector) -> Vector:
             break
     if balance.size <= NEARLY / BALANCED * target:
         return balance.motion
-    return -np.linalg.solve(springs.slope(begin, None) + np.eye(len(springs.load)), begin.imbalance)
+    slope = springs.slope(begin, None) + np.eye(len(springs.load))
+    return -np.asarray(np.linalg.solve(slope, begin.imbalance), dtype=np.float64)
 
 
 def _coupled(springs: _Springs, balance: _Balance, target: float) -> _Balance:
@@ -235,7 +236,7 @@ def _minimise(springs: _Springs, balance: _Balance, target: float) -> _Balance:
         if balance.size <= target or damping > 1e4:
             break
         slope = springs.slope(balance, None) + damping * np.eye(len(springs.load))
-        step = -np.linalg.solve(slope, balance.imbalance)
+        step = -np.asarray(np.linalg.solve(slope, balance.imbalance), dtype=np.float64)
         following = _descend(springs, balance, step, bound)
         if following is None:
             damping = max(100.0 * damping, 1e-8)

@@ -32,11 +32,11 @@ class TwoRanks:
 
     size = 2
 
-    def __init__(self, *used: int) -> None:
+    def __init__(self, *used: disposal.Key) -> None:
         self.used = used
 
-    def allgather(self, waiting: list[int]) -> list[list[int]]:
-        return [waiting, [number for number in waiting if number not in self.used]]
+    def allgather(self, waiting: list[disposal.Key]) -> list[list[disposal.Key]]:
+        return [waiting, [key for key in waiting if key not in self.used]]
 
 
 def test_objects_of_one_rank_are_destroyed_with_their_owner() -> None:
@@ -50,10 +50,10 @@ def test_objects_of_one_rank_are_destroyed_with_their_owner() -> None:
 def test_shared_objects_wait_until_no_rank_uses_them() -> None:
     owner, held = Owner(), Petsc()
     dispose_with(owner, held, comm=TwoRanks())  # type: ignore[arg-type]
-    number = disposal._registered
+    key = (2, disposal._registered[2])
     del owner
     assert held.destroyed == 0
-    sweep(TwoRanks(number))  # type: ignore[arg-type]
+    sweep(TwoRanks(key))  # type: ignore[arg-type]
     assert held.destroyed == 0
     sweep(TwoRanks())  # type: ignore[arg-type]
     assert held.destroyed == 1
