@@ -3,6 +3,15 @@
 from fenics_contact.feti.contact_search import ContactPoints
 from fenics_contact.feti.decomposition import Decomposition, decompose
 from fenics_contact.feti.dual import DualSystem
+from fenics_contact.feti.inverse import LocalKind
 from fenics_contact.feti.torn import TornSystem, build_torn_system
 
-__all__ = ["ContactPoints", "Decomposition", "DualSystem", "TornSystem", "build_torn_system", "decompose"]
+__all__ = [
+    "ContactPoints",
+    "Decomposition",
+    "DualSystem",
+    "LocalKind",
+    "TornSystem",
+    "build_torn_system",
+    "decompose",
+]
