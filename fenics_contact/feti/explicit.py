@@ -17,7 +17,7 @@ class ExplicitOperator:
 
     With the trace Q of the kernel on the interface, orthonormal, S + ρ Q Qᵀ is positive definite, and
 
-        K⁺ = [ I  −K_ii⁻¹ K_ib ]ᵀ-congruence of diag(K_ii⁻¹, (S + ρ Q Qᵀ)⁻¹)
+        K⁺ = T diag(K_ii⁻¹, (S + ρ Q Qᵀ)⁻¹) Tᵀ,   T = [I, −K_ii⁻¹ K_ib; 0, I],
 
     is a symmetric generalised inverse of K. The application of a dense triangle is limited by the memory
     alone, and reads a half to a third of what the substitutions with sparse factors read.
