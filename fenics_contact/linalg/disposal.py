@@ -16,11 +16,11 @@ from mpi4py import MPI
 Key = tuple[int, int]
 
 #: Objects of several ranks whose owner is gone on this rank.
-_waiting: dict[Key, tuple[Any, ...]] = {}
+_waiting: dict[Key, tuple[tuple[Any, ...], Any]] = {}
 _registered: Counter[int] = Counter()
 
 
-def dispose_with(owner: Any, *objects: Any, comm: MPI.Comm = MPI.COMM_SELF) -> None:
+def dispose_with(owner: Any, *objects: Any, comm: MPI.Comm = MPI.COMM_SELF, keep: Any = None) -> None:
     """Destroy PETSc objects when their owner is no longer used.
 
     Args:
@@ -28,13 +28,14 @@ def dispose_with(owner: Any, *objects: Any, comm: MPI.Comm = MPI.COMM_SELF) -> N
         *objects: PETSc objects. They must not refer to the owner.
         comm: Communicator they live on: that of the scene or of its first ranks. Objects of one rank are
             destroyed at once, others by `sweep`; they must be registered by all ranks in the same order.
+        keep: What has to live as long as the objects, such as the mesh whose communicator they use.
     """
     finalizer: Any
     if comm.size == 1:
-        finalizer = weakref.finalize(owner, _destroy, objects)
+        finalizer = weakref.finalize(owner, _destroy, objects, keep)
     else:
         _registered[comm.size] += 1
-        finalizer = weakref.finalize(owner, _retire, (comm.size, _registered[comm.size]), objects)
+        finalizer = weakref.finalize(owner, _retire, (comm.size, _registered[comm.size]), objects, keep)
     finalizer.atexit = False
 
 
@@ -45,13 +46,13 @@ def sweep(comm: MPI.Comm) -> None:
     waiting = [set(keys) for keys in comm.allgather(sorted(_waiting))]
     for key in sorted(waiting[0]):
         if all(key in keys for keys in waiting[: key[0]]) and key in _waiting:
-            _destroy(_waiting.pop(key))
+            _destroy(*_waiting.pop(key))
 
 
-def _retire(key: Key, objects: tuple[Any, ...]) -> None:
-    _waiting[key] = objects
+def _retire(key: Key, objects: tuple[Any, ...], keep: Any) -> None:
+    _waiting[key] = objects, keep
 
 
-def _destroy(objects: tuple[Any, ...]) -> None:
+def _destroy(objects: tuple[Any, ...], keep: Any) -> None:
     for part in objects:
         part.destroy()

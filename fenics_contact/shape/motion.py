@@ -63,7 +63,7 @@ class HarmonicExtension:
         mine[nodes] = _dolfinx.global_dofs(space, dofs)
         mesh.comm.Allreduce(mine, everywhere := np.empty_like(mine), op=MPI.MAX)
         self._rows[:] = everywhere
-        dispose_with(self, self._laplacian, comm=decomposition.comm)
+        dispose_with(self, self._laplacian, comm=decomposition.comm, keep=space)
         self._ksp = self._factor(np.concatenate([moving, held]))
 
     def _factor(self, given: np.ndarray) -> PETSc.KSP:
@@ -76,7 +76,8 @@ class HarmonicExtension:
         ksp.getPC().setFactorSolverType("mumps")
         ksp.setUp()
         self._given = self._rows[given]
-        dispose_with(self, ksp.getPC(), ksp, matrix, comm=self._laplacian.getComm().tompi4py())
+        comm = self._laplacian.getComm().tompi4py()
+        dispose_with(self, ksp.getPC(), ksp, matrix, comm=comm, keep=self._space)
         return ksp
 
     def extend(self, displacement: np.ndarray) -> np.ndarray:

@@ -37,6 +37,8 @@ class PressedBlock:
         nodes: Owned nodes that may touch the plane, as blocks of three local rows, shape (n,).
         points: Where they are, shape (n, 3).
         gap: How far above the plane, shape (n,).
+        space: Space of displacements; its mesh owns the communicator of the matrix, which must not be freed
+            before.
     """
 
     stiffness: PETSc.Mat
@@ -44,6 +46,7 @@ class PressedBlock:
     nodes: np.ndarray
     points: np.ndarray
     gap: np.ndarray
+    space: Any
 
 
 def assemble_block(comm: MPI.Comm, counts: Counts) -> PressedBlock:
@@ -67,7 +70,7 @@ def assemble_block(comm: MPI.Comm, counts: Counts) -> PressedBlock:
     nodes = np.setdiff1d(below, clamped)
     nodes = nodes[nodes < V.dofmap.index_map.size_local]
     points = V.tabulate_dof_coordinates()[nodes]
-    return PressedBlock(K, f, nodes, points, points[:, 2] - PLANE_HEIGHT)
+    return PressedBlock(K, f, nodes, points, points[:, 2] - PLANE_HEIGHT, V)
 
 
 def _vector_space(mesh: Any) -> Any:
