@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
+from fenics_contact.feti.factor import symmetric_matrix
 from fenics_contact.linalg import dispose_with
 
 #: Symbolic factorisations kept. Each holds the numbers of its last matrix as well: a few MB.
@@ -33,10 +34,7 @@ class Condensation:
         """
         self._size = len(interface)
         self._structure = (pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType))
-        csr = (*self._structure, pattern.data)
-        self._matrix = PETSc.Mat().createAIJ(pattern.shape, csr=csr, comm=PETSc.COMM_SELF)
-        self._matrix.setOption(PETSc.Mat.Option.SPD, True)
-        self._matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        self._matrix = symmetric_matrix(pattern)
         self._pc = PETSc.PC().create(PETSc.COMM_SELF)
         self._pc.setOperators(self._matrix)
         self._pc.setType(PETSc.PC.Type.CHOLESKY)

@@ -23,10 +23,7 @@ class Factor:
     def __init__(self, matrix: sp.csr_matrix) -> None:
         """Factor ``matrix``, shape (n, n)."""
         self.size = matrix.shape[0]
-        csr = (matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data)
-        given = PETSc.Mat().createAIJ(matrix.shape, csr=csr, comm=PETSc.COMM_SELF)
-        given.setOption(PETSc.Mat.Option.SPD, True)
-        given.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        given = symmetric_matrix(matrix)
         pc = PETSc.PC().create(PETSc.COMM_SELF)
         pc.setOperators(given)
         pc.setType(PETSc.PC.Type.CHOLESKY)
@@ -60,6 +57,15 @@ class Factor:
         given.destroy()
         found.destroy()
         return solution
+
+
+def symmetric_matrix(matrix: sp.csr_matrix) -> PETSc.Mat:
+    """Return a symmetric positive definite matrix on one rank as PETSc has it."""
+    csr = (matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data)
+    given = PETSc.Mat().createAIJ(matrix.shape, csr=csr, comm=PETSc.COMM_SELF)
+    given.setOption(PETSc.Mat.Option.SPD, True)
+    given.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    return given
 
 
 @lru_cache(maxsize=1)
