@@ -31,10 +31,11 @@ def nodal_displacement(decomposition: Decomposition, name: str, body: Body, torn
         torn: Torn displacement of this rank, shape (torn_size,).
 
     Returns:
-        Displacement of every node of the body, NaN on nodes that this rank does not hold, (n_nodes, 3).
+        Displacement of every node of the body, NaN on nodes that this rank does not hold, (n_nodes, dim).
     """
-    total, count = np.zeros((body.mesh.n_nodes, 3)), np.zeros(body.mesh.n_nodes)
-    blocks = torn.reshape(-1, 3)
+    dim = body.mesh.points.shape[1]
+    total, count = np.zeros((body.mesh.n_nodes, dim)), np.zeros(body.mesh.n_nodes)
+    blocks = torn.reshape(-1, dim)
     for mesh, start in zip(decomposition.meshes, decomposition.block_offset[:-1], strict=True):
         if mesh.body == name:
             total[mesh.nodes] += blocks[start : start + len(mesh.nodes)]
@@ -47,11 +48,11 @@ def displacement_function(mesh: Any, values: np.ndarray) -> Any:
 
     Args:
         mesh: The body's mesh.
-        values: Displacement of the body's nodes, known at least on this rank's own, shape (n_nodes, 3).
+        values: Displacement of the body's nodes, known at least on this rank's own, shape (n_nodes, dim).
     """
     function = _dolfinx.coefficient(mesh, "displacement")
     nodes, dofs = _dolfinx.node_dofs(function.function_space)
-    function.x.array.reshape(-1, 3)[dofs] = values[nodes]
+    function.x.array.reshape(-1, values.shape[1])[dofs] = values[nodes]
     function.x.scatter_forward()
     return function
 

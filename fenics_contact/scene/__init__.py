@@ -2,7 +2,14 @@
 
 from fenics_contact.scene.loads import BodyForce, Load, Support, TotalForce, Traction
 from fenics_contact.scene.materials import IsotropicElasticity, Material, rigid_body_modes
-from fenics_contact.scene.pairs import ContactPair, Coulomb, RigidPlane, Surface, Tresca
+from fenics_contact.scene.obstacles import (
+    DistanceObstacle,
+    RigidCylinder,
+    RigidObstacle,
+    RigidPlane,
+    RigidSphere,
+)
+from fenics_contact.scene.pairs import ContactPair, Coulomb, Surface, Tie, Tresca
 from fenics_contact.scene.scene import Body, Effect, Scene
 
 __all__ = [
@@ -10,14 +17,19 @@ __all__ = [
     "BodyForce",
     "ContactPair",
     "Coulomb",
+    "DistanceObstacle",
     "Effect",
     "IsotropicElasticity",
     "Load",
     "Material",
+    "RigidCylinder",
+    "RigidObstacle",
     "RigidPlane",
+    "RigidSphere",
     "Scene",
     "Support",
     "Surface",
+    "Tie",
     "TotalForce",
     "Traction",
     "Tresca",

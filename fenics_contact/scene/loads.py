@@ -41,6 +41,11 @@ class Support:
                 f"number, got {self.value!r}: use (0.0, 0.0, 0.0) to clamp, (None, None, 0.0) for a roller"
             )
 
+    def values(self, points: np.ndarray) -> np.ndarray:
+        """Return the prescribed displacements, NaN where free, (n, dim) -> (n, dim), [length]."""
+        given = [np.nan if component is None else component for component in self.value]
+        return np.tile(np.array(given, dtype=np.float64), (len(points), 1))
+
 
 @dataclass(frozen=True)
 class Traction:

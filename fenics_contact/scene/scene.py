@@ -11,7 +11,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import BodyMesh
 from fenics_contact.scene.loads import BodyForce, Load, Support
 from fenics_contact.scene.materials import Material
-from fenics_contact.scene.pairs import ContactPair, Coulomb, Surface, Tresca
+from fenics_contact.scene.pairs import ContactPair, Coulomb, Surface, Tie, Tresca
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,14 @@ class Scene:
         supports: Prescribed displacements.
         loads: Forces.
         contacts: Pairs of surfaces that may touch.
+        ties: Pairs of surfaces that stay together.
     """
 
     bodies: Mapping[str, Body]
     supports: Sequence[Support] = field(default=())
     loads: Sequence[Load] = field(default=())
     contacts: Sequence[ContactPair] = field(default=())
+    ties: Sequence[Tie] = field(default=())
 
     def __post_init__(self) -> None:
         """Refuse names that point to nothing."""
@@ -56,10 +58,12 @@ class Scene:
             self._require(
                 part.body, None if isinstance(part, BodyForce) else part.surface, type(part).__name__
             )
-        for pair in self.contacts:
-            self._require(pair.slave.body, pair.slave.name, "ContactPair.slave")
+        pairs: list[ContactPair | Tie] = [*self.contacts, *self.ties]
+        for pair in pairs:
+            kind = type(pair).__name__
+            self._require(pair.slave.body, pair.slave.name, f"{kind}.slave")
             if isinstance(pair.master, Surface):
-                self._require(pair.master.body, pair.master.name, "ContactPair.master")
+                self._require(pair.master.body, pair.master.name, f"{kind}.master")
 
     def _require(self, body: str, surface: str | None, user: str) -> None:
         if body not in self.bodies:
@@ -74,6 +78,11 @@ class Scene:
                 f"{user} names surface {surface!r} of body {body!r}, which has {sorted(surfaces)}: "
                 "use one of them"
             )
+
+    @property
+    def dim(self) -> int:
+        """Dimension of space, 2 or 3."""
+        return int(next(iter(self.bodies.values())).mesh.points.shape[1])
 
     @property
     def body_names(self) -> tuple[str, ...]:

@@ -1,0 +1,21 @@
+"""Typical nodal stiffness of cells, by which stiff and soft neighbours are weighted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.scene import Scene
+
+
+def cell_stiffness(scene: Scene) -> dict[str, np.ndarray]:
+    """Return a typical nodal stiffness of every cell of every body, [force / length].
+
+    It is a material's stiffness on a unit cell, times the mean cell size of the body: within a body of one
+    material it is the same everywhere.
+    """
+    found = {}
+    for name, body in scene.bodies.items():
+        size = (body.mesh.volume / body.mesh.n_cells) ** (1.0 / scene.dim)
+        modulus = float(np.mean(np.abs(body.material.parameters)))
+        found[name] = np.full(body.mesh.n_cells, modulus * size ** (scene.dim - 2))
+    return found
