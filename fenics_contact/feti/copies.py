@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fenics_contact.feti.cost_model import expected_seconds
+from fenics_contact.linalg.cost_model import expected_seconds
 from fenics_contact.scene import Scene
 
 

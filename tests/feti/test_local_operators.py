@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.feti.condensation import Condensations
-from fenics_contact.feti.cost_model import LocalCost, explicit_cost, implicit_cost, prefers_explicit
+from fenics_contact.linalg.cost_model import LocalCost, explicit_cost, implicit_cost, prefers_explicit
 from fenics_contact.feti.explicit import ExplicitOperator
 from fenics_contact.feti.implicit import ImplicitOperator
 from fenics_contact.feti.inverse import LocalKind
