@@ -10,34 +10,34 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact import _dolfinx
-from fenics_contact.geometry import BodyMesh, block
+from tests.dolfinx.samples import CELLS, Sample, box
 
 
-def owners(mesh: BodyMesh, ranks: int) -> dict[str, np.ndarray]:
+def owners(mesh: Sample, ranks: int) -> dict[str, np.ndarray]:
     """Ways to deal the cells out; under all but the first some rank has none."""
-    even = np.arange(mesh.n_cells) * ranks // mesh.n_cells
-    scattered = np.random.default_rng(1).integers(0, ranks, mesh.n_cells)
+    even = np.arange(len(mesh.cells)) * ranks // len(mesh.cells)
+    scattered = np.random.default_rng(1).integers(0, ranks, len(mesh.cells))
     return {
         "even": even,
         "scattered": scattered,
         "first rank empty": np.maximum(even, 1),
         "last rank empty": np.minimum(even, ranks - 2),
-        "all on the last": np.full(mesh.n_cells, ranks - 1),
+        "all on the last": np.full(len(mesh.cells), ranks - 1),
     }
 
 
-def look_at(comm: MPI.Comm, mesh: BodyMesh, rank: np.ndarray) -> dict[str, Any]:
+def look_at(comm: MPI.Comm, cell: str, mesh: Sample, rank: np.ndarray) -> dict[str, Any]:
     """Build the mesh and a field, and report what this rank holds."""
-    own = _dolfinx.rank_mesh(comm, mesh.points, mesh.cells, rank, mesh.cell_type)
-    cell_map = own.topology.index_map(3)
+    own = _dolfinx.rank_mesh(comm, mesh.points, mesh.cells, rank, cell)
+    cell_map = own.topology.index_map(mesh.dim)
     nodes_of_cells = _dolfinx.cell_nodes(own)[: cell_map.size_local]
     expected = np.sort(mesh.cells[rank == comm.rank], axis=1)
     cells_stay = {tuple(row) for row in np.sort(nodes_of_cells, axis=1)} == {tuple(row) for row in expected}
     field = _dolfinx.coefficient(own, "u")
     nodes, dofs = _dolfinx.node_dofs(field.function_space)
     dof_map = field.function_space.dofmap.index_map
-    place = field.function_space.tabulate_dof_coordinates()[dofs]
-    values = field.x.array.reshape(-1, 3)
+    place = field.function_space.tabulate_dof_coordinates()[dofs, : mesh.dim]
+    values = field.x.array.reshape(-1, mesh.dim)
     values[:] = np.nan
     held = dofs < dof_map.size_local  # only the owner knows; the others hear of it
     values[dofs[held]] = np.sin(nodes[held])[:, None]
@@ -56,10 +56,10 @@ def look_at(comm: MPI.Comm, mesh: BodyMesh, rank: np.ndarray) -> dict[str, Any]:
 def main() -> None:
     comm = MPI.COMM_WORLD
     found = {}
-    for cell in ("hexahedron", "tetrahedron"):
-        mesh = block((0, 0, 0), (2, 1, 1), (4, 3, 3), cell)
+    for cell in CELLS:
+        mesh = box(cell, (2, 1, 1), (4, 3, 3))
         for name, rank in owners(mesh, comm.size).items():
-            found[f"{cell}, {name}"] = comm.gather(look_at(comm, mesh, rank))
+            found[f"{cell}, {name}"] = comm.gather(look_at(comm, cell, mesh, rank))
     if comm.rank == 0:
         sys.stdout.write(json.dumps(found))
 

@@ -10,21 +10,20 @@ import ufl
 from mpi4py import MPI
 
 from fenics_contact import _dolfinx
-from fenics_contact.geometry import block
-
-CELLS = ["hexahedron", "tetrahedron"]
+from tests.dolfinx.samples import CELLS, Sample, box
 
 
 def constants(cell: str, count: int) -> list[Any]:
     return [ufl.Constant(_dolfinx.template(cell)) for _ in range(count)]
 
 
-def boxes(cell: str) -> list[tuple[Any, Any, float]]:
+def boxes(cell: str) -> list[tuple[Sample, Any, float]]:
     """Three boxes of different size and fineness with their volumes."""
     found = []
     for k in (1, 2, 3):
-        mesh = block((0, 0, 0), (k, 1, 2), (k, 1, k), cell)
-        found.append((mesh, _dolfinx.local_mesh(mesh.points, mesh.cells, cell), 2.0 * k))
+        mesh = box(cell, (k, 1, 2), (k, 1, k))
+        volume = 2.0 * k if mesh.dim == 3 else 1.0 * k
+        found.append((mesh, _dolfinx.local_mesh(mesh.points, mesh.cells, cell), volume))
     return found
 
 
@@ -53,7 +52,9 @@ def test_a_surface_integral_covers_the_facets_it_is_given(cell: str) -> None:
     one = area.constants()[0]
     form = _dolfinx.CompiledForm(MPI.COMM_SELF, area)
     for geometry, mesh, volume in boxes(cell):
-        sides = {"x0": 2.0, "y1": volume, "z0": volume / 2}
+        sides = (
+            {"x0": 2.0, "y1": volume, "z0": volume / 2} if geometry.dim == 3 else {"x0": 1.0, "y1": volume}
+        )
         for side, expected in sides.items():
             facets = {1: _dolfinx.match_facets(mesh, geometry.surfaces[side])}
             bound = form.bind(mesh, [], {}, {one: _dolfinx.Constant(mesh, np.float64(1.0))}, facets)
@@ -81,11 +82,58 @@ def test_the_mass_matrix_and_a_uniform_load_hold_the_volume(cell: str) -> None:
     dx = ufl.dx(domain=_dolfinx.template(cell), metadata={"quadrature_degree": 2})
     mass = _dolfinx.CompiledForm(MPI.COMM_SELF, ufl.inner(u, v) * dx)
     load = _dolfinx.CompiledForm(MPI.COMM_SELF, (v[0] + 2 * v[1]) * dx)
-    for _, mesh, volume in boxes(cell):
+    for sample, mesh, volume in boxes(cell):
+        dim = sample.dim
         V = _dolfinx.coefficient(mesh, "u").function_space
         indptr, indices, data = _dolfinx.assemble_csr(mass.bind(mesh, [V, V], {}, {}))
-        assert len(indptr) == len(mesh.geometry.x) * 3 + 1
+        assert len(indptr) == len(mesh.geometry.x) * dim + 1
         assert len(indices) == len(data) == indptr[-1]
-        assert data.sum() == pytest.approx(3 * volume, rel=1e-13)
+        assert data.sum() == pytest.approx(dim * volume, rel=1e-13)
         force = _dolfinx.assemble_vector(load.bind(mesh, [V], {}, {}))
-        assert force.reshape(-1, 3).sum(axis=0) == pytest.approx([volume, 2 * volume, 0.0])
+        assert force.reshape(-1, dim).sum(axis=0) == pytest.approx([volume, 2 * volume, 0.0][:dim])
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_tagged_volume_integral_covers_the_cells_it_is_given(cell: str) -> None:
+    a, b = constants(cell, 2)
+    dx = ufl.dx(domain=_dolfinx.template(cell), metadata={"quadrature_degree": 2})
+    form = _dolfinx.CompiledForm(MPI.COMM_SELF, a * dx(1) + b * dx(2))
+    sample = box(cell, (4, 1, 2), (4, 2, 2))
+    mesh = _dolfinx.local_mesh(sample.points, sample.cells, cell)
+    numbers = {
+        a: _dolfinx.Constant(mesh, np.float64(1.0)),
+        b: _dolfinx.Constant(mesh, np.float64(100.0)),
+    }
+    height = 2.0 if sample.dim == 3 else 1.0
+    middle = sample.points[sample.cells].mean(axis=1)[_dolfinx.input_cells(mesh), 0]
+    left, right = np.flatnonzero(middle < 1.0), np.flatnonzero(middle > 2.0)
+    for cells, expected in (
+        ({1: left, 2: right}, 201.0),
+        ({1: right[::-1]}, 2.0),
+        ({2: left, 1: left[:0]}, 100.0),
+    ):
+        bound = form.bind(mesh, [], {}, numbers, cells=cells)
+        assert _dolfinx.assemble_scalar(bound) == pytest.approx(expected * height, rel=1e-13)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_tagged_and_untagged_parts_of_a_matrix_add_up(cell: str) -> None:
+    space = _dolfinx.displacement_space(cell)
+    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+    dx = ufl.dx(domain=_dolfinx.template(cell), metadata={"quadrature_degree": 2})
+    whole = _dolfinx.CompiledForm(MPI.COMM_SELF, ufl.inner(ufl.grad(u), ufl.grad(v)) * dx)
+    parts = _dolfinx.CompiledForm(
+        MPI.COMM_SELF,
+        ufl.inner(ufl.grad(u), ufl.grad(v)) * dx(1) + ufl.inner(ufl.grad(u), ufl.grad(v)) * dx(7),
+    )
+    sample = box(cell, (4, 1, 2), (4, 2, 2))
+    mesh = _dolfinx.local_mesh(sample.points, sample.cells, cell)
+    V = _dolfinx.coefficient(mesh, "u").function_space
+    n_cells = len(sample.cells)
+    halves = {1: np.arange(0, n_cells, 2), 7: np.arange(1, n_cells, 2)}
+    expected = _dolfinx.assemble_csr(whole.bind(mesh, [V, V], {}, {}))
+    found = _dolfinx.assemble_csr(parts.bind(mesh, [V, V], {}, {}, cells=halves))
+    for given, wanted in zip(found[:2], expected[:2], strict=True):
+        np.testing.assert_array_equal(given, wanted)
+    np.testing.assert_allclose(found[2], expected[2], atol=1e-13)
+    assert np.abs(expected[2]).max() > 0.1

@@ -6,20 +6,11 @@ import numpy as np
 import pytest
 
 from fenics_contact import _dolfinx
-from fenics_contact.geometry import BodyMesh, block
-
-CELLS = ["hexahedron", "tetrahedron"]
+from tests.dolfinx.samples import CELLS, Sample, box, shuffled
 
 
-def skewed_block(cell: str) -> BodyMesh:
-    """A block whose nodes and cells are numbered at random: nothing may rest on a natural order."""
-    rng = np.random.default_rng(3)
-    mesh = block((0, 0, 0), (2, 3, 1), (2, 3, 2), cell)
-    number = rng.permutation(mesh.n_nodes)
-    points = np.empty_like(mesh.points)
-    points[number] = mesh.points
-    surfaces = {name: number[facets] for name, facets in mesh.surfaces.items()}
-    return BodyMesh(points, number[mesh.cells][rng.permutation(mesh.n_cells)], surfaces)
+def skewed_block(cell: str) -> Sample:
+    return shuffled(box(cell, (2, 3, 1), (2, 3, 2)))
 
 
 @pytest.mark.parametrize("cell", CELLS)
@@ -32,35 +23,51 @@ def test_every_cell_keeps_its_nodes(cell: str) -> None:
 
 
 @pytest.mark.parametrize("cell", CELLS)
-@pytest.mark.parametrize("components", [3, 1])
-def test_every_dof_sits_on_the_node_it_is_said_to_sit_on(cell: str, components: int) -> None:
+def test_every_cell_knows_which_of_the_given_ones_it_is(cell: str) -> None:
     mesh = skewed_block(cell)
     own = _dolfinx.local_mesh(mesh.points, mesh.cells, cell)
-    vector = components == 3
+    given = _dolfinx.input_cells(own)
+    assert not np.array_equal(given, np.arange(len(mesh.cells))), "dolfinx renumbered nothing"
+    np.testing.assert_array_equal(
+        np.sort(_dolfinx.cell_nodes(own), axis=1), np.sort(mesh.cells, axis=1)[given]
+    )
+
+
+@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize("components", ["vector", "scalar"])
+def test_every_dof_sits_on_the_node_it_is_said_to_sit_on(cell: str, components: str) -> None:
+    mesh = skewed_block(cell)
+    own = _dolfinx.local_mesh(mesh.points, mesh.cells, cell)
+    vector = components == "vector"
     space = _dolfinx.coefficient(own, "u").function_space if vector else _dolfinx.scalar_space(own, 1)
     nodes, dofs = _dolfinx.node_dofs(space)
-    assert np.array_equal(nodes, np.arange(mesh.n_nodes))
-    assert np.array_equal(np.sort(dofs), np.arange(mesh.n_nodes))
+    assert np.array_equal(nodes, np.arange(len(mesh.points)))
+    assert np.array_equal(np.sort(dofs), np.arange(len(mesh.points)))
     assert not np.array_equal(dofs, nodes), "dolfinx renumbered nothing: nothing was tested"
-    np.testing.assert_allclose(space.tabulate_dof_coordinates()[dofs], mesh.points[nodes], atol=1e-14)
+    place = space.tabulate_dof_coordinates()[dofs, : mesh.dim]
+    np.testing.assert_allclose(place, mesh.points[nodes], atol=1e-14)
+    assert space.dofmap.index_map_bs == (mesh.dim if vector else 1)
 
 
 @pytest.mark.parametrize("cell", CELLS)
 def test_moved_coordinates_reach_the_nodes_they_are_meant_for(cell: str) -> None:
     mesh = skewed_block(cell)
     own = _dolfinx.local_mesh(mesh.points, mesh.cells, cell)
-    moved = mesh.points @ np.array([[1.0, 0.2, 0.0], [0.0, 2.0, 0.0], [0.1, 0.0, 3.0]]) + 7.0
+    stretch = np.array([[1.0, 0.2, 0.0], [0.0, 2.0, 0.0], [0.1, 0.0, 3.0]])[: mesh.dim, : mesh.dim]
+    moved = mesh.points @ stretch + 7.0
     _dolfinx.update_coordinates(own, moved)
     space = _dolfinx.scalar_space(own, 1)
     nodes, dofs = _dolfinx.node_dofs(space)
-    np.testing.assert_allclose(space.tabulate_dof_coordinates()[dofs], moved[nodes], atol=1e-14)
+    place = space.tabulate_dof_coordinates()[dofs]
+    np.testing.assert_allclose(place[:, : mesh.dim], moved[nodes], atol=1e-14)
+    assert np.all(place[:, mesh.dim :] == 0.0)
 
 
 @pytest.mark.parametrize("cell", CELLS)
 def test_facets_are_found_whatever_the_order_of_their_vertices(cell: str) -> None:
     mesh = skewed_block(cell)
     own = _dolfinx.local_mesh(mesh.points, mesh.cells, cell)
-    corners = np.array(_dolfinx._FACET_VERTICES[cell])
+    corners = np.array(_dolfinx.FACET_VERTICES[cell])
     for facets in mesh.surfaces.values():
         rng = np.random.default_rng(5)
         shuffled = rng.permuted(facets, axis=1)[rng.permutation(len(facets))]
@@ -79,7 +86,7 @@ def test_facets_of_other_meshes_are_left_out(cell: str) -> None:
     here = mesh.points[mesh.surfaces["y0"]][:, :, 0].max(axis=1) <= 1.0
     assert here.any()
     assert not here.all()
-    numbered = np.full(mesh.n_nodes, len(used))  # a node that this mesh does not have
+    numbered = np.full(len(mesh.points), len(used))  # a node that this mesh does not have
     numbered[used] = np.arange(len(used))
     cells, _ = _dolfinx.match_facets(own, numbered[mesh.surfaces["y0"]])
     assert len(cells) == here.sum()

@@ -1,0 +1,74 @@
+"""The one place that knows which dolfinx runs; everything else takes FEniCSx through it.
+
+Forms are written once on a *template*, a `ufl.Mesh` without coordinates, compiled once, and then bound to any
+number of meshes: subdomain meshes of one body differ in their numbers, never in their code.
+
+Node numbers of meshes handed in are called *input nodes*, their cells *input cells*; cells come in VTK vertex
+order. Triangles and quadrilaterals lie in the plane: their points have two coordinates, their fields two
+components.
+"""
+
+from fenics_contact._dolfinx.assembly import (
+    assemble_csr,
+    assemble_matrix,
+    assemble_scalar,
+    assemble_vector,
+)
+from fenics_contact._dolfinx.cells import CELL_TYPES, FACET_VERTICES, dimension
+from fenics_contact._dolfinx.forms import CompiledForm
+from fenics_contact._dolfinx.loading import VERSION, dolfinx, jit
+from fenics_contact._dolfinx.meshes import local_mesh, rank_mesh
+from fenics_contact._dolfinx.numbering import (
+    cell_dofs,
+    cell_nodes,
+    coefficient,
+    global_dofs,
+    input_cells,
+    match_facets,
+    node_dofs,
+    scalar_space,
+    update_coordinates,
+)
+from fenics_contact._dolfinx.output import write_xdmf
+from fenics_contact._dolfinx.templates import (
+    cellwise_space,
+    displacement_space,
+    field_symbols,
+    nodal_space,
+    template,
+)
+
+Constant = dolfinx.fem.Constant
+Function = dolfinx.fem.Function
+
+__all__ = [
+    "CELL_TYPES",
+    "FACET_VERTICES",
+    "VERSION",
+    "CompiledForm",
+    "Constant",
+    "Function",
+    "assemble_csr",
+    "assemble_matrix",
+    "assemble_scalar",
+    "assemble_vector",
+    "cell_dofs",
+    "cell_nodes",
+    "cellwise_space",
+    "coefficient",
+    "dimension",
+    "displacement_space",
+    "field_symbols",
+    "global_dofs",
+    "input_cells",
+    "jit",
+    "local_mesh",
+    "match_facets",
+    "nodal_space",
+    "node_dofs",
+    "rank_mesh",
+    "scalar_space",
+    "template",
+    "update_coordinates",
+    "write_xdmf",
+]

@@ -1,0 +1,106 @@
+"""Forms that are compiled once and bound to many meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_contact._dolfinx.loading import OLD, cpp, dolfinx, jit, side_effects_undone
+from fenics_contact._dolfinx.numbering import cell_count, table
+
+#: Cells or facets with one tag: cell numbers, or (cells, local facets).
+Facets = Mapping[int, tuple[np.ndarray, np.ndarray]]
+Cells = Mapping[int, np.ndarray]
+
+
+class CompiledForm:
+    """A UFL form on a template, compiled once, bound to many meshes."""
+
+    def __init__(self, comm: MPI.Comm, form: Any) -> None:
+        """Compile ``form``. Collective on ``comm``: one rank compiles, the others read its cache."""
+        self.form = form
+        with side_effects_undone():
+            build = jit.ffcx_jit if OLD else dolfinx.fem.compile_form
+            self._compiled = build(comm, form, {}, {})
+
+    def bind(
+        self,
+        mesh: Any,
+        spaces: Sequence[Any],
+        coefficients: Mapping[Any, Any],
+        constants: Mapping[Any, Any],
+        facets: Facets | None = None,
+        *,
+        cells: Cells | None = None,
+    ) -> Any:
+        """Return the form on one mesh.
+
+        Integrals without a tag cover the whole mesh, those with a tag what is given for it, nothing else.
+
+        Args:
+            mesh: The mesh.
+            spaces: dolfinx function spaces of the form's arguments, in their order.
+            coefficients: Template coefficient -> dolfinx Function on ``mesh``.
+            constants: Template constant -> dolfinx Constant.
+            facets: Tag of a surface integral -> (cells, local facets), as `match_facets` returns them.
+            cells: Tag of a volume integral -> cells of ``mesh``; no cell has two tags.
+        """
+        if OLD:
+            return self._bind_old(mesh, spaces, coefficients, constants, facets or {}, cells or {})
+        kinds = dolfinx.fem.IntegralType
+        surfaces = [(tag, np.column_stack(pair)) for tag, pair in sorted((facets or {}).items())]
+        volumes = [(tag, np.sort(numbers)) for tag, numbers in sorted((cells or {}).items())]
+        domains = {
+            kind: [(tag, part.astype(np.int32).ravel()) for tag, part in parts]
+            for kind, parts in ((kinds.exterior_facet, surfaces), (kinds.cell, volumes))
+            if parts
+        }
+        # A symbol that dropped out of the form while UFL simplified it must not be handed over.
+        functions = {symbol: coefficients[symbol] for symbol in self.form.coefficients()}
+        numbers = {symbol: constants[symbol] for symbol in self.form.constants()}
+        return dolfinx.fem.create_form(self._compiled, list(spaces), mesh, domains, functions, numbers)
+
+    def _bind_old(
+        self, mesh: Any, spaces: Any, coefficients: Any, constants: Any, facets: Facets, cells: Cells
+    ) -> Any:
+        compiled, module, code = self._compiled
+        mine = self.form.coefficients()
+        order = [compiled.original_coefficient_position[i] for i in range(compiled.num_coefficients)]
+        kinds = cpp.fem.IntegralType
+        domains = dict.fromkeys((kinds.cell, kinds.exterior_facet, kinds.interior_facet, kinds.vertex))
+        if facets:
+            domains[kinds.exterior_facet] = _facet_tags(mesh, facets)
+        if cells:
+            domains[kinds.cell] = _tags(mesh, mesh.topology.dim, cells)
+        bound = type("Form", (dolfinx.fem.FormMetaClass, cpp.fem.Form_float64), {})
+        return bound(
+            compiled,
+            [space._cpp_object for space in spaces],
+            [coefficients[mine[i]]._cpp_object for i in order],
+            [constants[constant]._cpp_object for constant in self.form.constants()],
+            domains,
+            mesh._mesh,
+            module.ffi,
+            code,
+        )
+
+
+def _facet_tags(mesh: Any, facets: Facets) -> Any:
+    """Facet tags of dolfinx 0.5 from (cell, local facet) pairs."""
+    tdim = mesh.topology.dim
+    mesh.topology.create_entities(tdim - 1)
+    mesh.topology.create_connectivity(tdim, tdim - 1)
+    mesh.topology.create_connectivity(tdim - 1, tdim)
+    numbers = table(mesh.topology.connectivity(tdim, tdim - 1), cell_count(mesh))
+    return _tags(mesh, tdim - 1, {tag: numbers[cells, local] for tag, (cells, local) in facets.items()})
+
+
+def _tags(mesh: Any, dim: int, entities: Cells) -> Any:
+    """Tags of dolfinx 0.5 on entities of one dimension."""
+    indices = np.concatenate(list(entities.values())).astype(np.int32)
+    tags = np.concatenate([np.full(len(part), tag, np.int32) for tag, part in entities.items()])
+    order = np.argsort(indices)
+    return dolfinx.mesh.meshtags(mesh, dim, indices[order], tags[order])

@@ -1,0 +1,79 @@
+"""Meshes on one rank or on all, built from arrays of nodes and cells."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+import ufl
+from mpi4py import MPI
+
+from fenics_contact._dolfinx.cells import VERTEX_ORDER, dimension
+from fenics_contact._dolfinx.loading import OLD, cpp, dolfinx
+from fenics_contact._dolfinx.templates import vector_element
+
+
+def _partitioner(destinations: Any) -> Any:
+    """Send every cell to the ranks in its row of ``destinations``, the first of which owns it."""
+    if OLD:
+        return lambda comm, parts, tdim, cells, ghost_mode: destinations
+    return lambda comm, parts, cell_types, cells: destinations
+
+
+def local_mesh(points: np.ndarray, cells: np.ndarray, cell_type: str) -> Any:
+    """Build a mesh that lives on this rank alone.
+
+    Args:
+        points: Coordinates, shape (n, dim), [length].
+        cells: Rows of node numbers in VTK order, shape (m, n_vertices).
+        cell_type: One of `CELL_TYPES`.
+    """
+    return _create_mesh(MPI.COMM_SELF, points, cells, cell_type, np.zeros((len(cells), 1), dtype=np.int32))
+
+
+def rank_mesh(comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, rank: np.ndarray, cell_type: str) -> Any:
+    """Build a distributed mesh whose cells live on given ranks; a rank may have none. Collective on ``comm``.
+
+    Args:
+        comm: Communicator of the mesh.
+        points: All coordinates, shape (n_nodes, dim), replicated, [length].
+        cells: All cells, rows of node numbers in VTK order, replicated.
+        rank: Owner of each cell, shape (n_cells,), replicated.
+        cell_type: One of `CELL_TYPES`.
+    """
+    bounds = np.linspace(0, len(points), comm.size + 1).astype(int)
+    mine = np.flatnonzero(rank == comm.rank)
+    destinations: Any = np.full((len(mine), 1), comm.rank, dtype=np.int32)
+    if OLD and comm.size > 1:
+        destinations = _with_ghosts(cells, rank, mine, comm)
+    part = points[bounds[comm.rank] : bounds[comm.rank + 1]]
+    return _create_mesh(comm, part, cells[mine], cell_type, destinations)
+
+
+def _with_ghosts(cells: np.ndarray, rank: np.ndarray, mine: np.ndarray, comm: MPI.Comm) -> Any:
+    """Send each cell to its owner and to all ranks around it.
+
+    dolfinx 0.5 does not find out that two ranks share a vertex unless a ghost cell tells it.
+    """
+    vertices = cells.shape[1]
+    touching = sp.csr_matrix((np.ones(cells.size), (cells.ravel(), np.repeat(rank, vertices))))
+    reached = touching[cells[mine].ravel()].tocoo()
+    cell, to = np.unique([reached.row // vertices, reached.col], axis=1)
+    order = np.lexsort((to, to != comm.rank, cell))  # the owner comes first
+    offsets = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=len(mine)))])
+    return cpp.graph.AdjacencyList_int32(to[order].astype(np.int32), offsets.astype(np.int32))
+
+
+def _create_mesh(
+    comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, cell_type: str, destinations: Any
+) -> Any:
+    ordered = np.ascontiguousarray(cells[:, VERTEX_ORDER[cell_type]], dtype=np.int64)
+    points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, dimension(cell_type))
+    if isinstance(destinations, np.ndarray):
+        destinations = cpp.graph.AdjacencyList_int32(destinations)
+    element, partitioner = vector_element(cell_type), _partitioner(destinations)
+    if OLD:
+        adjacency, ghost_mode = cpp.graph.AdjacencyList_int64(ordered), cpp.mesh.GhostMode.shared_facet
+        return dolfinx.mesh.create_mesh(comm, adjacency, points, ufl.Mesh(element), ghost_mode, partitioner)
+    return dolfinx.mesh.create_mesh(comm, cells=ordered, x=points, e=element, partitioner=partitioner)

@@ -1,0 +1,104 @@
+"""Spaces on a mesh, and which of its cells, nodes, dofs and facets are which of the given ones."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fenics_contact._dolfinx.cells import FACET_VERTICES
+from fenics_contact._dolfinx.loading import OLD, dolfinx
+from fenics_contact._dolfinx.templates import cellwise_element, scalar_element, vector_element
+
+
+def _space(mesh: Any, element: Any) -> Any:
+    return dolfinx.fem.FunctionSpace(mesh, element) if OLD else dolfinx.fem.functionspace(mesh, element)
+
+
+def coefficient(mesh: Any, name: str) -> Any:
+    """Return a vector field on ``mesh`` with the given name (a C identifier)."""
+    return dolfinx.fem.Function(_space(mesh, vector_element(mesh.topology.cell_name())), name=name)
+
+
+def scalar_space(mesh: Any, degree: int) -> Any:
+    """Return the space of scalar fields of degree 0 (one value a cell) or 1 on ``mesh``."""
+    cell_type = mesh.topology.cell_name()
+    return _space(mesh, scalar_element(cell_type) if degree == 1 else cellwise_element(cell_type))
+
+
+def table(adjacency: Any, rows: int) -> np.ndarray:
+    """Return a list of lists of equal length as an array, (rows, length)."""
+    flat = np.asarray(getattr(adjacency, "array", adjacency))
+    # A rank without cells of a body has no rows; numpy cannot guess their length then.
+    return flat.reshape(rows, flat.size // max(rows, 1))
+
+
+def cell_count(mesh: Any) -> int:
+    """Return the number of this rank's cells, ghosts included."""
+    index_map = mesh.topology.index_map(mesh.topology.dim)
+    return int(index_map.size_local + index_map.num_ghosts)
+
+
+def _input_nodes(mesh: Any) -> np.ndarray:
+    return np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
+
+
+def cell_nodes(mesh: Any) -> np.ndarray:
+    """Return the input nodes of this rank's cells, tensor-product order, shape (n_cells, n_vertices)."""
+    dofmap = table(mesh.geometry.dofmap, cell_count(mesh))
+    return _input_nodes(mesh)[dofmap]
+
+
+def cell_dofs(space: Any) -> np.ndarray:
+    """Return the blocked dofs of this rank's cells, ghosts included, shape (n_cells, n_dofs of a cell)."""
+    return table(space.dofmap.list, cell_count(space.mesh))
+
+
+def input_cells(mesh: Any) -> np.ndarray:
+    """Return the input cell of each cell of a mesh on one rank, in dolfinx's order, shape (n_cells,)."""
+    return np.asarray(mesh.topology.original_cell_index, dtype=np.int64)
+
+
+def node_dofs(space: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return (input nodes, blocked dofs): dof ``dofs[i]`` of ``space`` sits on input node ``nodes[i]``.
+
+    Both arrays have one entry for each node of this rank, ghosts included, in ascending node order.
+    """
+    mesh = space.mesh
+    cells = cell_count(mesh)
+    nodes = cell_nodes(mesh).ravel()
+    dofs = table(space.dofmap.list, cells).ravel()
+    nodes, first = np.unique(nodes, return_index=True)
+    return nodes, dofs[first]
+
+
+def global_dofs(space: Any, dofs: np.ndarray) -> np.ndarray:
+    """Return the global numbers of this rank's blocked dofs, ghosts included."""
+    return np.asarray(space.dofmap.index_map.local_to_global(dofs.astype(np.int32)))
+
+
+def update_coordinates(mesh: Any, points: np.ndarray) -> None:
+    """Move the nodes of ``mesh`` to ``points``, shape (n_nodes, dim), indexed by input node."""
+    # dolfinx keeps three coordinates a node whatever the dimension.
+    mesh.geometry.x[:, : points.shape[1]] = points[_input_nodes(mesh)]
+
+
+def match_facets(mesh: Any, surface: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Find the facets of ``mesh`` whose nodes form a row of ``surface``.
+
+    Args:
+        mesh: A mesh on one rank.
+        surface: Facets as input nodes, shape (n_facets, n_corners), any vertex order.
+
+    Returns:
+        Cells and local facet numbers of those that lie on this mesh, one entry each.
+    """
+    cell_type = mesh.topology.cell_name()
+    local = np.array(FACET_VERTICES[cell_type])
+    faces = np.sort(cell_nodes(mesh)[:, local].reshape(-1, local.shape[1]), axis=1)
+    wanted = np.sort(surface, axis=1)
+    # One integer key a facet: rows of both tables are numbered together.
+    _, key = np.unique(np.vstack([wanted, faces]), axis=0, return_inverse=True)
+    key = key.ravel()
+    found = np.flatnonzero(np.isin(key[len(wanted) :], key[: len(wanted)]))
+    return found // len(local), found % len(local)

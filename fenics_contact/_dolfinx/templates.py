@@ -1,0 +1,73 @@
+"""Meshes without coordinates and their spaces, on which forms are written."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import ufl
+
+from fenics_contact._dolfinx.cells import dimension
+from fenics_contact._dolfinx.loading import OLD
+
+
+def _element(cell_type: str, shape: tuple[int, ...]) -> Any:
+    if not OLD:
+        import basix.ufl
+
+        return basix.ufl.element("Lagrange", cell_type, 1, shape=shape)
+    # The variant is spelt out because ffcx 0.5 rewrites coordinate elements to it while compiling: without
+    # it the signature of the next process differs and misses the compilation cache.
+    cell = ufl.Cell(cell_type)
+    return (ufl.VectorElement if shape else ufl.FiniteElement)("Lagrange", cell, 1, variant="equispaced")
+
+
+def vector_element(cell_type: str) -> Any:
+    """Return the element of coordinates and displacements, (bi-, tri-)linear, a component a direction."""
+    return _element(cell_type, (dimension(cell_type),))
+
+
+def scalar_element(cell_type: str) -> Any:
+    """Return the (bi-, tri-)linear element of scalars."""
+    return _element(cell_type, ())
+
+
+def cellwise_element(cell_type: str) -> Any:
+    """Return the element of scalars that are constant on each cell."""
+    if OLD:
+        return ufl.FiniteElement("DG", ufl.Cell(cell_type), 0)
+    import basix.ufl
+
+    return basix.ufl.element("DG", cell_type, 0)
+
+
+@lru_cache(maxsize=8)
+def template(cell_type: str) -> Any:
+    """Return the mesh without coordinates on which forms for cells of this type are written."""
+    return ufl.Mesh(vector_element(cell_type))
+
+
+@lru_cache(maxsize=8)
+def displacement_space(cell_type: str) -> Any:
+    """Return the template's space of vector fields, linear (simplices) or bi- or trilinear."""
+    return ufl.FunctionSpace(template(cell_type), vector_element(cell_type))
+
+
+def field_symbols(cell_type: str, count: int) -> list[Any]:
+    """Return UFL coefficients on the template's `displacement_space`, to be bound to Functions later.
+
+    They are counted from 0 in every form: ffcx 0.5 writes counts into C identifiers, which fails from ten on.
+    """
+    return [ufl.Coefficient(displacement_space(cell_type), count=number) for number in range(count)]
+
+
+@lru_cache(maxsize=8)
+def nodal_space(cell_type: str) -> Any:
+    """Return the template's space of scalars, linear or bi- or trilinear."""
+    return ufl.FunctionSpace(template(cell_type), scalar_element(cell_type))
+
+
+@lru_cache(maxsize=8)
+def cellwise_space(cell_type: str) -> Any:
+    """Return the template's space of scalars that are constant on each cell."""
+    return ufl.FunctionSpace(template(cell_type), cellwise_element(cell_type))
