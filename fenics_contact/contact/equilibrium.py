@@ -13,6 +13,7 @@ from fenics_contact.contact.held import check_held
 from fenics_contact.contact.result import ContactResult, Status
 from fenics_contact.contact.state import State
 from fenics_contact.contact.warm_start import carried_over
+from fenics_contact.errors import together
 from fenics_contact.feti import Decomposition, DualSystem, TornSystem, build_torn_system, decompose
 from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, ProjectedCG, Smalse, contact_step, solve
 from fenics_contact.scene import Scene
@@ -23,15 +24,20 @@ LINEAR_TOLERANCE = 1e-10
 
 
 def solve_scene(
-    scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm, *, solver: DualSolver | None = None
+    scene: Scene,
+    partitions: Mapping[str, np.ndarray] | None,
+    comm: MPI.Comm,
+    *,
+    solver: DualSolver | None = None,
 ) -> State:
     """Find the equilibrium of a scene. Collective on ``comm``.
 
     Args:
         scene: Bodies, supports, loads and contact pairs, the same on every rank.
-        partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
+        partitions: Body name -> subdomain of every cell, numbered from 0 within the body; None lets
+            `Scene.partition` cut the bodies into subdomains of a good size.
         comm: Communicator over which the subdomains are spread.
-        solver: Dual solver with its tolerance; `default_solver` chooses if it is None.
+        solver: Dual solver with its tolerance; `Scene.plan` tells which one is chosen if it is None.
 
     Raises:
         InvalidInputError: If scene or partition cannot be used.
@@ -42,10 +48,19 @@ def solve_scene(
         >>> parts = {"block": box_partition(mesh, (2, 1, 1))}  # doctest: +SKIP
         >>> state = solve_scene(scene, parts, MPI.COMM_WORLD)  # doctest: +SKIP
     """
+    decomposition, timer = decomposed(scene, partitions, comm)
+    return find_state(scene, decomposition, solver=solver, timer=timer)
+
+
+def decomposed(
+    scene: Scene, partitions: Mapping[str, np.ndarray] | None, comm: MPI.Comm
+) -> tuple[Decomposition, PhaseTimer]:
+    """Cut a scene, as given or into subdomains of a good size; return the time that took, too. Collective."""
     timer = PhaseTimer()
     with timer.phase("decompose"):
-        decomposition = decompose(scene, partitions, comm)
-    return find_state(scene, decomposition, solver=solver, timer=timer)
+        with together(comm):
+            cut = scene.partition(comm.size) if partitions is None else partitions
+        return decompose(scene, cut, comm), timer
 
 
 def find_state(
@@ -54,6 +69,7 @@ def find_state(
     *,
     solver: DualSolver | None = None,
     previous: State | None = None,
+    slip_from: State | None = None,
     start_geometry: bool = True,
     timer: PhaseTimer | None = None,
 ) -> State:
@@ -65,6 +81,8 @@ def find_state(
         solver: Dual solver with its tolerance; `default_solver` chooses if it is None.
         previous: State of a neighbouring geometry or load to start from; what did not change is not
             assembled and factored again.
+        slip_from: State from which slip is measured, that of the last load step; by default the undeformed
+            one.
         start_geometry: Refuse bodies that overlap before they are loaded.
         timer: Collects the seconds.
     """
@@ -77,7 +95,9 @@ def find_state(
             start_geometry=start_geometry,
             previous=None if known is None else known.torn,
         )
-        if previous is None:
+        if slip_from is not None:
+            torn = torn.with_slip_from(torn.jump(slip_from.torn_displacement))
+        if previous is None or known is None or torn.scene.loads != known.torn.scene.loads:
             check_held(torn)
     system = DualSystem(torn, timer, previous=known)
     with timer.phase("solve"):
@@ -134,4 +154,7 @@ def contact_result(system: DualSystem, solution: DualSolution) -> ContactResult:
         full[frictional] = values
         return full
 
-    return ContactResult(torn.points, normal, spread(tau), spread(bound), gap, spread(-minus_slip), status)
+    origin = torn.numbering.gather(torn.right, torn.tangential_rows.ravel()).reshape(-1, torn.dim - 1)
+    return ContactResult(
+        torn.points, normal, spread(tau), spread(bound), gap, spread(-minus_slip), spread(origin), status
+    )

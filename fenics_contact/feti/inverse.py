@@ -115,8 +115,8 @@ class TornInverse:
     def _operator_of(
         self, index: int, subdomain: Subdomain, interface: np.ndarray, kind: LocalKind
     ) -> LocalOperator | None:
-        """Return the operator of a subdomain that is the same object as here, with the same interface."""
-        same = self._subdomains[index] is subdomain and self._kind is kind
+        """Return the operator of a subdomain that has the same matrix as here, and the same interface."""
+        same = self._subdomains[index].matrix is subdomain.matrix and self._kind is kind
         return self.operators[index] if same and np.array_equal(self._local[index], interface) else None
 
 

@@ -84,6 +84,16 @@ class Scene:
         """Dimension of space, 2 or 3."""
         return int(next(iter(self.bodies.values())).mesh.points.shape[1])
 
+    def fixed(self, body: str) -> np.ndarray:
+        """Return whether supports prescribe a component of a body's node, shape (n_nodes, dim)."""
+        mesh = self.bodies[body].mesh
+        marks = np.zeros(mesh.points.shape, dtype=bool)
+        for support in self.supports:
+            if support.body == body:
+                nodes = np.unique(mesh.surfaces[support.surface])
+                marks[nodes] |= ~np.isnan(support.values(mesh.points[nodes]))
+        return marks
+
     @property
     def body_names(self) -> tuple[str, ...]:
         """Names of the bodies in the order in which everything is numbered."""
