@@ -9,8 +9,10 @@ from mpi4py import MPI
 
 from fenics_contact.contact.equilibrium import decomposed, find_state
 from fenics_contact.contact.state import State
+from fenics_contact.feti import Decomposition
 from fenics_contact.qp import DualSolver
 from fenics_contact.scene import LoadStep, Scene
+from fenics_contact.timing import PhaseTimer
 
 
 class LoadSequence:
@@ -35,10 +37,11 @@ class LoadSequence:
         *,
         solver: DualSolver | None = None,
     ) -> None:
-        """Decompose the scene. Collective on ``comm``; arguments as for `solve_scene`."""
+        """Start unloaded; arguments as for `solve_scene`."""
         self.scene, self.state = scene, None
-        self._decomposition, self._timer = decomposed(scene, partitions, comm)
-        self._solver = solver
+        self._partitions, self._comm, self._solver = partitions, comm, solver
+        self._decomposition: Decomposition | None = None
+        self._timer = PhaseTimer()
 
     state: State | None
 
@@ -51,6 +54,8 @@ class LoadSequence:
             ConvergenceError: If the solver does not reach its tolerance.
         """
         scene = step.applied_to(self.scene)
+        if self._decomposition is None:
+            self._decomposition, self._timer = decomposed(scene, self._partitions, self._comm)
         state = find_state(
             scene, self._decomposition, solver=self._solver, previous=self.state,
             slip_from=self.state, timer=self._timer,

@@ -11,6 +11,7 @@ from fenics_contact.scene.obstacles import (
 )
 from fenics_contact.scene.pairs import ContactPair, Coulomb, Surface, Tie, Tresca
 from fenics_contact.scene.scene import Body, Effect, Scene
+from fenics_contact.scene.steps import LoadStep
 
 __all__ = [
     "Body",
@@ -21,6 +22,7 @@ __all__ = [
     "Effect",
     "IsotropicElasticity",
     "Load",
+    "LoadStep",
     "Material",
     "RigidCylinder",
     "RigidObstacle",

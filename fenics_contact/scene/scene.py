@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh
+from fenics_contact.geometry import BodyMesh, default_partition
 from fenics_contact.scene.loads import BodyForce, Load, Support
 from fenics_contact.scene.materials import Material
 from fenics_contact.scene.pairs import ContactPair, Coulomb, Surface, Tie, Tresca
@@ -117,6 +117,18 @@ class Scene:
             self._require(name, None, "moved")
             bodies[name] = replace(bodies[name], mesh=bodies[name].mesh.moved(coordinates))
         return replace(self, bodies=bodies)
+
+    def partition(self, ranks: int = 1) -> dict[str, np.ndarray]:
+        """Cut every body into subdomains of a good size.
+
+        Args:
+            ranks: Number of ranks that need a subdomain each.
+
+        Returns:
+            Body name -> subdomain of every cell, numbered from 0 within the body.
+        """
+        each = -(-ranks // len(self.bodies))
+        return {name: default_partition(body.mesh, each, body=name) for name, body in self.bodies.items()}
 
     def effects(self) -> tuple[Effect, ...]:
         """List what the scene calls for; whatever is not listed is not built."""
