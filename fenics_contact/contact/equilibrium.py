@@ -10,13 +10,20 @@ from mpi4py import MPI
 from fenics_contact.contact.coulomb import FixedPoint
 from fenics_contact.contact.energies import compute_energies
 from fenics_contact.contact.held import check_held
-from fenics_contact.contact.result import ContactResult, Status
+from fenics_contact.contact.result import ContactResult, Status, no_contact
 from fenics_contact.contact.state import State
 from fenics_contact.contact.warm_start import carried_over
 from fenics_contact.errors import together
-from fenics_contact.feti import Decomposition, DualSystem, TornSystem, build_torn_system, decompose
+from fenics_contact.feti import (
+    Decomposition,
+    DirectSystem,
+    DualSystem,
+    TornSystem,
+    build_torn_system,
+    decompose,
+)
 from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, ProjectedCG, Smalse, contact_step, solve
-from fenics_contact.scene import Scene
+from fenics_contact.scene import Scene, SolverKind, choose_solver
 from fenics_contact.timing import PhaseTimer
 
 #: Largest relative residual of a scene without contact; its answer then equals that of a direct solver.
@@ -71,6 +78,7 @@ def find_state(
     previous: State | None = None,
     slip_from: State | None = None,
     start_geometry: bool = True,
+    sensitivity: bool = False,
     timer: PhaseTimer | None = None,
 ) -> State:
     """Find the equilibrium of a decomposed scene, possibly moved since. Collective.
@@ -84,25 +92,31 @@ def find_state(
         slip_from: State from which slip is measured, that of the last load step; by default the undeformed
             one.
         start_geometry: Refuse bodies that overlap before they are loaded.
+        sensitivity: Whether derivatives of the state are wanted, which live on the dual system.
         timer: Collects the seconds.
     """
     timer = timer or PhaseTimer()
     with timer.phase("assemble"):
-        known = None if previous is None else previous.system
         torn = build_torn_system(
             scene,
             decomposition,
             start_geometry=start_geometry,
-            previous=None if known is None else known.torn,
+            previous=None if previous is None else previous.torn,
         )
         if slip_from is not None:
             torn = torn.with_slip_from(torn.jump(slip_from.torn_displacement))
-        if previous is None or known is None or torn.scene.loads != known.torn.scene.loads:
+        if previous is None or torn.scene.loads != previous.scene.loads:
             check_held(torn)
+    kind = choose_solver(scene, decomposition.tearing.n_subdomains, sensitivity=sensitivity)
+    if solver is None and kind is SolverKind.DIRECT:
+        return _found_directly(torn, previous, timer)
+    known = previous.system if previous is not None and isinstance(previous.system, DualSystem) else None
     system = DualSystem(torn, timer, previous=known)
     with timer.phase("solve"):
-        start = None if previous is None else carried_over(previous.system, previous.solution, system)
-        solution = solve_dual(system, solver or default_solver(torn), start)
+        start = None
+        if previous is not None and known is not None and isinstance(previous.solution, DualSolution):
+            start = carried_over(known, previous.solution, system)
+        solution = solve_dual(system, solver or default_solver(kind), start)
     with timer.phase("state"):
         displacement = system.displacement(solution.multiplier, solution.alpha)
         contact = contact_result(system, solution)
@@ -111,9 +125,22 @@ def find_state(
     return State(system, solution, displacement, contact, energies, dict(timer.seconds))
 
 
-def default_solver(torn: TornSystem) -> DualSolver:
-    """Return projected conjugate gradients for a scene without contact, Newton on faces for one with."""
-    return FaceNewton() if torn.points.count else ProjectedCG(tolerance=LINEAR_TOLERANCE)
+def _found_directly(torn: TornSystem, previous: State | None, timer: PhaseTimer) -> State:
+    """Find the state of one body without multipliers."""
+    known = previous.system if previous is not None and isinstance(previous.system, DirectSystem) else None
+    system = DirectSystem(torn, timer, previous=known)
+    with timer.phase("solve"):
+        solution = system.solve()
+    energies = compute_energies(system, solution.displacement, solution.multiplier, 0.0)
+    contact = no_contact(torn.points)
+    return State(system, solution, solution.displacement, contact, energies, dict(timer.seconds))
+
+
+def default_solver(kind: SolverKind) -> DualSolver:
+    """Return the dual solver of a kind, with its tolerance."""
+    if kind is SolverKind.FACE_NEWTON:
+        return FaceNewton()
+    return ProjectedCG(tolerance=LINEAR_TOLERANCE)
 
 
 def solve_dual(system: DualSystem, solver: DualSolver, start: np.ndarray | None = None) -> DualSolution:

@@ -68,3 +68,11 @@ class ContactResult:
     def on_pair(self, pair: int) -> np.ndarray:
         """Return the numbers of the points of one contact pair."""
         return np.flatnonzero(self.points.pair == pair)
+
+
+def no_contact(points: ContactPoints) -> ContactResult:
+    """Return the result of a scene without contact points."""
+    nothing, vectors = np.zeros(0), np.zeros((0, points.normal.shape[1] - 1))
+    return ContactResult(
+        points, nothing, vectors, nothing, nothing, vectors, vectors, np.zeros(0, dtype=np.int64)
+    )

@@ -1,5 +1,6 @@
 """Scenes: bodies, materials, supports, loads and contact pairs."""
 
+from fenics_contact.scene.effects import Effect, EffectName
 from fenics_contact.scene.loads import BodyForce, Load, Support, TotalForce, Traction
 from fenics_contact.scene.materials import IsotropicElasticity, Material, rigid_body_modes
 from fenics_contact.scene.obstacles import (
@@ -9,31 +10,38 @@ from fenics_contact.scene.obstacles import (
     RigidPlane,
     RigidSphere,
 )
-from fenics_contact.scene.pairs import ContactPair, Coulomb, Surface, Tie, Tresca
-from fenics_contact.scene.scene import Body, Effect, Scene
+from fenics_contact.scene.pairs import ContactPair, Coulomb, Friction, Surface, Tie, Tresca
+from fenics_contact.scene.plan import ConeKind, Plan, SolverKind, choose_solver
+from fenics_contact.scene.scene import Body, Scene
 from fenics_contact.scene.steps import LoadStep
 
 __all__ = [
     "Body",
     "BodyForce",
+    "ConeKind",
     "ContactPair",
     "Coulomb",
     "DistanceObstacle",
     "Effect",
+    "EffectName",
+    "Friction",
     "IsotropicElasticity",
     "Load",
     "LoadStep",
     "Material",
+    "Plan",
     "RigidCylinder",
     "RigidObstacle",
     "RigidPlane",
     "RigidSphere",
     "Scene",
+    "SolverKind",
     "Support",
     "Surface",
     "Tie",
     "TotalForce",
     "Traction",
     "Tresca",
+    "choose_solver",
     "rigid_body_modes",
 ]

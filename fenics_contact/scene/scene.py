@@ -9,9 +9,11 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import BodyMesh, default_partition
+from fenics_contact.scene.effects import Effect, effects_of
 from fenics_contact.scene.loads import BodyForce, Load, Support
 from fenics_contact.scene.materials import Material
-from fenics_contact.scene.pairs import ContactPair, Coulomb, Surface, Tie, Tresca
+from fenics_contact.scene.pairs import ContactPair, Surface, Tie
+from fenics_contact.scene.plan import Plan, make_plan
 
 
 @dataclass(frozen=True)
@@ -20,14 +22,6 @@ class Body:
 
     mesh: BodyMesh
     material: Material
-
-
-@dataclass(frozen=True)
-class Effect:
-    """One physical effect that a scene calls for, and the reason."""
-
-    name: str
-    reason: str
 
 
 @dataclass(frozen=True)
@@ -132,17 +126,24 @@ class Scene:
 
     def effects(self) -> tuple[Effect, ...]:
         """List what the scene calls for; whatever is not listed is not built."""
-        found = [Effect("elasticity", f"{len(self.bodies)} elastic bodies")]
-        if self.supports:
-            found.append(Effect("prescribed displacement", f"{len(self.supports)} supports"))
-        if any(isinstance(load, BodyForce) for load in self.loads):
-            found.append(Effect("body force", "a load acts on a volume"))
-        if any(not isinstance(load, BodyForce) for load in self.loads):
-            found.append(Effect("surface load", "a load acts on a surface"))
-        if self.contacts:
-            found.append(Effect("contact", f"{len(self.contacts)} pairs may touch"))
-        if any(pair.has_friction and isinstance(pair.friction, Tresca) for pair in self.contacts):
-            found.append(Effect("Tresca friction", "a pair has a fixed slip bound"))
-        if any(pair.has_friction and isinstance(pair.friction, Coulomb) for pair in self.contacts):
-            found.append(Effect("Coulomb friction", "a pair has a friction coefficient above zero"))
-        return tuple(found)
+        return effects_of(self)
+
+    def plan(
+        self,
+        partitions: Mapping[str, np.ndarray] | None = None,
+        *,
+        ranks: int = 1,
+        sensitivity: bool = False,
+    ) -> Plan:
+        """Tell what will be built: unknowns, multipliers, solver, memory.
+
+        Args:
+            partitions: Body name -> subdomain of every cell; by default what `partition` returns.
+            ranks: Number of ranks, if the partition is left open.
+            sensitivity: Whether derivatives by the shape are wanted.
+
+        Example:
+            >>> print(scene.plan())  # doctest: +SKIP
+        """
+        cut = self.partition(ranks) if partitions is None else partitions
+        return make_plan(self, cut, sensitivity=sensitivity)

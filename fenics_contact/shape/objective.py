@@ -59,7 +59,7 @@ class TotalPotential:
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
         """∂J/∂u = K u − f, ∂J/∂X from UFL: half of a(u, u), all of L(u)."""
-        system, u = state.system, state.torn_displacement
+        system, u = state.dual, state.torn_displacement
         by_shape = work_by_shape(forms, system.torn, 0.5 * u, u)
         nothing = np.zeros(len(system.torn.numbering.owned))
         # In equilibrium K u − f = −Bᵀλ.
@@ -90,15 +90,15 @@ class VolumeIntegral:
         body = self._body(state)
         template = forms.functional(self.name, self.integrand, body.material, body.mesh.cell_type, "value")
         total = 0.0
-        for name, space, _, functions in subdomain_fields(state.system.torn, [state.torn_displacement]):
+        for name, space, _, functions in subdomain_fields(state.torn, [state.torn_displacement]):
             if name == self.body:
                 form = template.bind([], body.material.parameters, functions, mesh=space.mesh)
                 total += _dolfinx.assemble_scalar(form)
-        return float(state.system.problem.comm.allreduce(total))
+        return float(state.dual.problem.comm.allreduce(total))
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
         """Differentiate the integral by UFL."""
-        body, torn, u = self._body(state), state.system.torn, state.torn_displacement
+        body, torn, u = self._body(state), state.torn, state.torn_displacement
         cell_type = body.mesh.cell_type
         by_shape, by_displacement = (
             forms.functional(self.name, self.integrand, body.material, cell_type, by)
@@ -155,7 +155,7 @@ class ContactForces:
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
         """Place the user's derivatives on the contact rows."""
-        system, torn = state.system, state.system.torn
+        system, torn = state.dual, state.torn
         value, normal, tangential = self.function(state.contact)
         count = torn.points.count
         if normal.shape != (count,) or tangential.shape != (count, 2):
