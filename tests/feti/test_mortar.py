@@ -208,3 +208,18 @@ def test_folded_slave_facets_are_refused() -> None:
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0.2, 0.2, 0], [0, 1, 0]])
     with pytest.raises(InvalidInputError, match="convex facets on the slave surface, but 1 are folded"):
         mortar_coupling(faceted_surface(points, np.array([[3, 2, 1, 0]])), plate("quads", 2))
+
+
+@kinds
+@pytest.mark.parametrize("between", [0.01, 0.1, 3.0])
+def test_only_the_nearest_of_several_layers_counts(slave_kind: str, master_kind: str, between: float) -> None:
+    slave = plate(slave_kind, 5, up=False, height=0.02)
+    front = plate(master_kind, 6, low=-0.1, high=1.1)
+    back = plate(master_kind, 7, low=-0.3, high=1.4, height=-between)
+    points = np.vstack([back.points, front.points])
+    both = faceted_surface(points, np.vstack([back.facets, front.facets + len(back.points)]))
+    coupling, alone = mortar_coupling(slave, both), mortar_coupling(slave, front)
+    np.testing.assert_allclose(coupling.area, alone.area, rtol=1e-12)
+    weights = np.hstack([np.zeros((len(slave.nodes), len(back.nodes))), alone.weight.toarray()])
+    np.testing.assert_allclose(coupling.weight.toarray(), weights, atol=1e-12)
+    np.testing.assert_allclose(coupling.gap, 0.02, atol=1e-13)

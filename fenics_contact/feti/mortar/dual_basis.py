@@ -21,10 +21,10 @@ References:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy import sparse
+
+from fenics_contact.feti.mortar.cells import Cells
 
 #: Extent of a covered part, as root mean square in local coordinates, below which it is a sliver.
 SLIVER = 1e-4
@@ -37,27 +37,6 @@ CORNERS = {
     3: np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]),
     4: np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),
 }
-
-
-@dataclass(frozen=True)
-class Cells:
-    """Quadrature points on the intersections of slave and master facets.
-
-    Attributes:
-        facet: Slave facet of each cell, numbered 0, 1, … without gaps, shape (n,).
-        pair: Pair of facets of each cell, numbered 0, 1, … without gaps, shape (n,).
-        weight: Weights with the cell's measure, shape (n, q), [length²] or [length].
-        local: Local coordinates on the slave facet, shape (n, q, dim − 1).
-        slave: Shape functions of the slave facet, shape (n, q, corners).
-        master: Shape functions of the master facet, shape (n, q, master corners).
-    """
-
-    facet: np.ndarray
-    pair: np.ndarray
-    weight: np.ndarray
-    local: np.ndarray
-    slave: np.ndarray
-    master: np.ndarray
 
 
 def dual_integrals(cells: Cells) -> tuple[np.ndarray, np.ndarray]:
