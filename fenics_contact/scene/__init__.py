@@ -1,9 +1,37 @@
 """Scenes: bodies, materials, supports, loads and contact pairs."""
 
-from fenics_contact.scene.loads import BodyForce, Load, Support, TotalForce, Traction
-from fenics_contact.scene.materials import IsotropicElasticity, Material, rigid_body_modes
+from fenics_contact.scene.body import Body
+from fenics_contact.scene.loads import (
+    BodyForce,
+    Load,
+    Pressure,
+    SurfaceLoad,
+    ThermalStrain,
+    TotalForce,
+    Traction,
+    VolumeLoad,
+    gravity,
+)
+from fenics_contact.scene.materials import (
+    Elasticity,
+    EnergyModel,
+    IsotropicElasticity,
+    Material,
+    OrthotropicElasticity,
+    OrthotropicPlaneStress,
+    PlaneStrain,
+    PlaneStress,
+    Thermoelastic,
+    Transverse,
+    can_expand,
+    material_axes,
+    rigid_body_modes,
+    strain,
+)
 from fenics_contact.scene.pairs import ContactPair, Coulomb, RigidPlane, Surface, Tresca
-from fenics_contact.scene.scene import Body, Effect, Scene
+from fenics_contact.scene.scene import Effect, Scene
+from fenics_contact.scene.supports import Support
+from fenics_contact.scene.values import Ufl
 
 __all__ = [
     "Body",
@@ -11,15 +39,32 @@ __all__ = [
     "ContactPair",
     "Coulomb",
     "Effect",
+    "Elasticity",
+    "EnergyModel",
     "IsotropicElasticity",
     "Load",
     "Material",
+    "OrthotropicElasticity",
+    "OrthotropicPlaneStress",
+    "PlaneStrain",
+    "PlaneStress",
+    "Pressure",
     "RigidPlane",
     "Scene",
     "Support",
     "Surface",
+    "SurfaceLoad",
+    "ThermalStrain",
+    "Thermoelastic",
     "TotalForce",
     "Traction",
+    "Transverse",
     "Tresca",
+    "Ufl",
+    "VolumeLoad",
+    "can_expand",
+    "gravity",
+    "material_axes",
     "rigid_body_modes",
+    "strain",
 ]

@@ -8,18 +8,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh
-from fenics_contact.scene.loads import BodyForce, Load, Support
-from fenics_contact.scene.materials import Material
+from fenics_contact.scene.body import Body
+from fenics_contact.scene.loads import BodyForce, Load, SurfaceLoad, ThermalStrain
+from fenics_contact.scene.materials import can_expand
 from fenics_contact.scene.pairs import ContactPair, Coulomb, Surface, Tresca
-
-
-@dataclass(frozen=True)
-class Body:
-    """A mesh and what it is made of."""
-
-    mesh: BodyMesh
-    material: Material
+from fenics_contact.scene.supports import Support
 
 
 @dataclass(frozen=True)
@@ -47,15 +40,17 @@ class Scene:
     contacts: Sequence[ContactPair] = field(default=())
 
     def __post_init__(self) -> None:
-        """Refuse names that point to nothing."""
+        """Refuse names that point to nothing, and loads and supports that do not suit their bodies."""
         if not self.bodies:
             raise InvalidInputError(
                 "a scene needs at least one body, got none: pass bodies={'name': Body(...)}"
             )
         for part in (*self.supports, *self.loads):
-            self._require(
-                part.body, None if isinstance(part, BodyForce) else part.surface, type(part).__name__
-            )
+            surface = part.surface if isinstance(part, SurfaceLoad | Support) else None
+            self._require(part.body, surface, type(part).__name__)
+            self._require_components(part)
+            if isinstance(part, ThermalStrain):
+                self._require_expansion(part)
         for pair in self.contacts:
             self._require(pair.slave.body, pair.slave.name, "ContactPair.slave")
             if isinstance(pair.master, Surface):
@@ -75,6 +70,24 @@ class Scene:
                 "use one of them"
             )
 
+    def _require_components(self, part: Load | Support) -> None:
+        """Refuse a vector of another dimension than its body's."""
+        dim = self.bodies[part.body].mesh.dim
+        if isinstance(part.value, tuple) and len(part.value) != dim:
+            needed = "two entries, for x and y, as the body is plane" if dim == 2 else "three, for x, y and z"
+            raise InvalidInputError(
+                f"{type(part).__name__}.value of body {part.body!r} must hold {needed}, got {part.value!r}: "
+                f"give {dim} of them"
+            )
+
+    def _require_expansion(self, load: ThermalStrain) -> None:
+        stiff = [material for material in self.bodies[load.body].materials if not can_expand(material)]
+        if stiff:
+            raise InvalidInputError(
+                f"ThermalStrain needs a thermal expansion of every material of body {load.body!r}, got none "
+                f"for {stiff[0]!r}: give the material its thermal_expansion"
+            )
+
     @property
     def body_names(self) -> tuple[str, ...]:
         """Names of the bodies in the order in which everything is numbered."""
@@ -88,7 +101,7 @@ class Scene:
         """Return the scene with new coordinates for some bodies; topology and names stay.
 
         Args:
-            points: Body name -> coordinates, shape (n_nodes, 3), [length].
+            points: Body name -> coordinates, shape (n_nodes, dim), [length].
 
         Raises:
             InvalidInputError: If a body is unknown, a coordinate is not finite or a cell is inverted.
@@ -106,8 +119,10 @@ class Scene:
             found.append(Effect("prescribed displacement", f"{len(self.supports)} supports"))
         if any(isinstance(load, BodyForce) for load in self.loads):
             found.append(Effect("body force", "a load acts on a volume"))
-        if any(not isinstance(load, BodyForce) for load in self.loads):
+        if any(isinstance(load, SurfaceLoad) for load in self.loads):
             found.append(Effect("surface load", "a load acts on a surface"))
+        if any(isinstance(load, ThermalStrain) for load in self.loads):
+            found.append(Effect("thermal strain", "a temperature changes"))
         if self.contacts:
             found.append(Effect("contact", f"{len(self.contacts)} pairs may touch"))
         if any(pair.has_friction and isinstance(pair.friction, Tresca) for pair in self.contacts):
