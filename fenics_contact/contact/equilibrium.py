@@ -121,7 +121,7 @@ def contact_result(system: DualSystem, solution: DualSolution) -> ContactResult:
     gathered = [torn.numbering.gather(x, rows) for x in (solution.multiplier, solution.residual, step)]
     count, frictional = torn.points.count, torn.frictional
     normal, gap, normal_step = (x[:count] for x in gathered)
-    tau, minus_slip, tangential_step = (x[count:].reshape(-1, 2) for x in gathered)
+    tau, minus_slip, tangential_step = (x[count:].reshape(-1, torn.dim - 1) for x in gathered)
     trial_normal = normal - normal_step * gap
     trial_tangential = tau - tangential_step * minus_slip
     bound = torn.tresca_bound + torn.friction_coefficient * np.maximum(normal[frictional], 0)

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.errors import ConvergenceError, InfeasibleError, together
-from fenics_contact.feti import TornSystem
+from fenics_contact.feti import ContactPoints, TornSystem
 from fenics_contact.feti.dual import BALANCED
 from fenics_contact.scene import rigid_body_modes
 
@@ -33,7 +33,7 @@ def check_held(torn: TornSystem) -> None:
     loads = comm.allreduce(np.array([body.load_wrench(torn) for body in bodies]))
     loads[np.abs(loads) <= BALANCED * comm.allreduce(np.abs(torn.load).sum())] = 0.0
     with together(comm):
-        floating = [index for index, body in enumerate(bodies) if body.support.shape[1] < 6]
+        floating = [index for index, body in enumerate(bodies) if not body.held]
         if comm.rank == 0 and floating:
             _check_balance(torn, [bodies[index] for index in floating], loads[floating])
 
@@ -43,14 +43,15 @@ def _check_balance(torn: TornSystem, bodies: list[_RigidBody], loads: np.ndarray
     if scale == 0.0:
         return
     support = sp.block_diag([body.support for body in bodies])
+    tied = sp.vstack([body.tie_wrenches(torn) for body in bodies])
     contact = sp.vstack([body.contact_wrenches(torn) for body in bodies])
-    ray = _infeasibility_ray(support, contact, -loads.ravel() / scale, torn)
+    ray = _infeasibility_ray(sp.hstack([support, tied]), contact, -loads.ravel() / scale, torn)
     if ray is not None:
-        raise InfeasibleError(_describe(ray.reshape(-1, 6), bodies))
+        raise InfeasibleError(_describe(ray.reshape(len(bodies), -1), bodies, torn.dim))
 
 
 class _RigidBody:
-    """A body seen as rigid: its six modes, and the wrenches of supports, contacts and loads on it."""
+    """A body seen as rigid: its modes, and the wrenches of supports, ties, contacts and loads on it."""
 
     def __init__(self, torn: TornSystem, index: int) -> None:
         tearing = torn.decomposition.tearing
@@ -60,29 +61,44 @@ class _RigidBody:
         held = self._modes[torn.decomposition.fixed[self._nodes]]
         left, size, _ = np.linalg.svd(held.T @ held)
         resisted = size > RANK_TOLERANCE * size[0]
-        #: Wrenches that supports can exert in both directions, shape (6, n), orthonormal columns.
+        #: Wrenches that supports can exert in both directions, shape (n_modes, n), orthonormal columns.
         self.support = left[:, resisted]
 
+    @property
+    def held(self) -> bool:
+        """Whether supports alone resist every motion."""
+        return self.support.shape[1] == self.support.shape[0]
+
     def contact_wrenches(self, torn: TornSystem) -> sp.csr_matrix:
-        """Wrenches of unit normal and tangential multipliers, shape (6, n_contact + 2 n_friction)."""
-        points = torn.points
-        nodes = np.column_stack([points.slave, points.master])
-        weights = np.column_stack([np.ones(points.count), -points.weight])
-        here = (nodes >= self._nodes.start) & (nodes < self._nodes.stop)
-        inside = np.where(here, nodes - self._nodes.start, 0)
-        arms = np.einsum("nk,nkdm->ndm", weights * here, self._modes[inside])
+        """Wrenches of unit normal and tangential multipliers, (n_modes, n_contact + (dim - 1) n_friction)."""
+        points, arms = torn.points, self._arms(torn.points)
         # The contact force on the slave is n λ_N − t τ; the master feels the opposite (negative weights).
         normal = np.einsum("nd,ndm->mn", points.normal, arms)
         slip = -np.einsum("nad,ndm->mna", points.tangents[torn.frictional], arms[torn.frictional])
-        return sp.csr_matrix(np.hstack([normal, slip.reshape(6, -1)]))
+        return sp.csr_matrix(np.hstack([normal, slip.reshape(len(normal), -1)]))
+
+    def tie_wrenches(self, torn: TornSystem) -> sp.csr_matrix:
+        """Wrenches of unit forces at tied points, shape (n_modes, n)."""
+        arms = self._arms(torn.ties)
+        sliding = np.array([tie.sliding for tie in torn.scene.ties], dtype=bool)[torn.ties.pair]
+        bonded = arms[~sliding].reshape(-1, arms.shape[2]).T
+        gliding = np.einsum("nd,ndm->mn", torn.ties.normal[sliding], arms[sliding])
+        return sp.csr_matrix(np.hstack([bonded, gliding]))
 
     def load_wrench(self, torn: TornSystem) -> np.ndarray:
-        """Wrench of the loads on this rank's part of the body, shape (6,)."""
-        wrench = np.zeros(6)
+        """Wrench of the loads on this rank's part of the body, shape (n_modes,)."""
+        count = self._modes.shape[2]
+        wrench = np.zeros(count)
         for subdomain in torn.subdomains:
             if subdomain.mesh.body == self.name:
-                wrench += subdomain.load @ self._modes[subdomain.mesh.nodes].reshape(-1, 6)
+                wrench += subdomain.load @ self._modes[subdomain.mesh.nodes].reshape(-1, count)
         return wrench
+
+    def _arms(self, points: ContactPoints) -> np.ndarray:
+        """Return the jump at each point when the body alone moves, shape (n, dim, n_modes)."""
+        jump = points.jump[:, self._nodes]
+        moved = jump @ self._modes.reshape(self._modes.shape[0], -1)
+        return np.asarray(moved).reshape(points.count, *self._modes.shape[1:])
 
 
 def _infeasibility_ray(
@@ -97,18 +113,19 @@ def _infeasibility_ray(
     n_normal, discs = torn.points.count, len(torn.frictional)
     first = support.shape[1]
     coulomb = torn.tresca_bound == 0.0
-    # Rows −(Ψ, τ1, τ2) of each disc, with Ψ = μ λ_N or a given bound; b − A x must lie in the cone.
-    disc = 3 * np.arange(discs)
-    tau = first + n_normal + np.arange(2 * discs).reshape(-1, 2)
-    rows = np.concatenate([disc[coulomb], disc + 1, disc + 2])
-    columns = np.concatenate([first + torn.frictional[coulomb], tau[:, 0], tau[:, 1]])
-    values = np.concatenate([-torn.friction_coefficient[coulomb], -np.ones(2 * discs)])
-    cone = sp.csr_matrix((values, (rows, columns)), shape=(3 * discs, balance.shape[1]))
-    bound = np.zeros((discs, 3))
+    # Rows −(Ψ, τ) of each disc, with Ψ = μ λ_N or a given bound; b − A x must lie in the cone.
+    width = torn.dim
+    disc = width * np.arange(discs)
+    tau = first + n_normal + np.arange((width - 1) * discs).reshape(-1, width - 1)
+    rows = np.concatenate([disc[coulomb], (disc[:, None] + 1 + np.arange(width - 1)).ravel()])
+    columns = np.concatenate([first + torn.frictional[coulomb], tau.ravel()])
+    values = np.concatenate([-torn.friction_coefficient[coulomb], -np.ones(tau.size)])
+    cone = sp.csr_matrix((values, (rows, columns)), shape=(width * discs, balance.shape[1]))
+    bound = np.zeros((discs, width))
     bound[:, 0] = torn.tresca_bound
     press = -sp.identity(balance.shape[1], format="csr")[first : first + n_normal]
     cones = [clarabel.ZeroConeT(len(right)), clarabel.NonnegativeConeT(n_normal)]
-    cones += [clarabel.SecondOrderConeT(3)] * discs
+    cones += [clarabel.SecondOrderConeT(width)] * discs
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     solution = clarabel.DefaultSolver(
@@ -130,13 +147,15 @@ def _infeasibility_ray(
     return None
 
 
-def _describe(motion: np.ndarray, bodies: list[_RigidBody]) -> str:
+def _describe(motion: np.ndarray, bodies: list[_RigidBody], dim: int) -> str:
     worst = int(np.argmax(np.linalg.norm(motion, axis=1)))
     # The certificate points against the right side, which is minus the load.
     free = np.round(motion[worst] / np.abs(motion[worst]).max(), 3) + 0.0  # no -0
-    parts = [("translation", free[:3]), ("rotation", free[3:])]
+    parts = [("translation", free[:dim]), ("rotation", free[dim:])]
     words = " with ".join(
-        f"{kind} ({part[0]:.2g}, {part[1]:.2g}, {part[2]:.2g})" for kind, part in parts if np.any(part)
+        f"{kind} ({', '.join(f'{component:.2g}' for component in part)})"
+        for kind, part in parts
+        if np.any(part)
     )
     return (
         f"every body must be held by supports, contact or friction, but body {bodies[worst].name!r} can move "

@@ -25,11 +25,11 @@ class ContactResult:
     Attributes:
         points: Where the contact points are and how they are directed.
         normal_force: λ_N ≥ 0, shape (n,), [force].
-        friction_force: τ in the points' tangents, zero without friction, shape (n, 2), [force]. It acts on
-            the master; the slave feels the opposite.
+        friction_force: τ in the points' tangents, zero without friction, shape (n, dim - 1), [force]. It
+            acts on the master; the slave feels the opposite.
         slip_bound: Largest friction force, shape (n,), [force].
         gap: Distance after deformation, shape (n,), [length].
-        slip: Relative tangential displacement in the points' tangents, shape (n, 2), [length].
+        slip: Relative tangential displacement in the points' tangents, shape (n, dim - 1), [length].
         status: `Status` of each point, shape (n,). A closed point without friction slips.
     """
 
@@ -48,7 +48,7 @@ class ContactResult:
 
     @property
     def force(self) -> np.ndarray:
-        """Force on the slave at each point in space, n λ_N − t τ, shape (n, 3), [force]."""
+        """Force on the slave at each point in space, n λ_N − t τ, shape (n, dim), [force]."""
         points = self.points
         sliding = np.einsum("na,nad->nd", self.friction_force, points.tangents)
         return self.normal_force[:, None] * points.normal - sliding

@@ -19,6 +19,7 @@ from fenics_contact.contact.fields import (
 )
 from fenics_contact.contact.result import ContactResult
 from fenics_contact.feti import DualSystem
+from fenics_contact.feti.temperature import temperature_of
 from fenics_contact.qp import DualSolution
 from fenics_contact.scene import Scene
 
@@ -63,10 +64,13 @@ class State:
     @cached_property
     def von_mises(self) -> dict[str, Any]:
         """Von Mises stress of each body, constant on cells, [force / length²]. Collective on first use."""
-        return {name: von_mises(self.displacement[name], body) for name, body in self.scene.bodies.items()}
+        return {
+            name: von_mises(self.displacement[name], body, temperature_of(self.scene.loads, name))
+            for name, body in self.scene.bodies.items()
+        }
 
     def gather_displacement(self, body: str) -> np.ndarray:
-        """Return the displacement of a body's nodes on every rank, (n_nodes, 3), [length]. Collective."""
+        """Return the displacement of a body's nodes on every rank, (n_nodes, dim), [length]. Collective."""
         decomposition = self.system.torn.decomposition
         mine = nodal_displacement(decomposition, body, self.scene.bodies[body], self.torn_displacement)
         known = ~np.isnan(mine[:, 0])
@@ -87,7 +91,7 @@ class State:
             "subdomains": torn.decomposition.tearing.n_subdomains,
             "equality_multipliers": torn.n_equality,
             "normal_multipliers": torn.points.count,
-            "tangential_multipliers": 2 * len(torn.frictional),
+            "tangential_multipliers": torn.tangential_rows.size,
             "f_products": self.solution.products,
             "solver_steps": self.solution.iterations,
         }

@@ -16,18 +16,22 @@ def carried_over(old: DualSystem, solution: DualSolution, new: DualSystem) -> np
     """
     before, after = old.torn, new.torn
     start = np.zeros(len(after.numbering.owned))
-    gluing_old = before.numbering.owned < before.n_equality
-    gluing_new = after.numbering.owned < after.n_equality
+    # Ties of a moved scene may have other points, gluing rows stay what they are.
+    same = before.n_equality == after.n_equality
+    gluing_old = before.numbering.owned < (before.n_equality if same else before.n_gluing)
+    gluing_new = after.numbering.owned < (after.n_equality if same else after.n_gluing)
     start[gluing_new] = solution.multiplier[gluing_old]
     normal = before.numbering.gather(solution.multiplier, before.normal_rows)
-    tau = before.numbering.gather(solution.multiplier, before.tangential_rows.ravel()).reshape(-1, 2)
+    tau = before.numbering.gather(solution.multiplier, before.tangential_rows.ravel()).reshape(
+        -1, before.dim - 1
+    )
     match = _matches(before.points, after.points)
     found = match >= 0
     values = np.zeros(after.points.count)
     values[found] = normal[match[found]]
     _put(new, start, after.normal_rows, values)
     if len(after.frictional):
-        friction = np.zeros((before.points.count, 3))
+        friction = np.zeros((before.points.count, before.dim))
         friction[before.frictional] = np.einsum("na,nad->nd", tau, before.points.tangents[before.frictional])
         in_space = np.where(found[:, None], friction[match], 0.0)[after.frictional]
         turned = np.einsum("nad,nd->na", after.points.tangents[after.frictional], in_space)

@@ -1,6 +1,6 @@
 """Total FETI: torn systems, contact rows, the dual problem and its operators."""
 
-from fenics_contact.feti.contact_search import ContactPoints
+from fenics_contact.feti.contact_points import ContactPoints
 from fenics_contact.feti.decomposition import Decomposition, decompose
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.inverse import LocalKind

@@ -27,6 +27,12 @@ class Composition:
     materials: tuple[Material, ...]
     cells: dict[int, np.ndarray] | None = None
 
+    def same_as(self, other: Composition) -> bool:
+        """Return whether the other has the same materials at the same cells."""
+        if self.materials != other.materials or self.cells is None or other.cells is None:
+            return self.materials == other.materials and self.cells is other.cells
+        return all(np.array_equal(cells, other.cells[tag]) for tag, cells in self.cells.items())
+
     @property
     def parameters(self) -> tuple[float, ...]:
         """Numbers for the constants that `integrate` makes."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from fenics_contact.feti.cost_model import expected_seconds
+from fenics_contact.linalg.cost_model import expected_seconds
 from fenics_contact.scene import Scene
 
 
@@ -19,20 +20,29 @@ class Tearing:
     subdomains. A *copy* is a pair (node, subdomain); copies are sorted by node, then by subdomain.
 
     Attributes:
+        dim: Displacement components of a node.
         body_names: Names of the bodies, in numbering order.
         node_offset: First node of each body and the total, shape (n_bodies + 1,).
         subdomain_offset: First subdomain of each body and the total, shape (n_bodies + 1,).
         subdomain_rank: Owner of each subdomain, shape (n_subdomains,).
         first_copy: First copy of each node and the total, shape (n_nodes + 1,).
         copy_subdomain: Subdomain of each copy, shape (n_copies,).
+        copy_stiffness: Typical stiffness that each copy feels, the largest being one, shape (n_copies,).
     """
 
+    dim: int
     body_names: tuple[str, ...]
     node_offset: np.ndarray
     subdomain_offset: np.ndarray
     subdomain_rank: np.ndarray
     first_copy: np.ndarray
     copy_subdomain: np.ndarray
+    copy_stiffness: np.ndarray
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes of all bodies."""
+        return int(self.node_offset[-1])
 
     @property
     def multiplicity(self) -> np.ndarray:
@@ -42,7 +52,14 @@ class Tearing:
     @property
     def copy_node(self) -> np.ndarray:
         """Node of each copy, shape (n_copies,)."""
-        return np.repeat(np.arange(len(self.first_copy) - 1), self.multiplicity)
+        return np.repeat(np.arange(self.n_nodes), self.multiplicity)
+
+    @cached_property
+    def copy_share(self) -> np.ndarray:
+        """Stiffness of each copy relative to all copies of its node, shape (n_copies,)."""
+        return self.copy_stiffness / np.repeat(
+            np.add.reduceat(self.copy_stiffness, self.first_copy[:-1]), self.multiplicity
+        )
 
     @property
     def n_subdomains(self) -> int:
@@ -54,7 +71,9 @@ class Tearing:
         return nodes + self.node_offset[self.body_names.index(body)]
 
 
-def tear(scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int) -> Tearing:
+def tear(
+    scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int, stiffness: Mapping[str, np.ndarray]
+) -> Tearing:
     """Cut the bodies along a partition of their cells and deal the subdomains out to ranks.
 
     Args:
@@ -62,41 +81,48 @@ def tear(scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int) -> Tear
         partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
         ranks: Number of ranks; each gets about equally much work, of every body a run of consecutive
             subdomains.
+        stiffness: Body name -> typical nodal stiffness of every cell, shape (n_cells,), [force / length].
     """
     names = scene.body_names
     counts = [int(partitions[name].max()) + 1 for name in names]
     node_offset = np.cumsum([0] + [scene.bodies[name].mesh.n_nodes for name in names])
     subdomain_offset = np.cumsum([0, *counts])
     total = int(subdomain_offset[-1])
-    pairs = []
+    keys, sums = [], []
     for index, name in enumerate(names):
         cells = scene.bodies[name].mesh.cells
         subdomain = partitions[name].astype(np.int64) + subdomain_offset[index]
-        keys = (cells + node_offset[index]) * total + subdomain[:, None]
-        pairs.append(np.unique(keys))
-    keys = np.concatenate(pairs)
-    multiplicity = np.bincount(keys // total, minlength=int(node_offset[-1]))
-    costs = _costs(keys % total, multiplicity[keys // total] > 1, total)
+        every = (cells + node_offset[index]) * total + subdomain[:, None]
+        found, where = np.unique(every.ravel(), return_inverse=True)
+        weights = np.repeat(stiffness[name], cells.shape[1])
+        keys.append(found)
+        sums.append(np.bincount(where.ravel(), weights) / np.bincount(where.ravel()))
+    key, stiff = np.concatenate(keys), np.concatenate(sums)
+    multiplicity = np.bincount(key // total, minlength=int(node_offset[-1]))
+    costs = _costs(key % total, multiplicity[key // total] > 1, total, scene.dim)
     return Tearing(
+        scene.dim,
         names,
         node_offset,
         subdomain_offset,
         _deal_out(np.split(costs, subdomain_offset[1:-1]), ranks),
         np.concatenate([[0], np.cumsum(multiplicity)]),
-        keys % total,
+        key % total,
+        stiff / stiff.max(),
     )
 
 
-def _costs(copy_subdomain: np.ndarray, shared: np.ndarray, count: int) -> np.ndarray:
+def _costs(copy_subdomain: np.ndarray, shared: np.ndarray, count: int, dim: int) -> np.ndarray:
     """Return what each subdomain is expected to cost, shape (n_subdomains,), [s].
 
     Args:
         copy_subdomain: Subdomain of each copy of a node.
         shared: Whether other subdomains hold that node too.
         count: Number of subdomains.
+        dim: Displacement components of a node.
     """
-    size = 3 * np.bincount(copy_subdomain, minlength=count)
-    interface = 3 * np.bincount(copy_subdomain[shared], minlength=count)
+    size = dim * np.bincount(copy_subdomain, minlength=count)
+    interface = dim * np.bincount(copy_subdomain[shared], minlength=count)
     return np.array([expected_seconds(int(n), int(b)) for n, b in zip(size, interface, strict=True)])
 
 

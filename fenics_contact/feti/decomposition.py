@@ -12,8 +12,8 @@ from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.condensation import Condensations
 from fenics_contact.feti.copies import Tearing, tear
 from fenics_contact.feti.forms import FormLibrary
-from fenics_contact.feti.gluing import gluing_rows, prescribed_displacements
-from fenics_contact.feti.rows import Rows
+from fenics_contact.feti.gluing import GluingRows, gluing_rows, prescribed_displacements
+from fenics_contact.feti.nodal_stiffness import cell_stiffness
 from fenics_contact.feti.subdomain import SubdomainMesh, cut_out
 from fenics_contact.geometry import check_face_connected
 from fenics_contact.scene import Scene
@@ -28,10 +28,9 @@ class Decomposition:
         tearing: Numbering of nodes, copies and subdomains, replicated.
         partitions: Body name -> subdomain of every cell within the body, replicated.
         meshes: This rank's subdomain meshes, ascending by number.
-        block_offset: First block of three dofs of each of them in this rank's torn vector, and the total.
+        block_offset: First block of dofs of each of them in this rank's torn vector, and the total.
         copy_block: Block of each copy in this rank's torn vector, −1 where another rank holds it.
         gluing: Gluing and Dirichlet rows of all subdomains.
-        fixed: Whether a component of a node is prescribed, shape (n_nodes, 3).
         forms: Compiled forms.
         condensations: Symbolic factorisations of this rank's subdomains.
     """
@@ -42,20 +41,24 @@ class Decomposition:
     meshes: tuple[SubdomainMesh, ...]
     block_offset: np.ndarray
     copy_block: np.ndarray
-    gluing: Rows
-    fixed: np.ndarray
+    gluing: GluingRows
     forms: FormLibrary
     condensations: Condensations = field(default_factory=Condensations)
 
     @property
     def torn_size(self) -> int:
         """Length of this rank's torn vectors."""
-        return 3 * int(self.block_offset[-1])
+        return self.tearing.dim * int(self.block_offset[-1])
 
     @property
     def torn_unknowns(self) -> int:
         """Number of displacement unknowns of all subdomains of all ranks."""
-        return 3 * len(self.tearing.copy_subdomain)
+        return self.tearing.dim * len(self.tearing.copy_subdomain)
+
+    @property
+    def fixed(self) -> np.ndarray:
+        """Whether a component of a node is prescribed, shape (n_nodes, dim), replicated."""
+        return self.gluing.fixed
 
 
 def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm) -> Decomposition:
@@ -72,26 +75,24 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
     """
     with together(comm):
         _check_partitions(scene, partitions)
-        tearing = tear(scene, partitions, comm.size)
+    forms = FormLibrary(comm)
+    forms.prepare(scene)
+    with together(comm):
+        tearing = tear(scene, partitions, comm.size, cell_stiffness(scene, forms))
         if tearing.n_subdomains < comm.size:
             raise InvalidInputError(
                 f"every rank needs a subdomain, but {comm.size} ranks share {tearing.n_subdomains} "
                 "subdomains: run on fewer ranks or cut the bodies finer"
             )
-    forms = FormLibrary(comm)
-    forms.prepare(scene)
     with together(comm):
         meshes = tuple(
             _cut(scene, partitions, tearing, int(number))
             for number in np.flatnonzero(tearing.subdomain_rank == comm.rank)
         )
-        gluing = gluing_rows(scene, tearing)
-        fixed, _ = prescribed_displacements(scene, tearing)
+        gluing = gluing_rows(tearing, ~np.isnan(prescribed_displacements(scene, tearing)))
     block_offset = np.cumsum([0] + [len(mesh.nodes) for mesh in meshes])
     copy_block = _copy_blocks(tearing, meshes, block_offset)
-    return Decomposition(
-        comm, tearing, dict(partitions), meshes, block_offset, copy_block, gluing, fixed, forms
-    )
+    return Decomposition(comm, tearing, dict(partitions), meshes, block_offset, copy_block, gluing, forms)
 
 
 def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> None:
@@ -114,7 +115,7 @@ def _cut(scene: Scene, partitions: Mapping[str, np.ndarray], tearing: Tearing, n
     index = int(np.searchsorted(tearing.subdomain_offset, number, side="right")) - 1
     name = tearing.body_names[index]
     cells = np.flatnonzero(partitions[name] == number - tearing.subdomain_offset[index])
-    return cut_out(number, name, scene.bodies[name], cells, scene.loads)
+    return cut_out(number, name, scene.bodies[name], cells)
 
 
 def _copy_blocks(tearing: Tearing, meshes: tuple[SubdomainMesh, ...], block_offset: np.ndarray) -> np.ndarray:

@@ -18,9 +18,9 @@ REGULARISATION = 1e-4
 class DirichletPreconditioner:
     """M = (B D⁻¹ Bᵀ)⁻¹ B D⁻¹ S D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹, S the Schur complement of each K_s on its interface.
 
-    D is a typical stiffness of each body, so that of two bodies in contact the softer one gives way. Gluing
-    and Dirichlet rows are orthonormal and stay within a body: B D⁻¹ Bᵀ is diagonal but for the contact rows,
-    where it is factored.
+    D is the typical stiffness that each copy of a node feels, so that of two neighbours the softer one gives
+    way. Gluing and Dirichlet rows are orthogonal in D⁻¹: B D⁻¹ Bᵀ is diagonal but for the rows of contacts
+    and ties, where it is factored.
 
     References:
         Farhat, Roux: An unconventional domain decomposition method for an efficient parallel solution of
@@ -35,23 +35,23 @@ class DirichletPreconditioner:
         B: sp.csr_matrix,
         compliance: np.ndarray,
         numbering: DualNumbering,
-        n_equality: int,
+        n_gluing: int,
     ) -> None:
         """Factor the contact block of B D⁻¹ Bᵀ. Collective.
 
         Args:
             inverse: The factored subdomains.
             B: This rank's part of B on the interface, shape (n_local_rows, n_interface).
-            compliance: Diagonal of D⁻¹, shape (n_interface,), the same for all copies of a node.
+            compliance: Diagonal of D⁻¹, shape (n_interface,), the same for all components of a node.
             numbering: Owners and exchange of multipliers.
-            n_equality: Number of gluing and Dirichlet rows; contact rows have the higher numbers.
+            n_gluing: Number of gluing and Dirichlet rows; rows of ties and contacts have the higher numbers.
         """
         self._inverse, self._numbering = inverse, numbering
         self._B = (B @ sp.diags(compliance)).tocsr()
         self._Bt = self._B.T.tocsr()
-        diagonal = numbering.to_owned(B.multiply(self._B).sum(axis=1).A1)
-        self._equality = 1.0 / np.where(numbering.owned < n_equality, diagonal, 1.0)
-        self._contact = _ContactBlock(B, self._B, numbering, n_equality)
+        diagonal = numbering.to_owned(np.asarray(B.multiply(self._B).sum(axis=1)).ravel())
+        self._equality = 1.0 / np.where(numbering.owned < n_gluing, diagonal, 1.0)
+        self._contact = _ContactBlock(B, self._B, numbering, n_gluing)
 
     def __call__(self, residual: np.ndarray) -> np.ndarray:
         """Return M r for an owned vector. Collective."""
@@ -72,16 +72,16 @@ class _ContactBlock:
     """
 
     def __init__(
-        self, B: sp.csr_matrix, weighted: sp.csr_matrix, numbering: DualNumbering, n_equality: int
+        self, B: sp.csr_matrix, weighted: sp.csr_matrix, numbering: DualNumbering, n_gluing: int
     ) -> None:
         self._comm = numbering.comm
-        self._owned = np.flatnonzero(numbering.owned >= n_equality)
-        self._place = numbering.owned[self._owned] - n_equality
-        self._count = numbering.total - n_equality
+        self._owned = np.flatnonzero(numbering.owned >= n_gluing)
+        self._place = numbering.owned[self._owned] - n_gluing
+        self._count = numbering.total - n_gluing
         if self._count == 0:
             return
-        mine = np.flatnonzero(numbering.local_rows >= n_equality)
-        place = numbering.local_rows[mine] - n_equality
+        mine = np.flatnonzero(numbering.local_rows >= n_gluing)
+        place = numbering.local_rows[mine] - n_gluing
         share = (B[mine] @ weighted[mine].T).tocoo()
         entries = (share.data, place[share.row], place[share.col])
         value, row, column = (

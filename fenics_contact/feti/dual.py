@@ -64,7 +64,7 @@ class DualSystem:
             coarse = CoarseSpace(comm, self._coarse_columns(), self._resultants(comm))
         with timer.phase("preconditioner"):
             preconditioner = DirichletPreconditioner(
-                self.inverse, self._B_interface, self._compliance(), torn.numbering, torn.n_equality
+                self.inverse, self._B_interface, self._compliance(), torn.numbering, torn.n_gluing
             )
             diagonal = self._diagonal()
         d = self.jump(self.inverse(torn.load)) - torn.right
@@ -134,20 +134,12 @@ class DualSystem:
         return np.flatnonzero(self.positions(self.torn.tangential_rows)[:, 0] >= 0)
 
     def _compliance(self) -> np.ndarray:
-        """Return 1 / the mean diagonal stiffness of its body at each interface dof. Collective."""
-        tearing = self.torn.decomposition.tearing
-        body_of = np.searchsorted(tearing.subdomain_offset, np.arange(tearing.n_subdomains), side="right") - 1
-        sums = np.zeros((2, len(tearing.body_names)))
-        for subdomain in self.torn.subdomains:
-            size = subdomain.mesh.size
-            sums[:, body_of[subdomain.mesh.number]] += size * subdomain.typical_stiffness, size
-        total, count = self.torn.numbering.comm.allreduce(sums)
-        # Only the ratios between bodies matter.
-        weight = (count / total) / (count / total).max()
-        of_dof = np.repeat(
-            weight[body_of[[s.mesh.number for s in self.torn.subdomains]]], np.diff(self.inverse.offset)
-        )
-        return np.asarray(of_dof[self.inverse.interface])
+        """Return 1 / the typical stiffness that each interface dof feels."""
+        decomposition = self.torn.decomposition
+        here = decomposition.copy_block >= 0
+        of_block = np.empty(int(decomposition.block_offset[-1]))
+        of_block[decomposition.copy_block[here]] = 1.0 / decomposition.tearing.copy_stiffness[here]
+        return of_block[self.inverse.interface // self.torn.dim]
 
     def _diagonal(self) -> np.ndarray:
         """Return the diagonal of F on contact rows, one elsewhere, owned. Collective."""

@@ -90,7 +90,7 @@ def fixing_nodes(points: np.ndarray, count: int = FIXING_NODES) -> np.ndarray:
     """Pick well-spread nodes: each next one is farthest from those already taken.
 
     Args:
-        points: Coordinates, shape (n, 3).
+        points: Coordinates, shape (n, dim).
         count: How many to pick.
 
     Returns:
@@ -112,9 +112,9 @@ def regularised(stiffness: sp.csr_matrix, kernel: np.ndarray, points: np.ndarray
     entry of K.
 
     Args:
-        stiffness: K, shape (3 n, 3 n), block b of three dofs at ``points[b]``.
-        kernel: Columns that span the kernel of K, shape (3 n, n_modes).
-        points: Coordinates by block, shape (n, 3).
+        stiffness: K, shape (dim n, dim n), block b of dim dofs at ``points[b]``.
+        kernel: Columns that span the kernel of K, shape (dim n, n_modes).
+        points: Coordinates by block, shape (n, dim).
 
     References:
         Brzobohatý, Dostál, Kozubek, Kovář, Markopoulos: Cholesky decomposition with fixing nodes to
@@ -122,7 +122,8 @@ def regularised(stiffness: sp.csr_matrix, kernel: np.ndarray, points: np.ndarray
         Int. J. Numer. Meth. Engng 88 (2011) 493-509.
     """
     nodes = np.sort(fixing_nodes(points))
-    dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
+    dim = points.shape[1]
+    dofs = (dim * nodes[:, None] + np.arange(dim)).ravel()
     basis, _ = np.linalg.qr(kernel[dofs])
     block = stiffness.diagonal().max() * (basis @ basis.T)
     rows, columns = np.repeat(dofs, len(dofs)), np.tile(dofs, len(dofs))

@@ -75,7 +75,13 @@ class FormLibrary:
         return template.bind([space, space], parts.parameters, cells=parts.cells)
 
     def load(
-        self, load: Load, parts: Composition, cell_type: str, space: Any, points: np.ndarray, facets: Any = None
+        self,
+        load: Load,
+        parts: Composition,
+        cell_type: str,
+        space: Any,
+        points: np.ndarray,
+        facets: Any = None,
     ) -> Any:
         """Return the linear form of ``load`` bound to ``space``.
 
@@ -140,12 +146,5 @@ def as_tractions(scene: Scene) -> tuple[Load, ...]:
 
 def _spread(scene: Scene, load: TotalForce) -> Traction:
     facets = scene.facets(Surface(load.body, load.surface))
-    area = float(_areas(scene.bodies[load.body].mesh.points, facets).sum())
+    area = float(quadrature_areas(scene.bodies[load.body].mesh.points, facets).sum())
     return Traction(load.body, load.surface, tuple(component / area for component in load.value))
-
-
-def _areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
-    """Return areas of facets, in the plane lengths of edges."""
-    if facets.shape[1] == 2:
-        return np.asarray(np.linalg.norm(points[facets[:, 1]] - points[facets[:, 0]], axis=1))
-    return quadrature_areas(points, facets)

@@ -1,8 +1,8 @@
-"""Orthonormal rows that glue subdomains together and prescribe displacements (Total FETI)."""
+"""Rows that glue subdomains together and prescribe displacements (Total FETI)."""
 
 from __future__ import annotations
 
-from functools import lru_cache
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,50 +12,92 @@ from fenics_contact.feti.rows import Rows
 from fenics_contact.scene import Scene, Surface
 
 
-def prescribed_displacements(scene: Scene, tearing: Tearing) -> tuple[np.ndarray, np.ndarray]:
+def prescribed_displacements(scene: Scene, tearing: Tearing) -> np.ndarray:
     """Collect the supports node by node.
 
     Returns:
-        Whether a component is prescribed, shape (n_nodes, 3), and its value, same shape, [length].
+        The value of each prescribed component, NaN where it is free, shape (n_nodes, dim), [length].
 
     Raises:
         InvalidInputError: If two supports prescribe different values for one component of a node.
     """
-    n_nodes = int(tearing.node_offset[-1])
-    fixed, value = np.zeros((n_nodes, 3), dtype=bool), np.zeros((n_nodes, 3))
+    prescribed = np.full((tearing.n_nodes, scene.dim), np.nan)
     for support in scene.supports:
-        facets = scene.facets(Surface(support.body, support.surface))
-        nodes = tearing.global_nodes(support.body, np.unique(facets))
-        for component, given in enumerate(support.value):
-            if given is None:
-                continue
-            clash = fixed[nodes, component] & (value[nodes, component] != given)
-            if clash.any():
-                raise InvalidInputError(
-                    f"supports must agree where they meet: component {component} of {int(clash.sum())} nodes "
-                    f"of surface {support.surface!r} of body {support.body!r} already has another value than "
-                    f"{given}: leave the component free (None) in one of them"
-                )
-            fixed[nodes, component], value[nodes, component] = True, given
-    return fixed, value
+        own = np.unique(scene.facets(Surface(support.body, support.surface)))
+        nodes = tearing.global_nodes(support.body, own)
+        given, known = support.values(scene.bodies[support.body].mesh.points[own]), prescribed[nodes]
+        clash = ~np.isnan(known) & ~np.isnan(given) & (known != given)
+        if clash.any():
+            node, component = np.argwhere(clash)[0]
+            raise InvalidInputError(
+                f"supports must agree where they meet: component {component} of "
+                f"{int(clash[:, component].sum())} nodes of surface {support.surface!r} of body "
+                f"{support.body!r} already has another value than {given[node, component]:g}: leave the "
+                "component free (None) in one of them"
+            )
+        prescribed[nodes] = np.where(np.isnan(given), known, given)
+    return prescribed
 
 
-@lru_cache(maxsize=64)
-def helmert(copies: int) -> np.ndarray:
-    """Return orthonormal rows that vanish on equal copies, shape (copies - 1, copies)."""
-    rows = np.tril(np.ones((copies - 1, copies)))
-    k = np.arange(1, copies)
-    rows[k - 1, k] = -k
-    return rows / np.sqrt(k * (k + 1.0))[:, None]
+def weighted_helmert(stiffness: np.ndarray) -> np.ndarray:
+    """Return rows of unit length that vanish on equal copies and are orthogonal in the inner product D⁻¹.
 
+    Row k weighs the mean of the first k copies, each with its stiffness, against the next one; with equal
+    stiffnesses these are the rows of a Helmert matrix.
 
-def gluing_rows(scene: Scene, tearing: Tearing) -> Rows:
-    """Build the equality rows B_E u = c_E with B_E B_Eᵀ = I.
+    Args:
+        stiffness: D of the copies of each node, shape (n, m).
 
-    A free component of a node with m copies gets m − 1 gluing rows (a Helmert matrix, c = 0). A
-    prescribed one gets m rows, one for each copy, which glue it as well.
+    Returns:
+        Shape (n, m − 1, m).
     """
-    fixed, value = prescribed_displacements(scene, tearing)
+    count, copies = stiffness.shape
+    rows = np.zeros((count, copies - 1, copies))
+    for k in range(1, copies):  # a few copies, all nodes at once
+        rows[:, k - 1, :k] = stiffness[:, :k] / stiffness[:, :k].sum(axis=1, keepdims=True)
+        rows[:, k - 1, k] = -1.0
+    return rows / np.linalg.norm(rows, axis=2, keepdims=True)
+
+
+@dataclass(frozen=True)
+class GluingRows:
+    """The equality rows that hold torn bodies together and at their supports.
+
+    Attributes:
+        rows: The rows; their right side is filled from the supports of a load, see `right_side`.
+        dof: Node and component that each row belongs to, as node · dim + component, shape (n_rows,).
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+    """
+
+    rows: Rows
+    dof: np.ndarray
+    fixed: np.ndarray
+
+    def right_side(self, prescribed: np.ndarray) -> np.ndarray:
+        """Return c of the rows for prescribed displacements, as `prescribed_displacements` returns them.
+
+        Raises:
+            InvalidInputError: If other components are prescribed than those that the rows were built for.
+        """
+        if not np.array_equal(~np.isnan(prescribed), self.fixed):
+            raise InvalidInputError(
+                "the supports of a scene may change their values, not what they hold: "
+                f"{np.count_nonzero(self.fixed)} components were prescribed when the scene was decomposed, "
+                f"now {np.count_nonzero(~np.isnan(prescribed))} or others are: decompose it again"
+            )
+        return np.nan_to_num(prescribed).ravel()[self.dof]
+
+
+def gluing_rows(tearing: Tearing, fixed: np.ndarray) -> GluingRows:
+    """Build the equality rows B_E u = c_E, for which B_E D⁻¹ B_Eᵀ is diagonal, D the stiffness of copies.
+
+    A free component of a node with m copies gets m − 1 gluing rows of unit length (see `weighted_helmert`,
+    c = 0). A prescribed one gets m rows, one for each copy, which glue it as well.
+
+    Args:
+        tearing: Copies of the nodes.
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+    """
     multiplicity = tearing.multiplicity
     counts = np.where(fixed, multiplicity[:, None], multiplicity[:, None] - 1)
     start = np.concatenate([[0], np.cumsum(counts.ravel())])
@@ -68,16 +110,16 @@ def gluing_rows(scene: Scene, tearing: Tearing) -> Rows:
     within = np.arange(len(dof)) - start[dof]
     is_fixed = fixed.ravel()[dof]
     # A gluing row belongs to the rank of the node's first copy, a prescribing row to that of its own copy.
-    anchor = tearing.first_copy[dof // 3] + np.where(is_fixed, within, 0)
+    anchor = tearing.first_copy[dof // tearing.dim] + np.where(is_fixed, within, 0)
     owner = tearing.subdomain_rank[tearing.copy_subdomain[anchor]]
-    return Rows(row, copy, component, entry, value.ravel()[dof], owner)
+    return GluingRows(Rows(row, copy, component, entry, np.zeros(len(dof)), owner), dof, fixed)
 
 
 def _prescribed_entries(tearing: Tearing, fixed: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, ...]:
     node, component = np.nonzero(fixed)
     copies = tearing.multiplicity[node]
     within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
-    row = np.repeat(start[3 * node + component], copies) + within
+    row = np.repeat(start[tearing.dim * node + component], copies) + within
     copy = np.repeat(tearing.first_copy[node], copies) + within
     return row, copy, np.repeat(component, copies), np.ones(len(row))
 
@@ -86,9 +128,8 @@ def _glued_entries(
     tearing: Tearing, fixed: np.ndarray, start: np.ndarray, copies: int
 ) -> tuple[np.ndarray, ...]:
     node, component = np.nonzero(~fixed & (tearing.multiplicity == copies)[:, None])
-    matrix = helmert(copies)
-    k, j = np.nonzero(matrix)
-    row = start[3 * node + component][:, None] + k
-    copy = tearing.first_copy[node][:, None] + j
-    entry = np.broadcast_to(matrix[k, j], row.shape)
-    return row.ravel(), copy.ravel(), np.repeat(component, len(k)), entry.ravel()
+    copy_of = tearing.first_copy[node][:, None] + np.arange(copies)
+    matrix = weighted_helmert(tearing.copy_stiffness[copy_of])
+    k, j = np.nonzero(np.tri(copies - 1, copies, 1))
+    row = start[tearing.dim * node + component][:, None] + k
+    return row.ravel(), copy_of[:, j].ravel(), np.repeat(component, len(k)), matrix[:, k, j].ravel()

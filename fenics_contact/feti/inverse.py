@@ -10,11 +10,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.feti.condensation import Condensations
-from fenics_contact.feti.cost_model import prefers_explicit
 from fenics_contact.feti.explicit import ExplicitOperator
 from fenics_contact.feti.implicit import ImplicitOperator
 from fenics_contact.feti.local import LocalOperator, interface_dofs
 from fenics_contact.feti.subdomain import Subdomain
+from fenics_contact.linalg.cost_model import prefers_explicit
 
 
 class LocalKind(Enum):
@@ -115,8 +115,8 @@ class TornInverse:
     def _operator_of(
         self, index: int, subdomain: Subdomain, interface: np.ndarray, kind: LocalKind
     ) -> LocalOperator | None:
-        """Return the operator of a subdomain that is the same object as here, with the same interface."""
-        same = self._subdomains[index] is subdomain and self._kind is kind
+        """Return the operator of a subdomain that has the same matrix as here, and the same interface."""
+        same = self._subdomains[index].matrix is subdomain.matrix and self._kind is kind
         return self.operators[index] if same and np.array_equal(self._local[index], interface) else None
 
 

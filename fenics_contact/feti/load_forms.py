@@ -46,7 +46,7 @@ class Symbol:
         self.constants: tuple[Any, ...] = ()
         self.coefficients: tuple[Any, ...] = ()
         if isinstance(load.value, Ufl):
-            self.expression = _from_ufl(load, load.value, cell_type)
+            self.expression = from_ufl(load, load.value, cell_type)
         elif callable(load.value):
             nodal = _dolfinx.nodal_space if is_scalar(load) else _dolfinx.displacement_space
             self.expression = ufl.Coefficient(nodal(cell_type), count=FIRST_COUNT + number)
@@ -56,7 +56,8 @@ class Symbol:
             self.expression = self.constants[0] if is_scalar(load) else ufl.as_vector(list(self.constants))
 
 
-def _from_ufl(load: Load, value: Ufl, cell_type: str) -> Any:
+def from_ufl(load: Load, value: Ufl, cell_type: str) -> Any:
+    """Return a value given as `Ufl`, written on the template, after a check of its shape."""
     dim = _dolfinx.dimension(cell_type)
     shape = () if is_scalar(load) else (dim,)
     found = value.function(ufl.SpatialCoordinate(_dolfinx.template(cell_type)))

@@ -41,11 +41,11 @@ def interface_dofs(touched: np.ndarray, kernel: np.ndarray, points: np.ndarray) 
     Args:
         touched: Marks of the dofs, shape (n,).
         kernel: Columns that span the kernel of K, shape (n, n_modes).
-        points: Coordinates by block of three dofs, shape (n / 3, 3).
+        points: Coordinates by block of dim dofs, shape (n / dim, dim).
     """
     modes, _ = np.linalg.qr(kernel)
     trace = np.linalg.svd(modes[touched], compute_uv=False)
     if np.count_nonzero(trace > RANK_TOLERANCE) < kernel.shape[1]:
         touched = touched.copy()
-        touched.reshape(-1, 3)[fixing_nodes(points)] = True
+        touched.reshape(points.shape)[fixing_nodes(points)] = True
     return np.flatnonzero(touched)

@@ -61,14 +61,14 @@ def check_model(material: Material, cell_type: str, bind: Bind) -> None:
     unsymmetric = np.abs(K - K.T).max()
     if unsymmetric > ROUNDING * size:
         raise InvalidInputError(
-            f"the stiffness of a material must be symmetric, that of {name} is not (by {unsymmetric / size:.1e} "
-            "of its largest entry): the stress must follow from an energy"
+            f"the stiffness of a material must be symmetric, that of {name} is not (by "
+            f"{unsymmetric / size:.1e} of its largest entry): the stress must follow from an energy"
         )
-    energies, modes = np.linalg.eigh(0.5 * (K + K.T))
+    energies = np.linalg.eigvalsh(0.5 * (K + K.T))
     if energies[0] < -ROUNDING * energies[-1]:
         raise InvalidInputError(
-            f"the energy of a material must not be negative, {name} has the eigenvalue {energies[0]:.3g} beside "
-            f"{energies[-1]:.3g}: check signs and parameters"
+            f"the energy of a material must not be negative, {name} has the eigenvalue {energies[0]:.3g} "
+            f"beside {energies[-1]:.3g}: check signs and parameters"
         )
     R = _checked_kernel(material, points)
     check_kernel(K, R, f"material {name}")
@@ -99,7 +99,8 @@ def check_kernel(stiffness: Any, kernel: np.ndarray, what: str) -> None:
     if not energy <= KERNEL_TOLERANCE * scale:
         raise InvalidInputError(
             f"the kernel must hold motions without energy alone, that of {what} does not (‖K R‖ is "
-            f"{energy / scale:.1e} of ‖K‖ ‖R‖): kernel(points) must return modes that the stiffness annihilates"
+            f"{energy / scale:.1e} of ‖K‖ ‖R‖): kernel(points) must return modes that the "
+            "stiffness annihilates"
         )
 
 
@@ -107,14 +108,14 @@ def _checked_kernel(material: Material, points: np.ndarray) -> np.ndarray:
     name, modes = type(material).__name__, np.asarray(material.kernel(points))
     if modes.ndim != 3 or modes.shape[:2] != points.shape or not np.isfinite(modes).all():
         raise InvalidInputError(
-            f"kernel(points) of {name} must return finite modes of shape {points.shape} + (n_modes,), got shape "
-            f"{modes.shape}: one displacement a point and mode"
+            f"kernel(points) of {name} must return finite modes of shape {points.shape} + (n_modes,), got "
+            f"shape {modes.shape}: one displacement a point and mode"
         )
     R = modes.reshape(points.size, -1)
     if np.linalg.matrix_rank(R, tol=1e-8 * max(np.abs(R).max(initial=0.0), 1e-300)) < R.shape[1]:
         raise InvalidInputError(
-            f"the modes in the kernel of {name} must be independent, the {R.shape[1]} given are not: leave out "
-            "those that others make up"
+            f"the modes in the kernel of {name} must be independent, the {R.shape[1]} given are not: leave "
+            "out those that others make up"
         )
     return R
 

@@ -28,9 +28,9 @@ class Projection:
     Attributes:
         point: Which of the given points, ascending, shape (n,).
         facet: Facet hit, shape (n,).
-        local: Local coordinates on it, shape (n, 2).
+        local: Local coordinates on it, shape (n, dim − 1).
         gap: Signed distance along the normal, positive outside, shape (n,), [length].
-        normal: Interpolated outward unit normal there, shape (n, 3).
+        normal: Interpolated outward unit normal there, shape (n, dim).
     """
 
     point: np.ndarray
@@ -45,10 +45,10 @@ def interpolated_normal(weights: np.ndarray, normals: np.ndarray) -> tuple[np.nd
 
     Args:
         weights: Shape functions, shape (n, corners).
-        normals: Nodal normals, shape (n, corners, 3).
+        normals: Nodal normals, shape (n, corners, dim).
 
     Returns:
-        Unit normals, shape (n, 3), and the lengths before scaling, shape (n,).
+        Unit normals, shape (n, dim), and the lengths before scaling, shape (n,).
     """
     mean = np.einsum("nk,nkd->nd", weights, normals)
     length = np.linalg.norm(mean, axis=1)
@@ -63,7 +63,7 @@ def newton_matrix(
     normal: np.ndarray,
     length: np.ndarray,
 ) -> np.ndarray:
-    """Return ∂(x(ξ) + g n(ξ))/∂(ξ, g), shape (n, 3, 3); see `project` for the symbols."""
+    """Return ∂(x(ξ) + g n(ξ))/∂(ξ, g), shape (n, dim, dim); see `project` for the symbols."""
     tangents = np.einsum("nka,nkd->nda", derivatives, points)
     turned = np.einsum("nka,nkd->nda", derivatives, normals)
     turned = (turned - normal[:, :, None] * np.einsum("nd,nda->na", normal, turned)[:, None]) / length[
@@ -75,13 +75,13 @@ def newton_matrix(
 def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> Projection:
     """Project points onto a surface: find ξ, g with x(ξ) + g n(ξ) = point.
 
-    x(ξ) is the (bi)linear facet and n(ξ) the interpolated, normalised nodal normal. Because n is
-    continuous, so are gap, normal and weights while a point slides from facet to facet. Of several
-    projections the one with the smallest |g| counts; surfaces that face the same way do not touch.
+    x(ξ) is the (bi)linear facet, in the plane a straight edge, and n(ξ) the interpolated, normalised nodal
+    normal. Because n is continuous, so are gap, normal and weights while a point slides from facet to facet.
+    Of several projections the one with the smallest |g| counts; surfaces that face the same way do not touch.
 
     Args:
-        points: Slave nodes, shape (n, 3), [length].
-        normals: Their outward unit normals, shape (n, 3).
+        points: Slave nodes, shape (n, dim), [length].
+        normals: Their outward unit normals, shape (n, dim).
         master: The surface to project on.
     """
     corners = master.points[master.facets]
@@ -123,15 +123,15 @@ def _solve(
     nodes = master.facets[facet]
     corners, corner_normals, target = master.points[nodes], master.normals[nodes], points[point]
     size = np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).max(axis=1)
-    local = np.full((len(point), 2), 0.0 if master.corners == 4 else 1 / 3)
+    local = np.full((len(point), master.dim - 1), 1 / 3 if master.corners == 3 else 0.0)
     gap = np.zeros(len(point))
     at = np.arange(len(point))  # the pairs still iterated
     for count in range(NEWTON_STEPS):
         step = _newton_step(corners[at], corner_normals[at], target[at], local[at], gap[at], size[at])
         # A point far beyond the facet belongs to another one; keeping it near keeps its iterates finite.
-        local[at] = np.clip(local[at] + step[:, :2], -3, 3)
-        gap[at] += step[:, 2]
-        moving = np.abs(step[:, :2]).max(axis=1) > 1e-8  # convergence is quadratic: the next step is rounding
+        local[at] = np.clip(local[at] + step[:, :-1], -3, 3)
+        gap[at] += step[:, -1]
+        moving = np.abs(step[:, :-1]).max(axis=1) > 1e-8  # quadratic convergence: next comes rounding
         if count >= PATIENCE:
             moving &= outside(local[at], master.corners) < 1.0
         at = at[moving]
@@ -154,13 +154,13 @@ def _newton_step(
     gap: np.ndarray,
     size: np.ndarray,
 ) -> np.ndarray:
-    """Return the changes of (ξ, g), shape (n, 3); none where the facet and its normals are degenerate."""
+    """Return the changes of (ξ, g), shape (n, dim); none where the facet and its normals are degenerate."""
     values, derivatives = shape_functions(local, corners.shape[1])
     normal, length = interpolated_normal(values, normals)
     residual = np.einsum("nk,nkd->nd", values, corners) + gap[:, None] * normal - target
     matrix = newton_matrix(corners, normals, derivatives, gap, normal, length)
-    regular = np.abs(np.linalg.det(matrix)) > 1e-12 * size**2
-    matrix[~regular] = np.eye(3)
+    regular = np.abs(np.linalg.det(matrix)) > 1e-12 * size ** (matrix.shape[1] - 1)
+    matrix[~regular] = np.eye(matrix.shape[1])
     return np.where(regular[:, None], -np.linalg.solve(matrix, residual[:, :, None])[:, :, 0], 0.0)
 
 

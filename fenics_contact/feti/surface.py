@@ -6,17 +6,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact.errors import InvalidInputError
+
 
 def shape_functions(local: np.ndarray, corners: int) -> tuple[np.ndarray, np.ndarray]:
-    """Evaluate the shape functions of facets with 4 (bilinear) or 3 (linear) corners.
+    """Evaluate the shape functions of facets with 4 (bilinear), 3 or 2 (linear) corners.
 
     Args:
-        local: Local coordinates, shape (n, 2), in [−1, 1]² for quadrilaterals, in the unit triangle else.
-        corners: 4 or 3.
+        local: Local coordinates, in [−1, 1]² for quadrilaterals, shape (n, 2), in the unit triangle for
+            triangles, shape (n, 2), in [−1, 1] for the edges of plane bodies, shape (n, 1).
+        corners: 4, 3 or 2.
 
     Returns:
-        Values, shape (n, corners), and derivatives, shape (n, corners, 2).
+        Values, shape (n, corners), and derivatives, shape (n, corners, dim − 1).
     """
+    if corners == 2:
+        values = 0.5 * (1 + np.array([-1.0, 1.0]) * local)
+        return values, np.broadcast_to(np.array([[-0.5], [0.5]]), (len(local), 2, 1))
     s, t = local[:, 0], local[:, 1]
     if corners == 3:
         values = np.stack([1 - s - t, s, t], axis=1)
@@ -28,11 +34,13 @@ def shape_functions(local: np.ndarray, corners: int) -> tuple[np.ndarray, np.nda
 
 def shape_second_mixed(corners: int) -> np.ndarray:
     """Return ∂²N/∂s∂t of each shape function, the only second derivative not zero, shape (corners,)."""
-    return 0.25 * np.array([1.0, -1.0, 1.0, -1.0]) if corners == 4 else np.zeros(3)
+    return 0.25 * np.array([1.0, -1.0, 1.0, -1.0]) if corners == 4 else np.zeros(corners)
 
 
 def outside(local: np.ndarray, corners: int) -> np.ndarray:
     """Return by how much local coordinates lie outside the facet, shape (n,); zero inside."""
+    if corners == 2:
+        return np.maximum(np.abs(local[:, 0]) - 1, 0)
     s, t = local[:, 0], local[:, 1]
     if corners == 4:
         return np.maximum(np.maximum(np.abs(s), np.abs(t)) - 1, 0)
@@ -41,6 +49,8 @@ def outside(local: np.ndarray, corners: int) -> np.ndarray:
 
 def edge_distance(local: np.ndarray, corners: int) -> np.ndarray:
     """Return how far points inside a facet are from its edges, in local coordinates, shape (n,)."""
+    if corners == 2:
+        return 1 - np.abs(local[:, 0])
     s, t = local[:, 0], local[:, 1]
     if corners == 4:
         return 1 - np.maximum(np.abs(s), np.abs(t))
@@ -48,8 +58,15 @@ def edge_distance(local: np.ndarray, corners: int) -> np.ndarray:
 
 
 def corner_products(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
-    """Return the cross product of the two edges at each corner, outward, shape (n_facets, corners, 3)."""
+    """Return the cross product of the two edges at each corner, outward, shape (n_facets, corners, dim).
+
+    In the plane both ends of an edge get the edge itself turned clockwise: the body lies on its left.
+    """
     x = points[facets]
+    if facets.shape[1] == 2:
+        along = x[:, 1] - x[:, 0]
+        turned = np.stack([along[:, 1], -along[:, 0]], axis=1)
+        return np.stack([turned, turned], axis=1)
     return np.cross(np.roll(x, -1, axis=1) - x, np.roll(x, 1, axis=1) - x)
 
 
@@ -61,10 +78,11 @@ class FacetedSurface:
 
     Attributes:
         nodes: Nodes of the body on this surface, ascending, shape (n,).
-        facets: Facets as rows of positions in ``nodes``, cyclic order, shape (n_facets, 3 or 4).
-        points: Coordinates of the nodes, shape (n, 3), [length].
-        normals: Outward unit normals at the nodes, shape (n, 3).
-        areas: Area that belongs to each node, shape (n,), [length²].
+        facets: Facets as rows of positions in ``nodes``, shape (n_facets, corners): triangles or
+            quadrilaterals counterclockwise seen from outside, in the plane edges with the body on their left.
+        points: Coordinates of the nodes, shape (n, dim), [length].
+        normals: Outward unit normals at the nodes, shape (n, dim).
+        areas: Area, in the plane length, that belongs to each node, shape (n,), [length²] or [length].
     """
 
     nodes: np.ndarray
@@ -75,12 +93,31 @@ class FacetedSurface:
 
     @property
     def corners(self) -> int:
-        """Corners of a facet: 3 or 4."""
+        """Corners of a facet: 3 or 4, in the plane 2."""
         return int(self.facets.shape[1])
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space around it: 3 or 2."""
+        return int(self.points.shape[1])
 
 
 def faceted_surface(points: np.ndarray, facets: np.ndarray) -> FacetedSurface:
-    """Build the surface from the coordinates of a body and rows of its node numbers."""
+    """Build the surface from the coordinates of a body and rows of its node numbers.
+
+    Args:
+        points: Coordinates, shape (n_nodes, 3), or (n_nodes, 2) where the facets are edges, [length].
+        facets: Node numbers of triangles, quadrilaterals or edges, shape (n_facets, 3, 4 or 2).
+
+    Raises:
+        InvalidInputError: If coordinates and facets are not of the same dimension.
+    """
+    corners, dim = facets.shape[1], points.shape[1]
+    if (corners, dim) not in {(2, 2), (3, 3), (4, 3)}:
+        raise InvalidInputError(
+            "a surface needs edges in the plane or triangles or quadrilaterals in space, got facets with "
+            f"{corners} corners and points with {dim} coordinates: give the points of plane bodies two"
+        )
     nodes, local = np.unique(facets, return_inverse=True)
     local = local.reshape(facets.shape)
     own = points[nodes]
@@ -88,16 +125,20 @@ def faceted_surface(points: np.ndarray, facets: np.ndarray) -> FacetedSurface:
     summed = np.zeros_like(own)
     np.add.at(summed, local, products)
     areas = np.zeros(len(nodes))
-    # The corner products of a quadrilateral add up to four times its area vector, those of a triangle to six.
-    share = (
-        np.linalg.norm(products.sum(axis=1), axis=1) / (4 if facets.shape[1] == 4 else 6) / facets.shape[1]
-    )
+    # The corner products of a quadrilateral add up to four times its area vector, those of a triangle to six,
+    # those of an edge to two.
+    share = np.linalg.norm(products.sum(axis=1), axis=1) / {2: 2, 3: 6, 4: 4}[corners] / corners
     np.add.at(areas, local, np.broadcast_to(share[:, None], local.shape))
     return FacetedSurface(nodes, local, own, summed / np.linalg.norm(summed, axis=1)[:, None], areas)
 
 
 def quadrature_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
-    """Return facet areas by two Gauss points a direction, as the load forms integrate, shape (n_facets,)."""
+    """Return facet areas by two Gauss points a direction, as the load forms integrate, shape (n_facets,).
+
+    In the plane: the lengths of the edges.
+    """
+    if facets.shape[1] == 2:
+        return np.asarray(np.linalg.norm(corner_products(points, facets)[:, 0], axis=1), dtype=np.float64)
     if facets.shape[1] == 3:
         return 0.5 * np.linalg.norm(corner_products(points, facets)[:, 0], axis=1)
     corners, total = points[facets], np.zeros(len(facets))

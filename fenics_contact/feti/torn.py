@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.errors import together
-from fenics_contact.feti.contact_rows import contact_rows
-from fenics_contact.feti.contact_search import (
-    ContactPoints,
-    check_no_penetration,
-    find_contact_points,
-    friction_data,
-    no_contact_points,
-)
+from fenics_contact.feti.contact_points import ContactPoints, join_points
+from fenics_contact.feti.contact_rows import contact_rows, tied_rows
+from fenics_contact.feti.contact_search import check_no_penetration, find_contact_points, find_tied_points
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.forms import as_tractions
+from fenics_contact.feti.friction import friction_data
+from fenics_contact.feti.gluing import prescribed_displacements
 from fenics_contact.feti.numbering import DualNumbering
 from fenics_contact.feti.rows import Rows, stack
 from fenics_contact.feti.subdomain import Subdomain, assemble
@@ -28,14 +25,16 @@ from fenics_contact.scene import Scene
 class TornSystem:
     """min ½ uᵀK u − fᵀu + Σ Ψ_i ‖T_i u‖ subject to B_E u = c_E, B_N u ≤ c_N, distributed over ranks.
 
-    Rows of B are numbered: gluing and Dirichlet rows, normal rows (one a contact point), tangential rows
-    (two a frictional point).
+    Rows of B are numbered: gluing and Dirichlet rows, rows of ties, normal rows (one a contact point),
+    tangential rows (dim − 1 a frictional point).
 
     Attributes:
         scene: The scene with the geometry of this system.
         decomposition: What survives a change of geometry.
         subdomains: This rank's subdomains with their matrices.
         points: Contact points, replicated.
+        ties: Points of the ties, replicated.
+        n_equality: Number of gluing, Dirichlet and tie rows of all ranks.
         frictional: Numbers of the contact points with friction, replicated, shape (n_friction,).
         friction_coefficient: μ of each frictional point (zero under Tresca), replicated, shape (n_friction,).
         tresca_bound: Fixed slip bound of each frictional point, replicated, shape (n_friction,), [force].
@@ -48,6 +47,8 @@ class TornSystem:
     decomposition: Decomposition
     subdomains: tuple[Subdomain, ...]
     points: ContactPoints
+    ties: ContactPoints
+    n_equality: int
     frictional: np.ndarray
     friction_coefficient: np.ndarray
     tresca_bound: np.ndarray
@@ -56,9 +57,14 @@ class TornSystem:
     right: np.ndarray
 
     @property
-    def n_equality(self) -> int:
+    def dim(self) -> int:
+        """Displacement components of a node."""
+        return self.decomposition.tearing.dim
+
+    @property
+    def n_gluing(self) -> int:
         """Number of gluing and Dirichlet rows of all ranks."""
-        return self.decomposition.gluing.count
+        return self.decomposition.gluing.rows.count
 
     @property
     def normal_rows(self) -> np.ndarray:
@@ -67,9 +73,9 @@ class TornSystem:
 
     @property
     def tangential_rows(self) -> np.ndarray:
-        """Row numbers of every frictional point's two tangential multipliers, shape (n_friction, 2)."""
-        start = self.n_equality + self.points.count
-        return start + np.arange(2 * len(self.frictional)).reshape(-1, 2)
+        """Row numbers of every frictional point's tangential multipliers, shape (n_friction, dim - 1)."""
+        start, width = self.n_equality + self.points.count, self.dim - 1
+        return start + np.arange(width * len(self.frictional)).reshape(-1, width)
 
     @property
     def load(self) -> np.ndarray:
@@ -98,25 +104,42 @@ def build_torn_system(
     """
     comm = decomposition.comm
     loads = as_tractions(scene)
+    decomposition.forms.prepare(scene)  # a new load may be of a kind that the first scene did not have
     with together(comm):
         known = (None,) * len(decomposition.meshes) if previous is None else previous.subdomains
         subdomains = tuple(
             assemble(mesh, scene.bodies[mesh.body], loads, decomposition.forms, earlier)
             for mesh, earlier in zip(decomposition.meshes, known, strict=True)
         )
-    points = no_contact_points()
-    if scene.contacts:
-        points = find_contact_points(scene, decomposition.tearing, decomposition.fixed, comm)
-        if start_geometry:
-            check_no_penetration(scene, points)
+    with together(comm):
+        prescribed = prescribed_displacements(scene, decomposition.tearing)
+        right = decomposition.gluing.right_side(prescribed)
+    points, ties = _meeting_points(scene, decomposition, start_geometry)
     has_friction, coefficient, tresca = friction_data(scene.contacts, points)
     frictional = np.flatnonzero(has_friction)
-    rows = stack([decomposition.gluing, contact_rows(points, decomposition.tearing, frictional)])
+    gluing = replace(decomposition.gluing.rows, right=right)
+    tied = tied_rows(ties, scene.ties, decomposition.tearing, decomposition.fixed)
+    rows = stack([gluing, tied, contact_rows(points, decomposition.tearing, frictional)])
     numbering, B = _own_part(rows, decomposition, None if previous is None else previous.numbering)
     return TornSystem(
-        scene, decomposition, subdomains, points, frictional, coefficient[frictional], tresca[frictional],
-        numbering, B, rows.right[numbering.owned],
+        scene, decomposition, subdomains, points, ties, gluing.count + tied.count, frictional,
+        coefficient[frictional], tresca[frictional], numbering, B, rows.right[numbering.owned],
     )  # fmt: skip
+
+
+def _meeting_points(
+    scene: Scene, decomposition: Decomposition, start_geometry: bool
+) -> tuple[ContactPoints, ContactPoints]:
+    """Search for contact and tied points, only where the scene has pairs. Collective."""
+    tearing, fixed, comm = decomposition.tearing, decomposition.fixed, decomposition.comm
+    points = ties = join_points([], scene.dim, tearing.n_nodes)
+    if scene.contacts:
+        points = find_contact_points(scene, tearing, fixed, comm)
+        if start_geometry:
+            check_no_penetration(scene, points)
+    if scene.ties:
+        ties = find_tied_points(scene, tearing, fixed, comm)
+    return points, ties
 
 
 def _own_part(
@@ -125,7 +148,7 @@ def _own_part(
     """Number the multipliers and pick the entries of B that act on this rank's subdomains. Collective."""
     block = decomposition.copy_block[rows.copy]
     here = block >= 0
-    row, column = rows.row[here], 3 * block[here] + rows.component[here]
+    row, column = rows.row[here], decomposition.tearing.dim * block[here] + rows.component[here]
     touched, comm = np.unique(row), decomposition.comm
     # The pattern of communication stays as long as no rank's share of the rows changes.
     stays = known is not None and known.serves(rows.owner, touched)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from fenics_contact.geometry.block import block, box_lattice
+from fenics_contact.geometry.cell_types import CELL_TYPES, CellType, cell_type_of
+from fenics_contact.geometry.coincidence import merge_duplicate_nodes
 from fenics_contact.geometry.faces import boundary_faces, orient, vector_areas
+from fenics_contact.geometry.half_disc import half_disc
 from fenics_contact.geometry.hemisphere import half_cylinder, hemisphere
 from fenics_contact.geometry.link import DesignSurface, Link, chain_link
 from fenics_contact.geometry.mesh import BodyMesh
@@ -15,6 +18,7 @@ from fenics_contact.geometry.partition import (
     merge_pieces,
     torn_node_counts,
 )
+from fenics_contact.geometry.rectangle import rectangle, rectangle_lattice, split_quadrilaterals
 from fenics_contact.geometry.ring import LinkShape
 from fenics_contact.geometry.structured import split_hexahedra
 from fenics_contact.geometry.touch import (
@@ -27,8 +31,10 @@ from fenics_contact.geometry.touch import (
 )
 
 __all__ = [
+    "CELL_TYPES",
     "PULL_AXIS",
     "BodyMesh",
+    "CellType",
     "DesignSurface",
     "Link",
     "LinkShape",
@@ -39,16 +45,22 @@ __all__ = [
     "boundary_faces",
     "box_lattice",
     "box_partition",
+    "cell_type_of",
     "chain_link",
     "check_face_connected",
     "check_penetration",
     "combine",
     "half_cylinder",
+    "half_disc",
     "hemisphere",
+    "merge_duplicate_nodes",
     "merge_pieces",
     "mutual_clearance",
     "orient",
+    "rectangle",
+    "rectangle_lattice",
     "split_hexahedra",
+    "split_quadrilaterals",
     "torn_node_counts",
     "two_links",
     "vector_areas",

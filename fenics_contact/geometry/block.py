@@ -63,21 +63,22 @@ def box_lattice(ticks: Sequence[np.ndarray], cell: str = "hexahedron") -> BodyMe
 
 
 def box_sides(points: np.ndarray, cells: np.ndarray) -> dict[str, np.ndarray]:
-    """Sort the boundary faces of a box by the direction they face.
+    """Sort the boundary faces of a box or rectangle by the direction they face.
 
     Args:
-        points: Coordinates, (n_nodes, 3).
-        cells: Node numbers, (n_cells, 8 | 4), of a box along the axes.
+        points: Coordinates, (n_nodes, 3 | 2).
+        cells: Node numbers, (n_cells, n_vertices), of a box along the axes.
 
     Returns:
-        Facets of each of the six `SIDES`.
+        Facets of each of the six `SIDES`, or of the first four.
     """
-    facets, _ = boundary_faces(cells)
+    dim = points.shape[1]
+    facets, _ = boundary_faces(cells, dim)
     areas = vector_areas(points, facets)
     direction = np.argmax(np.abs(areas), axis=1)
     upper = np.take_along_axis(areas, direction[:, None], axis=1)[:, 0] > 0
     side = 2 * direction + upper
-    return {name: facets[side == s] for s, name in enumerate(SIDES)}
+    return {name: facets[side == s] for s, name in enumerate(SIDES[: 2 * dim])}
 
 
 def _count(counts: Sequence[int], direction: int) -> int:

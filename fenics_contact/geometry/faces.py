@@ -1,7 +1,10 @@
-"""Faces of hexahedral and tetrahedral cells: numbering, neighbours, boundary, outward orientation.
+"""Faces of cells: numbering, neighbours, boundary, outward orientation.
 
 A face is written as its node numbers in cyclic order, such that the right-hand rule gives the normal
-that points out of the cell. Two faces are the same when they have the same nodes.
+that points out of the cell. In two dimensions faces are edges, listed such that the cell lies to the left of
+them. Two faces are the same when they have the same nodes.
+
+Cells of four nodes are tetrahedra unless the caller says ``dim=2``.
 """
 
 from __future__ import annotations
@@ -9,48 +12,42 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-
-HEXAHEDRON_FACES = np.array(
-    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [2, 3, 7, 6], [0, 4, 7, 3], [1, 2, 6, 5]], dtype=np.int64
-)
-"""Local faces of a hexahedron (VTK order of vertices), outward: lower and upper in z, then y, then x."""
-
-TETRAHEDRON_FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], dtype=np.int64)
-"""Local faces of a tetrahedron, outward."""
+from fenics_contact.geometry.cell_types import cell_type_of
 
 
-def cell_faces(cells: np.ndarray) -> np.ndarray:
+def cell_faces(cells: np.ndarray, dim: int = 3) -> np.ndarray:
     """List the faces of every cell, outward.
 
     Args:
-        cells: Node numbers, (n_cells, 8) for hexahedra or (n_cells, 4) for tetrahedra.
+        cells: Node numbers, (n_cells, 8) for hexahedra, (n_cells, 4) for tetrahedra or (dim=2)
+            quadrilaterals, (n_cells, 3) for triangles.
+        dim: Dimension of the space, 2 or 3.
 
     Returns:
-        Node numbers of the faces, (n_cells, 6, 4) or (n_cells, 4, 3).
+        Node numbers of the faces, (n_cells, faces of a cell, nodes of a face).
     """
-    return cells[:, HEXAHEDRON_FACES if cells.shape[1] == 8 else TETRAHEDRON_FACES]
+    return cells[:, cell_type_of(cells, dim).faces]
 
 
 def face_keys(faces: np.ndarray) -> np.ndarray:
     """Reduce faces to two integers each that do not depend on the order of the nodes.
 
     Args:
-        faces: Node numbers, (n, 4) or (n, 3), all below 2**31.
+        faces: Node numbers, (n, 4 | 3 | 2), all below 2**31.
 
     Returns:
         (n, 2) int64; equal rows belong to faces with equal nodes.
     """
-    nodes = np.sort(faces, axis=1).astype(np.int64)
-    low = (nodes[:, 0] << 31) + nodes[:, 1]
-    high = nodes[:, 2] if nodes.shape[1] == 3 else (nodes[:, 2] << 31) + nodes[:, 3]
-    return np.column_stack([low, high])
+    nodes = np.zeros((faces.shape[0], 4), dtype=np.int64)
+    nodes[:, : faces.shape[1]] = np.sort(faces, axis=1)
+    return (nodes[:, [0, 2]] << 31) + nodes[:, [1, 3]]
 
 
 def number_faces(faces: np.ndarray) -> np.ndarray:
     """Number faces so that those with the same nodes get the same number.
 
     Args:
-        faces: Node numbers, (n, 4) or (n, 3).
+        faces: Node numbers, (n, 4 | 3 | 2).
 
     Returns:
         (n,) int64 numbers from 0 without holes.
@@ -65,27 +62,29 @@ def number_faces(faces: np.ndarray) -> np.ndarray:
     return numbers
 
 
-def boundary_faces(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def boundary_faces(cells: np.ndarray, dim: int = 3) -> tuple[np.ndarray, np.ndarray]:
     """Extract the faces that belong to one cell only.
 
     Args:
-        cells: Node numbers, (n_cells, 8 | 4).
+        cells: Node numbers, as in `cell_faces`.
+        dim: Dimension of the space, 2 or 3.
 
     Returns:
-        The faces, outward, (n, 4 | 3), and the cell that each belongs to, (n,), ascending.
+        The faces, outward, (n, 4 | 3 | 2), and the cell that each belongs to, (n,), ascending.
     """
-    faces = cell_faces(cells)
+    faces = cell_faces(cells, dim)
     flat = faces.reshape(-1, faces.shape[2])
     numbers = number_faces(flat)
     single = np.flatnonzero(np.bincount(numbers)[numbers] == 1)
     return flat[single], single // faces.shape[1]
 
 
-def neighbours(cells: np.ndarray) -> np.ndarray:
+def neighbours(cells: np.ndarray, dim: int = 3) -> np.ndarray:
     """Find the pairs of cells that share a face.
 
     Args:
-        cells: Node numbers, (n_cells, 8 | 4).
+        cells: Node numbers, as in `cell_faces`.
+        dim: Dimension of the space, 2 or 3.
 
     Returns:
         (n_pairs, 2) cell numbers.
@@ -93,7 +92,7 @@ def neighbours(cells: np.ndarray) -> np.ndarray:
     Raises:
         InvalidInputError: If more than two cells share a face.
     """
-    faces = cell_faces(cells)
+    faces = cell_faces(cells, dim)
     flat = faces.reshape(-1, faces.shape[2])
     numbers = number_faces(flat)
     counts = np.bincount(numbers)
@@ -124,20 +123,21 @@ def match_faces(faces: np.ndarray, candidates: np.ndarray) -> np.ndarray:
     return position[numbers[candidates.shape[0] :]]
 
 
-def orient(cells: np.ndarray, facets: np.ndarray) -> np.ndarray:
+def orient(cells: np.ndarray, facets: np.ndarray, dim: int = 3) -> np.ndarray:
     """Write boundary facets as the cells have them: cyclic and outward.
 
     Args:
-        cells: Node numbers, (n_cells, 8 | 4).
-        facets: Node numbers in any order, (n, 4 | 3).
+        cells: Node numbers, as in `cell_faces`.
+        facets: Node numbers in any order, (n, 4 | 3 | 2).
+        dim: Dimension of the space, 2 or 3.
 
     Returns:
-        The same facets, outward, (n, 4 | 3).
+        The same facets, outward.
 
     Raises:
         InvalidInputError: If a facet is not on the boundary.
     """
-    boundary, _ = boundary_faces(cells)
+    boundary, _ = boundary_faces(cells, dim)
     found = match_faces(facets, boundary)
     if np.any(found < 0):
         lost = np.flatnonzero(found < 0)
@@ -151,6 +151,8 @@ def orient(cells: np.ndarray, facets: np.ndarray) -> np.ndarray:
 def start_at_smallest(facets: np.ndarray) -> np.ndarray:
     """Rotate every facet so that it starts at its smallest node; equal cycles become equal rows.
 
+    Edges stay as they are: both directions would be one cycle, but differ in the side the normal points to.
+
     Args:
         facets: Node numbers in cyclic order, (n, k).
 
@@ -158,6 +160,8 @@ def start_at_smallest(facets: np.ndarray) -> np.ndarray:
         The rotated facets, (n, k).
     """
     k = facets.shape[1]
+    if k == 2:
+        return facets
     columns = (np.argmin(facets, axis=1)[:, None] + np.arange(k)) % k
     return np.take_along_axis(facets, columns, axis=1)
 
@@ -165,17 +169,21 @@ def start_at_smallest(facets: np.ndarray) -> np.ndarray:
 def vector_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
     """Integrate the outward normal over every facet.
 
-    The vector area of a bilinear facet is half the cross product of its diagonals, exactly. Over a closed
-    surface the vector areas add up to zero.
+    The vector area of a bilinear facet is half the cross product of its diagonals, exactly. In two dimensions
+    it is the edge turned clockwise by a right angle. Over a closed surface the vector areas add up to zero.
 
     Args:
-        points: Coordinates, (n_nodes, 3).
-        facets: Node numbers in cyclic order, (n, 4 | 3).
+        points: Coordinates, (n_nodes, 3 | 2).
+        facets: Node numbers in cyclic order, (n, 4 | 3), or edges with the body on their left, (n, 2).
 
     Returns:
-        (n, 3) vectors: normal times area (for a warped facet: of its projection along the mean normal).
+        (n, 3 | 2) vectors: normal times area (for a warped facet: of its projection along the mean normal) or
+        length.
     """
     corners = points[facets]
+    if facets.shape[1] == 2:
+        along = corners[:, 1] - corners[:, 0]
+        return np.column_stack([along[:, 1], -along[:, 0]])
     if facets.shape[1] == 3:
         first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     else:

@@ -9,53 +9,68 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fenics_contact.geometry import quality
+from fenics_contact.geometry.cell_types import cell_type_of
+from fenics_contact.geometry.coincidence import check_no_coincident_nodes
 from fenics_contact.geometry.validation import (
     check_jacobians,
     checked_cells,
     checked_grid,
     checked_points,
+    checked_regions,
     checked_surfaces,
 )
 
 
 @dataclass(frozen=True, eq=False)
 class BodyMesh:
-    """Hexahedra or tetrahedra of one body, replicated on all ranks.
+    """Cells of one body, replicated on all ranks.
 
-    The arrays are copied and made read-only; a body that moves is a new value, see `moved`.
+    Three coordinates make hexahedra or tetrahedra of it, two quadrilaterals or triangles. The arrays are
+    copied and made read-only; a body that moves is a new value, see `moved`.
 
     Attributes:
-        points: Coordinates, (n_nodes, 3) float64, in the scene's unit of length.
-        cells: Node numbers, (n_cells, 8) for hexahedra or (n_cells, 4) for tetrahedra, int64, vertices in
-            the order of VTK and gmsh, Jacobian positive.
+        points: Coordinates, (n_nodes, 3 | 2) float64, in the scene's unit of length.
+        cells: Node numbers, (n_cells, 8) for hexahedra, (n_cells, 4) for tetrahedra; in two dimensions
+            (n_cells, 4) for quadrilaterals, (n_cells, 3) for triangles; int64, vertices in the order of VTK
+            and gmsh, Jacobian positive (in two dimensions: counter-clockwise).
         surfaces: Name to facets, (n_facets, 4 | 3) int64 node numbers in cyclic order, the right-hand
-            normal pointing out of the body.
-        grid: Structured index of every cell, (n_cells, 3) int64, or None. The tetrahedra that a hexahedron
-            was split into share its index.
+            normal pointing out of the body. In two dimensions (n_facets, 2) edges with the body on their
+            left: run through in their direction, the boundary goes round the body counter-clockwise.
+        grid: Structured index of every cell, (n_cells, 3 | 2) int64, or None. The simplices that a cell was
+            split into share its index.
+        regions: Name to ascending cell numbers, int64, of the parts of the body that differ, in their
+            material for instance; no part unless given, else every cell belongs to exactly one.
+        coincident_nodes: Whether nodes may lie at the same place, as on the two sides of a crack.
 
     Raises:
         InvalidInputError: If an array has the wrong shape or type, a coordinate is not finite, a node
-            number is out of range or unused, a cell is inverted, or a facet is not an outward boundary face.
+            number is out of range or unused, a cell is inverted, nodes coincide, a facet is not an outward
+            boundary face, or the regions overlap or leave out a cell.
     """
 
     points: np.ndarray
     cells: np.ndarray
     surfaces: Mapping[str, np.ndarray] = field(default_factory=dict)
     grid: np.ndarray | None = None
+    regions: Mapping[str, np.ndarray] = field(default_factory=dict)
+    coincident_nodes: bool = False
 
     def __post_init__(self) -> None:
         """Check everything, cheap things first."""
         points = checked_points(self.points)
-        cells = checked_cells(self.cells, points.shape[0])
-        check_jacobians(
-            points, cells, "list the vertices of the cells in VTK order and check the coordinates"
-        )
+        cells = checked_cells(self.cells, *points.shape)
         self._set(
             points=points,
             cells=cells,
-            surfaces=checked_surfaces(self.surfaces, cells, points.shape[0]),
-            grid=checked_grid(self.grid, cells.shape[0]),
+            grid=checked_grid(self.grid, cells.shape[0], points.shape[1]),
+            regions=checked_regions(self.regions, cells.shape[0]),
         )
+        check_jacobians(
+            points, cells, "list the vertices of the cells in VTK order and check the coordinates"
+        )
+        if not self.coincident_nodes:
+            check_no_coincident_nodes(points)
+        self._set(surfaces=checked_surfaces(self.surfaces, cells, *points.shape))
 
     def _set(self, **values: object) -> None:
         for name, value in values.items():
@@ -63,8 +78,13 @@ class BodyMesh:
 
     @property
     def cell_type(self) -> str:
-        """``"hexahedron"`` or ``"tetrahedron"``."""
-        return "hexahedron" if self.cells.shape[1] == 8 else "tetrahedron"
+        """``"hexahedron"``, ``"tetrahedron"``, ``"quadrilateral"`` or ``"triangle"``."""
+        return cell_type_of(self.cells, self.dim).name
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space the body lies in, 2 or 3."""
+        return int(self.points.shape[1])
 
     @property
     def n_nodes(self) -> int:
@@ -78,16 +98,17 @@ class BodyMesh:
 
     @property
     def volume(self) -> float:
-        """Volume of the body, exact for its trilinear or linear cells."""
+        """Volume of the body, in two dimensions its area; exact for its cells."""
         return quality.volume(self.points, self.cells)
 
     def moved(self, points: np.ndarray) -> BodyMesh:
         """Return the same mesh at new coordinates.
 
-        Cells, surfaces and grid are shared with this mesh and not checked again.
+        Cells, surfaces, grid and regions are shared with this mesh and not checked again, nor is whether
+        nodes coincide.
 
         Args:
-            points: New coordinates, (n_nodes, 3).
+            points: New coordinates, (n_nodes, 3 | 2).
 
         Returns:
             The moved mesh.

@@ -1,7 +1,7 @@
 """Cutting a mesh into subdomains.
 
 A partition is an int64 array with the subdomain 0..S-1 of every cell. A subdomain must hang together through
-faces: pieces joined by an edge or a node only can move against each other at no energy, beyond the six rigid
+faces: pieces joined by an edge or a node only can move against each other at no energy, beyond the rigid
 body modes that the solver knows of.
 """
 
@@ -19,7 +19,7 @@ from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.structured import check_count
 
 
-def box_partition(mesh: BodyMesh, boxes: tuple[int, int, int]) -> np.ndarray:
+def box_partition(mesh: BodyMesh, boxes: tuple[int, ...]) -> np.ndarray:
     """Cut a structured mesh into boxes of cells.
 
     Where a count does not divide, the boxes differ by at most one layer of cells. Subdomains are numbered
@@ -40,12 +40,13 @@ def box_partition(mesh: BodyMesh, boxes: tuple[int, int, int]) -> np.ndarray:
             "box_partition needs a structured mesh, this one has grid None: use `bisection_partition(mesh, "
             "parts)`"
         )
-    if len(boxes) != 3:
+    if len(boxes) != mesh.dim:
+        number = {2: "two", 3: "three"}[mesh.dim]
         raise InvalidInputError(
-            f"boxes must be three integers, got {boxes!r}: give one for each grid direction"
+            f"boxes must be {number} integers, got {boxes!r}: give one for each grid direction"
         )
     counts = mesh.grid.max(axis=0) + 1
-    for d in range(3):
+    for d in range(mesh.dim):
         check_count(boxes[d], f"boxes[{d}]")
         if boxes[d] > counts[d]:
             raise InvalidInputError(
@@ -120,7 +121,7 @@ def merge_pieces(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
         InvalidInputError: If the mesh consists of separate parts, so that a piece has no neighbour.
     """
     partition = _checked_partition(mesh, partition).copy()
-    pairs = neighbours(mesh.cells)
+    pairs = neighbours(mesh.cells, mesh.dim)
     while True:
         piece, owner = _face_pieces(mesh, partition, pairs)
         by_size = np.lexsort((np.arange(owner.size), -np.bincount(piece)))
@@ -153,7 +154,7 @@ def check_face_connected(mesh: BodyMesh, partition: np.ndarray) -> None:
         InvalidInputError: Naming the subdomain.
     """
     partition = _checked_partition(mesh, partition)
-    _, owner = _face_pieces(mesh, partition, neighbours(mesh.cells))
+    _, owner = _face_pieces(mesh, partition, neighbours(mesh.cells, mesh.dim))
     pieces = np.bincount(owner)
     torn = np.flatnonzero(pieces > 1)
     if torn.size:
@@ -204,7 +205,7 @@ def torn_node_counts(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
         partition: (n_cells,) subdomain numbers.
 
     Returns:
-        (S,) node counts; three times their sum is the number of torn displacements.
+        (S,) node counts; their sum times the dimension is the number of torn displacements.
     """
     owner = np.repeat(partition, mesh.cells.shape[1])
     pairs = np.unique(owner * mesh.n_nodes + mesh.cells.ravel())

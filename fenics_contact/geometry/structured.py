@@ -1,10 +1,11 @@
-"""Structured hexahedra, possibly closed into a ring, and their conforming split into tetrahedra."""
+"""Structured hexahedra and quadrilaterals, possibly closed into a ring, and their split into simplices."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry.cell_types import CELL_TYPES
 from fenics_contact.geometry.faces import boundary_faces, match_faces, orient
 from fenics_contact.geometry.mesh import BodyMesh
 
@@ -18,13 +19,12 @@ REFLECTIONS = np.array(
 )
 """Vertices of a hexahedron after mirroring it in its first, second or third direction."""
 
-CELL_TYPES = ("hexahedron", "tetrahedron")
 
-
-def check_cell_type(cell: str) -> None:
+def check_cell_type(cell: str, dim: int = 3) -> None:
     """Refuse a cell type that the structured meshes do not offer."""
-    if cell not in CELL_TYPES:
-        raise InvalidInputError(f"cell must be one of {CELL_TYPES}, got {cell!r}: choose one of them")
+    known = tuple(name for name, kind in CELL_TYPES.items() if kind.dim == dim)
+    if cell not in known:
+        raise InvalidInputError(f"cell must be one of {known}, got {cell!r}: choose one of them")
 
 
 def check_count(value: int, name: str, least: int = 1) -> None:
@@ -35,29 +35,37 @@ def check_count(value: int, name: str, least: int = 1) -> None:
         )
 
 
-def structured_cells(counts: tuple[int, int, int], closed: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Number the hexahedra of a lattice.
+def structured_cells(counts: tuple[int, ...], closed: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Number the hexahedra or quadrilaterals of a lattice.
 
     Node (i, j, k) has the number ``(i * (n2 + 1) + j) * (n3 + 1) + k``; cells follow the same order.
 
     Args:
-        counts: Number of cells in each direction.
+        counts: Number of cells in each direction, three or two.
         closed: If true, the first direction is a ring: its last layer of cells ends at its first nodes.
 
     Returns:
-        Cells, (n_cells, 8), and their index triples, (n_cells, 3), int64.
+        Cells, (n_cells, 8 | 4), and their indices, (n_cells, 3 | 2), int64.
     """
-    n1, n2, n3 = counts
-    nodes = np.arange((n1 + (not closed)) * (n2 + 1) * (n3 + 1)).reshape(-1, n2 + 1, n3 + 1)
+    solid = len(counts) == 3
+    n1, n2, n3 = counts if solid else (*counts, 1)
+    nodes = np.arange((n1 + (not closed)) * (n2 + 1) * (n3 + solid)).reshape(-1, n2 + 1, n3 + solid)
     low, high = (nodes, np.roll(nodes, -1, axis=0)) if closed else (nodes[:-1], nodes[1:])
     vertices = [
         layer[:, j : n2 + j, k : n3 + k]
-        for k in (0, 1)
+        for k in range(1 + solid)
         for layer, j in ((low, 0), (high, 0), (high, 1), (low, 1))
     ]
-    cells = np.stack(vertices, axis=-1).reshape(-1, 8)
-    grid = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1).reshape(-1, 3)
+    cells = np.stack(vertices, axis=-1).reshape(-1, len(vertices))
+    grid = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1).reshape(-1, len(counts))
     return cells.astype(np.int64), grid.astype(np.int64)
+
+
+def repeated_regions(mesh: BodyMesh, pieces: int) -> dict[str, np.ndarray]:
+    """Return the regions after every cell c was split into cells ``pieces * c + (0 ... pieces - 1)``."""
+    return {
+        name: (pieces * cells[:, None] + np.arange(pieces)).ravel() for name, cells in mesh.regions.items()
+    }
 
 
 def split_hexahedra(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> BodyMesh:
@@ -73,11 +81,17 @@ def split_hexahedra(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> BodyM
             given.
 
     Returns:
-        The tetrahedra on the same nodes, surfaces split alike, grid index repeated.
+        The tetrahedra on the same nodes, surfaces and regions split alike, grid index repeated.
 
     Raises:
-        InvalidInputError: If neighbouring cells are numbered so that their diagonals do not meet.
+        InvalidInputError: If the cells are no hexahedra, or neighbours are numbered so that their diagonals
+            do not meet.
     """
+    if mesh.cell_type != "hexahedron":
+        raise InvalidInputError(
+            f"split_hexahedra needs hexahedra, got cells of type {mesh.cell_type}: give it a mesh of "
+            "hexahedra (`split_quadrilaterals` splits those of two dimensions)"
+        )
     cells = _split_cells(mesh.cells, mirrored)
     grid = None if mesh.grid is None else np.repeat(mesh.grid, KUHN_TETRAHEDRA.shape[0], axis=0)
     boundary, _ = boundary_faces(cells)
@@ -89,7 +103,8 @@ def split_hexahedra(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> BodyM
     surfaces = {
         name: orient(cells, _split_facets(facets, boundary)) for name, facets in mesh.surfaces.items()
     }
-    return BodyMesh(mesh.points, cells, surfaces, grid)
+    regions = repeated_regions(mesh, KUHN_TETRAHEDRA.shape[0])
+    return BodyMesh(mesh.points, cells, surfaces, grid, regions, mesh.coincident_nodes)
 
 
 def _split_cells(cells: np.ndarray, mirrored: np.ndarray | None) -> np.ndarray:

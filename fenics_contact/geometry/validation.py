@@ -8,17 +8,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry.cell_types import cell_type_of
 from fenics_contact.geometry.faces import boundary_faces, match_faces, start_at_smallest
 from fenics_contact.geometry.quality import is_inverted, jacobian_ratio
 
 
 def checked_points(points: ArrayLike, shape: tuple[int, ...] | None = None) -> np.ndarray:
-    """Return finite coordinates, (n_nodes, 3) float64, as a read-only copy."""
+    """Return finite coordinates, (n_nodes, 3 | 2) float64, as a read-only copy."""
     array = np.array(points, dtype=np.float64)
-    if array.ndim != 2 or array.shape[1] != 3 or (shape is not None and array.shape != shape):
-        needed = "(n_nodes, 3)" if shape is None else str(shape)
+    if array.ndim != 2 or array.shape[1] not in (2, 3) or (shape is not None and array.shape != shape):
+        needed = "(n_nodes, 3) or (n_nodes, 2)" if shape is None else str(shape)
         raise InvalidInputError(
-            f"points must have shape {needed}, got {array.shape}: give three coordinates for every node"
+            f"points must have shape {needed}, got {array.shape}: give all coordinates of every node, three "
+            "for a solid, two for a plane body"
         )
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if bad.size:
@@ -49,14 +51,12 @@ def _check_range(nodes: np.ndarray, n_nodes: int, name: str) -> None:
         )
 
 
-def checked_cells(cells: ArrayLike, n_nodes: int) -> np.ndarray:
-    """Return cells, (n_cells, 8 | 4) int64, that use every one of the ``n_nodes`` nodes."""
+def checked_cells(cells: ArrayLike, n_nodes: int, dim: int) -> np.ndarray:
+    """Return cells, (n_cells, n_vertices) int64, that use every one of the ``n_nodes`` nodes."""
     array = _integers(cells, "cells")
-    if array.ndim != 2 or array.shape[1] not in (4, 8) or array.shape[0] == 0:
-        raise InvalidInputError(
-            "cells must have shape (n_cells, 8) for hexahedra or (n_cells, 4) for tetrahedra with at least "
-            f"one cell, got {array.shape}: give the vertices of every cell in VTK order"
-        )
+    cell_type_of(array, dim)
+    if array.shape[0] == 0:
+        raise InvalidInputError("a mesh must have at least one cell, got none: give the cells of the body")
     _check_range(array, n_nodes, "cells")
     orphans = np.flatnonzero(np.bincount(array.ravel(), minlength=n_nodes) == 0)
     if orphans.size:
@@ -71,8 +71,8 @@ def check_jacobians(points: np.ndarray, cells: np.ndarray, remedy: str) -> None:
     """Refuse a mesh with an inverted or degenerate cell.
 
     Args:
-        points: Coordinates, (n_nodes, 3).
-        cells: Node numbers, (n_cells, 8 | 4).
+        points: Coordinates, (n_nodes, 3 | 2).
+        cells: Node numbers, (n_cells, n_vertices).
         remedy: What to do about it; ends the message.
 
     Raises:
@@ -83,20 +83,22 @@ def check_jacobians(points: np.ndarray, cells: np.ndarray, remedy: str) -> None:
         return
     ratios = jacobian_ratio(points, cells[inverted])
     worst = int(np.argmin(ratios))
-    centre = points[cells[inverted[worst]]].mean(axis=0)
+    centre = ", ".join(f"{x:.6g}" for x in points[cells[inverted[worst]]].mean(axis=0))
     raise InvalidInputError(
         f"every cell must have a positive Jacobian, {inverted.size} of {cells.shape[0]} are inverted or "
-        f"flat; the worst is cell {inverted[worst]} at ({centre[0]:.6g}, {centre[1]:.6g}, {centre[2]:.6g}) "
-        f"with a Jacobian ratio (smallest over largest) of {ratios[worst]:.3g}: {remedy}"
+        f"flat; the worst is cell {inverted[worst]} at ({centre}) with a "
+        f" Jacobian ratio (smallest over largest) of {ratios[worst]:.3g}: {remedy}"
     )
 
 
 def checked_surfaces(
-    surfaces: Mapping[str, ArrayLike], cells: np.ndarray, n_nodes: int
+    surfaces: Mapping[str, ArrayLike], cells: np.ndarray, n_nodes: int, dim: int
 ) -> dict[str, np.ndarray]:
-    """Return named facets, (n_facets, 4 | 3) int64 each, that are outward boundary faces of the cells."""
+    """Return named facets, (n_facets, 4 | 3 | 2) int64 each, that are outward boundary faces of the cells."""
     checked: dict[str, np.ndarray] = {}
-    boundary = boundary_faces(cells)[0] if surfaces else np.zeros((0, 4), dtype=np.int64)
+    if not surfaces:
+        return checked
+    boundary = boundary_faces(cells, dim)[0]
     for name, facets in surfaces.items():
         array = _integers(facets, f"surface '{name}'")
         if array.ndim != 2 or array.shape[1] != boundary.shape[1] or array.shape[0] == 0:
@@ -105,19 +107,19 @@ def checked_surfaces(
                 f"got {array.shape}: leave out a surface that is empty"
             )
         _check_range(array, n_nodes, f"surface '{name}'")
-        _check_facets(name, array, boundary)
+        _check_facets(name, array, boundary, dim)
         checked[name] = array
     return checked
 
 
-def _check_facets(name: str, facets: np.ndarray, boundary: np.ndarray) -> None:
+def _check_facets(name: str, facets: np.ndarray, boundary: np.ndarray, dim: int) -> None:
     found = match_faces(facets, boundary)
     lost = np.flatnonzero(found < 0)
     if lost.size:
         raise InvalidInputError(
             f"surface '{name}' must consist of boundary faces of the cells, {lost.size} of {facets.shape[0]} "
             f"are not, first facet {lost[0]} with nodes {facets[lost[0]].tolist()}: take them from "
-            "`boundary_faces(cells)`"
+            f"`boundary_faces(cells, dim={dim})`"
         )
     same = (start_at_smallest(facets) == start_at_smallest(boundary[found])).all(axis=1)
     if not same.all():
@@ -125,18 +127,48 @@ def _check_facets(name: str, facets: np.ndarray, boundary: np.ndarray) -> None:
         raise InvalidInputError(
             f"surface '{name}' must list nodes around each facet with the normal pointing out of the body, "
             f"{np.count_nonzero(~same)} of {facets.shape[0]} facets do not, first facet {first} with nodes "
-            f"{facets[first].tolist()}: order them with `orient(cells, facets)`"
+            f"{facets[first].tolist()}: order them with `orient(cells, facets, dim={dim})`"
         )
 
 
-def checked_grid(grid: ArrayLike | None, n_cells: int) -> np.ndarray | None:
-    """Return the structured index of every cell, (n_cells, 3) int64 from zero, or None."""
+def checked_grid(grid: ArrayLike | None, n_cells: int, dim: int) -> np.ndarray | None:
+    """Return the structured index of every cell, (n_cells, dim) int64 from zero, or None."""
     if grid is None:
         return None
     array = _integers(grid, "grid")
-    if array.shape != (n_cells, 3) or array.min() < 0:
+    if array.shape != (n_cells, dim) or array.min() < 0:
         raise InvalidInputError(
-            f"grid must have shape ({n_cells}, 3) and no negative entry, got shape {array.shape}: give one "
-            "index triple for every cell, or None for an unstructured mesh"
+            f"grid must have shape ({n_cells}, {dim}) and no negative entry, got shape {array.shape}: give "
+            f"{dim} indices for every cell, or None for an unstructured mesh"
         )
     return array
+
+
+def checked_regions(regions: Mapping[str, ArrayLike], n_cells: int) -> dict[str, np.ndarray]:
+    """Return named ascending cell numbers, int64 each; every cell is in exactly one if there is any."""
+    checked: dict[str, np.ndarray] = {}
+    owner = np.full(n_cells, -1, dtype=np.int64)
+    for number, (name, cells) in enumerate(regions.items()):
+        array = np.sort(_integers(cells, f"region '{name}'"), axis=None)
+        if array.size == 0 or array[0] < 0 or array[-1] >= n_cells:
+            raise InvalidInputError(
+                f"region '{name}' must hold cell numbers from 0 to {n_cells - 1}, got "
+                f"{f'{array[0]} to {array[-1]}' if array.size else 'none'}: cell numbers count the rows of "
+                "cells from zero; leave out a region that is empty"
+            )
+        taken = np.union1d(array[owner[array] >= 0], array[1:][np.diff(array) == 0])
+        if taken.size:
+            raise InvalidInputError(
+                f"every cell must belong to one region, {taken.size} of region '{name}' are in it twice or "
+                f"in another too, first cell {taken[0]}: give each cell to one region"
+            )
+        owner[array] = number
+        array.setflags(write=False)
+        checked[name] = array
+    left = np.flatnonzero(owner < 0)
+    if checked and left.size:
+        raise InvalidInputError(
+            f"every cell must belong to a region where there are any, {left.size} of {n_cells} do not, first "
+            f"cell {left[0]}: give the rest a region of its own"
+        )
+    return checked

@@ -1,6 +1,7 @@
 """Scenes: bodies, materials, supports, loads and contact pairs."""
 
 from fenics_contact.scene.body import Body
+from fenics_contact.scene.kernels import rigid_body_modes
 from fenics_contact.scene.loads import (
     BodyForce,
     Load,
@@ -25,10 +26,16 @@ from fenics_contact.scene.materials import (
     Transverse,
     can_expand,
     material_axes,
-    rigid_body_modes,
     strain,
 )
-from fenics_contact.scene.pairs import ContactPair, Coulomb, RigidPlane, Surface, Tresca
+from fenics_contact.scene.obstacles import (
+    DistanceObstacle,
+    RigidCylinder,
+    RigidObstacle,
+    RigidPlane,
+    RigidSphere,
+)
+from fenics_contact.scene.pairs import ContactPair, Coulomb, Surface, Tie, Tresca
 from fenics_contact.scene.scene import Effect, Scene
 from fenics_contact.scene.supports import Support
 from fenics_contact.scene.values import Ufl
@@ -38,6 +45,7 @@ __all__ = [
     "BodyForce",
     "ContactPair",
     "Coulomb",
+    "DistanceObstacle",
     "Effect",
     "Elasticity",
     "EnergyModel",
@@ -49,13 +57,17 @@ __all__ = [
     "PlaneStrain",
     "PlaneStress",
     "Pressure",
+    "RigidCylinder",
+    "RigidObstacle",
     "RigidPlane",
+    "RigidSphere",
     "Scene",
     "Support",
     "Surface",
     "SurfaceLoad",
     "ThermalStrain",
     "Thermoelastic",
+    "Tie",
     "TotalForce",
     "Traction",
     "Transverse",

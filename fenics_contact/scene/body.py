@@ -56,23 +56,18 @@ class Body:
 def _check_regions(mesh: BodyMesh, materials: Mapping[str, Material]) -> None:
     if set(materials) != set(mesh.regions):
         raise InvalidInputError(
-            f"materials by region must name exactly the regions of the mesh, got {sorted(materials)}, the mesh "
-            f"has {sorted(mesh.regions)}: give one material for each, or one for the whole body"
-        )
-    counts = np.zeros(mesh.n_cells, dtype=np.int64)
-    for cells in mesh.regions.values():
-        counts[cells] += 1
-    if (counts != 1).any():
-        raise InvalidInputError(
-            f"every cell must lie in exactly one region for materials by region, {int((counts != 1).sum())} "
-            f"of {mesh.n_cells} do not, first cell {int(np.argmax(counts != 1))} in {int(counts[counts != 1][0])}"
-            " regions: make the regions a partition of the cells"
+            f"materials by region must name exactly the regions of the mesh, got {sorted(materials)}, the "
+            f"mesh has {sorted(mesh.regions)}: give one material for each, or one for the whole body"
         )
 
 
 def _check_material(material: Material, dim: int) -> None:
     name = type(material).__name__
-    missing = [part for part in ("dims", "parameters", "stress", "stiffness", "kernel") if not hasattr(material, part)]
+    missing = [
+        part
+        for part in ("dims", "parameters", "stress", "stiffness", "kernel")
+        if not hasattr(material, part)
+    ]
     if missing:
         raise InvalidInputError(
             f"a material must have dims, parameters, stress, stiffness and kernel, {name} lacks {missing}: "
@@ -88,6 +83,6 @@ def _check_material(material: Material, dim: int) -> None:
         hash(material)
     except TypeError as error:
         raise InvalidInputError(
-            f"a material must be hashable, {name} is not ({error}): write it as a frozen dataclass of numbers "
-            "and tuples"
+            f"a material must be hashable, {name} is not ({error}): write it as a frozen dataclass of "
+            "numbers and tuples"
         ) from error

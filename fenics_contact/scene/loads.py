@@ -15,8 +15,7 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene.values import ScalarValue, VectorValue, checked_scalar, checked_vector
-
-Vector = tuple[float, ...]
+from fenics_contact.scene.vectors import Vector
 
 
 @dataclass(frozen=True)
@@ -57,8 +56,8 @@ class TotalForce:
         value = checked_vector("TotalForce.value", self.value)
         if not isinstance(value, tuple):
             raise InvalidInputError(
-                f"TotalForce.value must be numbers, got {self.value!r}: a resultant has no place to depend on; "
-                "give a Traction as a function of position"
+                f"TotalForce.value must be numbers, got {self.value!r}: a resultant has no place to depend "
+                "on; give a Traction as a function of position"
             )
         object.__setattr__(self, "value", value)
 

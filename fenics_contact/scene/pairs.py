@@ -1,13 +1,16 @@
-"""Who may touch whom, and with which friction."""
+"""Who may touch whom, with which friction, and who is bonded to whom."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene.loads import Vector
+from fenics_contact.scene.obstacles import RigidObstacle
+
+Discretisation: TypeAlias = Literal["node", "mortar"]
 
 
 @dataclass(frozen=True)
@@ -16,30 +19,6 @@ class Surface:
 
     body: str
     name: str
-
-
-@dataclass(frozen=True)
-class RigidPlane:
-    """An immovable half space.
-
-    Attributes:
-        point: Any point of the plane, [length].
-        normal: Direction from the obstacle into the free side; scaled to unit length.
-    """
-
-    point: Vector
-    normal: Vector
-
-    def __post_init__(self) -> None:
-        """Scale the normal, refuse one without direction."""
-        length = float(np.linalg.norm(self.normal))
-        vectors = len(self.point) == len(self.normal) == 3 and np.all(np.isfinite(self.point))
-        if not (vectors and np.isfinite(length) and length > 0):
-            raise InvalidInputError(
-                "RigidPlane needs a point and a normal of three finite numbers, the normal not zero, got "
-                f"point {self.point!r} and normal {self.normal!r}: for a floor give normal (0, 0, 1)"
-            )
-        object.__setattr__(self, "normal", tuple(float(c / length) for c in self.normal))
 
 
 @dataclass(frozen=True)
@@ -82,17 +61,22 @@ class Tresca:
 
 @dataclass(frozen=True)
 class ContactPair:
-    """Two surfaces that may touch. Every node of the slave is kept out of the master.
+    """Two surfaces that may touch. The slave is kept out of the master.
 
     Attributes:
         slave: Surface whose nodes carry the contact forces.
         master: Surface of another body, or a rigid obstacle.
         friction: Friction law, or None for frictionless contact.
+        discretisation: ``"node"`` keeps every slave node out of the master facet that it projects on: simple,
+            and what shape derivatives know. ``"mortar"`` keeps weighted means of the gap positive (dual
+            basis, integration over the common segments of both meshes): passes the contact patch test on
+            meshes that do not match. Nodes are kept off a rigid obstacle one by one, whatever is given.
     """
 
     slave: Surface
-    master: Surface | RigidPlane
+    master: Surface | RigidObstacle
     friction: Coulomb | Tresca | None = None
+    discretisation: Discretisation = "node"
 
     def __post_init__(self) -> None:
         """Refuse self-contact by name."""
@@ -101,6 +85,7 @@ class ContactPair:
                 f"contact of body {self.slave.body!r} with itself is not supported: "
                 "slave and master must belong to different bodies; split the body if its parts may touch"
             )
+        _require_discretisation(self.discretisation)
 
     @property
     def has_friction(self) -> bool:
@@ -109,3 +94,37 @@ class ContactPair:
             case Coulomb(friction_coefficient=value) | Tresca(traction=value):
                 return value > 0
         return False
+
+
+@dataclass(frozen=True)
+class Tie:
+    """Two surfaces that stay together: they neither part nor, unless they may slide, shift.
+
+    What lies between them at the start, a gap of their meshes, stays as it is.
+
+    Attributes:
+        slave: Surface whose nodes carry the forces; the finer mesh is the better slave.
+        master: Surface of another body.
+        sliding: Whether the surfaces may shift along each other: contact known to be closed.
+        discretisation: As for `ContactPair`.
+    """
+
+    slave: Surface
+    master: Surface
+    sliding: bool = False
+    discretisation: Discretisation = "mortar"
+
+    def __post_init__(self) -> None:
+        """Refuse a body that is tied to itself."""
+        if self.master.body == self.slave.body:
+            raise InvalidInputError(
+                f"body {self.slave.body!r} cannot be tied to itself: a tie joins two bodies; mesh its parts "
+                "together, or as two bodies"
+            )
+        _require_discretisation(self.discretisation)
+
+
+def _require_discretisation(given: str) -> None:
+    known = get_args(Discretisation)
+    if given not in known:
+        raise InvalidInputError(f"discretisation must be one of {list(known)}, got {given!r}")

@@ -11,7 +11,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene.body import Body
 from fenics_contact.scene.loads import BodyForce, Load, SurfaceLoad, ThermalStrain
 from fenics_contact.scene.materials import can_expand
-from fenics_contact.scene.pairs import ContactPair, Coulomb, Surface, Tresca
+from fenics_contact.scene.pairs import ContactPair, Coulomb, Surface, Tie, Tresca
 from fenics_contact.scene.supports import Support
 
 
@@ -32,12 +32,14 @@ class Scene:
         supports: Prescribed displacements.
         loads: Forces.
         contacts: Pairs of surfaces that may touch.
+        ties: Pairs of surfaces that stay together.
     """
 
     bodies: Mapping[str, Body]
     supports: Sequence[Support] = field(default=())
     loads: Sequence[Load] = field(default=())
     contacts: Sequence[ContactPair] = field(default=())
+    ties: Sequence[Tie] = field(default=())
 
     def __post_init__(self) -> None:
         """Refuse names that point to nothing, and loads and supports that do not suit their bodies."""
@@ -51,10 +53,12 @@ class Scene:
             self._require_components(part)
             if isinstance(part, ThermalStrain):
                 self._require_expansion(part)
-        for pair in self.contacts:
-            self._require(pair.slave.body, pair.slave.name, "ContactPair.slave")
+        pairs: list[ContactPair | Tie] = [*self.contacts, *self.ties]
+        for pair in pairs:
+            kind = type(pair).__name__
+            self._require(pair.slave.body, pair.slave.name, f"{kind}.slave")
             if isinstance(pair.master, Surface):
-                self._require(pair.master.body, pair.master.name, "ContactPair.master")
+                self._require(pair.master.body, pair.master.name, f"{kind}.master")
 
     def _require(self, body: str, surface: str | None, user: str) -> None:
         if body not in self.bodies:
@@ -87,6 +91,11 @@ class Scene:
                 f"ThermalStrain needs a thermal expansion of every material of body {load.body!r}, got none "
                 f"for {stiff[0]!r}: give the material its thermal_expansion"
             )
+
+    @property
+    def dim(self) -> int:
+        """Dimension of space, 2 or 3."""
+        return int(next(iter(self.bodies.values())).mesh.points.shape[1])
 
     @property
     def body_names(self) -> tuple[str, ...]:

@@ -7,12 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.contact import State
+from fenics_contact.feti import ContactPoints, TornSystem
 from fenics_contact.feti.contact_search import surface_of
-from fenics_contact.scene import RigidPlane, Tresca
+from fenics_contact.scene import RigidObstacle, Surface, Tresca
 from fenics_contact.shape.adjoint import Adjoint
 from fenics_contact.shape.linearised_face import LinearisedFace
 from fenics_contact.shape.objective import Partials
-from fenics_contact.shape.projection_derivative import PointDerivatives, projection_pulled_back
+from fenics_contact.shape.projection_derivative import (
+    PointDerivatives,
+    frames_pulled_back,
+    projection_pulled_back,
+)
 from fenics_contact.shape.surface_derivative import areas_pulled_back
 
 
@@ -22,22 +27,28 @@ class RowFields:
 
     Attributes:
         normal: λ_N and ζ_N, shape (2, n).
-        friction: τ and ζ_T in the points' tangents, shape (2, n, 2).
-        relative: Slave minus master displacement, of the adjoint and of the state, shape (2, n, 3): the field
-            that each multiplier is paired with.
-        master: Displacement of the master's corners, shape (2, n, 4, 3), in the same order.
+        friction: τ and ζ_T in the points' tangents, shape (2, n, dim - 1).
+        nodes: Nodes of slaves and masters, ascending, shape (n_nodes,).
+        values: Displacement of these nodes, of the adjoint and of the state, shape (2, n_nodes, dim): the
+            field that each multiplier is paired with.
+        relative: Slave minus master displacement, shape (2, n, dim), in the same order.
     """
 
     normal: np.ndarray
     friction: np.ndarray
+    nodes: np.ndarray
+    values: np.ndarray
     relative: np.ndarray
-    master: np.ndarray
+
+    def at(self, nodes: np.ndarray) -> np.ndarray:
+        """Return the displacements of some of the nodes, shape (2, ..., dim)."""
+        return np.asarray(self.values[:, np.searchsorted(self.nodes, nodes)])
 
 
 def contact_by_shape(state: State, adjoint: Adjoint, by_bound: np.ndarray) -> np.ndarray:
-    """Return ∂/∂X of −λᵀ B w + ζᵀ(c − B u) plus the slip bounds' share, replicated, shape (n_nodes, 3).
+    """Return ∂/∂X of −λᵀ B w + ζᵀ(c − B u) plus the slip bounds' share, replicated, shape (n_nodes, dim).
 
-    Collective.
+    Pairs with mortar contact must lie where no node moves: their share is left out. Collective.
 
     Args:
         state: The state.
@@ -46,37 +57,55 @@ def contact_by_shape(state: State, adjoint: Adjoint, by_bound: np.ndarray) -> np
     """
     torn = state.system.torn
     tearing, points = torn.decomposition.tearing, torn.points
-    result = np.zeros((int(tearing.node_offset[-1]), 3))
+    result = np.zeros((tearing.n_nodes, torn.dim))
     if points.count == 0:
         return result
-    derivatives = _by_point(state, _row_fields(state, adjoint))
+    rows = _row_fields(state, adjoint)
     by_bound_full = np.zeros(points.count)
     by_bound_full[torn.frictional] = by_bound
     for index, pair in enumerate(torn.scene.contacts):
-        mine = points.pair == index
-        gap, slave = derivatives.gap[mine], points.slave[mine]
-        surface = surface_of(torn.scene, pair.slave)
-        nodes = tearing.global_nodes(pair.slave.body, surface.nodes)
+        mine = np.flatnonzero(points.pair == index)
         if isinstance(pair.friction, Tresca):
+            surface = surface_of(torn.scene, pair.slave)
+            nodes = tearing.global_nodes(pair.slave.body, surface.nodes)
             by_areas = np.zeros(len(nodes))
-            by_areas[np.searchsorted(nodes, slave)] = pair.friction.traction * by_bound_full[mine]
+            by_areas[np.searchsorted(nodes, points.slave[mine])] = (
+                pair.friction.traction * by_bound_full[mine]
+            )
             result[nodes] += areas_pulled_back(surface, by_areas)
-        if isinstance(pair.master, RigidPlane):
-            result[slave] += gap[:, None] * np.asarray(pair.master.normal)
-            continue
-        master = surface_of(torn.scene, pair.master)
-        by = PointDerivatives(
-            gap,
-            derivatives.normal[mine],
-            derivatives.tangents[mine],
-            derivatives.weight[mine][:, : master.corners],
-        )
-        by_slave, by_master = projection_pulled_back(
-            master, points.facet[mine], points.local[mine], points.gap[mine], by
-        )
-        result[slave] += by_slave
-        result[tearing.global_nodes(pair.master.body, master.nodes)] += by_master
+        if not isinstance(pair.master, Surface):
+            result[points.slave[mine]] += _by_obstacle(torn, pair.master, rows, mine)
+        elif pair.discretisation == "node":
+            _add_projected(result, torn, pair.master, rows, mine)
     return result
+
+
+def _by_obstacle(torn: TornSystem, obstacle: RigidObstacle, rows: RowFields, mine: np.ndarray) -> np.ndarray:
+    """Return the derivative by the slave nodes that meet an obstacle, shape (n, dim)."""
+    by, normal = _by_point(torn.points, rows, mine), torn.points.normal[mine]
+    bending = obstacle.curvatures(_points(torn, torn.points.slave[mine]))
+    turning = by.normal + frames_pulled_back(normal, by.tangents)
+    return np.asarray(by.gap[:, None] * normal + np.einsum("nde,ne->nd", bending, turning))
+
+
+def _add_projected(
+    result: np.ndarray, torn: TornSystem, master: Surface, rows: RowFields, mine: np.ndarray
+) -> None:
+    """Add the derivative by slave and master nodes of points found by projection."""
+    points, surface = torn.points, surface_of(torn.scene, master)
+    nodes = torn.decomposition.tearing.global_nodes(master.body, surface.nodes)
+    corners = rows.at(nodes[surface.facets[points.facet[mine]]])
+    by = _by_point(points, rows, mine, corners)
+    by_slave, by_master = projection_pulled_back(
+        surface, points.facet[mine], points.local[mine], points.gap[mine], by
+    )
+    result[points.slave[mine]] += by_slave
+    result[nodes] += by_master
+
+
+def _points(torn: TornSystem, nodes: np.ndarray) -> np.ndarray:
+    """Return the coordinates of nodes of all bodies, shape (n, dim)."""
+    return np.concatenate([body.mesh.points for body in torn.scene.bodies.values()])[nodes]
 
 
 def bound_sensitivity(
@@ -94,45 +123,54 @@ def bound_sensitivity(
 def _row_fields(state: State, adjoint: Adjoint) -> RowFields:
     system = state.system
     torn = system.torn
-    points, tearing = torn.points, torn.decomposition.tearing
-    normal = np.stack(
-        [torn.numbering.gather(x, torn.normal_rows) for x in (state.solution.multiplier, adjoint.multiplier)]
-    )
-    friction = np.zeros((2, points.count, 2))
-    for k, x in enumerate((state.solution.multiplier, adjoint.multiplier)):
-        friction[k, torn.frictional] = torn.numbering.gather(x, torn.tangential_rows.ravel()).reshape(-1, 2)
-    nodes = np.unique(np.concatenate([points.slave, points.master.ravel()]))
-    relative, master = np.zeros((2, points.count, 3)), np.zeros((2, points.count, 4, 3))
-    for k, field in enumerate((adjoint.displacement, state.torn_displacement)):
-        values = nodal_means(state, field, nodes)
-        master[k] = values[np.searchsorted(nodes, points.master)]
-        slave = values[np.searchsorted(nodes, points.slave)]
-        relative[k] = slave - np.einsum("nj,njd->nd", points.weight, master[k])
-    _ = tearing
-    return RowFields(normal, friction, relative, master)
+    points, width = torn.points, torn.dim - 1
+    multipliers = (state.solution.multiplier, adjoint.multiplier)
+    normal = np.stack([torn.numbering.gather(x, torn.normal_rows) for x in multipliers])
+    friction = np.zeros((2, points.count, width))
+    for k, x in enumerate(multipliers):
+        gathered = torn.numbering.gather(x, torn.tangential_rows.ravel())
+        friction[k, torn.frictional] = gathered.reshape(-1, width)
+    nodes = np.unique(points.jump.indices)
+    fields = (adjoint.displacement, state.torn_displacement)
+    values = np.stack([nodal_means(state, field, nodes) for field in fields])
+    jump = points.jump[:, nodes]
+    return RowFields(normal, friction, nodes, values, np.stack([jump @ value for value in values]))
 
 
 def nodal_means(state: State, field: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Return the mean over all copies of a torn field at some nodes, replicated, shape (n, 3). Collective."""
+    """Return the mean over all copies of a torn field at some nodes, replicated, (n, dim). Collective.
+
+    Copies weigh as in the contact rows.
+    """
     decomposition = state.system.torn.decomposition
     tearing = decomposition.tearing
     copies = tearing.multiplicity[nodes]
     within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
-    block = decomposition.copy_block[np.repeat(tearing.first_copy[nodes], copies) + within]
+    copy = np.repeat(tearing.first_copy[nodes], copies) + within
+    block = decomposition.copy_block[copy]
     here = np.flatnonzero(block >= 0)
-    owner = np.repeat(np.arange(len(nodes)), copies)[here]
-    total = np.zeros((len(nodes), 3))
-    np.add.at(total, owner, field.reshape(-1, 3)[block[here]])
-    return np.asarray(decomposition.comm.allreduce(total)) / copies[:, None]
+    total = np.zeros((len(nodes), tearing.dim))
+    shares = tearing.copy_share[copy[here], None] * field.reshape(-1, tearing.dim)[block[here]]
+    np.add.at(total, np.repeat(np.arange(len(nodes)), copies)[here], shares)
+    return np.asarray(decomposition.comm.allreduce(total))
 
 
-def _by_point(state: State, rows: RowFields) -> PointDerivatives:
-    """Differentiate −λᵀ B w − ζᵀ B u + ζ_N g; rows −n·rel(v) and t·rel(v), rel(v) = v_s − Σ w_j v_j."""
-    points = state.system.torn.points
-    normal = np.einsum("kn,knd->nd", rows.normal, rows.relative)
-    tangents = -np.einsum("kna,knd->nad", rows.friction, rows.relative)
-    pulled = -rows.normal[:, :, None] * points.normal + np.einsum(
-        "kna,nad->knd", rows.friction, points.tangents
-    )
-    weight = np.einsum("knd,knjd->nj", pulled, rows.master)
-    return PointDerivatives(rows.normal[1], normal, tangents, weight)
+def _by_point(
+    points: ContactPoints, rows: RowFields, mine: np.ndarray, corners: np.ndarray | None = None
+) -> PointDerivatives:
+    """Differentiate −λᵀ B w − ζᵀ B u + ζ_N g; rows −n·rel(v) and t·rel(v), rel(v) = v_s − Σ w_j v_j.
+
+    Args:
+        points: All points.
+        rows: Their multipliers and displacements.
+        mine: The points to differentiate, shape (m,).
+        corners: Displacements of the corners of their master facets, shape (2, m, corners, dim).
+    """
+    force, friction, relative = rows.normal[:, mine], rows.friction[:, mine], rows.relative[:, mine]
+    normal = np.einsum("kn,knd->nd", force, relative)
+    tangents = -np.einsum("kna,knd->nad", friction, relative)
+    if corners is None:
+        return PointDerivatives(force[1], normal, tangents, np.zeros((len(mine), 0)))
+    pulled = -force[:, :, None] * points.normal[mine]
+    pulled = pulled + np.einsum("kna,nad->knd", friction, points.tangents[mine])
+    return PointDerivatives(force[1], normal, tangents, np.einsum("knd,knjd->nj", pulled, corners))

@@ -94,7 +94,7 @@ class SurfaceDesign:
         width = TRANSITION * extent if self.transition is None else self.transition
         distance, _ = cKDTree(surface).query(mesh.points)
         far = distance > max(FAR * extent, width)
-        facets, _ = boundary_faces(mesh.cells)
+        facets, _ = boundary_faces(mesh.cells, mesh.dim)
         boundary = np.setdiff1d(facets, self.surface.nodes)
         far[boundary] |= distance[boundary] > width
         return np.flatnonzero(far)

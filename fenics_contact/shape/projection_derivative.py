@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.feti.contact_search import reference_axes
+from fenics_contact.feti.contact_points import reference_axes
 from fenics_contact.feti.projection import interpolated_normal, newton_matrix
 from fenics_contact.feti.surface import FacetedSurface, shape_functions
 from fenics_contact.shape.surface_derivative import normals_pulled_back
@@ -32,7 +32,7 @@ class PointDerivatives:
 def frames_pulled_back(normal: np.ndarray, by_tangents: np.ndarray) -> np.ndarray:
     """Return the derivative by the unit normals from that by the tangents built on them, shape (n, 3).
 
-    Reverse of `fenics_contact.feti.contact_search.tangent_frames`.
+    Reverse of `fenics_contact.feti.contact_points.tangent_frames`.
 
     Args:
         normal: Unit normals, shape (n, 3).

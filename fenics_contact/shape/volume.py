@@ -5,17 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.feti.surface import shape_functions
-from fenics_contact.geometry import BodyMesh, boundary_faces
+from fenics_contact.geometry import BodyMesh, boundary_faces, vector_areas
 
 
 def volume_by_points(mesh: BodyMesh) -> np.ndarray:
-    """Return the derivative of the volume by every node, shape (n_nodes, 3), [length²].
+    """Return the derivative of the volume by every node, shape (n_nodes, 3), [length²]; in 2D of the area.
 
     Moving the boundary by v changes the volume by ∫ v·n dA, so that only boundary nodes count; two Gauss
     points a direction integrate this exactly on bilinear faces.
     """
-    faces, _ = boundary_faces(mesh.cells)
+    faces, _ = boundary_faces(mesh.cells, mesh.dim)
     corners, result = mesh.points[faces], np.zeros_like(mesh.points)
+    if mesh.dim == 2:
+        np.add.at(result, faces, 0.5 * vector_areas(mesh.points, faces)[:, None])
+        return result
     positions: np.ndarray
     if faces.shape[1] == 4:
         grid = np.array([-1.0, 1.0]) / np.sqrt(3)

@@ -90,7 +90,7 @@ def _body_layers(mesh: BodyMesh, partition: np.ndarray, family: int, explode: fl
     colours = colour_subdomains(neighbours(mesh.cells, partition), family)
     layers = []
     for number in np.unique(partition):
-        faces, _ = boundary_faces(mesh.cells[partition == number])
+        faces, _ = boundary_faces(mesh.cells[partition == number], mesh.dim)
         piece = surface(mesh.points, faces)
         centre = piece.points.mean(axis=0)
         piece.points = centre + (1.0 - explode) * (piece.points - centre)
@@ -106,7 +106,7 @@ _SEAM = {"color": INK, "line_width": 4, "lighting": False}
 
 def _seams(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
     """Edges of the body's surface at which subdomains meet, (n, 2)."""
-    faces, cells = boundary_faces(mesh.cells)
+    faces, cells = boundary_faces(mesh.cells, mesh.dim)
     edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     labels = np.repeat(partition[cells], faces.shape[1])
     order = np.lexsort((edges[:, 1], edges[:, 0]))

@@ -170,7 +170,7 @@ def _place_sections(figure: Any, details: list[_Detail], top: int, look: _Look) 
 
 
 def _body_layer(body: BodyFields, look: _Look) -> Layer:
-    faces, cells = boundary_faces(body.mesh.cells)
+    faces, cells = boundary_faces(body.mesh.cells, body.mesh.dim)
     mesh = surface(body.deformed(look.scale), faces)
     if look.smooth:
         mesh.point_data["shown"] = look.scalars(body)[mesh.point_data["node"]]

@@ -177,3 +177,66 @@ def test_shape_functions_add_up_to_one_and_their_slopes_are_right(corners: int) 
             shape_functions(local + step, corners)[0] - shape_functions(local - step, corners)[0]
         ) / 2e-6
         np.testing.assert_allclose(slopes[:, :, direction], numeric, atol=1e-9)
+
+
+# In the plane, where surfaces are curves.
+
+
+def arc(n: int, radius: float = 1.0, uneven: float = 0.03) -> FacetedSurface:
+    """The upper part of a disc's rim, seen from outside; the disc lies on the left of its edges."""
+    angle = np.linspace(2.6, 0.5, n + 1)
+    angle = angle + uneven * np.sin(5 * angle)
+    points = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    return faceted_surface(points, np.column_stack([np.arange(1, n + 1), np.arange(n)]))
+
+
+def ring(angle: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    direction = np.column_stack([np.cos(angle), np.sin(angle)])
+    return radius[:, None] * direction, direction
+
+
+def test_straight_lines_are_exact() -> None:
+    rng = np.random.default_rng(1)
+    ticks = np.sort(np.concatenate([[0, 3], rng.uniform(0, 3, 11)]))
+    points = np.column_stack([rng.uniform(0, 3, 200), rng.uniform(-0.5, 2, 200)])
+    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
+    edges = np.column_stack([np.arange(1, 13), np.arange(12)])
+    line = faceted_surface(np.column_stack([ticks, 0 * ticks]) @ turn.T, edges)
+    found = project(points @ turn.T, np.tile([0.0, -1.0], (200, 1)) @ turn.T, line)
+    np.testing.assert_array_equal(found.point, np.arange(200))
+    assert found.local.shape == (200, 1)
+    np.testing.assert_allclose(found.gap, points[:, 1], atol=1e-13)
+    np.testing.assert_allclose(found.normal, np.tile(turn[:, 1], (200, 1)), atol=1e-13)
+    np.testing.assert_allclose(foot(found, line) @ turn, points * [1, 0], atol=1e-13)
+
+
+def test_distance_and_normal_of_curves_converge_with_second_order() -> None:
+    rng = np.random.default_rng(2)
+    distance = rng.uniform(-0.05, 0.2, 50)
+    points, direction = ring(rng.uniform(0.8, 2.3, 50), 1 + distance)
+    errors = []
+    for n in (8, 16, 32, 64):
+        found = project(points, -direction, arc(n))
+        assert len(found.point) == 50
+        errors.append([np.abs(found.gap - distance).max(), np.abs(found.normal - direction).max()])
+    rates = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+    assert rates[-1].min() > 1.8, f"orders of gap and normal: {rates}"
+    assert errors[0][0] > 1e-4, "the coarse curve is too good: nothing was tested"
+
+
+def test_gap_and_normal_do_not_jump_between_edges() -> None:
+    def jumps(steps: int) -> np.ndarray:
+        points, direction = ring(np.linspace(0.8, 2.3, steps + 1), np.full(steps + 1, 1.03))
+        found = project(points, -direction, arc(9))
+        assert len(found.point) == steps + 1, "a point between two edges was lost"
+        assert len(np.unique(found.facet)) > 4, "hardly a corner was crossed"
+        return np.abs(np.diff(np.column_stack([found.gap, found.normal]), axis=0)).max(axis=0)
+
+    assert (jumps(3200) < jumps(400) / 6 + 1e-12).all()
+
+
+def test_points_beyond_the_ends_of_a_curve_and_from_behind_have_no_projection() -> None:
+    line = faceted_surface(np.array([[0.0, 0], [0.5, 0], [1, 0]]), np.array([[1, 0], [2, 1]]))
+    points = np.array([[0.5, 0.1], [1.01, 0.1], [-0.01, 0.1], [1.0, 0.1], [0.3, 0.1]])
+    normals = np.array([[0.0, -1], [0, -1], [0, -1], [0, -1], [0, 1]])
+    assert project(points, normals, line).point.tolist() == [0, 3]

@@ -7,9 +7,9 @@ import pytest
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import block, boundary_faces, orient, vector_areas
+from fenics_contact.geometry.cell_types import HEXAHEDRON
 from fenics_contact.geometry.faces import cell_faces, match_faces, neighbours, number_faces
 from fenics_contact.geometry.quality import (
-    HEXAHEDRON_VERTICES,
     cell_volumes,
     jacobian_ratio,
     jacobians,
@@ -99,7 +99,7 @@ def test_the_jacobian_is_the_derivative_of_the_trilinear_map() -> None:
     points, cells = shaken("hexahedron")
 
     def image(position: np.ndarray) -> np.ndarray:
-        weights = np.prod(np.where(HEXAHEDRON_VERTICES == 1.0, position, 1.0 - position), axis=1)
+        weights = np.prod(np.where(HEXAHEDRON.vertices == 1.0, position, 1.0 - position), axis=1)
         return np.asarray(weights @ points[cells])
 
     position, h = np.array([0.3, 0.8, 0.1]), 1e-5

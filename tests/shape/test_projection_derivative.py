@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fenics_contact.feti.contact_search import tangent_frames
+from fenics_contact.feti.contact_points import tangent_frames
 from fenics_contact.feti.projection import project
 from fenics_contact.feti.surface import FacetedSurface, faceted_surface, outside, shape_functions
 from fenics_contact.geometry import block

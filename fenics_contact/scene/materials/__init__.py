@@ -10,7 +10,6 @@ from fenics_contact.scene.materials.orthotropic import (
 )
 from fenics_contact.scene.materials.plane import PlaneStrain, PlaneStress
 from fenics_contact.scene.materials.protocol import Material, Thermoelastic, Transverse, can_expand
-from fenics_contact.scene.materials.rigid import rigid_body_modes
 
 __all__ = [
     "Elasticity",
@@ -25,6 +24,5 @@ __all__ = [
     "Transverse",
     "can_expand",
     "material_axes",
-    "rigid_body_modes",
     "strain",
 ]

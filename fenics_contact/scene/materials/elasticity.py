@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import ufl
 
-from fenics_contact.scene.materials.rigid import rigid_body_modes
+from fenics_contact.scene.kernels import rigid_body_modes
 
 
 def strain(u: Any) -> Any:

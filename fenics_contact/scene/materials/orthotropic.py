@@ -158,8 +158,8 @@ class OrthotropicPlaneStress(Elasticity):
         if not np.isfinite(others).all() or min(*moduli, self.shear_modulus) <= 0:
             raise InvalidInputError(
                 "OrthotropicPlaneStress needs finite constants with positive moduli, got young_moduli "
-                f"{moduli}, poisson_ratio {self.poisson_ratio!r}, shear_modulus {self.shear_modulus!r}, angle "
-                f"{self.angle!r}: give moduli in force per area and the angle in radians"
+                f"{moduli}, poisson_ratio {self.poisson_ratio!r}, shear_modulus {self.shear_modulus!r}, "
+                f"angle {self.angle!r}: give moduli in force per area and the angle in radians"
             )
         _ = self.stiffness_matrix
 

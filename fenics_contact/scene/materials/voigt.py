@@ -21,9 +21,7 @@ def strain_vector(strain: Any, dim: int) -> list[Any]:
 def as_tensor(vector: list[Any], dim: int) -> Any:
     """Return the stress tensor (UFL) with the given Voigt entries."""
     place = {pair: k for k, pair in enumerate(PAIRS[dim])}
-    return ufl.as_tensor(
-        [[vector[place[min(i, j), max(i, j)]] for j in range(dim)] for i in range(dim)]
-    )
+    return ufl.as_tensor([[vector[place[min(i, j), max(i, j)]] for j in range(dim)] for i in range(dim)])
 
 
 def upper_triangle(matrix: np.ndarray) -> tuple[float, ...]:

@@ -31,6 +31,10 @@ class Rates:
     stream: float = 15e9
 
 
+#: Bytes of a sparse factor of n dofs of a solid, divided by n^1.5.
+FACTOR_BYTES = 29.0
+#: Bytes of the two packed triangles of dense operators, divided by the square of the interface dofs.
+TRIANGLE_BYTES = 6.0
 #: Rates measured as `Rates` describes.
 MEASURED = Rates()
 
@@ -88,6 +92,13 @@ def prefers_explicit(size: int, interface: int, *, products: int = PRODUCTS, rat
 def expected_seconds(size: int, interface: int) -> float:
     """Return what a subdomain costs when it is kept in the cheaper way; arguments as `prefers_explicit`."""
     return min(_totals(size, interface, PRODUCTS, MEASURED))
+
+
+def expected_bytes(size: int, interface: int) -> float:
+    """Return the memory of a factored subdomain that is kept in the cheaper way; arguments as above."""
+    if prefers_explicit(size, interface):
+        return TRIANGLE_BYTES * interface**2 + FACTOR_BYTES * (size - interface) ** 1.5
+    return FACTOR_BYTES * (size**1.5 + (size - interface) ** 1.5)
 
 
 def _totals(size: int, interface: int, products: int, rates: Rates) -> tuple[float, float]:

@@ -1,0 +1,88 @@
+"""Contact points: places where a node of one surface meets another surface or an obstacle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+
+@dataclass(frozen=True)
+class ContactPoints:
+    """Contact points of a scene, replicated on all ranks, in the order pair by pair, node by node.
+
+    Attributes:
+        pair: Contact pair of the scene, shape (n,).
+        slave: Slave node among all bodies' nodes, shape (n,).
+        master: Weights of the nodes of all bodies in the point of the master that the node meets, shape
+            (n, n_nodes); a row sums to one, and is empty on a rigid obstacle.
+        normal: Unit normal from master to slave, shape (n, dim).
+        tangents: Unit tangents, shape (n, dim - 1, dim).
+        gap: Distance along the normal, positive when open, shape (n,), [length].
+        area: Area of the slave surface that belongs to the node, shape (n,), [length^(dim - 1)].
+        facet: Facet of the master surface that a node projects on; −1 on a rigid obstacle and where a point
+            stands for a mean over facets, shape (n,).
+        local: Local coordinates on it, shape (n, dim - 1).
+    """
+
+    pair: np.ndarray
+    slave: np.ndarray
+    master: sp.csr_matrix
+    normal: np.ndarray
+    tangents: np.ndarray
+    gap: np.ndarray
+    area: np.ndarray
+    facet: np.ndarray
+    local: np.ndarray
+
+    @property
+    def count(self) -> int:
+        """Number of contact points."""
+        return len(self.slave)
+
+    @cached_property
+    def jump(self) -> sp.csr_matrix:
+        """Weights of the nodes in slave minus master displacement, shape (n, n_nodes)."""
+        shape = self.master.shape
+        slave = sp.csr_matrix((np.ones(self.count), (np.arange(self.count), self.slave)), shape=shape)
+        return (slave - self.master).tocsr()
+
+
+def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> ContactPoints:
+    """Return the points of several pairs in their order; none at all where there is no part."""
+    if not parts:
+        integer = np.zeros(0, dtype=np.int64)
+        return ContactPoints(
+            integer, integer, sp.csr_matrix((0, n_nodes)), np.zeros((0, dim)), np.zeros((0, dim - 1, dim)),
+            np.zeros(0), np.zeros(0), integer, np.zeros((0, dim - 1)),
+        )  # fmt: skip
+
+    def strung(name: str) -> np.ndarray:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    return ContactPoints(
+        strung("pair"), strung("slave"), sp.vstack([part.master for part in parts], format="csr"),
+        strung("normal"), strung("tangents"), strung("gap"), strung("area"), strung("facet"), strung("local"),
+    )  # fmt: skip
+
+
+def reference_axes(normals: np.ndarray) -> np.ndarray:
+    """Return for each normal the coordinate axis that is least aligned with it, shape (n, dim)."""
+    # Rounding first: symmetric geometries have ties, which must not be decided by the last bit.
+    return np.eye(normals.shape[1])[np.argmin(np.round(np.abs(normals), 6), axis=1)]
+
+
+def tangent_frames(normals: np.ndarray) -> np.ndarray:
+    """Return the unit tangents of each unit normal, shape (n, dim - 1, dim).
+
+    In space (t1, t2, n) is right-handed, in the plane (t, n).
+    """
+    if normals.shape[1] == 2:
+        return np.stack([normals[:, 1], -normals[:, 0]], axis=1)[:, None]
+    axes = reference_axes(normals)
+    first = axes - np.einsum("nd,nd->n", axes, normals)[:, None] * normals
+    first = first / np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([first, np.cross(normals, first)], axis=1)

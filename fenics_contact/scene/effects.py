@@ -1,0 +1,77 @@
+"""What a scene calls for. Whatever is not listed is not built."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+from fenics_contact.scene.loads import BodyForce, ThermalStrain
+from fenics_contact.scene.pairs import Coulomb, Tresca
+
+if TYPE_CHECKING:
+    from fenics_contact.scene.scene import Scene
+
+
+class EffectName(StrEnum):
+    """The effects that a scene can call for."""
+
+    ELASTICITY = "elasticity"
+    PRESCRIBED_DISPLACEMENT = "prescribed displacement"
+    BODY_FORCE = "body force"
+    SURFACE_LOAD = "surface load"
+    THERMAL_STRAIN = "thermal strain"
+    TIE = "tied surfaces"
+    CONTACT = "contact"
+    TRESCA = "Tresca friction"
+    COULOMB = "Coulomb friction"
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One physical effect that a scene calls for, and the reason.
+
+    Attributes:
+        name: Which one.
+        reason: What in the scene calls for it.
+    """
+
+    name: EffectName
+    reason: str
+
+
+def effects_of(scene: Scene) -> tuple[Effect, ...]:
+    """List what a scene calls for, in the order of `EffectName`."""
+    return tuple(_found(scene))
+
+
+def _found(scene: Scene) -> Iterator[Effect]:
+    names = EffectName
+    yield Effect(names.ELASTICITY, _count(len(scene.bodies), "elastic body", "elastic bodies"))
+    if scene.supports:
+        yield Effect(names.PRESCRIBED_DISPLACEMENT, _count(len(scene.supports), "support", "supports"))
+    volume = [load for load in scene.loads if isinstance(load, BodyForce)]
+    thermal = [load for load in scene.loads if isinstance(load, ThermalStrain)]
+    surface = len(scene.loads) - len(volume) - len(thermal)
+    if volume:
+        yield Effect(names.BODY_FORCE, _count(len(volume), "load on a volume", "loads on volumes"))
+    if surface:
+        yield Effect(names.SURFACE_LOAD, _count(surface, "load on a surface", "loads on surfaces"))
+    if thermal:
+        yield Effect(names.THERMAL_STRAIN, _count(len(thermal), "change of temperature", "temperatures"))
+    if scene.ties:
+        yield Effect(names.TIE, _count(len(scene.ties), "pair stays together", "pairs stay together"))
+    if scene.contacts:
+        yield Effect(names.CONTACT, _count(len(scene.contacts), "pair may touch", "pairs may touch"))
+    for name, law, what in (
+        (names.TRESCA, Tresca, "a fixed slip bound"),
+        (names.COULOMB, Coulomb, "a friction coefficient above zero"),
+    ):
+        count = sum(pair.has_friction and isinstance(pair.friction, law) for pair in scene.contacts)
+        if count:
+            yield Effect(name, _count(count, f"pair has {what}", f"pairs have {what}"))
+
+
+def _count(number: int, one: str, many: str) -> str:
+    return f"{number} {one if number == 1 else many}"

@@ -1,0 +1,36 @@
+"""Which rigid motions of a body its supports resist."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fenics_contact.scene.kernels import rigid_body_modes
+
+if TYPE_CHECKING:
+    from fenics_contact.scene.scene import Scene
+
+#: Support reactions below this fraction of the largest count as none: the motion is not resisted.
+RANK_TOLERANCE = 1e-9
+
+
+def resisted_motions(modes: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis of the rigid motions that supports resist.
+
+    Args:
+        modes: Rigid motions at the nodes, shape (n_nodes, dim, n_modes).
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+
+    Returns:
+        Coefficients of the modes as columns, shape (n_modes, rank).
+    """
+    held = modes[fixed]
+    left, size, _ = np.linalg.svd(held.T @ held)
+    return np.asarray(left[:, size > RANK_TOLERANCE * size[0]])
+
+
+def held_by_supports(scene: Scene, body: str) -> bool:
+    """Tell whether the supports of a body resist all its rigid motions."""
+    modes = rigid_body_modes(scene.bodies[body].mesh.points)
+    return resisted_motions(modes, scene.fixed(body)).shape[1] == modes.shape[2]

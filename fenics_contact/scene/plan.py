@@ -1,0 +1,167 @@
+"""What will be built for a scene, known before anything is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fenics_contact.geometry import copy_counts
+from fenics_contact.linalg.cost_model import expected_bytes
+from fenics_contact.scene.effects import Effect, EffectName, effects_of
+from fenics_contact.scene.held import held_by_supports
+from fenics_contact.scene.pairs import ContactPair, Surface
+
+if TYPE_CHECKING:
+    from fenics_contact.scene.scene import Scene
+
+#: Bytes for each torn unknown beside the factors: meshes, rows of B, vectors and their history.
+BYTES_PER_UNKNOWN = 1200
+
+
+class SolverKind(StrEnum):
+    """How the equilibrium is found."""
+
+    DIRECT = "sparse factorisation of one body"
+    PROJECTED_CG = "projected conjugate gradients"
+    FACE_NEWTON = "semismooth Newton on faces"
+
+
+class ConeKind(StrEnum):
+    """Which inequalities the multipliers obey."""
+
+    NONE = "none"
+    BOUNDS = "half lines"
+    DISCS = "half lines and discs of given radius"
+    COULOMB = "friction cones"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What the solution of a scene needs, and nothing else will be built.
+
+    Attributes:
+        effects: What the scene calls for.
+        subdomains: Subdomains of all bodies.
+        unknowns: Displacement unknowns of all subdomains.
+        multipliers: Number of multipliers by kind; those of ties and contact are upper bounds, as only nodes
+            that meet their master get one.
+        solver: How the equilibrium is found.
+        cone: Which inequalities the multipliers obey.
+        fixed_point: Whether slip bounds follow the normal forces (Coulomb's law).
+        coarse_motions: Rigid motions of the subdomains, the size of the coarse problem; 0 without one.
+        adjoint: Whether sensitivities are asked for, which need one adjoint solve a design.
+        memory: Expected memory of all ranks together without their libraries, [bytes].
+    """
+
+    effects: tuple[Effect, ...]
+    subdomains: int
+    unknowns: int
+    multipliers: Mapping[str, int]
+    solver: SolverKind
+    cone: ConeKind
+    fixed_point: bool
+    coarse_motions: int
+    adjoint: bool
+    memory: float
+
+    def __str__(self) -> str:
+        """Return one line for each decision."""
+        kinds = ", ".join(f"{count} {kind}" for kind, count in self.multipliers.items() if count)
+        coarse = f"{self.coarse_motions} rigid motions" if self.coarse_motions else "none"
+        bounds = "follow the normal forces" if self.fixed_point else "given"
+        lines = {
+            "effects": "; ".join(f"{effect.name} ({effect.reason})" for effect in self.effects),
+            "unknowns": f"{self.unknowns} in {self.subdomains} subdomains",
+            "multipliers": kinds or "none",
+            "solver": self.solver.value,
+            "cone": self.cone.value,
+            "slip bounds": bounds if self.cone in (ConeKind.DISCS, ConeKind.COULOMB) else "none",
+            "coarse problem": coarse,
+            "adjoint": "one solve a design" if self.adjoint else "none",
+            "memory": f"{self.memory / 1e6:.0f} MB",
+        }
+        return "\n".join(f"{name:15s} {value}" for name, value in lines.items())
+
+
+def make_plan(scene: Scene, partitions: Mapping[str, np.ndarray], *, sensitivity: bool = False) -> Plan:
+    """Decide what a scene needs.
+
+    Args:
+        scene: The scene.
+        partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
+        sensitivity: Whether derivatives by the shape are wanted.
+    """
+    effects = effects_of(scene)
+    names = {effect.name for effect in effects}
+    sizes = {name: copy_counts(body.mesh, partitions[name]) for name, body in scene.bodies.items()}
+    subdomains = sum(len(size.nodes) for size in sizes.values())
+    unknowns = scene.dim * sum(int(size.nodes.sum()) for size in sizes.values())
+    solver = _solver(scene, names, subdomains, sensitivity)
+    direct = solver is SolverKind.DIRECT
+    motions = 0 if direct else subdomains * scene.dim * (scene.dim + 1) // 2
+    pieces = [
+        expected_bytes(scene.dim * int(nodes), scene.dim * int(shared))
+        for size in sizes.values()
+        for nodes, shared in zip(size.nodes, size.shared, strict=True)
+    ]
+    return Plan(
+        effects=effects,
+        subdomains=subdomains,
+        unknowns=unknowns,
+        multipliers={} if direct else _multipliers(scene, unknowns),
+        solver=solver,
+        cone=_cone(names),
+        fixed_point=EffectName.COULOMB in names,
+        coarse_motions=motions,
+        adjoint=sensitivity,
+        memory=float(sum(pieces)) + BYTES_PER_UNKNOWN * unknowns + 8.0 * motions**2,
+    )
+
+
+def _solver(scene: Scene, names: set[EffectName], subdomains: int, sensitivity: bool) -> SolverKind:
+    if EffectName.CONTACT in names:
+        return SolverKind.FACE_NEWTON
+    # The adjoint lives on the dual system; a body that supports do not hold alone has a singular stiffness.
+    if subdomains == 1 and not sensitivity and held_by_supports(scene, scene.body_names[0]):
+        return SolverKind.DIRECT
+    return SolverKind.PROJECTED_CG
+
+
+def _cone(names: set[EffectName]) -> ConeKind:
+    if EffectName.COULOMB in names:
+        return ConeKind.COULOMB
+    if EffectName.TRESCA in names:
+        return ConeKind.DISCS
+    return ConeKind.BOUNDS if EffectName.CONTACT in names else ConeKind.NONE
+
+
+def _multipliers(scene: Scene, unknowns: int) -> dict[str, int]:
+    nodes = sum(body.mesh.n_nodes for body in scene.bodies.values())
+    fixed = sum(_prescribed(scene, name) for name in scene.body_names)
+    slaves = [_slave_nodes(scene, pair.slave) for pair in scene.contacts]
+    frictional = [count for pair, count in zip(scene.contacts, slaves, strict=True) if _rubs(pair)]
+    width = [1 if tie.sliding else scene.dim for tie in scene.ties]
+    tied = [w * _slave_nodes(scene, tie.slave) for tie, w in zip(scene.ties, width, strict=True)]
+    return {
+        "gluing": unknowns - scene.dim * nodes,
+        "prescribed": fixed,
+        "tied": sum(tied),
+        "normal": sum(slaves),
+        "tangential": (scene.dim - 1) * sum(frictional),
+    }
+
+
+def _prescribed(scene: Scene, body: str) -> int:
+    return int(np.count_nonzero(scene.fixed(body)))
+
+
+def _slave_nodes(scene: Scene, surface: Surface) -> int:
+    return len(np.unique(scene.facets(surface)))
+
+
+def _rubs(pair: ContactPair) -> bool:
+    return pair.has_friction
