@@ -9,8 +9,10 @@ import ufl
 
 from fenics_contact import _dolfinx
 from fenics_contact.feti import Decomposition
-from fenics_contact.feti.forms import Template, scalar_constants, volume_measure
-from fenics_contact.scene import Body
+from fenics_contact.feti.composition import Composition, integrate
+from fenics_contact.feti.temperature import Temperature, stress_in_space
+from fenics_contact.feti.templates import Template, volume_measure
+from fenics_contact.scene import Body, Material
 
 
 def body_mesh(decomposition: Decomposition, name: str, body: Body) -> Any:
@@ -57,32 +59,62 @@ def displacement_function(mesh: Any, values: np.ndarray) -> Any:
     return function
 
 
-def von_mises(displacement: Any, body: Body) -> Any:
+def von_mises(displacement: Any, body: Body, temperature: Temperature = Temperature()) -> Any:
     """Return the von Mises stress averaged over each cell, [force / length²], a piecewise constant Function.
 
+    The stress is that in space: of plane bodies with what the material carries normal to the plane.
     Collective on the mesh.
 
     Args:
         displacement: The displacement Function of the body.
-        body: Gives the material.
+        body: Gives the materials.
+        temperature: Temperature change of the body, whose share is taken off.
     """
-    mesh = displacement.function_space.mesh
-    cell_type = body.mesh.cell_type
+    mesh, cell_type = displacement.function_space.mesh, body.mesh.cell_type
+    parts = _composition(mesh, body)
     (u,) = _dolfinx.field_symbols(cell_type, 1)
-    constants = scalar_constants(cell_type, len(body.material.parameters))
-    stress = body.material.stress(u, constants)
-    deviator = stress - ufl.tr(stress) / 3 * ufl.Identity(3)
     q = ufl.TestFunction(_dolfinx.cellwise_space(cell_type))
+    change, numbers, fields = temperature.write(cell_type)
+
+    def density(material: Material, constants: Any) -> Any:
+        stress = stress_in_space(material, u, constants, change)
+        deviator = stress - ufl.tr(stress) / 3 * ufl.Identity(3)
+        return ufl.sqrt(1.5 * ufl.inner(deviator, deviator)) * q
+
     dx = volume_measure(cell_type, 2)
-    weighted = Template(mesh.comm, ufl.sqrt(1.5 * ufl.inner(deviator, deviator)) * q * dx, constants, [u])
+    form, constants = integrate(parts.materials, cell_type, density, dx)
+    weighted = Template(mesh.comm, form, (*numbers, *constants), [u, *fields])
     volume = Template(mesh.comm, q * dx, ())
     space = _dolfinx.scalar_space(mesh, 0)
     result = _dolfinx.Function(space, name="von_mises")
-    above = _dolfinx.assemble_vector(weighted.bind([space], body.material.parameters, [displacement]))
+    values = (*temperature.numbers, *parts.parameters)
+    functions = [displacement, *temperature.fields(mesh, body.mesh.points)]
+    above = _dolfinx.assemble_vector(weighted.bind([space], values, functions, cells=parts.cells))
     below = _dolfinx.assemble_vector(volume.bind([space], ()))
     result.x.array[: len(above)] = above / below
     result.x.scatter_forward()
     return result
+
+
+def _composition(mesh: Any, body: Body) -> Composition:
+    """Return the materials of a body's mesh: all of them on every rank, wherever their cells are."""
+    count = len(body.materials)
+    if count == 1:
+        return Composition(body.materials)
+    number = body.material_of_cells[_cells_of_body(mesh, body.mesh.cells)]
+    return Composition(body.materials, {k + 1: np.flatnonzero(number == k) for k in range(count)})
+
+
+def _cells_of_body(mesh: Any, cells: np.ndarray) -> np.ndarray:
+    """Return which cell of the body each of this rank's own is, shape (n_owned,)."""
+    owned = mesh.topology.index_map(mesh.topology.dim).size_local
+    mine = _dolfinx.cell_nodes(mesh).reshape(-1, cells.shape[1])[:owned]
+    # dolfinx has its own order of cells: they are recognised by their nodes.
+    _, key = np.unique(np.sort(np.vstack([cells, mine]), axis=1), axis=0, return_inverse=True)
+    key = key.ravel()
+    place = np.empty(len(cells) + len(mine), dtype=np.int64)
+    place[key[: len(cells)]] = np.arange(len(cells))
+    return place[key[len(cells) :]]
 
 
 def cell_values(function: Any, cells: np.ndarray) -> np.ndarray:
@@ -90,20 +122,13 @@ def cell_values(function: Any, cells: np.ndarray) -> np.ndarray:
 
     Args:
         function: Function on the body's own mesh, one value a cell.
-        cells: Node numbers of all cells of the body, (n_cells, 8 | 4).
+        cells: Node numbers of all cells of the body, (n_cells, n_vertices).
 
     Returns:
         One value for every cell, (n_cells,), replicated.
     """
     space = function.function_space
-    topology = space.mesh.topology
-    owned = topology.index_map(topology.dim).size_local
-    mine = _dolfinx.cell_nodes(space.mesh).reshape(-1, cells.shape[1])[:owned]
-    # dolfinx has its own order of cells: they are recognised by their nodes.
-    _, key = np.unique(np.sort(np.vstack([cells, mine]), axis=1), axis=0, return_inverse=True)
-    place = np.empty(len(cells), dtype=np.int64)
-    place[key.ravel()[: len(cells)]] = np.arange(len(cells))
-    dofs = _dolfinx.cell_dofs(space).ravel()[:owned]
+    number = _cells_of_body(space.mesh, cells)
     values = np.zeros(len(cells))
-    values[place[key.ravel()[len(cells) :]]] = function.x.array[dofs]
+    values[number] = function.x.array[_dolfinx.cell_dofs(space).ravel()[: len(number)]]
     return np.asarray(space.mesh.comm.allreduce(values))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from fenics_contact.contact.fields import (
 from fenics_contact.contact.result import ContactResult
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem, TornSystem
+from fenics_contact.feti.temperature import temperature_of
 from fenics_contact.qp import DualSolution
 from fenics_contact.scene import Scene
 
@@ -58,12 +59,21 @@ class State:
         Raises:
             InvalidInputError: If the state was found without one.
         """
+        self._require_multipliers()
+        return cast(DualSystem, self.system)
+
+    @property
+    def dual_solution(self) -> DualSolution:
+        """What the dual solver found; raises as `dual` does."""
+        self._require_multipliers()
+        return cast(DualSolution, self.solution)
+
+    def _require_multipliers(self) -> None:
         if isinstance(self.system, DirectSystem):
             raise InvalidInputError(
                 "this needs multipliers, but the state of one body that supports hold was found directly: "
                 "solve with sensitivity=True"
             )
-        return self.system
 
     @property
     def scene(self) -> Scene:
@@ -83,7 +93,10 @@ class State:
     @cached_property
     def von_mises(self) -> dict[str, Any]:
         """Von Mises stress of each body, constant on cells, [force / length²]. Collective on first use."""
-        return {name: von_mises(self.displacement[name], body) for name, body in self.scene.bodies.items()}
+        return {
+            name: von_mises(self.displacement[name], body, temperature_of(self.scene.loads, name))
+            for name, body in self.scene.bodies.items()
+        }
 
     def gather_displacement(self, body: str) -> np.ndarray:
         """Return the displacement of a body's nodes on every rank, (n_nodes, dim), [length]. Collective."""

@@ -75,14 +75,15 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
     """
     with together(comm):
         _check_partitions(scene, partitions)
-        tearing = tear(scene, partitions, comm.size, cell_stiffness(scene))
+    forms = FormLibrary(comm)
+    forms.prepare(scene)
+    with together(comm):
+        tearing = tear(scene, partitions, comm.size, cell_stiffness(scene, forms))
         if tearing.n_subdomains < comm.size:
             raise InvalidInputError(
                 f"every rank needs a subdomain, but {comm.size} ranks share {tearing.n_subdomains} "
                 "subdomains: run on fewer ranks or cut the bodies finer"
             )
-    forms = FormLibrary(comm)
-    forms.prepare(scene)
     with together(comm):
         meshes = tuple(
             _cut(scene, partitions, tearing, int(number))
@@ -114,7 +115,7 @@ def _cut(scene: Scene, partitions: Mapping[str, np.ndarray], tearing: Tearing, n
     index = int(np.searchsorted(tearing.subdomain_offset, number, side="right")) - 1
     name = tearing.body_names[index]
     cells = np.flatnonzero(partitions[name] == number - tearing.subdomain_offset[index])
-    return cut_out(number, name, scene.bodies[name], cells, scene.loads)
+    return cut_out(number, name, scene.bodies[name], cells)
 
 
 def _copy_blocks(tearing: Tearing, meshes: tuple[SubdomainMesh, ...], block_offset: np.ndarray) -> np.ndarray:

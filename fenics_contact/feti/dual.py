@@ -33,6 +33,9 @@ class DualSystem:
 
     inverse: TornInverse
     problem: DualProblem
+    kernel: sp.csr_matrix
+    _B_interface: sp.csr_matrix
+    _Bt_interface: sp.csr_matrix
 
     def __init__(
         self,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,43 +9,33 @@ import ufl
 from mpi4py import MPI
 
 from fenics_contact import _dolfinx
+from fenics_contact.feti.composition import Composition, integrate, possible
+from fenics_contact.feti.load_forms import Symbol, fields_of, load_key, load_name, load_parameters, load_work
+from fenics_contact.feti.model_checks import check_model, unit_cell_stiffness
 from fenics_contact.feti.surface import quadrature_areas
-from fenics_contact.scene import BodyForce, Load, Material, Scene, Surface, TotalForce, Traction
+from fenics_contact.feti.templates import (
+    LOADED,
+    QUADRATURE_DEGREE,
+    Template,
+    Templates,
+    Written,
+    scalar_constants,
+    surface_measure,
+    volume_measure,
+)
+from fenics_contact.scene import Load, Material, Scene, Surface, ThermalStrain, TotalForce, Traction
 
-#: Gauss rule of the volume: two points a direction on hexahedra, one on tetrahedra suit linear elasticity.
-QUADRATURE_DEGREE = {"hexahedron": 2, "tetrahedron": 1}
-#: Tag that every loaded surface gets inside a load form.
-LOADED = 1
-
-
-class Template:
-    """A compiled form and its constants."""
-
-    def __init__(
-        self, comm: MPI.Comm, form: Any, constants: Sequence[Any], coefficients: Sequence[Any] = ()
-    ) -> None:
-        """Compile ``form``. Collective on ``comm``."""
-        self._form = _dolfinx.CompiledForm(comm, form)
-        self._constants, self._coefficients = tuple(constants), tuple(coefficients)
-
-    def bind(
-        self,
-        spaces: Sequence[Any],
-        values: Sequence[float],
-        functions: Sequence[Any] = (),
-        facets: Any = None,
-        mesh: Any = None,
-    ) -> Any:
-        """Return the form on one mesh, with numbers for its constants and Functions for its coefficients."""
-        mesh = spaces[0].mesh if mesh is None else mesh
-        constants = {
-            symbol: _dolfinx.Constant(mesh, np.float64(value))
-            for symbol, value in zip(self._constants, values, strict=True)
-        }
-        coefficients = dict(zip(self._coefficients, functions, strict=True))
-        return self._form.bind(
-            mesh, spaces, coefficients, constants, None if facets is None else {LOADED: facets}
-        )
+__all__ = [
+    "LOADED",
+    "QUADRATURE_DEGREE",
+    "FormLibrary",
+    "Template",
+    "Templates",
+    "as_tractions",
+    "scalar_constants",
+    "surface_measure",
+    "volume_measure",
+]
 
 
 class FormLibrary:
@@ -54,74 +43,100 @@ class FormLibrary:
 
     def __init__(self, comm: MPI.Comm) -> None:
         """Start empty; `prepare` fills it."""
-        self._comm = comm
-        self._forms: dict[tuple[Any, ...], Template] = {}
+        self._templates = Templates(comm)
+        self._typical_modulus: dict[tuple[Material, str], float] = {}
 
     @property
     def compiled(self) -> tuple[tuple[Any, ...], ...]:
         """Names of the forms compiled so far."""
-        return tuple(self._forms)
+        return self._templates.names
 
     def prepare(self, scene: Scene) -> None:
-        """Compile what the scene calls for and is not there yet. Collective on the library's communicator."""
+        """Compile what the scene calls for and is not there yet. Collective on the library's communicator.
+
+        Raises:
+            InvalidInputError: If a material contradicts itself (see `check_model`), or the value of a load
+                has the wrong shape.
+        """
         for body in scene.bodies.values():
-            key = _stiffness_key(body.material, body.mesh.cell_type)
-            if key not in self._forms:
-                self._forms[key] = self._stiffness_template(body.material, body.mesh.cell_type)
-        for load in scene.loads:
-            cell_type = scene.bodies[load.body].mesh.cell_type
-            key = _load_key(load, cell_type)
-            if key not in self._forms:
-                self._forms[key] = self._load_template(load, cell_type)
+            cell_type = body.mesh.cell_type
+            for materials in possible(body):
+                self._prepare_stiffness(materials, cell_type)
+            for material in body.materials:
+                self._check(material, cell_type)
+        for load in as_tractions(scene):
+            body = scene.bodies[load.body]
+            for materials in possible(body):
+                self._prepare_load(load, materials, body.mesh.cell_type)
 
-    def stiffness(self, material: Material, cell_type: str, space: Any) -> Any:
-        """Return the bilinear form of ``material`` bound to ``space``."""
-        return self._forms[_stiffness_key(material, cell_type)].bind([space, space], material.parameters)
+    def stiffness(self, parts: Composition, cell_type: str, space: Any) -> Any:
+        """Return the bilinear form of the materials ``parts`` bound to ``space``."""
+        template = self._templates["stiffness", parts.materials, cell_type]
+        return template.bind([space, space], parts.parameters, cells=parts.cells)
 
-    def load(self, load: Load, cell_type: str, space: Any, facets: Any = None) -> Any:
-        """Return the linear form of ``load`` bound to ``space``; surface loads need their ``facets``."""
-        return self._forms[_load_key(load, cell_type)].bind([space], load.value, facets=facets)
+    def load(
+        self,
+        load: Load,
+        parts: Composition,
+        cell_type: str,
+        space: Any,
+        points: np.ndarray,
+        facets: Any = None,
+    ) -> Any:
+        """Return the linear form of ``load`` bound to ``space``.
 
-    def _stiffness_template(self, material: Material, cell_type: str) -> Template:
-        V = _dolfinx.displacement_space(cell_type)
-        constants = scalar_constants(cell_type, len(material.parameters))
-        integrand = material.stiffness(ufl.TrialFunction(V), ufl.TestFunction(V), constants)
-        return Template(self._comm, integrand * volume_measure(cell_type), constants)
+        Args:
+            load: The load; a resultant must have been spread.
+            parts: Materials of the mesh.
+            cell_type: Of the mesh.
+            space: Displacements on the mesh.
+            points: Coordinates by input node of the mesh, shape (n, dim), [length].
+            facets: (cells, local facets) that a surface load acts on.
+        """
+        template = self._templates[load_key(load, parts.materials, cell_type)]
+        cells = parts.cells if isinstance(load, ThermalStrain) else None
+        functions = fields_of(load, space, points)
+        return template.bind([space], load_parameters(load, parts), functions, facets, cells=cells)
 
-    def _load_template(self, load: Load, cell_type: str) -> Template:
-        constants = scalar_constants(cell_type, 3)
-        v = ufl.TestFunction(_dolfinx.displacement_space(cell_type))
-        return Template(self._comm, load_work(load, cell_type, constants, v), constants)
+    def typical_modulus(self, material: Material, cell_type: str) -> float:
+        """Return the mean diagonal entry of the stiffness of a cell of edge length one.
 
+        [force / length²] times [length^(dim − 2)]; a measure of how stiff materials are beside one another.
+        """
+        return self._typical_modulus[material, cell_type]
 
-def load_work(load: Load, cell_type: str, constants: Sequence[Any], v: Any) -> Any:
-    """Return the virtual work of a load with components ``constants`` along ``v``, a UFL form."""
-    measure = volume_measure(cell_type, 2) if isinstance(load, BodyForce) else surface_measure(cell_type)
-    return ufl.dot(ufl.as_vector(list(constants)), v) * measure
+    def _check(self, material: Material, cell_type: str) -> None:
+        if (material, cell_type) in self._typical_modulus:
+            return
+        parts = Composition((material,))
 
+        def bind(space: Any) -> Any:
+            return self.stiffness(parts, cell_type, space)
 
-def _stiffness_key(material: Material, cell_type: str) -> tuple[Any, ...]:
-    return ("stiffness", type(material), cell_type)
+        check_model(material, cell_type, bind)
+        stiffness = unit_cell_stiffness(cell_type, bind)
+        self._typical_modulus[material, cell_type] = float(np.diag(stiffness).mean())
 
+    def _prepare_stiffness(self, materials: tuple[Material, ...], cell_type: str) -> None:
+        def write() -> Written:
+            V = _dolfinx.displacement_space(cell_type)
+            u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
+            form, constants = integrate(
+                materials, cell_type, lambda m, c: m.stiffness(u, v, c), volume_measure(cell_type)
+            )
+            return form, constants, ()
 
-def _load_key(load: Load, cell_type: str) -> tuple[Any, ...]:
-    return ("body force" if isinstance(load, BodyForce) else "surface load", cell_type)
+        name = ("stiffness", *(type(material) for material in materials), cell_type)
+        self._templates.get(("stiffness", materials, cell_type), name, write)
 
+    def _prepare_load(self, load: Load, materials: tuple[Material, ...], cell_type: str) -> None:
+        def write() -> Written:
+            v = ufl.TestFunction(_dolfinx.displacement_space(cell_type))
+            symbol = Symbol(load, cell_type)
+            form, constants = load_work(load, materials, cell_type, symbol.expression, v)
+            return form, (*symbol.constants, *constants), symbol.coefficients
 
-def scalar_constants(cell_type: str, count: int) -> tuple[Any, ...]:
-    """Return ``count`` UFL constants on the template."""
-    return tuple(ufl.Constant(_dolfinx.template(cell_type)) for _ in range(count))
-
-
-def volume_measure(cell_type: str, degree: int | None = None) -> Any:
-    """Return dx on the template with the package's quadrature degree, or the given one."""
-    degree = QUADRATURE_DEGREE[cell_type] if degree is None else degree
-    return ufl.dx(domain=_dolfinx.template(cell_type), metadata={"quadrature_degree": degree})
-
-
-def surface_measure(cell_type: str) -> Any:
-    """Return ds of the loaded surface on the template."""
-    return ufl.ds(domain=_dolfinx.template(cell_type), metadata={"quadrature_degree": 2})(LOADED)
+        self._templates.get(load_key(load, materials, cell_type), load_name(load, cell_type), write)
 
 
 def as_tractions(scene: Scene) -> tuple[Load, ...]:
@@ -132,5 +147,4 @@ def as_tractions(scene: Scene) -> tuple[Load, ...]:
 def _spread(scene: Scene, load: TotalForce) -> Traction:
     facets = scene.facets(Surface(load.body, load.surface))
     area = float(quadrature_areas(scene.bodies[load.body].mesh.points, facets).sum())
-    x, y, z = (component / area for component in load.value)
-    return Traction(load.body, load.surface, (x, y, z))
+    return Traction(load.body, load.surface, tuple(component / area for component in load.value))

@@ -10,11 +10,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.feti.condensation import Condensations
-from fenics_contact.linalg.cost_model import prefers_explicit
 from fenics_contact.feti.explicit import ExplicitOperator
 from fenics_contact.feti.implicit import ImplicitOperator
 from fenics_contact.feti.local import LocalOperator, interface_dofs
 from fenics_contact.feti.subdomain import Subdomain
+from fenics_contact.linalg.cost_model import prefers_explicit
 
 
 class LocalKind(Enum):

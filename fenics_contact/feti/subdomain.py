@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,15 +11,17 @@ import scipy.sparse as sp
 
 from fenics_contact import _dolfinx
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.composition import Composition, composition
 from fenics_contact.feti.forms import FormLibrary
-from fenics_contact.scene import Body, BodyForce, Load, Material
+from fenics_contact.feti.model_checks import check_kernel
+from fenics_contact.scene import Body, Load, SurfaceLoad
 
 
 @dataclass(frozen=True)
 class SubdomainMesh:
     """The part of a scene that survives a change of geometry: mesh, numbering, tagged facets.
 
-    Blocks of three dofs are numbered as dolfinx numbers them.
+    Blocks of dofs, one a direction, are numbered as dolfinx numbers them.
 
     Attributes:
         number: Number among all subdomains.
@@ -27,7 +29,7 @@ class SubdomainMesh:
         cells: Cells of the body's mesh, in this mesh's order.
         nodes: Nodes of the body, by block: block b sits on node ``nodes[b]``.
         space: dolfinx function space of displacements on the subdomain's own mesh.
-        facets: Index of a surface load in the scene -> (cells, local facets) on this mesh.
+        facets: Surface of the body -> (cells, local facets) on this mesh; `facets_of` adds to it.
     """
 
     number: int
@@ -35,31 +37,48 @@ class SubdomainMesh:
     cells: np.ndarray
     nodes: np.ndarray
     space: Any
-    facets: dict[int, tuple[np.ndarray, np.ndarray]]
+    facets: dict[str, tuple[np.ndarray, np.ndarray]]
+
+    @property
+    def dim(self) -> int:
+        """Dimension of space, the length of a block."""
+        return int(self.space.mesh.geometry.dim)
 
     @property
     def size(self) -> int:
         """Number of dofs."""
-        return 3 * len(self.nodes)
+        return self.dim * len(self.nodes)
+
+    def facets_of(self, body: Body, surface: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return the part of a surface of the body that lies on this mesh: cells, local facets."""
+        if surface not in self.facets:
+            used = np.sort(self.nodes)
+            facets = body.mesh.surfaces[surface]
+            inside = np.isin(facets, used).all(axis=1)
+            own = np.searchsorted(used, facets[inside])
+            self.facets[surface] = _dolfinx.match_facets(self.space.mesh, own)
+        return self.facets[surface]
 
 
 @dataclass(frozen=True)
 class Subdomain:
-    """A subdomain with its numbers for one geometry.
+    """A subdomain with its numbers for one geometry and one load.
+
+    Those that differ in their loads alone share one `matrix`.
 
     Attributes:
         mesh: Mesh and numbering.
-        material: Material it was assembled for.
+        material: What it was assembled for: its materials and where they are.
         loads: Loads on it that it was assembled for.
-        points: Coordinates by block, shape (n, 3), [length].
-        load: f_s, shape (3 n,), [force].
-        kernel: R_s, shape (3 n, n_modes): zero-energy modes as columns.
+        points: Coordinates by block, shape (n, dim), [length].
+        load: f_s, shape (dim n,), [force].
+        kernel: R_s, shape (dim n, n_modes): zero-energy modes as columns.
         typical_stiffness: Mean diagonal entry of K_s, [force / length].
         matrix: K_s, forgotten when it is factored.
     """
 
     mesh: SubdomainMesh
-    material: Material
+    material: Composition
     loads: tuple[Load, ...]
     points: np.ndarray
     load: np.ndarray
@@ -69,7 +88,7 @@ class Subdomain:
 
     @property
     def stiffness(self) -> sp.csr_matrix:
-        """K_s, shape (3 n, 3 n); assembled again if it was forgotten."""
+        """K_s, shape (dim n, dim n); assembled again if it was forgotten."""
         return self.matrix.get()
 
 
@@ -92,9 +111,7 @@ class Forgettable:
         self._matrix = None
 
 
-def cut_out(
-    number: int, body_name: str, body: Body, cells: np.ndarray, loads: Sequence[Load]
-) -> SubdomainMesh:
+def cut_out(number: int, body_name: str, body: Body, cells: np.ndarray) -> SubdomainMesh:
     """Build the mesh of one subdomain.
 
     Args:
@@ -102,7 +119,6 @@ def cut_out(
         body_name: Name of the body.
         body: The body.
         cells: Its cells that belong to the subdomain.
-        loads: Loads of the scene; surface loads on this body are looked for among the facets.
     """
     mesh = body.mesh
     used, local = np.unique(mesh.cells[cells], return_inverse=True)
@@ -112,15 +128,7 @@ def cut_out(
     input_nodes, dofs = _dolfinx.node_dofs(space)
     nodes = np.empty(len(used), dtype=np.int64)
     nodes[dofs] = used[input_nodes]
-    facets = {}
-    for index, load in enumerate(loads):
-        if load.body == body_name and not isinstance(load, BodyForce):
-            surface = mesh.surfaces[load.surface]
-            inside = np.isin(surface, used).all(axis=1)
-            matched = _dolfinx.match_facets(own, np.searchsorted(used, surface[inside]))
-            if len(matched[0]):
-                facets[index] = matched
-    return SubdomainMesh(number, body_name, cells, nodes, space, facets)
+    return SubdomainMesh(number, body_name, cells[_dolfinx.input_cells(own)], nodes, space, {})
 
 
 def assemble(
@@ -137,44 +145,67 @@ def assemble(
         body: Its body, with the coordinates to use.
         loads: Loads of the scene, resultants already spread.
         forms: Compiled forms.
-        earlier: The same subdomain in another state, returned as it is if coordinates, material and loads
-            are equal.
+        earlier: The same subdomain in another state. It is returned as it is if coordinates, materials and
+            loads are equal; if the loads alone differ, the result has its matrix and its kernel.
 
     Raises:
-        InvalidInputError: If a matrix or load entry is not a number.
+        InvalidInputError: If a matrix or load entry is not a number, or the kernel of the material is none.
     """
-    space, cell_type = mesh.space, body.mesh.cell_type
+    parts = composition(body, mesh.cells)
     points = body.mesh.points[mesh.nodes]
-    acting = [
-        (index, load)
-        for index, load in enumerate(loads)
-        if load.body == mesh.body and (isinstance(load, BodyForce) or index in mesh.facets)
-    ]
-    own_loads = tuple(load for _, load in acting)
-    if (
-        earlier is not None
-        and (earlier.material, earlier.loads) == (body.material, own_loads)
-        and np.array_equal(earlier.points, points)
-    ):
-        return earlier
+    acting = tuple(load for load in loads if _acts(load, mesh, body))
     order = np.argsort(mesh.nodes)
+    if earlier is None or not _same_stiffness(earlier, parts, points):
+        earlier = _with_stiffness(mesh, body, parts, forms, points)
+    elif earlier.loads == acting:
+        return earlier
+    force = np.zeros(mesh.size)
+    if acting:
+        _dolfinx.update_coordinates(mesh.space.mesh, points[order])
+    for load in acting:
+        facets = mesh.facets_of(body, load.surface) if isinstance(load, SurfaceLoad) else None
+        form = forms.load(load, parts, body.mesh.cell_type, mesh.space, points[order], facets)
+        force += _dolfinx.assemble_vector(form)
+    _check_finite(force, mesh)
+    return replace(earlier, loads=acting, load=force)
+
+
+def _acts(load: Load, mesh: SubdomainMesh, body: Body) -> bool:
+    if load.body != mesh.body:
+        return False
+    return not isinstance(load, SurfaceLoad) or len(mesh.facets_of(body, load.surface)[0]) > 0
+
+
+def _same_stiffness(earlier: Subdomain, parts: Composition, points: np.ndarray) -> bool:
+    return earlier.material.same_as(parts) and np.array_equal(earlier.points, points)
+
+
+def _with_stiffness(
+    mesh: SubdomainMesh, body: Body, parts: Composition, forms: FormLibrary, points: np.ndarray
+) -> Subdomain:
+    """Return the subdomain without loads."""
+    space, cell_type = mesh.space, body.mesh.cell_type
+    by_input_node = points[np.argsort(mesh.nodes)]
 
     def stiffness() -> sp.csr_matrix:
-        _dolfinx.update_coordinates(space.mesh, points[order])
-        indptr, indices, data = _dolfinx.assemble_csr(forms.stiffness(body.material, cell_type, space))
+        _dolfinx.update_coordinates(space.mesh, by_input_node)
+        indptr, indices, data = _dolfinx.assemble_csr(forms.stiffness(parts, cell_type, space))
         return sp.csr_matrix((data, indices, indptr), shape=(mesh.size, mesh.size))
 
     matrix = Forgettable(stiffness)
-    diagonal = matrix.get().diagonal()
-    force = np.zeros(mesh.size)
-    for index, load in acting:
-        force += _dolfinx.assemble_vector(forms.load(load, cell_type, space, mesh.facets.get(index)))
-    if not (np.isfinite(matrix.get().data).all() and np.isfinite(force).all()):
+    K = matrix.get()
+    _check_finite(K.data, mesh)
+    # A motion without energy has none in any of the materials.
+    kernels = [material.kernel(points).reshape(mesh.size, -1) for material in parts.materials]
+    kernel = min(kernels, key=lambda modes: modes.shape[1])
+    check_kernel(K, kernel, f"subdomain {mesh.number} of body {mesh.body!r}")
+    typical = float(K.diagonal().mean())
+    return Subdomain(mesh, parts, (), points, np.zeros(mesh.size), kernel, typical, matrix)
+
+
+def _check_finite(values: np.ndarray, mesh: SubdomainMesh) -> None:
+    if not np.isfinite(values).all():
         raise InvalidInputError(
             f"stiffness and load of subdomain {mesh.number} of body {mesh.body!r} must be finite, got NaN or "
             "infinity: check the material parameters, the loads and the coordinates"
         )
-    kernel = body.material.kernel(points)
-    return Subdomain(
-        mesh, body.material, own_loads, points, force, kernel.reshape(mesh.size, -1), diagonal.mean(), matrix
-    )

@@ -1,8 +1,34 @@
 """Scenes: bodies, materials, supports, loads and contact pairs."""
 
+from fenics_contact.scene.body import Body
 from fenics_contact.scene.effects import Effect, EffectName
-from fenics_contact.scene.loads import BodyForce, Load, Support, TotalForce, Traction
-from fenics_contact.scene.materials import IsotropicElasticity, Material, rigid_body_modes
+from fenics_contact.scene.kernels import rigid_body_modes
+from fenics_contact.scene.loads import (
+    BodyForce,
+    Load,
+    Pressure,
+    SurfaceLoad,
+    ThermalStrain,
+    TotalForce,
+    Traction,
+    VolumeLoad,
+    gravity,
+)
+from fenics_contact.scene.materials import (
+    Elasticity,
+    EnergyModel,
+    IsotropicElasticity,
+    Material,
+    OrthotropicElasticity,
+    OrthotropicPlaneStress,
+    PlaneStrain,
+    PlaneStress,
+    Thermoelastic,
+    Transverse,
+    can_expand,
+    material_axes,
+    strain,
+)
 from fenics_contact.scene.obstacles import (
     DistanceObstacle,
     RigidCylinder,
@@ -12,8 +38,10 @@ from fenics_contact.scene.obstacles import (
 )
 from fenics_contact.scene.pairs import ContactPair, Coulomb, Discretisation, Friction, Surface, Tie, Tresca
 from fenics_contact.scene.plan import ConeKind, Plan, SolverKind, choose_solver
-from fenics_contact.scene.scene import Body, Scene
+from fenics_contact.scene.scene import Scene
 from fenics_contact.scene.steps import LoadStep
+from fenics_contact.scene.supports import Support
+from fenics_contact.scene.values import Ufl
 
 __all__ = [
     "Body",
@@ -25,12 +53,19 @@ __all__ = [
     "DistanceObstacle",
     "Effect",
     "EffectName",
+    "Elasticity",
+    "EnergyModel",
     "Friction",
     "IsotropicElasticity",
     "Load",
     "LoadStep",
     "Material",
+    "OrthotropicElasticity",
+    "OrthotropicPlaneStress",
     "Plan",
+    "PlaneStrain",
+    "PlaneStress",
+    "Pressure",
     "RigidCylinder",
     "RigidObstacle",
     "RigidPlane",
@@ -39,10 +74,20 @@ __all__ = [
     "SolverKind",
     "Support",
     "Surface",
+    "SurfaceLoad",
+    "ThermalStrain",
+    "Thermoelastic",
     "Tie",
     "TotalForce",
     "Traction",
+    "Transverse",
     "Tresca",
+    "Ufl",
+    "VolumeLoad",
+    "can_expand",
     "choose_solver",
+    "gravity",
+    "material_axes",
     "rigid_body_modes",
+    "strain",
 ]

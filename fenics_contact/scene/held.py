@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fenics_contact.scene.materials import rigid_body_modes
+from fenics_contact.scene.kernels import rigid_body_modes
 
 if TYPE_CHECKING:
     from fenics_contact.scene.scene import Scene

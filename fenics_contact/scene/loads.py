@@ -1,50 +1,21 @@
-"""Supports and loads, each on one named part of one body."""
+"""Loads, each on one named body or on one of its surfaces.
+
+Loads are dead: they keep direction and size while the body deforms. Values are numbers, functions of position
+(evaluated at the nodes and interpolated) or `Ufl`. Loads are values: two with the same numbers, or with the
+same function object, are equal, and what was assembled for one serves the other. A function must therefore
+always return the same for the same points.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-
-Vector = tuple[float, float, float]
-
-
-def _require_vector(name: str, value: Vector) -> None:
-    if len(value) != 3 or not np.all(np.isfinite(value)):
-        raise InvalidInputError(
-            f"{name} must be three finite numbers, got {value!r}: give one for x, y and z"
-        )
-
-
-@dataclass(frozen=True)
-class Support:
-    """Displacement prescribed on a surface, component by component.
-
-    Attributes:
-        body: Name of the body.
-        surface: Name of its surface.
-        value: Displacement [length] for x, y, z; None leaves a component free.
-    """
-
-    body: str
-    surface: str
-    value: tuple[float | None, float | None, float | None] = (0.0, 0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        """Refuse a support that prescribes nothing or something that is no number."""
-        given = [component for component in self.value if component is not None]
-        if len(self.value) != 3 or not given or not np.all(np.isfinite(given)):
-            raise InvalidInputError(
-                "Support.value must hold three entries, each a finite number or None, and at least one "
-                f"number, got {self.value!r}: use (0.0, 0.0, 0.0) to clamp, (None, None, 0.0) for a roller"
-            )
-
-    def values(self, points: np.ndarray) -> np.ndarray:
-        """Return the prescribed displacements, NaN where free, (n, dim) -> (n, dim), [length]."""
-        given = [np.nan if component is None else component for component in self.value]
-        return np.tile(np.array(given, dtype=np.float64), (len(points), 1))
+from fenics_contact.scene.values import ScalarValue, VectorValue, checked_scalar, checked_vector
+from fenics_contact.scene.vectors import Vector
 
 
 @dataclass(frozen=True)
@@ -54,16 +25,16 @@ class Traction:
     Attributes:
         body: Name of the body.
         surface: Name of its surface.
-        value: Force a reference area, [force / length²].
+        value: Force a reference area, [force / length²] (in the plane: a unit of thickness).
     """
 
     body: str
     surface: str
-    value: Vector
+    value: VectorValue
 
     def __post_init__(self) -> None:
         """Refuse what is no vector."""
-        _require_vector("Traction.value", self.value)
+        object.__setattr__(self, "value", checked_vector("Traction.value", self.value))
 
 
 @dataclass(frozen=True)
@@ -73,7 +44,7 @@ class TotalForce:
     Attributes:
         body: Name of the body.
         surface: Name of its surface.
-        value: Resultant, [force].
+        value: Resultant, [force] (in the plane: a unit of thickness).
     """
 
     body: str
@@ -81,13 +52,38 @@ class TotalForce:
     value: Vector
 
     def __post_init__(self) -> None:
-        """Refuse what is no vector."""
-        _require_vector("TotalForce.value", self.value)
+        """Refuse what is no vector of numbers."""
+        value = checked_vector("TotalForce.value", self.value)
+        if not isinstance(value, tuple):
+            raise InvalidInputError(
+                f"TotalForce.value must be numbers, got {self.value!r}: a resultant has no place to depend "
+                "on; give a Traction as a function of position"
+            )
+        object.__setattr__(self, "value", value)
+
+
+@dataclass(frozen=True)
+class Pressure:
+    """Dead load normal to the undeformed surface; positive presses on the body, traction = −p n.
+
+    Attributes:
+        body: Name of the body.
+        surface: Name of its surface.
+        value: p, [force / length²].
+    """
+
+    body: str
+    surface: str
+    value: ScalarValue
+
+    def __post_init__(self) -> None:
+        """Refuse what is no number."""
+        object.__setattr__(self, "value", checked_scalar("Pressure.value", self.value))
 
 
 @dataclass(frozen=True)
 class BodyForce:
-    """Dead load on the volume, such as weight.
+    """Dead load on the volume; for weight see `gravity`.
 
     Attributes:
         body: Name of the body.
@@ -95,11 +91,50 @@ class BodyForce:
     """
 
     body: str
-    value: Vector
+    value: VectorValue
 
     def __post_init__(self) -> None:
         """Refuse what is no vector."""
-        _require_vector("BodyForce.value", self.value)
+        object.__setattr__(self, "value", checked_vector("BodyForce.value", self.value))
 
 
-Load = Traction | TotalForce | BodyForce
+@dataclass(frozen=True)
+class ThermalStrain:
+    """A temperature change that would strain the body if nothing held it: σ = C : (ε(u) − ΔT α).
+
+    Its work is ∫ ΔT (C : α) : ε(v). Several on one body add up. The energy of a state counts it as the work
+    of a load, so that a body that expands freely has the strain energy of its expansion, although no stress.
+
+    Attributes:
+        body: Name of the body, whose materials must know their thermal expansion.
+        temperature_change: ΔT against the temperature without stress, in degrees.
+    """
+
+    body: str
+    temperature_change: ScalarValue
+
+    def __post_init__(self) -> None:
+        """Refuse what is no number."""
+        value = checked_scalar("ThermalStrain.temperature_change", self.temperature_change)
+        object.__setattr__(self, "temperature_change", value)
+
+    @property
+    def value(self) -> ScalarValue:
+        """ΔT, under the name that all loads have."""
+        return self.temperature_change
+
+
+SurfaceLoad = Traction | TotalForce | Pressure
+VolumeLoad = BodyForce | ThermalStrain
+Load = SurfaceLoad | VolumeLoad
+
+
+def gravity(body: str, density: float, acceleration: Sequence[float]) -> BodyForce:
+    """Return the weight of a body.
+
+    Args:
+        body: Name of the body.
+        density: Mass a volume, in the scene's units, for steel in N, mm, s: 7.85e-9.
+        acceleration: Of gravity, [length / time²], for instance (0, 0, -9810).
+    """
+    return BodyForce(body, tuple(float(component) for component in density * np.asarray(acceleration)))

@@ -8,20 +8,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh, default_partition
+from fenics_contact.geometry import default_partition
+from fenics_contact.scene.body import Body
 from fenics_contact.scene.effects import Effect, effects_of
-from fenics_contact.scene.loads import BodyForce, Load, Support
-from fenics_contact.scene.materials import Material
+from fenics_contact.scene.loads import Load, SurfaceLoad, ThermalStrain
+from fenics_contact.scene.materials import can_expand
 from fenics_contact.scene.pairs import ContactPair, Surface, Tie
 from fenics_contact.scene.plan import Plan, make_plan
-
-
-@dataclass(frozen=True)
-class Body:
-    """A mesh and what it is made of."""
-
-    mesh: BodyMesh
-    material: Material
+from fenics_contact.scene.supports import Support
 
 
 @dataclass(frozen=True)
@@ -43,15 +37,17 @@ class Scene:
     ties: Sequence[Tie] = field(default=())
 
     def __post_init__(self) -> None:
-        """Refuse names that point to nothing."""
+        """Refuse names that point to nothing, and loads and supports that do not suit their bodies."""
         if not self.bodies:
             raise InvalidInputError(
                 "a scene needs at least one body, got none: pass bodies={'name': Body(...)}"
             )
         for part in (*self.supports, *self.loads):
-            self._require(
-                part.body, None if isinstance(part, BodyForce) else part.surface, type(part).__name__
-            )
+            surface = part.surface if isinstance(part, SurfaceLoad | Support) else None
+            self._require(part.body, surface, type(part).__name__)
+            self._require_components(part)
+            if isinstance(part, ThermalStrain):
+                self._require_expansion(part)
         pairs: list[ContactPair | Tie] = [*self.contacts, *self.ties]
         for pair in pairs:
             kind = type(pair).__name__
@@ -71,6 +67,24 @@ class Scene:
             raise InvalidInputError(
                 f"{user} names surface {surface!r} of body {body!r}, which has {sorted(surfaces)}: "
                 "use one of them"
+            )
+
+    def _require_components(self, part: Load | Support) -> None:
+        """Refuse a vector of another dimension than its body's."""
+        dim = self.bodies[part.body].mesh.dim
+        if isinstance(part.value, tuple) and len(part.value) != dim:
+            needed = "two entries, for x and y, as the body is plane" if dim == 2 else "three, for x, y and z"
+            raise InvalidInputError(
+                f"{type(part).__name__}.value of body {part.body!r} must hold {needed}, got {part.value!r}: "
+                f"give {dim} of them"
+            )
+
+    def _require_expansion(self, load: ThermalStrain) -> None:
+        stiff = [material for material in self.bodies[load.body].materials if not can_expand(material)]
+        if stiff:
+            raise InvalidInputError(
+                f"ThermalStrain needs a thermal expansion of every material of body {load.body!r}, got none "
+                f"for {stiff[0]!r}: give the material its thermal_expansion"
             )
 
     @property
@@ -101,7 +115,7 @@ class Scene:
         """Return the scene with new coordinates for some bodies; topology and names stay.
 
         Args:
-            points: Body name -> coordinates, shape (n_nodes, 3), [length].
+            points: Body name -> coordinates, shape (n_nodes, dim), [length].
 
         Raises:
             InvalidInputError: If a body is unknown, a coordinate is not finite or a cell is inverted.

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from fenics_contact.scene.loads import Load, Support
+from fenics_contact.scene.loads import Load
 from fenics_contact.scene.scene import Scene
+from fenics_contact.scene.supports import Support
 
 
 @dataclass(frozen=True)

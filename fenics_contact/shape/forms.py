@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import ufl
 
 from fenics_contact import _dolfinx
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import TornSystem
-from fenics_contact.feti.forms import Template, as_tractions, load_work, scalar_constants, volume_measure
-from fenics_contact.scene import Body, BodyForce, Load, Material
+from fenics_contact.feti.composition import integrate, possible
+from fenics_contact.feti.load_forms import Symbol, load_key, load_name, load_parameters, load_work
+from fenics_contact.feti.subdomain import Subdomain
+from fenics_contact.feti.temperature import Temperature, stress_left
+from fenics_contact.feti.templates import Template, Templates, Written, volume_measure
+from fenics_contact.scene import Load, Material, ThermalStrain, VolumeLoad
 
 #: Builds an integrand (UFL) from a displacement u, the coordinate x and the stress σ(u).
 Integrand = Callable[[Any, Any, Any], Any]
+Materials = tuple[Material, ...]
 
 
 class ShapeForms:
     """Compiled functionals of one or two displacement fields and their derivatives, by what they express.
 
-    A functional is compiled when it is first asked for, by all ranks together.
+    A functional is compiled when it is first asked for, by all ranks together. ``materials`` are those of
+    a `Composition`.
 
     Attributes:
         moving: Marks of the nodes of all bodies that a design moves, or None for all; derivatives by other
@@ -29,55 +36,72 @@ class ShapeForms:
 
     def __init__(self, torn: TornSystem, moving: np.ndarray | None = None) -> None:
         """Start empty."""
-        self._comm, self.moving = torn.decomposition.comm, moving
-        self._templates: dict[tuple[Any, ...], Template] = {}
+        self.moving = moving
+        self._templates = Templates(torn.decomposition.comm)
 
-    def get(
-        self, key: tuple[Any, ...], build: Callable[[], tuple[Any, Sequence[Any], Sequence[Any]]]
-    ) -> Template:
-        """Return the template under ``key``; ``build`` gives form, constants, coefficients to compile."""
-        if key not in self._templates:
-            self._templates[key] = Template(self._comm, *build())
-        return self._templates[key]
+    @property
+    def compiled(self) -> tuple[tuple[Any, ...], ...]:
+        """Names of the forms compiled so far."""
+        return self._templates.names
 
-    def virtual_work_by_shape(self, material: Material, cell_type: str) -> Template:
+    def virtual_work_by_shape(self, materials: Materials, cell_type: str) -> Template:
         """∂/∂x of a(u, w) with coefficients (u, w)."""
 
-        def build() -> tuple[Any, Sequence[Any], Sequence[Any]]:
+        def write() -> Written:
             u, w = _dolfinx.field_symbols(cell_type, 2)
-            constants = scalar_constants(cell_type, len(material.parameters))
-            form = material.stiffness(u, w, constants) * volume_measure(cell_type)
+            form, constants = integrate(
+                materials, cell_type, lambda m, c: m.stiffness(u, w, c), volume_measure(cell_type)
+            )
             return _by_shape(form, cell_type), constants, [u, w]
 
-        return self.get(("work by shape", type(material), cell_type), build)
+        name = ("work by shape", *(type(material) for material in materials), cell_type)
+        return self._templates.get(("work by shape", materials, cell_type), name, write)
 
-    def body_force_by_shape(self, load: Load, cell_type: str) -> Template:
-        """∂/∂x of the work of a body force along the coefficient w."""
+    def load_by_shape(self, load: Load, materials: Materials, cell_type: str) -> Template:
+        """∂/∂x of the work of a load on the volume along the coefficient w."""
 
-        def build() -> tuple[Any, Sequence[Any], Sequence[Any]]:
+        def write() -> Written:
             (w,) = _dolfinx.field_symbols(cell_type, 1)
-            constants = scalar_constants(cell_type, 3)
-            return _by_shape(load_work(load, cell_type, constants, w), cell_type), constants, [w]
+            symbol = Symbol(load, cell_type)
+            form, constants = load_work(load, materials, cell_type, symbol.expression, w)
+            return _by_shape(form, cell_type), (*symbol.constants, *constants), [w]
 
-        return self.get(("body force by shape", cell_type), build)
+        key = ("load by shape", *load_key(load, materials, cell_type))
+        return self._templates.get(key, ("by shape", *load_name(load, cell_type)), write)
 
     def functional(
-        self, name: str, integrand: Integrand, material: Material, cell_type: str, by: str
+        self,
+        name: str,
+        integrand: Integrand,
+        materials: Materials,
+        cell_type: str,
+        by: str,
+        temperature: Temperature = Temperature(),
     ) -> Template:
-        """∫ integrand(u, x, σ) dx itself (by="value"), or its derivative by="displacement" or by="shape"."""
+        """∫ integrand(u, x, σ) dx itself (by="value"), or its derivative by="displacement" or by="shape".
 
-        def build() -> tuple[Any, Sequence[Any], Sequence[Any]]:
+        Its constants are those of the temperature, then those of the materials; its coefficients are u and
+        those of the temperature.
+        """
+
+        def write() -> Written:
             (u,) = _dolfinx.field_symbols(cell_type, 1)
-            constants = scalar_constants(cell_type, len(material.parameters))
             x = ufl.SpatialCoordinate(_dolfinx.template(cell_type))
-            form = integrand(u, x, material.stress(u, constants)) * volume_measure(cell_type, 2)
+            change, numbers, fields = temperature.write(cell_type)
+
+            def density(material: Material, constants: Sequence[Any]) -> Any:
+                return integrand(u, x, stress_left(material, u, constants, change))
+
+            form, constants = integrate(materials, cell_type, density, volume_measure(cell_type, 2))
             if by == "displacement":
                 form = ufl.derivative(form, u, ufl.TestFunction(_dolfinx.displacement_space(cell_type)))
             elif by == "shape":
                 form = _by_shape(form, cell_type)
-            return form, constants, [u]
+            return form, (*numbers, *constants), [u, *fields]
 
-        return self.get((name, by, type(material), cell_type), build)
+        types = tuple(type(material) for material in materials)
+        key = (name, integrand, by, materials, cell_type, temperature.key)
+        return self._templates.get(key, (name, by, *types, cell_type), write)
 
 
 def _by_shape(form: Any, cell_type: str) -> Any:
@@ -86,59 +110,97 @@ def _by_shape(form: Any, cell_type: str) -> Any:
 
 
 def work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Return ∂/∂X of a(u, w) − L(w), this rank's share by node of all bodies, shape (n_nodes, 3).
+    """Return ∂/∂X of a(u, w) − L(w), this rank's share by node of all bodies, shape (n_nodes, dim).
 
-    Tractions are left out: loaded surfaces do not move with a design.
+    Loads on surfaces are left out: loaded surfaces do not move with a design.
 
     Args:
         forms: Compiled derivatives.
         torn: The torn system.
         u: Torn displacement of this rank, [length].
         w: Torn field in the place of the test function.
-    """
-    loads = [load for load in as_tractions(torn.scene) if isinstance(load, BodyForce)]
-    for body in torn.scene.bodies.values():  # all ranks compile, also for bodies they hold no part of
-        forms.virtual_work_by_shape(body.material, body.mesh.cell_type)
-    for load in loads:
-        forms.body_force_by_shape(load, torn.scene.bodies[load.body].mesh.cell_type)
 
-    def on_subdomain(body: Body, name: str, space: Any, functions: Sequence[Any]) -> np.ndarray:
-        cell_type = body.mesh.cell_type
-        template = forms.virtual_work_by_shape(body.material, cell_type)
-        result = _dolfinx.assemble_vector(template.bind([space], body.material.parameters, functions))
+    Raises:
+        InvalidInputError: If a load on a body that moves is a function of position without a derivative.
+    """
+    loads = [
+        load
+        for load in torn.scene.loads
+        if isinstance(load, VolumeLoad) and _moves(torn, load.body, forms.moving)
+    ]
+    check_differentiable(loads)
+    for name, body in torn.scene.bodies.items():  # all ranks compile, also for bodies they hold no part of
+        for materials in possible(body):
+            forms.virtual_work_by_shape(materials, body.mesh.cell_type)
+            for load in loads:
+                if load.body == name:
+                    forms.load_by_shape(load, materials, body.mesh.cell_type)
+
+    def on_subdomain(subdomain: Subdomain, functions: Sequence[Any]) -> np.ndarray:
+        space, parts = subdomain.mesh.space, subdomain.material
+        cell_type = torn.scene.bodies[subdomain.mesh.body].mesh.cell_type
+        template = forms.virtual_work_by_shape(parts.materials, cell_type)
+        form = template.bind([space], parts.parameters, functions, cells=parts.cells)
+        result = _dolfinx.assemble_vector(form)
         for load in loads:
-            if load.body == name:
-                template = forms.body_force_by_shape(load, cell_type)
-                result -= _dolfinx.assemble_vector(template.bind([space], load.value, functions[1:]))
+            if load.body == subdomain.mesh.body:
+                template = forms.load_by_shape(load, parts.materials, cell_type)
+                cells = parts.cells if isinstance(load, ThermalStrain) else None
+                form = template.bind([space], load_parameters(load, parts), functions[1:], cells=cells)
+                result -= _dolfinx.assemble_vector(form)
         return result
 
     return sum_over_subdomains(torn, [u, w], on_subdomain, forms.moving)
 
 
+def _moves(torn: TornSystem, body: str, moving: np.ndarray | None) -> bool:
+    if moving is None:
+        return True
+    nodes = np.arange(torn.scene.bodies[body].mesh.n_nodes)
+    return bool(moving[torn.decomposition.tearing.global_nodes(body, nodes)].any())
+
+
+def check_differentiable(loads: Sequence[Load]) -> None:
+    """Refuse loads whose change with the place of the nodes is not known.
+
+    Raises:
+        InvalidInputError: If a load is a plain function of position.
+    """
+    for load in loads:
+        if callable(load.value):
+            raise InvalidInputError(
+                f"a {type(load).__name__} on body {load.body!r}, whose shape changes, must be numbers or "
+                "Ufl, got a function of position, which has no derivative: write it as Ufl(lambda x: ...)"
+            )
+
+
 def sum_over_subdomains(
     torn: TornSystem,
     fields: Sequence[np.ndarray],
-    evaluate: Callable[[Body, str, Any, Sequence[Any]], np.ndarray],
+    evaluate: Callable[[Subdomain, Sequence[Any]], np.ndarray],
     moving: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Add up vectors of nodal derivatives over this rank's subdomains, shape (n_nodes, 3) for all bodies.
+    """Add up vectors of nodal derivatives over this rank's subdomains, shape (n_nodes, dim) for all bodies.
 
     Args:
         torn: The torn system.
         fields: Torn fields handed to ``evaluate`` as Functions.
-        evaluate: Gets body, its name, the subdomain's space and the Functions; returns a vector by dof.
+        evaluate: Gets the subdomain and the Functions; returns a vector by dof.
         moving: Marks of nodes of all bodies; subdomains without one of them are left out.
     """
     tearing = torn.decomposition.tearing
-    total = np.zeros((int(tearing.node_offset[-1]), 3))
-    for name, space, nodes, functions in subdomain_fields(torn, fields, moving):
-        vector = evaluate(torn.scene.bodies[name], name, space, functions)
-        total[tearing.global_nodes(name, nodes)] += vector.reshape(-1, 3)
+    total = np.zeros((int(tearing.node_offset[-1]), torn.scene.dim))
+    for subdomain, functions in subdomain_fields(torn, fields, moving):
+        vector = evaluate(subdomain, functions)
+        nodes = tearing.global_nodes(subdomain.mesh.body, subdomain.mesh.nodes)
+        total[nodes] += vector.reshape(-1, torn.scene.dim)
     return total
 
 
-def subdomain_fields(torn: TornSystem, fields: Sequence[np.ndarray], moving: np.ndarray | None = None) -> Any:
-    """Yield (body name, space, nodes by block, Functions) of each of this rank's subdomains.
+def subdomain_fields(
+    torn: TornSystem, fields: Sequence[np.ndarray], moving: np.ndarray | None = None
+) -> Iterator[tuple[Subdomain, list[Any]]]:
+    """Yield each of this rank's subdomains with the fields as Functions on it.
 
     Args:
         torn: The torn system.
@@ -159,4 +221,4 @@ def subdomain_fields(torn: TornSystem, fields: Sequence[np.ndarray], moving: np.
             function = _dolfinx.Function(mesh.space, name=f"field{index}")
             function.x.array[:] = field[start : start + mesh.size]
             functions.append(function)
-        yield mesh.body, mesh.space, mesh.nodes, functions
+        yield subdomain, functions

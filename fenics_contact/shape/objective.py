@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,14 +12,21 @@ import numpy as np
 from fenics_contact import _dolfinx
 from fenics_contact.contact import ContactResult, State
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.composition import possible
+from fenics_contact.feti.subdomain import Subdomain
+from fenics_contact.feti.temperature import temperature_of
 from fenics_contact.scene import Body
 from fenics_contact.shape.forms import (
     Integrand,
     ShapeForms,
+    check_differentiable,
     subdomain_fields,
     sum_over_subdomains,
     work_by_shape,
 )
+
+#: Binds a functional to a subdomain, with Functions for its fields and spaces for its arguments.
+Bind = Callable[[Subdomain, Sequence[Any], Sequence[Any]], Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +37,7 @@ class Partials:
         value: J, the same on every rank.
         by_displacement: ∂J/∂u on this rank's torn dofs, shape (torn_size,).
         by_multiplier: ∂J/∂λ, owned, shape (n_owned,).
-        by_shape: ∂J/∂X at fixed u and λ, this rank's share, shape (n_nodes, 3) for the nodes of all bodies;
+        by_shape: ∂J/∂X at fixed u and λ, this rank's share, shape (n_nodes, dim) for the nodes of all bodies;
             what nodes that no design moves get is left open.
     """
 
@@ -71,8 +79,9 @@ class VolumeIntegral:
     """J = ∫ integrand(u, x, σ) dx over one body.
 
     Attributes:
-        name: Identifies the integrand among compiled forms; use a new name for a new integrand.
-        integrand: Takes displacement, coordinates and stress (UFL), returns a UFL scalar.
+        name: What it is called among compiled forms.
+        integrand: Takes displacement, coordinates and stress (UFL; without what a temperature change takes
+            off), returns a UFL scalar.
         body: Name of the body.
 
     Example:
@@ -87,42 +96,51 @@ class VolumeIntegral:
 
     def value(self, state: State, forms: ShapeForms) -> float:
         """Integrate. Collective."""
-        body = self._body(state)
-        template = forms.functional(self.name, self.integrand, body.material, body.mesh.cell_type, "value")
+        bind = self._prepare(state, forms, "value")
         total = 0.0
-        for name, space, _, functions in subdomain_fields(state.torn, [state.torn_displacement]):
-            if name == self.body:
-                form = template.bind([], body.material.parameters, functions, mesh=space.mesh)
-                total += _dolfinx.assemble_scalar(form)
+        for subdomain, functions in subdomain_fields(state.torn, [state.torn_displacement]):
+            if subdomain.mesh.body == self.body:
+                total += _dolfinx.assemble_scalar(bind(subdomain, functions, []))
         return float(state.dual.problem.comm.allreduce(total))
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
         """Differentiate the integral by UFL."""
-        body, torn, u = self._body(state), state.torn, state.torn_displacement
-        cell_type = body.mesh.cell_type
-        by_shape, by_displacement = (
-            forms.functional(self.name, self.integrand, body.material, cell_type, by)
-            for by in ("shape", "displacement")
-        )
+        torn, u = state.torn, state.torn_displacement
+        check_differentiable(temperature_of(torn.scene.loads, self.body).loads)
+        by_shape, by_displacement = (self._prepare(state, forms, by) for by in ("shape", "displacement"))
 
-        def assemble(template: Any, name: str, space: Any, functions: Any) -> np.ndarray:
-            if name != self.body:
-                return np.zeros(3 * space.dofmap.index_map.size_local)
-            return _dolfinx.assemble_vector(template.bind([space], body.material.parameters, functions))
+        def assemble(bind: Bind, subdomain: Subdomain, functions: Any) -> np.ndarray:
+            if subdomain.mesh.body != self.body:
+                return np.zeros(subdomain.mesh.size)
+            return _dolfinx.assemble_vector(bind(subdomain, functions, [subdomain.mesh.space]))
 
-        def shape(_: Body, name: str, space: Any, functions: Any) -> np.ndarray:
-            return assemble(by_shape, name, space, functions)
-
-        gradient = [
-            assemble(by_displacement, name, space, fs) for name, space, _, fs in subdomain_fields(torn, [u])
-        ]
+        gradient = [assemble(by_displacement, *each) for each in subdomain_fields(torn, [u])]
         nothing = np.zeros(len(torn.numbering.owned))
         return Partials(
             self.value(state, forms),
             np.concatenate(gradient),
             nothing,
-            sum_over_subdomains(torn, [u], shape, forms.moving),
+            sum_over_subdomains(torn, [u], partial(assemble, by_shape), forms.moving),
         )
+
+    def _prepare(self, state: State, forms: ShapeForms, by: str) -> Bind:
+        """Compile the integral or a derivative, return what binds it to a subdomain. Collective."""
+        body = self._body(state)
+        cell_type, temperature = body.mesh.cell_type, temperature_of(state.scene.loads, self.body)
+        for materials in possible(body):
+            forms.functional(self.name, self.integrand, materials, cell_type, by, temperature)
+
+        def bind(subdomain: Subdomain, functions: Sequence[Any], spaces: Sequence[Any]) -> Any:
+            parts, mesh = subdomain.material, subdomain.mesh.space.mesh
+            template = forms.functional(
+                self.name, self.integrand, parts.materials, cell_type, by, temperature
+            )
+            points = body.mesh.points[np.sort(subdomain.mesh.nodes)]
+            fields = [*functions, *temperature.fields(mesh, points)]
+            numbers = (*temperature.numbers, *parts.parameters)
+            return template.bind(spaces, numbers, fields, mesh=mesh, cells=parts.cells)
+
+        return bind
 
     def _body(self, state: State) -> Body:
         bodies = state.scene.bodies
@@ -170,7 +188,5 @@ class ContactForces:
         ):
             position = system.positions(rows)
             by_multiplier[position[position >= 0]] = values[position >= 0]
-        nodes = int(torn.decomposition.tearing.node_offset[-1])
-        return Partials(
-            float(value), np.zeros(len(state.torn_displacement)), by_multiplier, np.zeros((nodes, 3))
-        )
+        by_shape = np.zeros((int(torn.decomposition.tearing.node_offset[-1]), torn.scene.dim))
+        return Partials(float(value), np.zeros(len(state.torn_displacement)), by_multiplier, by_shape)

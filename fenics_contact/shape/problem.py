@@ -13,7 +13,7 @@ from fenics_contact.contact import State, find_state
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
 from fenics_contact.feti import decompose
 from fenics_contact.qp import DualSolver, FaceNewton
-from fenics_contact.scene import BodyForce, Scene
+from fenics_contact.scene import Scene, SurfaceLoad
 from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
 from fenics_contact.shape.contact_derivative import bound_sensitivity, contact_by_shape
 from fenics_contact.shape.design import SurfaceDesign
@@ -159,7 +159,7 @@ class ShapeProblem:
             scene = self.scene_of(alpha)
         state = find_state(
             scene, self.decomposition, solver=self.solver, previous=self._previous,
-            start_geometry=self._previous is None, timer=self._timer,
+            start_geometry=self._previous is None, sensitivity=True, timer=self._timer,
         )  # fmt: skip
         self._previous = state
         return state
@@ -253,7 +253,7 @@ class ShapeProblem:
         body = scene.bodies[name]
         surfaces = {part.surface for part in scene.supports if part.body == name}
         surfaces |= {
-            load.surface for load in scene.loads if load.body == name and not isinstance(load, BodyForce)
+            load.surface for load in scene.loads if load.body == name and isinstance(load, SurfaceLoad)
         }
         held = [body.mesh.surfaces[surface].ravel() for surface in sorted(surfaces)]
         held.append(design.nodes_beyond_transition(body.mesh))

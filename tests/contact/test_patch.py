@@ -46,7 +46,10 @@ def bodies(slave: str, master: str) -> dict[str, Body]:
         lower, upper = rectangle((0, 0), (1, 1), (4, 3), master), rectangle((0, 1), (1, 2), (7, 3), slave)
         law = PlaneStrain(1000.0, 0.3)
         return {"lower": Body(renamed(lower), law), "upper": Body(renamed(upper), law)}
-    lower, upper = block((0, 0, 0), (1, 1, 1), (3, 4, 2), master), block((0, 0, 1), (1, 1, 2), (5, 3, 2), slave)
+    lower, upper = (
+        block((0, 0, 0), (1, 1, 1), (3, 4, 2), master),
+        block((0, 0, 1), (1, 1, 2), (5, 3, 2), slave),
+    )
     return {"lower": Body(renamed(lower), SOFT), "upper": Body(renamed(upper), SOFT)}
 
 
@@ -115,7 +118,10 @@ def test_friction_does_not_disturb_the_patch(cell: str) -> None:
     scene = pressed(bodies(cell, cell), "mortar", friction=Coulomb(0.4))
     state = solved(scene)
     assert worst_stress(scene, state) < 1e-9
-    assert np.abs(state.contact.friction_force).max() < 1e-9 * state.contact.normal_force.max()
+    # Where rollers hold slave and master alike, friction and reactions share a force that nobody sees.
+    free = ~state.torn.decomposition.fixed[state.contact.points.slave].any(axis=1)
+    assert 5 < free.sum() < state.contact.points.count
+    assert np.abs(state.contact.friction_force[free]).max() < 1e-9 * state.contact.normal_force.max()
 
 
 def test_a_slave_that_reaches_beyond_its_master_bears_the_right_force() -> None:

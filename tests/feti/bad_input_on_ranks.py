@@ -45,7 +45,7 @@ def infinite_load_on_the_last_rank() -> Cut:
     return scene, partitions
 
 
-def infinite_stiffness_on_the_last_rank() -> Cut:
+def infinite_stiffness() -> Cut:
     _, partitions = bar()
     hard = Body(BAR, IsotropicElasticity(1e308, 0.49))
     scene = Scene({"bar": Body(BAR, STEEL), "hard": hard}, [Support("bar", "z0"), Support("hard", "z0")])
@@ -83,7 +83,7 @@ def clashing_supports() -> Cut:
 CASES: tuple[Callable[[], Cut], ...] = (
     too_few_subdomains,
     infinite_load_on_the_last_rank,
-    infinite_stiffness_on_the_last_rank,
+    infinite_stiffness,
     nothing_holds_it,
     pulled_off_the_floor,
     overlap,

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mpi4py import MPI
 
 from fenics_contact.feti.copies import _spread_over_ranks, tear
+from fenics_contact.feti.forms import FormLibrary
 from fenics_contact.feti.nodal_stiffness import cell_stiffness
 from tests.feti.scenes import touching_blocks
 
@@ -35,7 +37,9 @@ def test_one_heavy_subdomain_does_not_take_a_neighbour_along() -> None:
 
 def test_nodes_and_subdomains_of_all_bodies_are_numbered_through() -> None:
     scene, partitions = touching_blocks()
-    tearing = tear(scene, partitions, 3, cell_stiffness(scene))
+    forms = FormLibrary(MPI.COMM_SELF)
+    forms.prepare(scene)
+    tearing = tear(scene, partitions, 3, cell_stiffness(scene, forms))
     assert tearing.body_names == ("lower", "upper", "third")
     assert tearing.subdomain_offset.tolist() == [0, 4, 7, 9]
     assert tearing.n_subdomains == 9

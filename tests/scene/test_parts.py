@@ -54,15 +54,17 @@ def test_a_slip_bound_must_not_be_negative(value: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "value", [(), (0.0, 0.0), (None, None, None), (0.0, 0.0, math.nan), (math.inf, None, None), (0, 0, 0, 0)]
+    "value", [(), (0.0,), (None, None, None), (0.0, 0.0, math.nan), (math.inf, None, None), (0, 0, 0, 0)]
 )
 def test_a_support_must_prescribe_something(value: Any) -> None:
-    message = r"Support.value must hold three entries, .* got .*: use \(0.0, 0.0, 0.0\) to clamp"
+    message = (
+        r"Support.value must hold three entries \(two for a plane body\), .* got .*: use \(0.0, 0.0, 0.0\) to"
+    )
     with pytest.raises(InvalidInputError, match=message):
         Support("body", "side", value)
 
 
-@pytest.mark.parametrize("value", [(1.0, 2.0), (0.0, math.nan, 0.0), (0.0, 0.0, -math.inf), (1, 2, 3, 4)])
+@pytest.mark.parametrize("value", [1.0, (0.0, math.nan, 0.0), (0.0, 0.0, -math.inf), (1, 2, 3, 4), "xyz"])
 @pytest.mark.parametrize(
     ("name", "make"),
     [
@@ -72,7 +74,7 @@ def test_a_support_must_prescribe_something(value: Any) -> None:
     ],
 )
 def test_a_load_must_be_a_vector(name: str, make: Callable[[Any], Any], value: Any) -> None:
-    message = rf"{name}.value must be three finite numbers, got .*: give one for x, y and z"
+    message = rf"{name}.value must be three finite numbers \(two for a plane body\), got .*: give one for x"
     with pytest.raises(InvalidInputError, match=message):
         make(value)
 

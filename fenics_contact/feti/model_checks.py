@@ -1,0 +1,140 @@
+"""Does a material do what it claims? Checked on one small cell, before anything is built on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from fenics_contact import _dolfinx
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.scene import Material
+
+#: Vertices of cells with edges of length one along the axes, in VTK order.
+UNIT_CELL = {
+    "triangle": np.array([[0, 0], [1, 0], [0, 1]], dtype=np.float64),
+    "quadrilateral": np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float64),
+    "tetrahedron": np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float64),
+    "hexahedron": np.array(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]],
+        dtype=np.float64,
+    ),
+}
+#: Below this, relative to the largest, an eigenvalue or an entry counts as rounding.
+ROUNDING = 1e-11
+#: Largest ‖K R‖ relative to ‖K‖ ‖R‖.
+KERNEL_TOLERANCE = 1e-8
+
+#: Binds the stiffness of the material to a space.
+Bind = Callable[[Any], Any]
+
+
+def unit_cell_stiffness(cell_type: str, bind: Bind) -> np.ndarray:
+    """Return the stiffness matrix of a cell of edge length one, dense, block by block."""
+    return _cell(UNIT_CELL[cell_type], cell_type, bind)[0]
+
+
+def check_model(material: Material, cell_type: str, bind: Bind) -> None:
+    """Check stiffness and kernel of a material on one skew cell.
+
+    A kernel with a mode too few makes the generalised inverse blow up, one with a mode too many takes real
+    stiffness away; both would pass for a solution.
+
+    Args:
+        material: The material.
+        cell_type: Type of the cell.
+        bind: Binds its stiffness form.
+
+    Raises:
+        InvalidInputError: If the stiffness is not finite, not symmetric or has a negative energy, the kernel
+            has the wrong shape, dependent modes or modes that are none, or a mode without energy is missing.
+    """
+    name = type(material).__name__
+    K, points = _cell(_skewed(UNIT_CELL[cell_type]), cell_type, bind)
+    if not np.isfinite(K).all():
+        raise InvalidInputError(
+            f"stiffness and load must be finite, got NaN or infinity in the stiffness of {name}: check the "
+            "material parameters"
+        )
+    size = np.abs(K).max()
+    unsymmetric = np.abs(K - K.T).max()
+    if unsymmetric > ROUNDING * size:
+        raise InvalidInputError(
+            f"the stiffness of a material must be symmetric, that of {name} is not (by "
+            f"{unsymmetric / size:.1e} of its largest entry): the stress must follow from an energy"
+        )
+    energies = np.linalg.eigvalsh(0.5 * (K + K.T))
+    if energies[0] < -ROUNDING * energies[-1]:
+        raise InvalidInputError(
+            f"the energy of a material must not be negative, {name} has the eigenvalue {energies[0]:.3g} "
+            f"beside {energies[-1]:.3g}: check signs and parameters"
+        )
+    R = _checked_kernel(material, points)
+    check_kernel(K, R, f"material {name}")
+    claimed, found = R.shape[1], int((energies < ROUNDING * energies[-1]).sum())
+    if found > claimed:
+        raise InvalidInputError(
+            f"the kernel of a material must hold every motion without energy, that of {name} has {claimed} "
+            f"modes and a {cell_type} has {found} of them: add the missing ones to kernel(points)"
+        )
+
+
+def check_kernel(stiffness: Any, kernel: np.ndarray, what: str) -> None:
+    """Check that a stiffness matrix annihilates its kernel.
+
+    All modes are tried at once, each with a weight of its own.
+
+    Args:
+        stiffness: K, dense or sparse, shape (n, n).
+        kernel: R, shape (n, n_modes).
+        what: Whose they are, for the message.
+
+    Raises:
+        InvalidInputError: If ‖K R‖ is not small beside ‖K‖ ‖R‖.
+    """
+    weights = 1 / (1 + np.sqrt(np.arange(2, 2 + kernel.shape[1])))
+    energy = np.abs(stiffness @ (kernel @ weights)).max(initial=0.0)
+    scale = np.abs(stiffness).max() * np.abs(kernel).max(initial=0.0)
+    if not energy <= KERNEL_TOLERANCE * scale:
+        raise InvalidInputError(
+            f"the kernel must hold motions without energy alone, that of {what} does not (‖K R‖ is "
+            f"{energy / scale:.1e} of ‖K‖ ‖R‖): kernel(points) must return modes that the "
+            "stiffness annihilates"
+        )
+
+
+def _checked_kernel(material: Material, points: np.ndarray) -> np.ndarray:
+    name, modes = type(material).__name__, np.asarray(material.kernel(points))
+    if modes.ndim != 3 or modes.shape[:2] != points.shape or not np.isfinite(modes).all():
+        raise InvalidInputError(
+            f"kernel(points) of {name} must return finite modes of shape {points.shape} + (n_modes,), got "
+            f"shape {modes.shape}: one displacement a point and mode"
+        )
+    R = modes.reshape(points.size, -1)
+    if np.linalg.matrix_rank(R, tol=1e-8 * max(np.abs(R).max(initial=0.0), 1e-300)) < R.shape[1]:
+        raise InvalidInputError(
+            f"the modes in the kernel of {name} must be independent, the {R.shape[1]} given are not: leave "
+            "out those that others make up"
+        )
+    return R
+
+
+def _skewed(vertices: np.ndarray) -> np.ndarray:
+    """Return a cell without any symmetry; the same for every material."""
+    n, dim = vertices.shape
+    shift = np.sin(1.0 + 2.3 * np.arange(n * dim)).reshape(n, dim)
+    return vertices + 0.08 * shift
+
+
+def _cell(vertices: np.ndarray, cell_type: str, bind: Bind) -> tuple[np.ndarray, np.ndarray]:
+    """Return the stiffness of one cell and its points, both block by block."""
+    mesh = _dolfinx.local_mesh(vertices, np.arange(len(vertices))[None], cell_type)
+    space = _dolfinx.coefficient(mesh, "u").function_space
+    nodes, dofs = _dolfinx.node_dofs(space)
+    points = np.empty_like(vertices)
+    points[dofs] = vertices[nodes]
+    indptr, indices, data = _dolfinx.assemble_csr(bind(space))
+    K = np.zeros((vertices.size, vertices.size))
+    K[np.repeat(np.arange(vertices.size), np.diff(indptr)), indices] = data
+    return K, points

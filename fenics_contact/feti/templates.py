@@ -1,0 +1,130 @@
+"""Compiled forms with their constants and coefficients, and the measures they are integrated with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import ufl
+from mpi4py import MPI
+
+from fenics_contact import _dolfinx
+
+#: Gauss rule of the volume: two points a direction on tensor-product cells, one on simplices suit linear
+#: elasticity.
+QUADRATURE_DEGREE = {"hexahedron": 2, "tetrahedron": 1, "quadrilateral": 2, "triangle": 1}
+#: Tag that every loaded surface gets inside a load form.
+LOADED = 1
+
+#: A form, its constants and its coefficients.
+Written = tuple[Any, Sequence[Any], Sequence[Any]]
+
+
+class Template:
+    """A compiled form, its constants and its coefficients."""
+
+    def __init__(
+        self, comm: MPI.Comm, form: Any, constants: Sequence[Any], coefficients: Sequence[Any] = ()
+    ) -> None:
+        """Compile ``form``. Collective on ``comm``."""
+        self._form = _dolfinx.CompiledForm(comm, form)
+        self._constants, self._coefficients = tuple(constants), tuple(coefficients)
+
+    def bind(
+        self,
+        spaces: Sequence[Any],
+        values: Sequence[float],
+        functions: Sequence[Any] = (),
+        facets: Any = None,
+        mesh: Any = None,
+        cells: Mapping[int, np.ndarray] | None = None,
+    ) -> Any:
+        """Return the form on one mesh, with numbers for its constants and Functions for its coefficients.
+
+        Args:
+            spaces: Spaces of its arguments.
+            values: Numbers for its constants.
+            functions: Functions for its coefficients.
+            facets: (cells, local facets) of its surface integral.
+            mesh: The mesh, where there are no arguments.
+            cells: Cells of its tagged volume integrals by tag.
+        """
+        mesh = spaces[0].mesh if mesh is None else mesh
+        constants = {
+            symbol: _dolfinx.Constant(mesh, np.float64(value))
+            for symbol, value in zip(self._constants, values, strict=True)
+        }
+        coefficients = dict(zip(self._coefficients, functions, strict=True))
+        tagged = None if facets is None else {LOADED: facets}
+        return self._form.bind(mesh, spaces, coefficients, constants, tagged, cells=cells)
+
+
+class Templates:
+    """Compiled forms by key; what different keys write alike is compiled once.
+
+    A key names all that a form was written from. Keys of two materials of one class differ, their forms
+    mostly do not: only numbers do, which enter later.
+    """
+
+    def __init__(self, comm: MPI.Comm) -> None:
+        """Start empty."""
+        self._comm = comm
+        self._by_key: dict[Hashable, Template] = {}
+        self._by_text: dict[Hashable, Template] = {}
+        self._names: list[tuple[Any, ...]] = []
+
+    @property
+    def names(self) -> tuple[tuple[Any, ...], ...]:
+        """Names of the forms that were compiled, in that order."""
+        return tuple(self._names)
+
+    def __getitem__(self, key: Hashable) -> Template:
+        """Return what was prepared under ``key``."""
+        return self._by_key[key]
+
+    def __contains__(self, key: Hashable) -> bool:
+        return key in self._by_key
+
+    def get(self, key: Hashable, name: tuple[Any, ...], write: Callable[[], Written]) -> Template:
+        """Return the template under ``key``. Collective when it is new.
+
+        Args:
+            key: All that the form depends on.
+            name: What it is called among `names`.
+            write: Gives form, constants and coefficients.
+        """
+        if key not in self._by_key:
+            form, constants, coefficients = write()
+            text = _text(form, constants, coefficients)
+            if text not in self._by_text:
+                self._by_text[text] = Template(self._comm, form, constants, coefficients)
+                self._names.append(name)
+            self._by_key[key] = self._by_text[text]
+        return self._by_key[key]
+
+
+def _text(form: Any, constants: Sequence[Any], coefficients: Sequence[Any]) -> Hashable:
+    """Return what two forms have in common if one can be bound in the place of the other."""
+    used = form.constants(), form.coefficients()
+    places = tuple(
+        tuple(symbol in mine for symbol in symbols)
+        for symbols, mine in zip((constants, coefficients), used, strict=True)
+    )
+    return form.signature(), places
+
+
+def scalar_constants(cell_type: str, count: int) -> tuple[Any, ...]:
+    """Return ``count`` UFL constants on the template."""
+    return tuple(ufl.Constant(_dolfinx.template(cell_type)) for _ in range(count))
+
+
+def volume_measure(cell_type: str, degree: int | None = None) -> Any:
+    """Return dx on the template with the package's quadrature degree, or the given one."""
+    degree = QUADRATURE_DEGREE[cell_type] if degree is None else degree
+    return ufl.dx(domain=_dolfinx.template(cell_type), metadata={"quadrature_degree": degree})
+
+
+def surface_measure(cell_type: str) -> Any:
+    """Return ds of the loaded surface on the template."""
+    return ufl.ds(domain=_dolfinx.template(cell_type), metadata={"quadrature_degree": 2})(LOADED)

@@ -1,0 +1,88 @@
+"""A body: a mesh and what it is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry import BodyMesh
+from fenics_contact.scene.materials import Material
+
+
+@dataclass(frozen=True)
+class Body:
+    """A mesh and what it is made of.
+
+    Attributes:
+        mesh: The mesh.
+        material: The material, or one for each of the mesh's regions by name.
+    """
+
+    mesh: BodyMesh
+    material: Material | Mapping[str, Material]
+
+    def __post_init__(self) -> None:
+        """Refuse materials of another dimension and regions without exactly one material."""
+        if isinstance(self.material, Mapping):
+            _check_regions(self.mesh, self.material)
+        for material in self.materials:
+            _check_material(material, self.mesh.dim)
+
+    @property
+    def materials(self) -> tuple[Material, ...]:
+        """The different materials, in the order of the regions."""
+        if not isinstance(self.material, Mapping):
+            return (self.material,)
+        found: list[Material] = []
+        for region in self.mesh.regions:
+            if self.material[region] not in found:
+                found.append(self.material[region])
+        return tuple(found)
+
+    @property
+    def material_of_cells(self) -> np.ndarray:
+        """Number of each cell's material in `materials`, shape (n_cells,)."""
+        number = np.zeros(self.mesh.n_cells, dtype=np.int64)
+        if isinstance(self.material, Mapping):
+            materials = self.materials
+            for region, cells in self.mesh.regions.items():
+                number[cells] = materials.index(self.material[region])
+        return number
+
+
+def _check_regions(mesh: BodyMesh, materials: Mapping[str, Material]) -> None:
+    if set(materials) != set(mesh.regions):
+        raise InvalidInputError(
+            f"materials by region must name exactly the regions of the mesh, got {sorted(materials)}, the "
+            f"mesh has {sorted(mesh.regions)}: give one material for each, or one for the whole body"
+        )
+
+
+def _check_material(material: Material, dim: int) -> None:
+    name = type(material).__name__
+    missing = [
+        part
+        for part in ("dims", "parameters", "stress", "stiffness", "kernel")
+        if not hasattr(material, part)
+    ]
+    if missing:
+        raise InvalidInputError(
+            f"a material must have dims, parameters, stress, stiffness and kernel, {name} lacks {missing}: "
+            "derive it from Elasticity or EnergyModel"
+        )
+    if dim not in material.dims:
+        raise InvalidInputError(
+            f"the material must be made for the dimension of the mesh, {name} is for {material.dims} and the "
+            f"mesh has {dim}: use PlaneStrain or PlaneStress in the plane, IsotropicElasticity or "
+            "OrthotropicElasticity in space"
+        )
+    try:
+        hash(material)
+    except TypeError as error:
+        raise InvalidInputError(
+            f"a material must be hashable, {name} is not ({error}): write it as a frozen dataclass of "
+            "numbers and tuples"
+        ) from error

@@ -1,0 +1,30 @@
+"""Rigid body motions: the displacements that strain no elastic body."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def rigid_body_modes(points: np.ndarray) -> np.ndarray:
+    """Return the translations and the rotations about the centroid of ``points``.
+
+    Rotations are divided by the largest distance from the centroid, so that all modes have about the same
+    size whatever the unit of length.
+
+    Args:
+        points: Coordinates, shape (n, dim), [length].
+
+    Returns:
+        Modes, dimensionless: shape (n, 3, 6) in space, (n, 2, 3) in the plane.
+    """
+    arm = points - points.mean(axis=0)
+    arm = arm / max(float(np.abs(arm).max()), np.finfo(float).tiny)
+    n, dim = arm.shape
+    modes = np.zeros((n, dim, 3 * (dim - 1)))
+    modes[:, range(dim), range(dim)] = 1.0
+    if dim == 2:
+        modes[:, :, 2] = np.stack([-arm[:, 1], arm[:, 0]], axis=1)
+        return modes
+    for axis in range(3):
+        modes[:, :, 3 + axis] = np.cross(np.eye(3)[axis], arm)
+    return modes

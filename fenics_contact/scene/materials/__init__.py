@@ -1,0 +1,28 @@
+"""Physics models: what a body is made of, written in UFL."""
+
+from fenics_contact.scene.materials.elasticity import Elasticity, strain
+from fenics_contact.scene.materials.energy import EnergyModel
+from fenics_contact.scene.materials.isotropic import IsotropicElasticity
+from fenics_contact.scene.materials.orthotropic import (
+    OrthotropicElasticity,
+    OrthotropicPlaneStress,
+    material_axes,
+)
+from fenics_contact.scene.materials.plane import PlaneStrain, PlaneStress
+from fenics_contact.scene.materials.protocol import Material, Thermoelastic, Transverse, can_expand
+
+__all__ = [
+    "Elasticity",
+    "EnergyModel",
+    "IsotropicElasticity",
+    "Material",
+    "OrthotropicElasticity",
+    "OrthotropicPlaneStress",
+    "PlaneStrain",
+    "PlaneStress",
+    "Thermoelastic",
+    "Transverse",
+    "can_expand",
+    "material_axes",
+    "strain",
+]

@@ -1,0 +1,65 @@
+"""What a physics model must provide."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+
+@runtime_checkable
+class Material(Protocol):
+    """A linear elastic model; `Elasticity` and `EnergyModel` leave only two of these members to write.
+
+    Numbers that may differ from body to body are returned by `parameters` and reach the forms as UFL
+    constants, so that all bodies of one class share one compiled form. A model is a value: equal models are
+    interchangeable, and it can be hashed, as a frozen dataclass of numbers and tuples can.
+    """
+
+    @property
+    def dims(self) -> tuple[int, ...]:
+        """Dimensions of the bodies that it is for: ``(2,)``, ``(3,)`` or ``(2, 3)``."""
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """Values of the model's constants, in the order in which the forms receive them."""
+
+    def stress(self, u: Any, parameters: Any) -> Any:
+        """Return the stress tensor (dim x dim, UFL) of the displacement ``u``."""
+
+    def stiffness(self, u: Any, v: Any, parameters: Any) -> Any:
+        """Return the integrand of the symmetric bilinear form, virtual work a volume (UFL scalar)."""
+
+    def kernel(self, points: np.ndarray) -> np.ndarray:
+        """Return the zero-energy modes at ``points``, shape (n, dim) -> (n, dim, n_modes)."""
+
+
+@runtime_checkable
+class Thermoelastic(Protocol):
+    """What a material must provide beside for `ThermalStrain` to act on it."""
+
+    @property
+    def expands(self) -> bool:
+        """Whether this material was given a thermal expansion."""
+
+    def thermal_stress(self, parameters: Any) -> Any:
+        """Return the stress that a temperature rise by one degree loses to expansion (dim x dim, UFL).
+
+        σ = stress(u) − ΔT · thermal_stress; for an isotropic body (3λ + 2G) α I.
+        """
+
+
+@runtime_checkable
+class Transverse(Protocol):
+    """What a plane model provides beside if it carries stress normal to its plane (plane strain)."""
+
+    def transverse_stress(self, u: Any, parameters: Any) -> Any:
+        """Return the stress normal to the plane (UFL scalar), without thermal strain."""
+
+    def transverse_thermal_stress(self, parameters: Any) -> Any:
+        """Return what a temperature rise by one degree takes from it (UFL scalar)."""
+
+
+def can_expand(material: Material) -> bool:
+    """Return whether a temperature change strains the material."""
+    return isinstance(material, Thermoelastic) and material.expands

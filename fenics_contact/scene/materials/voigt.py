@@ -1,0 +1,77 @@
+"""Symmetric tensors as vectors (Voigt), their rotation, and stiffness matrices from engineering constants."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import ufl
+
+from fenics_contact.errors import InvalidInputError
+
+#: Index pairs in Voigt order: xx, yy, zz, yz, xz, xy; in the plane xx, yy, xy.
+PAIRS = {3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)), 2: ((0, 0), (1, 1), (0, 1))}
+
+
+def strain_vector(strain: Any, dim: int) -> list[Any]:
+    """Return the entries of a strain tensor (UFL) with engineering shears, γ = 2 ε."""
+    return [(1 if i == j else 2) * strain[i, j] for i, j in PAIRS[dim]]
+
+
+def as_tensor(vector: list[Any], dim: int) -> Any:
+    """Return the stress tensor (UFL) with the given Voigt entries."""
+    place = {pair: k for k, pair in enumerate(PAIRS[dim])}
+    return ufl.as_tensor([[vector[place[min(i, j), max(i, j)]] for j in range(dim)] for i in range(dim)])
+
+
+def upper_triangle(matrix: np.ndarray) -> tuple[float, ...]:
+    """Return the entries on and above the diagonal, row by row."""
+    return tuple(float(value) for value in matrix[np.triu_indices(len(matrix))])
+
+
+def symmetric_product(entries: Any, vector: list[Any]) -> list[Any]:
+    """Return the product of a symmetric matrix, given by its upper triangle, with a vector (UFL)."""
+    n = len(vector)
+    place = {(i, j): k for k, (i, j) in enumerate(zip(*np.triu_indices(n), strict=True))}
+    return [sum(entries[place[min(i, j), max(i, j)]] * vector[j] for j in range(n)) for i in range(n)]
+
+
+def rotated_stiffness(C: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """Turn a stiffness matrix from material axes to those of the scene.
+
+    Args:
+        C: Stiffness in material axes, Voigt, shape (6, 6) or (3, 3).
+        axes: Material axes as rows, orthonormal, shape (dim, dim).
+    """
+    T = strain_rotation(axes)
+    return np.asarray(T.T @ C @ T)
+
+
+def strain_rotation(axes: np.ndarray) -> np.ndarray:
+    """Return the matrix that turns a strain vector of the scene's axes into material axes."""
+    dim = len(axes)
+    T = np.empty((len(PAIRS[dim]),) * 2)
+    for column, (i, j) in enumerate(PAIRS[dim]):
+        unit = np.zeros((dim, dim))
+        unit[i, j] += 0.5
+        unit[j, i] += 0.5  # engineering shear 1
+        turned = axes @ unit @ axes.T
+        T[:, column] = [(1 if a == b else 2) * turned[a, b] for a, b in PAIRS[dim]]
+    return T
+
+
+def checked_stiffness(compliance: np.ndarray, constants: str) -> np.ndarray:
+    """Invert a compliance matrix, shape (n, n).
+
+    Raises:
+        InvalidInputError: If it is not positive definite; ``constants`` names what it was built from.
+    """
+    scale = np.sqrt(np.abs(np.diag(compliance)))
+    smallest = np.linalg.eigvalsh(compliance / np.outer(scale, scale)).min()
+    if not smallest > 1e-12:
+        raise InvalidInputError(
+            f"engineering constants must give a positive energy, {constants} do not (smallest eigenvalue of "
+            f"the scaled compliance {smallest:.3g}): reduce the Poisson ratios, ν_ij² < E_i / E_j for each "
+            "pair is necessary"
+        )
+    return np.asarray(np.linalg.inv(compliance), dtype=np.float64)

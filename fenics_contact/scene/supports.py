@@ -1,0 +1,67 @@
+"""Supports: displacements prescribed on surfaces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.scene.values import OfPosition, evaluate
+
+#: What a support does with one component: leave it free, give it a number, or a function of the points.
+Component = float | OfPosition | None
+
+
+@dataclass(frozen=True)
+class Support:
+    """Displacement prescribed on a surface, component by component.
+
+    Attributes:
+        body: Name of the body.
+        surface: Name of its surface.
+        value: Displacement [length] for x, y, z (for x, y on a plane body). None leaves a component free; a
+            function gets points, shape (n, dim), and returns the component there, shape (n,).
+    """
+
+    body: str
+    surface: str
+    value: tuple[Component, ...] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Refuse a support that prescribes nothing or something that is no number."""
+        given = [component for component in self.value if component is not None]
+        numbers = [component for component in given if not callable(component)]
+        if len(self.value) not in (2, 3) or not given or not np.all(np.isfinite(numbers)):
+            raise InvalidInputError(
+                "Support.value must hold three entries (two for a plane body), each a finite number, a "
+                f"function of the points or None, and at least one that is not None, got {self.value!r}: use "
+                "(0.0, 0.0, 0.0) to clamp, (None, None, 0.0) for a roller"
+            )
+        object.__setattr__(self, "value", tuple(self.value))
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the body that it is for."""
+        return len(self.value)
+
+    def values(self, points: np.ndarray) -> np.ndarray:
+        """Return the prescribed displacement, NaN where a component is free.
+
+        Args:
+            points: Coordinates of nodes on the surface, shape (n, dim), [length].
+
+        Returns:
+            Shape (n, dim), [length].
+
+        Raises:
+            InvalidInputError: If a function returns something else than a finite number a point.
+        """
+        result = np.full(points.shape, np.nan)
+        for component, given in enumerate(self.value):
+            if callable(given):
+                name = f"component {component} of the support of surface {self.surface!r}"
+                result[:, component] = evaluate(name, given, points, ())
+            elif given is not None:
+                result[:, component] = given
+        return result

@@ -1,0 +1,99 @@
+"""What a load or a support may be given as: numbers, a function of position, or UFL."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+
+#: A function of points, shape (n, dim), [length], with a row (a vector) or a number (a scalar) for each.
+OfPosition = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Ufl:
+    """A value written in UFL: compiled into the form and evaluated at its quadrature points.
+
+    Attributes:
+        function: Takes the spatial coordinate (UFL), returns a UFL vector or scalar.
+
+    Example:
+        Water that presses harder with depth:
+
+        >>> Pressure("dam", "front", Ufl(lambda x: 9.81e-6 * (2e4 - x[2]))).surface
+        'front'
+    """
+
+    function: Callable[[Any], Any]
+
+
+VectorValue = Sequence[float] | OfPosition | Ufl
+ScalarValue = float | OfPosition | Ufl
+
+
+def checked_vector(name: str, value: Any) -> Any:
+    """Return numbers as a tuple of floats, a function or UFL as it is.
+
+    Raises:
+        InvalidInputError: If it is no vector of a plane or of space.
+    """
+    if isinstance(value, Ufl) or callable(value):
+        return value
+    found = _floats(value)
+    if found is None or found.shape not in ((2,), (3,)):
+        raise InvalidInputError(
+            f"{name} must be three finite numbers (two for a plane body), got {value!r}: give one for x, y "
+            "and z, or a function of the points"
+        )
+    return tuple(float(component) for component in found)
+
+
+def checked_scalar(name: str, value: Any) -> Any:
+    """Return a number as a float, a function or UFL as it is.
+
+    Raises:
+        InvalidInputError: If it is none of them.
+    """
+    if isinstance(value, Ufl) or callable(value):
+        return value
+    found = _floats(value)
+    if found is None or found.shape != ():
+        raise InvalidInputError(
+            f"{name} must be a finite number, got {value!r}: give a number or a function of the points"
+        )
+    return float(found)
+
+
+def _floats(value: Any) -> np.ndarray | None:
+    try:
+        found = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+    return found if np.isfinite(found).all() else None
+
+
+def evaluate(name: str, function: OfPosition, points: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Evaluate a function of position.
+
+    Args:
+        name: What the values are, for the message.
+        function: The function.
+        points: Where, shape (n, dim), [length].
+        shape: Shape of one value: () or (dim,).
+
+    Raises:
+        InvalidInputError: If it returns another shape or something that is no number.
+    """
+    found = _floats(function(points.copy()))
+    wanted = (len(points), *shape)
+    if found is None or found.shape != wanted:
+        given = "something that is no finite number" if found is None else f"shape {found.shape}"
+        raise InvalidInputError(
+            f"the function given as {name} must return finite numbers of shape {wanted} for points of shape "
+            f"{points.shape}, got {given}: it gets all points at once, a row each"
+        )
+    return found
