@@ -21,6 +21,8 @@ References:
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from scipy import sparse
 
@@ -68,8 +70,9 @@ class _sum_by:
         self.matrix = sparse.csr_matrix((np.ones(count), (number, np.arange(count))), shape=(rows, count))
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
-        summed = self.matrix @ values.reshape(len(values), -1)
-        return np.asarray(summed.reshape(-1, *values.shape[1:]), dtype=np.float64)
+        shape = values.shape[1:]
+        summed = self.matrix @ values.reshape(len(values), math.prod(shape))
+        return np.asarray(summed.reshape(len(summed), *shape), dtype=np.float64)
 
 
 def _modes(cells: Cells, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
