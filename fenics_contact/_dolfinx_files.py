@@ -10,6 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact import _dolfinx  # imports dolfinx first and undoes what that leaves behind
+from fenics_contact.errors import InvalidInputError
 
 import dolfinx.io  # isort: skip
 from dolfinx import cpp  # isort: skip
@@ -65,8 +66,20 @@ def read_mesh(path: Path, name: str, inline: bool) -> Any:
         path: The file.
         name: Name of the grid.
         inline: Whether the numbers are in the file itself and not in an HDF5 file beside it.
+
+    Raises:
+        InvalidInputError: If a node belongs to no cell, at which dolfinx 0.5 ends the whole process.
     """
     with _opened(path, inline) as file:
+        n_nodes = len(file.read_geometry_data(name, "/Xdmf/Domain"))
+        used = np.unique(file.read_topology_data(name, "/Xdmf/Domain"))
+        unused = np.setdiff1d(np.arange(n_nodes), used)
+        if unused.size:
+            raise InvalidInputError(
+                f"every node must belong to a cell, {unused.size} of {n_nodes} in grid '{name}' of "
+                f"file '{path}' "
+                f"do not, first node {unused[0]}: remove them (meshio: mesh.remove_orphaned_nodes())"
+            )
         return file.read_mesh(name=name)
 
 
