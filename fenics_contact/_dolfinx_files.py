@@ -84,11 +84,22 @@ def read_mesh(path: Path, name: str, inline: bool) -> Any:
 
 
 def read_tags(path: Path, mesh: Any, name: str, inline: bool) -> Any:
-    """Read the first attribute of a grid of an XDMF file as tags on ``mesh``; arguments as in `read_mesh`."""
+    """Read the first attribute of a grid of an XDMF file as tags on ``mesh``; arguments as in `read_mesh`.
+
+    Raises:
+        InvalidInputError: If some of the tagged cells or facets are not in the mesh.
+    """
     tdim = mesh.topology.dim
     mesh.topology.create_connectivity(tdim - 1, tdim)
     with _opened(path, inline) as file:
-        return file.read_meshtags(mesh, name=name)
+        tagged = len(file.read_topology_data(name, "/Xdmf/Domain"))
+        tags = file.read_meshtags(mesh, name=name)
+    if len(tags.indices) != tagged:
+        raise InvalidInputError(
+            f"tags must be on cells or facets of the mesh, {tagged - len(tags.indices)} of {tagged} in grid "
+            f"'{name}' of file '{path}' are on none: write both files from one mesh, with all its nodes"
+        )
+    return tags
 
 
 def _opened(path: Path, inline: bool) -> Any:
