@@ -83,15 +83,25 @@ def read_mesh(path: Path, name: str, inline: bool) -> Any:
         return file.read_mesh(name=name)
 
 
-def read_tags(path: Path, mesh: Any, name: str, inline: bool) -> Any:
-    """Read the first attribute of a grid of an XDMF file as tags on ``mesh``; arguments as in `read_mesh`.
+def read_tags(path: Path, mesh: Any, name: str, inline: bool, own_points: bool) -> Any:
+    """Read the first attribute of a grid of an XDMF file as tags on ``mesh``.
+
+    Args:
+        path: As in `read_mesh`.
+        mesh: The mesh.
+        name: As in `read_mesh`.
+        inline: As in `read_mesh`.
+        own_points: Whether the grid has points of its own, which must be those of the mesh then.
 
     Raises:
-        InvalidInputError: If some of the tagged cells or facets are not in the mesh.
+        InvalidInputError: If the points are others, or some of the tagged cells or facets are not in the
+            mesh.
     """
     tdim = mesh.topology.dim
     mesh.topology.create_connectivity(tdim - 1, tdim)
     with _opened(path, inline) as file:
+        if own_points:
+            _check_points(mesh, file.read_geometry_data(name, "/Xdmf/Domain"), path)
         tagged = len(file.read_topology_data(name, "/Xdmf/Domain"))
         tags = file.read_meshtags(mesh, name=name)
     if len(tags.indices) != tagged:
@@ -100,6 +110,18 @@ def read_tags(path: Path, mesh: Any, name: str, inline: bool) -> Any:
             f"'{name}' of file '{path}' are on none: write both files from one mesh, with all its nodes"
         )
     return tags
+
+
+def _check_points(mesh: Any, points: np.ndarray, path: Path) -> None:
+    """Refuse tags on other nodes: they would be taken for those with the same numbers."""
+    own = np.empty((len(mesh.geometry.x), mesh.geometry.dim))
+    own[mesh.geometry.input_global_indices] = mesh.geometry.x[:, : mesh.geometry.dim]
+    if own.shape != points.shape or not np.allclose(own, points, rtol=0.0, atol=1e-8 * np.abs(own).max()):
+        raise InvalidInputError(
+            f"the facets of file '{path}' must be on the nodes of the mesh, they are on {len(points)} "
+            f"nodes of "
+            f"their own, the mesh has {len(own)}: write both files with all nodes, in the same order"
+        )
 
 
 def _opened(path: Path, inline: bool) -> Any:

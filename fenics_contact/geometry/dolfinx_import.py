@@ -129,7 +129,11 @@ def _read(path: Path, facet_path: Path, names: tuple[str | None, str | None, str
     )
 
     def tags(file: Path, grid: Grid | None) -> Any:
-        return None if grid is None else _dolfinx_files.read_tags(file, mesh, grid.name, grid.inline)
+        return (
+            None
+            if grid is None
+            else _dolfinx_files.read_tags(file, mesh, grid.name, grid.inline, grid.has_points)
+        )
 
     try:
         mesh = _dolfinx_files.read_mesh(path, place.name, place.inline)

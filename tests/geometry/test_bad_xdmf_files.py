@@ -104,6 +104,20 @@ def test_cells_that_no_body_can_have_are_refused(
         read_xdmf(written(meshio, tmp_path / "bad.xdmf", CUBE, cells))
 
 
+def test_tagged_facets_that_are_not_in_the_mesh_are_refused(meshio: ModuleType, tmp_path: Path) -> None:
+    cells = written(meshio, tmp_path / "cells.xdmf", CUBE[:4], {"quad": [[0, 1, 2, 3]]})
+    facets = written(meshio, tmp_path / "facets.xdmf", CUBE[:4], {"line": [[0, 1], [0, 2]]})
+    with pytest.raises(InvalidInputError, match=r"1 of 2 in grid 'Grid' of file .* are on none: write both"):
+        read_xdmf(cells, facet_file=facets)
+
+
+def test_facets_on_other_nodes_are_refused(meshio: ModuleType, tmp_path: Path) -> None:
+    cells = written(meshio, tmp_path / "cells.xdmf", CUBE[:4], {"quad": [[0, 1, 2, 3]]})
+    facets = written(meshio, tmp_path / "facets.xdmf", CUBE[1:3], {"line": [[0, 1]]})
+    with pytest.raises(InvalidInputError, match=r"facets.xdmf' must be on the nodes of the mesh, .* 2 nodes"):
+        read_xdmf(cells, facet_file=facets)
+
+
 def test_cells_listed_left_handed_are_turned(meshio: ModuleType, tmp_path: Path) -> None:
     points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 0, 1), (1, 0, -1)]
     cells = {"tetra": [[0, 2, 1, 3], [0, 2, 1, 4]]}
