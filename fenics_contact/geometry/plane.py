@@ -6,7 +6,7 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry.cell_types import cell_type_of
-from fenics_contact.geometry.faces import cell_faces, start_at_smallest
+from fenics_contact.geometry.faces import cell_faces, number_faces, start_at_smallest
 from fenics_contact.geometry.quality import jacobians
 
 FLAT = 1e-10
@@ -79,13 +79,17 @@ def turned_right_handed(points: np.ndarray, cells: np.ndarray, source: str) -> n
     negative = jacobians(points, cells).max(axis=1) < 0.0
     turned = np.where(negative[:, None], cells[:, _MIRRORED[cell_type_of(cells, dim).name]], cells)
     faces = cell_faces(turned, dim)
-    flat = start_at_smallest(faces.reshape(-1, faces.shape[2]))
-    _, first, count = np.unique(flat, axis=0, return_index=True, return_counts=True)
-    if count.max() > 1:
-        face = flat[first[np.argmax(count)]]
+    flat = faces.reshape(-1, faces.shape[2])
+    numbers = number_faces(flat)
+    order = np.argsort(numbers, kind="stable")
+    one, other = order[:-1], order[1:]
+    first = start_at_smallest(flat)
+    same = (numbers[one] == numbers[other]) & (first[one] == first[other]).all(axis=1)
+    if same.any():
+        face = flat[one[np.argmax(same)]]
         place = ", ".join(f"{x:.6g}" for x in points[face].mean(axis=0))
         raise InvalidInputError(
-            f"cells that share a face must lie on its two sides, {np.count_nonzero(count > 1)} faces of "
+            f"cells that share a face must lie on its two sides, {np.count_nonzero(same)} faces of "
             f"{source} have both on one side, first at ({place}): a cell there is flipped over or "
             f"there twice; "
             "mesh again"
