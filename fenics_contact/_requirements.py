@@ -80,6 +80,7 @@ _GMSH = Requirement(
     "apt-get install --no-install-recommends python3-gmsh",
     "conda install -c conda-forge python-gmsh",
 )
+_PYMETIS = Requirement("pymetis", "2025.2", "pip install pymetis", "conda install -c conda-forge pymetis")
 
 
 def check() -> None:
@@ -106,6 +107,16 @@ def check_gmsh() -> None:
     module = _load(_GMSH, "gmsh")
     if _GMSH.version() is None:  # Debian 12 installs it without metadata
         _check_version(_GMSH, module.__version__)
+
+
+def load_pymetis() -> Any:
+    """Check and return pymetis, which only the partition of graphs needs.
+
+    Raises:
+        MissingRequirementError: pymetis is missing, too old or cannot be loaded.
+    """
+    _check_installed(_PYMETIS)
+    return _load(_PYMETIS, "pymetis")
 
 
 def _check_installed(requirement: Requirement) -> None:

@@ -7,15 +7,18 @@ from fenics_contact.contact.held import check_held
 from fenics_contact.contact.result import ContactResult, Status
 from fenics_contact.contact.slip_bounds import Damping
 from fenics_contact.contact.state import State
+from fenics_contact.contact.steps import LoadSequence, solve_steps
 
 __all__ = [
     "ContactResult",
     "Damping",
     "Energies",
     "FixedPoint",
+    "LoadSequence",
     "State",
     "Status",
     "check_held",
     "find_state",
     "solve_scene",
+    "solve_steps",
 ]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.feti import DualSystem
+from fenics_contact.feti import DirectSystem, DualSystem
 
 
 @dataclass(frozen=True)
@@ -37,18 +37,18 @@ class Energies:
 
 
 def compute_energies(
-    dual: DualSystem, displacement: np.ndarray, multiplier: np.ndarray, friction: float
+    system: DualSystem | DirectSystem, displacement: np.ndarray, multiplier: np.ndarray, friction: float
 ) -> Energies:
     """Compute all energies. Collective.
 
     Args:
-        dual: The solved system.
+        system: The solved system.
         displacement: Torn displacement of this rank, [length].
         multiplier: λ, owned, [force].
         friction: Σ Ψ ‖slip‖ of all ranks.
     """
-    torn = dual.torn
-    internal = torn.load - dual.force(multiplier)  # = K u
+    torn = system.torn
+    internal = torn.load - system.force(multiplier)  # = K u
     mine = np.array([0.5 * internal @ displacement, torn.load @ displacement, multiplier @ torn.right])
     strain, load, prescribed = (float(total) for total in torn.numbering.comm.allreduce(mine))
     # Of the displacement only K⁺(f − Bᵀλ) meets a force in equilibrium, rigid motions do no work.

@@ -10,12 +10,20 @@ from mpi4py import MPI
 from fenics_contact.contact.coulomb import FixedPoint
 from fenics_contact.contact.energies import compute_energies
 from fenics_contact.contact.held import check_held
-from fenics_contact.contact.result import ContactResult, Status
+from fenics_contact.contact.result import ContactResult, Status, no_contact
 from fenics_contact.contact.state import State
 from fenics_contact.contact.warm_start import carried_over
-from fenics_contact.feti import Decomposition, DualSystem, TornSystem, build_torn_system, decompose
+from fenics_contact.errors import together
+from fenics_contact.feti import (
+    Decomposition,
+    DirectSystem,
+    DualSystem,
+    TornSystem,
+    build_torn_system,
+    decompose,
+)
 from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, ProjectedCG, Smalse, contact_step, solve
-from fenics_contact.scene import Scene
+from fenics_contact.scene import Scene, SolverKind, choose_solver
 from fenics_contact.timing import PhaseTimer
 
 #: Largest relative residual of a scene without contact; its answer then equals that of a direct solver.
@@ -23,15 +31,20 @@ LINEAR_TOLERANCE = 1e-10
 
 
 def solve_scene(
-    scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm, *, solver: DualSolver | None = None
+    scene: Scene,
+    partitions: Mapping[str, np.ndarray] | None,
+    comm: MPI.Comm,
+    *,
+    solver: DualSolver | None = None,
 ) -> State:
     """Find the equilibrium of a scene. Collective on ``comm``.
 
     Args:
         scene: Bodies, supports, loads and contact pairs, the same on every rank.
-        partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
+        partitions: Body name -> subdomain of every cell, numbered from 0 within the body; None lets
+            `Scene.partition` cut the bodies into subdomains of a good size.
         comm: Communicator over which the subdomains are spread.
-        solver: Dual solver with its tolerance; `default_solver` chooses if it is None.
+        solver: Dual solver with its tolerance; `Scene.plan` tells which one is chosen if it is None.
 
     Raises:
         InvalidInputError: If scene or partition cannot be used.
@@ -42,10 +55,19 @@ def solve_scene(
         >>> parts = {"block": box_partition(mesh, (2, 1, 1))}  # doctest: +SKIP
         >>> state = solve_scene(scene, parts, MPI.COMM_WORLD)  # doctest: +SKIP
     """
+    decomposition, timer = decomposed(scene, partitions, comm)
+    return find_state(scene, decomposition, solver=solver, timer=timer)
+
+
+def decomposed(
+    scene: Scene, partitions: Mapping[str, np.ndarray] | None, comm: MPI.Comm
+) -> tuple[Decomposition, PhaseTimer]:
+    """Cut a scene, as given or into subdomains of a good size; return the time that took, too. Collective."""
     timer = PhaseTimer()
     with timer.phase("decompose"):
-        decomposition = decompose(scene, partitions, comm)
-    return find_state(scene, decomposition, solver=solver, timer=timer)
+        with together(comm):
+            cut = scene.partition(comm.size) if partitions is None else partitions
+        return decompose(scene, cut, comm), timer
 
 
 def find_state(
@@ -54,7 +76,9 @@ def find_state(
     *,
     solver: DualSolver | None = None,
     previous: State | None = None,
+    slip_from: State | None = None,
     start_geometry: bool = True,
+    sensitivity: bool = False,
     timer: PhaseTimer | None = None,
 ) -> State:
     """Find the equilibrium of a decomposed scene, possibly moved since. Collective.
@@ -65,24 +89,34 @@ def find_state(
         solver: Dual solver with its tolerance; `default_solver` chooses if it is None.
         previous: State of a neighbouring geometry or load to start from; what did not change is not
             assembled and factored again.
+        slip_from: State from which slip is measured, that of the last load step; by default the undeformed
+            one.
         start_geometry: Refuse bodies that overlap before they are loaded.
+        sensitivity: Whether derivatives of the state are wanted, which live on the dual system.
         timer: Collects the seconds.
     """
     timer = timer or PhaseTimer()
     with timer.phase("assemble"):
-        known = None if previous is None else previous.system
         torn = build_torn_system(
             scene,
             decomposition,
             start_geometry=start_geometry,
-            previous=None if known is None else known.torn,
+            previous=None if previous is None else previous.torn,
         )
-        if previous is None:
+        if slip_from is not None:
+            torn = torn.with_slip_from(torn.jump(slip_from.torn_displacement))
+        if previous is None or torn.scene.loads != previous.scene.loads:
             check_held(torn)
+    kind = choose_solver(scene, decomposition.tearing.n_subdomains, sensitivity=sensitivity)
+    if solver is None and kind is SolverKind.DIRECT:
+        return _found_directly(torn, previous, timer)
+    known = previous.system if previous is not None and isinstance(previous.system, DualSystem) else None
     system = DualSystem(torn, timer, previous=known)
     with timer.phase("solve"):
-        start = None if previous is None else carried_over(previous.system, previous.solution, system)
-        solution = solve_dual(system, solver or default_solver(torn), start)
+        start = None
+        if previous is not None and known is not None and isinstance(previous.solution, DualSolution):
+            start = carried_over(known, previous.solution, system)
+        solution = solve_dual(system, solver or default_solver(kind), start)
     with timer.phase("state"):
         displacement = system.displacement(solution.multiplier, solution.alpha)
         contact = contact_result(system, solution)
@@ -91,9 +125,22 @@ def find_state(
     return State(system, solution, displacement, contact, energies, dict(timer.seconds))
 
 
-def default_solver(torn: TornSystem) -> DualSolver:
-    """Return projected conjugate gradients for a scene without contact, Newton on faces for one with."""
-    return FaceNewton() if torn.points.count else ProjectedCG(tolerance=LINEAR_TOLERANCE)
+def _found_directly(torn: TornSystem, previous: State | None, timer: PhaseTimer) -> State:
+    """Find the state of one body without multipliers."""
+    known = previous.system if previous is not None and isinstance(previous.system, DirectSystem) else None
+    system = DirectSystem(torn, timer, previous=known)
+    with timer.phase("solve"):
+        solution = system.solve()
+    energies = compute_energies(system, solution.displacement, solution.multiplier, 0.0)
+    contact = no_contact(torn.points)
+    return State(system, solution, solution.displacement, contact, energies, dict(timer.seconds))
+
+
+def default_solver(kind: SolverKind) -> DualSolver:
+    """Return the dual solver of a kind, with its tolerance."""
+    if kind is SolverKind.FACE_NEWTON:
+        return FaceNewton()
+    return ProjectedCG(tolerance=LINEAR_TOLERANCE)
 
 
 def solve_dual(system: DualSystem, solver: DualSolver, start: np.ndarray | None = None) -> DualSolution:
@@ -134,4 +181,7 @@ def contact_result(system: DualSystem, solution: DualSolution) -> ContactResult:
         full[frictional] = values
         return full
 
-    return ContactResult(torn.points, normal, spread(tau), spread(bound), gap, spread(-minus_slip), status)
+    origin = torn.numbering.gather(torn.right, torn.tangential_rows.ravel()).reshape(-1, torn.dim - 1)
+    return ContactResult(
+        torn.points, normal, spread(tau), spread(bound), gap, spread(-minus_slip), spread(origin), status
+    )

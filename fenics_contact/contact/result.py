@@ -29,7 +29,9 @@ class ContactResult:
             acts on the master; the slave feels the opposite.
         slip_bound: Largest friction force, shape (n,), [force].
         gap: Distance after deformation, shape (n,), [length].
-        slip: Relative tangential displacement in the points' tangents, shape (n, dim - 1), [length].
+        slip: Relative tangential displacement in the points' tangents since the last load step, shape
+            (n, dim - 1), [length].
+        slip_before: The same of all load steps before, shape (n, dim - 1), [length].
         status: `Status` of each point, shape (n,). A closed point without friction slips.
     """
 
@@ -39,6 +41,7 @@ class ContactResult:
     slip_bound: np.ndarray
     gap: np.ndarray
     slip: np.ndarray
+    slip_before: np.ndarray
     status: np.ndarray
 
     @property
@@ -53,6 +56,11 @@ class ContactResult:
         sliding = np.einsum("na,nad->nd", self.friction_force, points.tangents)
         return self.normal_force[:, None] * points.normal - sliding
 
+    @property
+    def total_slip(self) -> np.ndarray:
+        """Relative tangential displacement since the undeformed state, shape (n, dim - 1), [length]."""
+        return self.slip_before + self.slip
+
     def count(self, status: Status) -> int:
         """Return how many points have a status."""
         return int(np.count_nonzero(self.status == status))
@@ -60,3 +68,11 @@ class ContactResult:
     def on_pair(self, pair: int) -> np.ndarray:
         """Return the numbers of the points of one contact pair."""
         return np.flatnonzero(self.points.pair == pair)
+
+
+def no_contact(points: ContactPoints) -> ContactResult:
+    """Return the result of a scene without contact points."""
+    nothing, vectors = np.zeros(0), np.zeros((0, points.normal.shape[1] - 1))
+    return ContactResult(
+        points, nothing, vectors, nothing, nothing, vectors, vectors, np.zeros(0, dtype=np.int64)
+    )

@@ -18,7 +18,8 @@ from fenics_contact.contact.fields import (
     von_mises,
 )
 from fenics_contact.contact.result import ContactResult
-from fenics_contact.feti import DualSystem
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem, TornSystem
 from fenics_contact.feti.temperature import temperature_of
 from fenics_contact.qp import DualSolution
 from fenics_contact.scene import Scene
@@ -31,30 +32,49 @@ class State:
     Fields on the bodies' own meshes are built when they are first asked for, by all ranks together.
 
     Attributes:
-        system: The dual system that was solved.
-        solution: Multiplier, residuals and history of the dual solver.
+        system: The system that was solved: a dual one, or that of a body that needs none.
+        solution: Multiplier, residuals and history of the solver.
         torn_displacement: This rank's torn displacement, shape (torn_size,), [length].
         contact: What happens on the contact surfaces, replicated.
         energies: Energies of all bodies.
         seconds: Wall time of this rank by phase, of all work up to this state that shares its timer.
     """
 
-    system: DualSystem
-    solution: DualSolution
+    system: DualSystem | DirectSystem
+    solution: DualSolution | DirectSolution
     torn_displacement: np.ndarray
     contact: ContactResult
     energies: Energies
     seconds: Mapping[str, float]
 
     @property
+    def torn(self) -> TornSystem:
+        """The torn system: subdomains, rows, contact points."""
+        return self.system.torn
+
+    @property
+    def dual(self) -> DualSystem:
+        """The dual system.
+
+        Raises:
+            InvalidInputError: If the state was found without one.
+        """
+        if isinstance(self.system, DirectSystem):
+            raise InvalidInputError(
+                "this needs multipliers, but the state of one body that supports hold was found directly: "
+                "solve with sensitivity=True"
+            )
+        return self.system
+
+    @property
     def scene(self) -> Scene:
         """The scene in the geometry of this state."""
-        return self.system.torn.scene
+        return self.torn.scene
 
     @cached_property
     def displacement(self) -> dict[str, Any]:
         """Displacement of each body as a Function on its own mesh, [length]. Collective on first use."""
-        decomposition = self.system.torn.decomposition
+        decomposition = self.torn.decomposition
         fields = {}
         for name, body in self.scene.bodies.items():
             values = nodal_displacement(decomposition, name, body, self.torn_displacement)
@@ -71,7 +91,7 @@ class State:
 
     def gather_displacement(self, body: str) -> np.ndarray:
         """Return the displacement of a body's nodes on every rank, (n_nodes, dim), [length]. Collective."""
-        decomposition = self.system.torn.decomposition
+        decomposition = self.torn.decomposition
         mine = nodal_displacement(decomposition, body, self.scene.bodies[body], self.torn_displacement)
         known = ~np.isnan(mine[:, 0])
         total = decomposition.comm.allreduce(np.where(known[:, None], mine, 0.0))
@@ -85,7 +105,7 @@ class State:
     @property
     def counts(self) -> dict[str, int]:
         """Sizes and work: torn unknowns, multipliers by kind, products, steps."""
-        torn = self.system.torn
+        torn = self.torn
         return {
             "torn_unknowns": torn.decomposition.torn_unknowns,
             "subdomains": torn.decomposition.tearing.n_subdomains,

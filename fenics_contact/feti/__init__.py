@@ -2,6 +2,7 @@
 
 from fenics_contact.feti.contact_points import ContactPoints
 from fenics_contact.feti.decomposition import Decomposition, decompose
+from fenics_contact.feti.direct import DirectSolution, DirectSystem
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.inverse import LocalKind
 from fenics_contact.feti.torn import TornSystem, build_torn_system
@@ -9,6 +10,8 @@ from fenics_contact.feti.torn import TornSystem, build_torn_system
 __all__ = [
     "ContactPoints",
     "Decomposition",
+    "DirectSolution",
+    "DirectSystem",
     "DualSystem",
     "LocalKind",
     "TornSystem",

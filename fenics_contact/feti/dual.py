@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
@@ -30,6 +32,7 @@ class DualSystem:
     """
 
     inverse: TornInverse
+    problem: DualProblem
 
     def __init__(
         self,
@@ -57,8 +60,31 @@ class DualSystem:
             condensations = torn.decomposition.condensations
             with together(comm):
                 self.inverse = TornInverse(torn.subdomains, torn.B, condensations, kind=kind, previous=known)
-            self._B_interface = torn.B[:, self.inverse.interface].tocsr()
-            self._Bt_interface = self._B_interface.T.tocsr()
+        if previous is not None and self._is_that_of(previous):
+            self._take_over(previous, timer)
+        else:
+            self._set_up(timer)
+        d = self.jump(self.inverse(torn.load)) - torn.right
+        self.problem = replace(self.problem, rhs=d)
+
+    def _is_that_of(self, previous: DualSystem) -> bool:
+        """Tell whether F and G are those of an earlier system. Collective."""
+        differs = self.torn.B is not previous.torn.B or self.inverse.factored > 0
+        return not self.torn.numbering.comm.allreduce(int(differs))
+
+    def _take_over(self, previous: DualSystem, timer: PhaseTimer) -> None:
+        """Use the operators of an earlier system with the present load. Collective."""
+        self._B_interface, self._Bt_interface = previous._B_interface, previous._Bt_interface
+        self.kernel = previous.kernel
+        with timer.phase("coarse space"):
+            coarse = previous.problem.coarse.with_load(self._resultants(self.torn.numbering.comm))
+        self.problem = replace(previous.problem, operator=self.apply, coarse=coarse)
+
+    def _set_up(self, timer: PhaseTimer) -> None:
+        """Build coarse space and preconditioner. Collective."""
+        torn, comm = self.torn, self.torn.numbering.comm
+        self._B_interface = torn.B[:, self.inverse.interface].tocsr()
+        self._Bt_interface = self._B_interface.T.tocsr()
         with timer.phase("coarse space"):
             self.kernel = self._kernel(comm)
             coarse = CoarseSpace(comm, self._coarse_columns(), self._resultants(comm))
@@ -67,8 +93,10 @@ class DualSystem:
                 self.inverse, self._B_interface, self._compliance(), torn.numbering, torn.n_gluing
             )
             diagonal = self._diagonal()
-        d = self.jump(self.inverse(torn.load)) - torn.right
-        self.problem = DualProblem(comm, self.apply, d, coarse, self._layout(), diagonal, preconditioner)
+        nothing = np.zeros(len(torn.numbering.owned))
+        self.problem = DualProblem(
+            comm, self.apply, nothing, coarse, self._layout(), diagonal, preconditioner
+        )
 
     def apply(self, multiplier: np.ndarray) -> np.ndarray:
         """Return F λ = B K⁺ Bᵀ λ for an owned vector. Collective."""
@@ -83,7 +111,7 @@ class DualSystem:
 
     def jump(self, displacement: np.ndarray) -> np.ndarray:
         """Return B u, owned, [length]. Collective."""
-        return self.torn.numbering.to_owned(self._B @ displacement)
+        return self.torn.jump(displacement)
 
     def displacement(self, multiplier: np.ndarray, alpha: np.ndarray) -> np.ndarray:
         """Return u = K⁺(f − Bᵀλ) + R α on this rank's torn dofs, [length]. Collective."""

@@ -8,6 +8,28 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 
+#: Local coordinates of the corners of quadrilaterals.
+_S, _T = np.array([-1.0, 1.0, 1.0, -1.0]), np.array([-1.0, -1.0, 1.0, 1.0])
+
+
+def shape_values(local: np.ndarray, corners: int) -> np.ndarray:
+    """Evaluate the shape functions alone, at points of any leading shape; see `shape_functions`.
+
+    Args:
+        local: Local coordinates, shape (..., dim − 1).
+        corners: 4, 3 or 2.
+
+    Returns:
+        Values, shape (..., corners).
+    """
+    if corners == 2:
+        return np.asarray(0.5 * (1 + np.array([-1.0, 1.0]) * local), dtype=np.float64)
+    s, t = local[..., 0], local[..., 1]
+    if corners == 3:
+        return np.stack([1 - s - t, s, t], axis=-1)
+    u, v = 1 + _S * s[..., None], 1 + _T * t[..., None]
+    return np.asarray(0.25 * u * v, dtype=np.float64)
+
 
 def shape_functions(local: np.ndarray, corners: int) -> tuple[np.ndarray, np.ndarray]:
     """Evaluate the shape functions of facets with 4 (bilinear), 3 or 2 (linear) corners.
@@ -20,16 +42,14 @@ def shape_functions(local: np.ndarray, corners: int) -> tuple[np.ndarray, np.nda
     Returns:
         Values, shape (n, corners), and derivatives, shape (n, corners, dim − 1).
     """
+    values = shape_values(local, corners)
     if corners == 2:
-        values = 0.5 * (1 + np.array([-1.0, 1.0]) * local)
         return values, np.broadcast_to(np.array([[-0.5], [0.5]]), (len(local), 2, 1))
-    s, t = local[:, 0], local[:, 1]
     if corners == 3:
-        values = np.stack([1 - s - t, s, t], axis=1)
-        return values, np.broadcast_to(np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]), (len(s), 3, 2))
-    a, b = np.array([-1.0, 1.0, 1.0, -1.0]), np.array([-1.0, -1.0, 1.0, 1.0])
-    u, v = 1 + a * s[:, None], 1 + b * t[:, None]
-    return 0.25 * u * v, 0.25 * np.stack([a * v, u * b], axis=2)
+        slopes = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
+        return values, np.broadcast_to(slopes, (len(local), 3, 2))
+    u, v = 1 + _S * local[:, :1], 1 + _T * local[:, 1:]
+    return values, 0.25 * np.stack([_S * v, u * _T], axis=2)
 
 
 def shape_second_mixed(corners: int) -> np.ndarray:

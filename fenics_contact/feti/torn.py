@@ -56,6 +56,19 @@ class TornSystem:
     B: sp.csr_matrix
     right: np.ndarray
 
+    def jump(self, displacement: np.ndarray) -> np.ndarray:
+        """Return B u for a torn displacement of this rank, owned, [length]. Collective."""
+        return self.numbering.to_owned(self.B @ displacement)
+
+    def with_slip_from(self, jump: np.ndarray) -> TornSystem:
+        """Return the system in which slip is measured from an earlier displacement.
+
+        Args:
+            jump: B u of the earlier displacement, owned, shape (n_owned,), [length].
+        """
+        tangential = self.numbering.owned >= self.n_equality + self.points.count
+        return replace(self, right=np.where(tangential, jump, self.right))
+
     @property
     def dim(self) -> int:
         """Displacement components of a node."""
@@ -114,16 +127,41 @@ def build_torn_system(
     with together(comm):
         prescribed = prescribed_displacements(scene, decomposition.tearing)
         right = decomposition.gluing.right_side(prescribed)
+    if previous is not None and _meets_alike(scene, previous.scene):
+        # Only loads and prescribed values changed: B stays the same object, which tells that F stays too.
+        system = replace(previous, scene=scene, subdomains=subdomains)
+    else:
+        system = _joined(scene, decomposition, subdomains, start_geometry, previous)
+    right = np.concatenate([right, np.zeros(system.n_equality - len(right)), system.points.gap])
+    right = np.concatenate([right, np.zeros(system.tangential_rows.size)])
+    return replace(system, right=right[system.numbering.owned])
+
+
+def _meets_alike(scene: Scene, other: Scene) -> bool:
+    """Tell whether bodies have the same meshes, and the same pairs of surfaces meet, in two scenes."""
+    meshes = [[body.mesh for body in each.bodies.values()] for each in (scene, other)]
+    same = all(mesh is mate for mesh, mate in zip(*meshes, strict=True))
+    return same and list(scene.contacts) == list(other.contacts) and list(scene.ties) == list(other.ties)
+
+
+def _joined(
+    scene: Scene,
+    decomposition: Decomposition,
+    subdomains: tuple[Subdomain, ...],
+    start_geometry: bool,
+    previous: TornSystem | None,
+) -> TornSystem:
+    """Search for contact and build B; the right side is left empty. Collective."""
     points, ties = _meeting_points(scene, decomposition, start_geometry)
     has_friction, coefficient, tresca = friction_data(scene.contacts, points)
     frictional = np.flatnonzero(has_friction)
-    gluing = replace(decomposition.gluing.rows, right=right)
-    tied = tied_rows(ties, scene.ties, decomposition.tearing, decomposition.fixed)
-    rows = stack([gluing, tied, contact_rows(points, decomposition.tearing, frictional)])
+    gluing, tearing = decomposition.gluing.rows, decomposition.tearing
+    tied = tied_rows(ties, scene.ties, tearing, decomposition.fixed)
+    rows = stack([gluing, tied, contact_rows(points, tearing, frictional)])
     numbering, B = _own_part(rows, decomposition, None if previous is None else previous.numbering)
     return TornSystem(
         scene, decomposition, subdomains, points, ties, gluing.count + tied.count, frictional,
-        coefficient[frictional], tresca[frictional], numbering, B, rows.right[numbering.owned],
+        coefficient[frictional], tresca[frictional], numbering, B, np.zeros(0),
     )  # fmt: skip
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from fenics_contact.geometry.block import block, box_lattice
 from fenics_contact.geometry.cell_types import CELL_TYPES, CellType, cell_type_of
 from fenics_contact.geometry.coincidence import merge_duplicate_nodes
+from fenics_contact.geometry.default_partition import default_partition, target_parts
 from fenics_contact.geometry.faces import boundary_faces, orient, vector_areas
+from fenics_contact.geometry.graph_partition import graph_partition
 from fenics_contact.geometry.half_disc import half_disc
 from fenics_contact.geometry.hemisphere import half_cylinder, hemisphere
 from fenics_contact.geometry.link import DesignSurface, Link, chain_link
@@ -14,6 +16,7 @@ from fenics_contact.geometry.partition import (
     bisection_partition,
     box_partition,
     check_face_connected,
+    check_one_piece,
     combine,
     merge_pieces,
     torn_node_counts,
@@ -48,8 +51,11 @@ __all__ = [
     "cell_type_of",
     "chain_link",
     "check_face_connected",
+    "check_one_piece",
     "check_penetration",
     "combine",
+    "default_partition",
+    "graph_partition",
     "half_cylinder",
     "half_disc",
     "hemisphere",
@@ -61,6 +67,7 @@ __all__ = [
     "rectangle_lattice",
     "split_hexahedra",
     "split_quadrilaterals",
+    "target_parts",
     "torn_node_counts",
     "two_links",
     "vector_areas",

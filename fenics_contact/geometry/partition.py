@@ -37,7 +37,7 @@ def box_partition(mesh: BodyMesh, boxes: tuple[int, ...]) -> np.ndarray:
     """
     if mesh.grid is None:
         raise InvalidInputError(
-            "box_partition needs a structured mesh, this one has grid None: use `bisection_partition(mesh, "
+            "box_partition needs a structured mesh, this one has grid None: use `graph_partition(mesh, "
             "parts)`"
         )
     if len(boxes) != mesh.dim:
@@ -104,7 +104,7 @@ def _face_pieces(mesh: BodyMesh, partition: np.ndarray, pairs: np.ndarray) -> tu
     return piece, owner
 
 
-def merge_pieces(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
+def merge_pieces(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> np.ndarray:
     """Make every subdomain connected through faces.
 
     The largest piece of each subdomain stays; every other piece goes to the subdomain whose largest piece it
@@ -113,6 +113,7 @@ def merge_pieces(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
     Args:
         mesh: A mesh that is itself connected through faces.
         partition: (n_cells,) subdomain numbers.
+        body: Name of the body, for messages.
 
     Returns:
         (n_cells,) subdomain numbers, the same subdomains.
@@ -133,8 +134,8 @@ def merge_pieces(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
         links = links[~kept[links[:, 0]] & kept[links[:, 1]]]
         if links.shape[0] == 0:
             raise InvalidInputError(
-                f"a mesh must be connected through faces to be cut, {np.count_nonzero(~kept)} pieces of this "
-                "one have no neighbour: give each separate part a mesh of its own"
+                f"{_named(body)} must be connected through faces to be cut, {np.count_nonzero(~kept)} pieces "
+                f"of it have no neighbour: {_APART}"
             )
         shared, counts = np.unique(links, axis=0, return_counts=True)
         order = np.argsort(counts, kind="stable")  # the last assignment wins: the one with most faces
@@ -143,12 +144,44 @@ def merge_pieces(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
         partition = target[piece]
 
 
-def check_face_connected(mesh: BodyMesh, partition: np.ndarray) -> None:
+_APART = (
+    "join nodes that coincide with `merge_duplicate_nodes`, or give each separate part a mesh and a body of "
+    "its own"
+)
+
+
+def _named(body: str) -> str:
+    return f"body '{body}'" if body else "a mesh"
+
+
+def check_one_piece(mesh: BodyMesh, body: str = "") -> None:
+    """Refuse a mesh that does not hang together through faces.
+
+    Args:
+        mesh: The mesh.
+        body: Name of the body, for the message.
+
+    Raises:
+        InvalidInputError: Saying in how many parts it is.
+    """
+    piece, owner = _face_pieces(
+        mesh, np.zeros(mesh.n_cells, dtype=np.int64), neighbours(mesh.cells, mesh.dim)
+    )
+    if owner.size > 1:
+        sizes = np.sort(np.bincount(piece))[::-1]
+        raise InvalidInputError(
+            f"{_named(body)} must be connected through faces to be cut, it consists of {owner.size} parts, "
+            f"the largest of {sizes[0]} and {sizes[1]} cells: {_APART}"
+        )
+
+
+def check_face_connected(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> None:
     """Refuse a partition with a subdomain that is empty or does not hang together through faces.
 
     Args:
         mesh: The mesh.
         partition: (n_cells,) subdomain numbers.
+        body: Name of the body, for the message.
 
     Raises:
         InvalidInputError: Naming the subdomain.
@@ -159,7 +192,8 @@ def check_face_connected(mesh: BodyMesh, partition: np.ndarray) -> None:
     torn = np.flatnonzero(pieces > 1)
     if torn.size:
         raise InvalidInputError(
-            f"every subdomain must be connected through cell faces, {torn.size} of {pieces.size} are not, "
+            f"every subdomain{f' of {_named(body)}' if body else ''} must be connected through cell faces, "
+            f"{torn.size} of {pieces.size} are not, "
             f"first subdomain {torn[0]} in {pieces[torn[0]]} pieces: cut differently, or "
             "give each piece to a neighbour with `merge_pieces`"
         )

@@ -20,7 +20,7 @@ def contact_fields(state: State, body: str) -> dict[str, np.ndarray]:
         slave and ``contact_slip``, (n_nodes, 3), [force] and [length]. A node that belongs to several pairs
         has their sum, and the status of the last.
     """
-    contact, tearing = state.contact, state.system.torn.decomposition.tearing
+    contact, tearing = state.contact, state.torn.decomposition.tearing
     start = int(tearing.node_offset[tearing.body_names.index(body)])
     count = state.scene.bodies[body].mesh.n_nodes
     nodes = contact.points.slave - start

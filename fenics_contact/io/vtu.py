@@ -40,7 +40,7 @@ def write_vtu(state: State, folder: str | Path, name: str = "state") -> Path:
     index = Path(folder) / f"{name}.vtm"
     meshes = {body: _gathered(state, body) for body in state.scene.bodies}
     files = list(file_of_each(meshes, index.parent, name, ".vtu").values())
-    comm = state.system.torn.decomposition.comm
+    comm = state.torn.decomposition.comm
     with together(comm):
         if comm.rank == 0:
             # The index last: whoever finds it finds what it names.
@@ -53,7 +53,7 @@ def write_vtu(state: State, folder: str | Path, name: str = "state") -> Path:
 
 def _gathered(state: State, body: str) -> meshio.Mesh:
     mesh = state.scene.bodies[body].mesh
-    decomposition = state.system.torn.decomposition
+    decomposition = state.torn.decomposition
     tearing = decomposition.tearing
     first = int(tearing.subdomain_offset[tearing.body_names.index(body)])
     subdomain = np.asarray(decomposition.partitions[body], dtype=np.int32) + np.int32(first)

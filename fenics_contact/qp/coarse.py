@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property
 from typing import TypeAlias
 
@@ -66,6 +67,12 @@ class CoarseSpace:
         """Generalised inverse of G G^T, factored when first asked for. Collective then."""
         gram = gram_matrix(self.comm, self.matrix) if self._gram_matrix is None else self._gram_matrix
         return GramInverse(gram) if isinstance(gram, np.ndarray) else SparseGramInverse(self.comm, gram)
+
+    def with_load(self, load: Vector) -> CoarseSpace:
+        """Return the coarse space of another load e, shape (m,), replicated; what is factored is shared."""
+        other = copy(self)
+        other.load = np.asarray(load, dtype=np.float64)
+        return other
 
     @property
     def m(self) -> int:

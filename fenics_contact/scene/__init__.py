@@ -1,6 +1,7 @@
 """Scenes: bodies, materials, supports, loads and contact pairs."""
 
 from fenics_contact.scene.body import Body
+from fenics_contact.scene.effects import Effect, EffectName
 from fenics_contact.scene.kernels import rigid_body_modes
 from fenics_contact.scene.loads import (
     BodyForce,
@@ -35,25 +36,32 @@ from fenics_contact.scene.obstacles import (
     RigidPlane,
     RigidSphere,
 )
-from fenics_contact.scene.pairs import ContactPair, Coulomb, Surface, Tie, Tresca
-from fenics_contact.scene.scene import Effect, Scene
+from fenics_contact.scene.pairs import ContactPair, Coulomb, Friction, Surface, Tie, Tresca
+from fenics_contact.scene.plan import ConeKind, Plan, SolverKind, choose_solver
+from fenics_contact.scene.scene import Scene
+from fenics_contact.scene.steps import LoadStep
 from fenics_contact.scene.supports import Support
 from fenics_contact.scene.values import Ufl
 
 __all__ = [
     "Body",
     "BodyForce",
+    "ConeKind",
     "ContactPair",
     "Coulomb",
     "DistanceObstacle",
     "Effect",
+    "EffectName",
     "Elasticity",
     "EnergyModel",
+    "Friction",
     "IsotropicElasticity",
     "Load",
+    "LoadStep",
     "Material",
     "OrthotropicElasticity",
     "OrthotropicPlaneStress",
+    "Plan",
     "PlaneStrain",
     "PlaneStress",
     "Pressure",
@@ -62,6 +70,7 @@ __all__ = [
     "RigidPlane",
     "RigidSphere",
     "Scene",
+    "SolverKind",
     "Support",
     "Surface",
     "SurfaceLoad",
@@ -75,6 +84,7 @@ __all__ = [
     "Ufl",
     "VolumeLoad",
     "can_expand",
+    "choose_solver",
     "gravity",
     "material_axes",
     "rigid_body_modes",

@@ -59,6 +59,9 @@ class Tresca:
             )
 
 
+Friction: TypeAlias = Coulomb | Tresca | None
+
+
 @dataclass(frozen=True)
 class ContactPair:
     """Two surfaces that may touch. The slave is kept out of the master.
@@ -75,7 +78,7 @@ class ContactPair:
 
     slave: Surface
     master: Surface | RigidObstacle
-    friction: Coulomb | Tresca | None = None
+    friction: Friction = None
     discretisation: Discretisation = "node"
 
     def __post_init__(self) -> None:

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fenics_contact.geometry import copy_counts
+from fenics_contact.geometry import BodyMesh
 from fenics_contact.linalg.cost_model import expected_bytes
 from fenics_contact.scene.effects import Effect, EffectName, effects_of
 from fenics_contact.scene.held import held_by_supports
-from fenics_contact.scene.pairs import ContactPair, Surface
+from fenics_contact.scene.pairs import Surface
 
 if TYPE_CHECKING:
     from fenics_contact.scene.scene import Scene
@@ -97,17 +97,14 @@ def make_plan(scene: Scene, partitions: Mapping[str, np.ndarray], *, sensitivity
     """
     effects = effects_of(scene)
     names = {effect.name for effect in effects}
-    sizes = {name: copy_counts(body.mesh, partitions[name]) for name, body in scene.bodies.items()}
-    subdomains = sum(len(size.nodes) for size in sizes.values())
-    unknowns = scene.dim * sum(int(size.nodes.sum()) for size in sizes.values())
-    solver = _solver(scene, names, subdomains, sensitivity)
+    counts = [_node_counts(body.mesh, partitions[name]) for name, body in scene.bodies.items()]
+    nodes, shared = (np.concatenate(column) for column in zip(*counts, strict=True))
+    subdomains, unknowns = len(nodes), scene.dim * int(nodes.sum())
+    solver = choose_solver(scene, subdomains, sensitivity=sensitivity)
     direct = solver is SolverKind.DIRECT
     motions = 0 if direct else subdomains * scene.dim * (scene.dim + 1) // 2
-    pieces = [
-        expected_bytes(scene.dim * int(nodes), scene.dim * int(shared))
-        for size in sizes.values()
-        for nodes, shared in zip(size.nodes, size.shared, strict=True)
-    ]
+    sizes = zip(scene.dim * nodes, scene.dim * shared, strict=True)
+    factors = sum(expected_bytes(int(size), int(interface)) for size, interface in sizes)
     return Plan(
         effects=effects,
         subdomains=subdomains,
@@ -118,14 +115,21 @@ def make_plan(scene: Scene, partitions: Mapping[str, np.ndarray], *, sensitivity
         fixed_point=EffectName.COULOMB in names,
         coarse_motions=motions,
         adjoint=sensitivity,
-        memory=float(sum(pieces)) + BYTES_PER_UNKNOWN * unknowns + 8.0 * motions**2,
+        memory=factors + BYTES_PER_UNKNOWN * unknowns + 8.0 * motions**2,
     )
 
 
-def _solver(scene: Scene, names: set[EffectName], subdomains: int, sensitivity: bool) -> SolverKind:
-    if EffectName.CONTACT in names:
+def choose_solver(scene: Scene, subdomains: int, *, sensitivity: bool = False) -> SolverKind:
+    """Return how the equilibrium of a scene is found.
+
+    Args:
+        scene: The scene.
+        subdomains: Subdomains of all bodies.
+        sensitivity: Whether derivatives are wanted, which live on the dual system.
+    """
+    if EffectName.CONTACT in {effect.name for effect in effects_of(scene)}:
         return SolverKind.FACE_NEWTON
-    # The adjoint lives on the dual system; a body that supports do not hold alone has a singular stiffness.
+    # A body that its supports do not hold alone has a singular stiffness.
     if subdomains == 1 and not sensitivity and held_by_supports(scene, scene.body_names[0]):
         return SolverKind.DIRECT
     return SolverKind.PROJECTED_CG
@@ -141,27 +145,27 @@ def _cone(names: set[EffectName]) -> ConeKind:
 
 def _multipliers(scene: Scene, unknowns: int) -> dict[str, int]:
     nodes = sum(body.mesh.n_nodes for body in scene.bodies.values())
-    fixed = sum(_prescribed(scene, name) for name in scene.body_names)
+    fixed = sum(int(np.count_nonzero(scene.fixed(name))) for name in scene.body_names)
     slaves = [_slave_nodes(scene, pair.slave) for pair in scene.contacts]
-    frictional = [count for pair, count in zip(scene.contacts, slaves, strict=True) if _rubs(pair)]
-    width = [1 if tie.sliding else scene.dim for tie in scene.ties]
-    tied = [w * _slave_nodes(scene, tie.slave) for tie, w in zip(scene.ties, width, strict=True)]
+    rubbing = [count for pair, count in zip(scene.contacts, slaves, strict=True) if pair.has_friction]
+    tied = [(1 if tie.sliding else scene.dim) * _slave_nodes(scene, tie.slave) for tie in scene.ties]
     return {
         "gluing": unknowns - scene.dim * nodes,
         "prescribed": fixed,
         "tied": sum(tied),
         "normal": sum(slaves),
-        "tangential": (scene.dim - 1) * sum(frictional),
+        "tangential": (scene.dim - 1) * sum(rubbing),
     }
-
-
-def _prescribed(scene: Scene, body: str) -> int:
-    return int(np.count_nonzero(scene.fixed(body)))
 
 
 def _slave_nodes(scene: Scene, surface: Surface) -> int:
     return len(np.unique(scene.facets(surface)))
 
 
-def _rubs(pair: ContactPair) -> bool:
-    return pair.has_friction
+def _node_counts(mesh: BodyMesh, partition: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes of each subdomain, and how many of them it shares, shape (n_subdomains,) each."""
+    keys = np.unique(partition[:, None] * np.int64(mesh.n_nodes) + mesh.cells)
+    subdomain, node = keys // mesh.n_nodes, keys % mesh.n_nodes
+    torn = np.bincount(node)[node] > 1
+    count = int(partition.max()) + 1
+    return np.bincount(subdomain, minlength=count), np.bincount(subdomain[torn], minlength=count)

@@ -8,19 +8,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry import default_partition
 from fenics_contact.scene.body import Body
-from fenics_contact.scene.loads import BodyForce, Load, SurfaceLoad, ThermalStrain
+from fenics_contact.scene.effects import Effect, effects_of
+from fenics_contact.scene.loads import Load, SurfaceLoad, ThermalStrain
 from fenics_contact.scene.materials import can_expand
-from fenics_contact.scene.pairs import ContactPair, Coulomb, Surface, Tie, Tresca
+from fenics_contact.scene.pairs import ContactPair, Surface, Tie
+from fenics_contact.scene.plan import Plan, make_plan
 from fenics_contact.scene.supports import Support
-
-
-@dataclass(frozen=True)
-class Effect:
-    """One physical effect that a scene calls for, and the reason."""
-
-    name: str
-    reason: str
 
 
 @dataclass(frozen=True)
@@ -97,6 +92,16 @@ class Scene:
         """Dimension of space, 2 or 3."""
         return int(next(iter(self.bodies.values())).mesh.points.shape[1])
 
+    def fixed(self, body: str) -> np.ndarray:
+        """Return whether supports prescribe a component of a body's node, shape (n_nodes, dim)."""
+        mesh = self.bodies[body].mesh
+        marks = np.zeros(mesh.points.shape, dtype=bool)
+        for support in self.supports:
+            if support.body == body:
+                nodes = np.unique(mesh.surfaces[support.surface])
+                marks[nodes] |= ~np.isnan(support.values(mesh.points[nodes]))
+        return marks
+
     @property
     def body_names(self) -> tuple[str, ...]:
         """Names of the bodies in the order in which everything is numbered."""
@@ -121,21 +126,38 @@ class Scene:
             bodies[name] = replace(bodies[name], mesh=bodies[name].mesh.moved(coordinates))
         return replace(self, bodies=bodies)
 
+    def partition(self, ranks: int = 1) -> dict[str, np.ndarray]:
+        """Cut every body into subdomains of a good size.
+
+        Args:
+            ranks: Number of ranks that need a subdomain each.
+
+        Returns:
+            Body name -> subdomain of every cell, numbered from 0 within the body.
+        """
+        each = -(-ranks // len(self.bodies))
+        return {name: default_partition(body.mesh, each, body=name) for name, body in self.bodies.items()}
+
     def effects(self) -> tuple[Effect, ...]:
         """List what the scene calls for; whatever is not listed is not built."""
-        found = [Effect("elasticity", f"{len(self.bodies)} elastic bodies")]
-        if self.supports:
-            found.append(Effect("prescribed displacement", f"{len(self.supports)} supports"))
-        if any(isinstance(load, BodyForce) for load in self.loads):
-            found.append(Effect("body force", "a load acts on a volume"))
-        if any(isinstance(load, SurfaceLoad) for load in self.loads):
-            found.append(Effect("surface load", "a load acts on a surface"))
-        if any(isinstance(load, ThermalStrain) for load in self.loads):
-            found.append(Effect("thermal strain", "a temperature changes"))
-        if self.contacts:
-            found.append(Effect("contact", f"{len(self.contacts)} pairs may touch"))
-        if any(pair.has_friction and isinstance(pair.friction, Tresca) for pair in self.contacts):
-            found.append(Effect("Tresca friction", "a pair has a fixed slip bound"))
-        if any(pair.has_friction and isinstance(pair.friction, Coulomb) for pair in self.contacts):
-            found.append(Effect("Coulomb friction", "a pair has a friction coefficient above zero"))
-        return tuple(found)
+        return effects_of(self)
+
+    def plan(
+        self,
+        partitions: Mapping[str, np.ndarray] | None = None,
+        *,
+        ranks: int = 1,
+        sensitivity: bool = False,
+    ) -> Plan:
+        """Tell what will be built: unknowns, multipliers, solver, memory.
+
+        Args:
+            partitions: Body name -> subdomain of every cell; by default what `partition` returns.
+            ranks: Number of ranks, if the partition is left open.
+            sensitivity: Whether derivatives by the shape are wanted.
+
+        Example:
+            >>> print(scene.plan())  # doctest: +SKIP
+        """
+        cut = self.partition(ranks) if partitions is None else partitions
+        return make_plan(self, cut, sensitivity=sensitivity)

@@ -55,7 +55,7 @@ def solve_adjoint(
     Raises:
         ConvergenceError: If the face does not hold every body, or the tolerance was not reached.
     """
-    system, problem = state.system, state.system.problem
+    system, problem = state.dual, state.dual.problem
     face_system = FaceSystems(problem, system.apply).build(linearised.face)
     transposed = CoupledSystem.build(face_system, problem.coarse, linearised.moving, linearised.tested)
     if transposed is None:

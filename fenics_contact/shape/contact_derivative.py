@@ -55,7 +55,7 @@ def contact_by_shape(state: State, adjoint: Adjoint, by_bound: np.ndarray) -> np
         adjoint: Its adjoint.
         by_bound: Derivative by each frictional point's slip bound, replicated, shape (n_friction,).
     """
-    torn = state.system.torn
+    torn = state.torn
     tearing, points = torn.decomposition.tearing, torn.points
     result = np.zeros((tearing.n_nodes, torn.dim))
     if points.count == 0:
@@ -112,7 +112,7 @@ def bound_sensitivity(
     state: State, adjoint: Adjoint, partials: Partials, linearised: LinearisedFace
 ) -> np.ndarray:
     """Return dJ by each slip bound at fixed geometry, d·(∂J/∂τ − B_T w), replicated. Collective."""
-    system = state.system
+    system = state.dual
     force = partials.by_multiplier - system.jump(adjoint.displacement)
     mine = np.einsum("na,na->n", linearised.slip_direction, force[system.problem.layout.tangential])
     result = np.zeros(len(system.torn.frictional))
@@ -121,7 +121,7 @@ def bound_sensitivity(
 
 
 def _row_fields(state: State, adjoint: Adjoint) -> RowFields:
-    system = state.system
+    system = state.dual
     torn = system.torn
     points, width = torn.points, torn.dim - 1
     multipliers = (state.solution.multiplier, adjoint.multiplier)
@@ -142,7 +142,7 @@ def nodal_means(state: State, field: np.ndarray, nodes: np.ndarray) -> np.ndarra
 
     Copies weigh as in the contact rows.
     """
-    decomposition = state.system.torn.decomposition
+    decomposition = state.torn.decomposition
     tearing = decomposition.tearing
     copies = tearing.multiplicity[nodes]
     within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)

@@ -73,7 +73,7 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
         coupling: Leave out the growth of friction with the normal force if False; the derivative is then
             that of Tresca friction.
     """
-    system, solution = state.system, state.solution
+    system, solution = state.dual, state.solution
     layout, comm = system.problem.layout, system.problem.comm
     step = contact_step(layout, system.problem.diagonal)
     trial = solution.multiplier - step * solution.residual
@@ -107,7 +107,7 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
 
 def _points_on_edges(state: State) -> int:
     """Count the closed points over an edge of their master facet, where the normal field has a kink."""
-    points = state.system.torn.points
+    points = state.torn.points
     total = 0
     for index, pair in enumerate(state.scene.contacts):
         if isinstance(pair.master, Surface):

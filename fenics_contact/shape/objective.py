@@ -67,7 +67,7 @@ class TotalPotential:
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
         """∂J/∂u = K u − f, ∂J/∂X from UFL: half of a(u, u), all of L(u)."""
-        system, u = state.system, state.torn_displacement
+        system, u = state.dual, state.torn_displacement
         by_shape = work_by_shape(forms, system.torn, 0.5 * u, u)
         nothing = np.zeros(len(system.torn.numbering.owned))
         # In equilibrium K u − f = −Bᵀλ.
@@ -98,14 +98,14 @@ class VolumeIntegral:
         """Integrate. Collective."""
         bind = self._prepare(state, forms, "value")
         total = 0.0
-        for subdomain, functions in subdomain_fields(state.system.torn, [state.torn_displacement]):
+        for subdomain, functions in subdomain_fields(state.torn, [state.torn_displacement]):
             if subdomain.mesh.body == self.body:
                 total += _dolfinx.assemble_scalar(bind(subdomain, functions, []))
-        return float(state.system.problem.comm.allreduce(total))
+        return float(state.dual.problem.comm.allreduce(total))
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
         """Differentiate the integral by UFL."""
-        torn, u = state.system.torn, state.torn_displacement
+        torn, u = state.torn, state.torn_displacement
         check_differentiable(temperature_of(torn.scene.loads, self.body).loads)
         by_shape, by_displacement = (self._prepare(state, forms, by) for by in ("shape", "displacement"))
 
@@ -173,7 +173,7 @@ class ContactForces:
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
         """Place the user's derivatives on the contact rows."""
-        system, torn = state.system, state.system.torn
+        system, torn = state.dual, state.torn
         value, normal, tangential = self.function(state.contact)
         count = torn.points.count
         if normal.shape != (count,) or tangential.shape != (count, 2):

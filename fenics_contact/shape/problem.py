@@ -172,7 +172,7 @@ class ShapeProblem:
     def evaluate(self, alpha: np.ndarray) -> DesignPoint:
         """Solve the state and its adjoint and return value and subgradient. Collective."""
         state = self.state_of(alpha)
-        before = state.system.products
+        before = state.dual.products
         forms = self._shape_forms(state)
         with self._timer.phase("objective"):
             partials = self.objective.partials(state, forms)
@@ -184,7 +184,7 @@ class ShapeProblem:
             by_points = self._by_points(state, adjoint, partials.by_shape, by_bound)
             gradient = self._by_design(by_points)
         self.evaluations += 1
-        self.products += state.system.products
+        self.products += state.dual.products
         comm = self.decomposition.comm
         # Ranks must take the same decisions: rounding in sums over ranks may not tell them apart.
         value, gradient = comm.bcast((partials.value, gradient))
@@ -194,9 +194,9 @@ class ShapeProblem:
             gradient,
             state,
             linearised.weak,
-            state.system.products - before,
+            state.dual.products - before,
         )
-        logger.info("design %d: J = %.9g, %d products", self.evaluations, value, state.system.products)
+        logger.info("design %d: J = %.9g, %d products", self.evaluations, value, state.dual.products)
         self.last = point
         self.first = self.first or point
         self.best = point if self.best is None or value < self.best.value else self.best
@@ -218,7 +218,7 @@ class ShapeProblem:
         self, state: State, adjoint: Adjoint, by_shape: np.ndarray, by_bound: np.ndarray
     ) -> np.ndarray:
         """Sum the objective's own derivative, −wᵀ(δK u − δf) and the contact points' share over all ranks."""
-        torn = state.system.torn
+        torn = state.torn
         work = work_by_shape(self._shape_forms(state), torn, state.torn_displacement, adjoint.displacement)
         contact = contact_by_shape(state, adjoint, by_bound)
         return np.asarray(torn.decomposition.comm.allreduce(by_shape - work)) + contact
@@ -241,7 +241,7 @@ class ShapeProblem:
             for design, motion in zip(self.designs, self._motions, strict=True):
                 nodes = np.arange(self.scene.bodies[design.body].mesh.n_nodes)
                 moving[tearing.global_nodes(design.body, np.setdiff1d(nodes, motion.held))] = True
-            self._forms = ShapeForms(state.system.torn, moving)
+            self._forms = ShapeForms(state.torn, moving)
         return self._forms
 
     def _motion(self, design: SurfaceDesign) -> HarmonicExtension:

@@ -62,7 +62,7 @@ def contact_patch(state: State, pair: int, reach: float | None) -> ContactPatch:
     corners = mesh.points[facets]
     outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     nodes, local = np.unique(facets[outward @ view.towards > 0], return_inverse=True)
-    numbers = state.system.torn.decomposition.tearing.global_nodes(slave.body, nodes)
+    numbers = state.torn.decomposition.tearing.global_nodes(slave.body, nodes)
     chosen = chosen[np.isin(contact.points.slave[chosen], numbers)]
     points = np.searchsorted(numbers, contact.points.slave[chosen])
     pressure = np.zeros(len(nodes))

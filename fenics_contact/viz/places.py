@@ -16,6 +16,6 @@ def contact_places(state: State, points: Mapping[str, np.ndarray]) -> np.ndarray
         state: Gives the contact points and the numbering of nodes over all bodies.
         points: Body name -> coordinates of its nodes, (n_nodes, 3), deformed or not.
     """
-    names = state.system.torn.decomposition.tearing.body_names
+    names = state.torn.decomposition.tearing.body_names
     stacked = np.concatenate([points[name] for name in names])
     return np.asarray(stacked[state.contact.points.slave])

@@ -71,7 +71,7 @@ def plot_contact_pressure(
     given = None if clim is None else checked_range(clim)
     units = units or Units()
     draw_on_one_rank(
-        state.system.torn.decomposition.comm,
+        state.torn.decomposition.comm,
         lambda: _draw(contact_patch(state, pair, reach), target, given, title, units, width),
     )
     return target

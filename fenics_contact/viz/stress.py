@@ -92,7 +92,7 @@ def plot_stress(
     if sections and np.any(state.contact.normal_force > 0):
         places = contact_places(state, {name: body.deformed(1.0) for name, body in bodies.items()})
         spot = strongest_contact(state.contact, places)
-    draw_on_one_rank(state.system.torn.decomposition.comm, lambda: _draw(bodies, spot, target, look))
+    draw_on_one_rank(state.torn.decomposition.comm, lambda: _draw(bodies, spot, target, look))
     return target
 
 

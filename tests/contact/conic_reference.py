@@ -216,8 +216,13 @@ class ConicReference:
         """Return K u − f node by node, the forces that supports and contact must exert, (n_nodes, 3)."""
         return (self.K @ displacement.ravel() - self.f).reshape(-1, 3)
 
-    def solve(self, slip_bound: np.ndarray | None = None) -> ConicSolution:
-        """Minimise at given slip bounds, those of the scene's Tresca pairs by default."""
+    def solve(
+        self, slip_bound: np.ndarray | None = None, before: np.ndarray | None = None
+    ) -> ConicSolution:
+        """Minimise at given slip bounds, those of the scene's Tresca pairs by default.
+
+        Slip is measured from the displacement ``before``, shape (n_nodes, 3), or from rest.
+        """
         bound = self.rows.bound if slip_bound is None else slip_bound
         discs = np.flatnonzero(bound > 0)
         free = np.isnan(self.prescribed)
@@ -226,7 +231,8 @@ class ConicReference:
         n_discs = len(discs)
         gap = self.rows.gap - self.rows.N @ held
         slip_rows = (3 * discs[:, None] + np.arange(3)).ravel()
-        sliding, pulled = self.rows.T[slip_rows][:, free], self.rows.T[slip_rows] @ held
+        start = held if before is None else held - before.ravel()
+        sliding, pulled = self.rows.T[slip_rows][:, free], self.rows.T[slip_rows] @ start
         # One cone (s, slip in space) a disc: rows 4 i of the identity in s, rows 4 i + 1.. of T.
         lift = sp.kron(sp.identity(n_discs), np.array([[1.0], [0], [0], [0]]))
         spread = sp.kron(sp.identity(n_discs), np.vstack([np.zeros(3), np.eye(3)])) if n_discs else None

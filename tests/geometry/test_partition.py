@@ -70,7 +70,7 @@ def test_two_numbers_are_no_box(brick: BodyMesh) -> None:
 
 def test_boxes_of_an_unstructured_mesh_are_refused() -> None:
     with pytest.raises(
-        InvalidInputError, match="needs a structured mesh, this one has grid None: use `bisec"
+        InvalidInputError, match="needs a structured mesh, this one has grid None: use `graph"
     ):
         box_partition(hemisphere(1.0, 2), (1, 1, 1))
 
@@ -132,7 +132,7 @@ def test_a_connected_partition_is_left_as_it_is(brick: BodyMesh) -> None:
 def test_a_body_in_two_parts_cannot_be_one_subdomain() -> None:
     one = block((0, 0, 0), (1, 1, 1), (1, 1, 1))
     apart = BodyMesh(np.vstack([one.points, one.points + 2.0]), np.vstack([one.cells, one.cells + 8]))
-    with pytest.raises(InvalidInputError, match="1 pieces of this one have no neighbour"):
+    with pytest.raises(InvalidInputError, match="1 pieces of it have no neighbour"):
         merge_pieces(apart, np.zeros(2, dtype=int))
     check_face_connected(apart, np.array([0, 1]))
 

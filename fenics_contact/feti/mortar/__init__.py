@@ -1,7 +1,5 @@
-"""placeholder until the branch is merged."""
+"""Mortar coupling: surfaces whose meshes do not match, joined in weighted means by dual multipliers."""
 
-from typing import Any
+from fenics_contact.feti.mortar.coupling import MortarCoupling, mortar_coupling
 
-
-def mortar_coupling(slave: Any, master: Any, comm: Any) -> Any:
-    raise NotImplementedError
+__all__ = ["MortarCoupling", "mortar_coupling"]

@@ -1,0 +1,84 @@
+"""One body that is not torn and that supports hold: its stiffness is factored, nothing is dualised."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.feti.factor import Factor
+from fenics_contact.feti.torn import TornSystem
+from fenics_contact.timing import PhaseTimer
+
+
+@dataclass(frozen=True, eq=False)
+class DirectSolution:
+    """Displacement and reactions of one body.
+
+    Attributes:
+        displacement: u, shape (torn_size,), [length].
+        multiplier: Reactions of the supports, one a prescribed component, shape (n_rows,), [force].
+        gluing_residual: ‖f − K u‖ over the free components, relative to the forces that cancel there.
+    """
+
+    displacement: np.ndarray
+    multiplier: np.ndarray
+    gluing_residual: float
+    natural_residual: float = 0.0
+    coarse_residual: float = 0.0
+    iterations: int = 1
+    products: int = 0
+    history: tuple[()] = ()
+    reason: str = "solved by a sparse factorisation"
+
+
+class DirectSystem:
+    """K of one body with the components that supports prescribe eliminated.
+
+    Attributes:
+        torn: The system; it has one subdomain and no rows but those of supports.
+        products: Products with a dual operator: none.
+    """
+
+    products = 0
+
+    def __init__(
+        self, torn: TornSystem, timer: PhaseTimer | None = None, *, previous: DirectSystem | None = None
+    ) -> None:
+        """Factor the stiffness.
+
+        Args:
+            torn: The system.
+            timer: Collects the seconds.
+            previous: System of another load, whose factor is taken over.
+        """
+        self.torn = torn
+        (body,) = torn.subdomains
+        self._fixed = torn.B.indices
+        self._free = np.setdiff1d(np.arange(body.mesh.size), self._fixed)
+        if previous is not None and previous.torn.subdomains[0].matrix is body.matrix:
+            self._factor = previous._factor
+            return
+        with (timer or PhaseTimer()).phase("factor"):
+            self._factor = Factor(body.stiffness[self._free][:, self._free].tocsr())
+
+    def solve(self) -> DirectSolution:
+        """Return the displacement under the present load, refined once."""
+        (body,) = self.torn.subdomains
+        stiffness, load, free = body.stiffness, self.torn.load, self._free
+        displacement = np.zeros(body.mesh.size)
+        displacement[self._fixed] = self.torn.right
+        moved = stiffness @ displacement
+        for _ in range(2):  # the second pass removes the rounding of the first
+            correction = np.empty(len(free))
+            self._factor.solve((load - stiffness @ displacement)[free], correction)
+            displacement[free] += correction
+        missing = load - stiffness @ displacement
+        scale = max(np.linalg.norm(load), np.linalg.norm(moved), np.finfo(float).tiny)
+        return DirectSolution(
+            displacement, missing[self._fixed], float(np.linalg.norm(missing[free]) / scale)
+        )
+
+    def force(self, multiplier: np.ndarray) -> np.ndarray:
+        """Return Bᵀλ, the reactions on all components, shape (torn_size,), [force]."""
+        return np.asarray(self.torn.B.T @ multiplier)

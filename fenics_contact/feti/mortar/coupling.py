@@ -1,0 +1,164 @@
+"""Mortar coupling of two surfaces by dual Lagrange multipliers, integrated segment by segment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from mpi4py import MPI
+from scipy import sparse
+
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.feti.mortar.candidates import candidate_pairs
+from fenics_contact.feti.mortar.clipping import pieces
+from fenics_contact.feti.mortar.dual_basis import Cells, dual_integrals
+from fenics_contact.feti.mortar.local_coordinates import local_coordinates, rule
+from fenics_contact.feti.mortar.planes import Planes, check_convex, laid_flat, measure, planes_of
+from fenics_contact.feti.surface import FacetedSurface, shape_values
+
+#: Share of a node's area that has to face the master, or the node carries no multiplier.
+LEAST_SHARE = 1e-8
+#: Pairs of facets treated at once: the arrays of a chunk stay below some 50 MB, and mostly in the cache.
+CHUNK = 4096
+
+
+@dataclass(frozen=True)
+class MortarCoupling:
+    """Which slave nodes carry a multiplier, and the weighted mean of the master that each of them meets.
+
+    The dual functions ψ_i satisfy ∫ ψ_i N_j = δ_ij D_i with the shape functions N_j of the slave, so that the
+    constraint of one multiplier contains one slave node alone: n_i · (u_i − Σ_j (M_ij / D_i) u_j).
+
+    Attributes:
+        node: Positions in ``slave.nodes``, ascending, shape (n,).
+        area: D_i = ∫ ψ_i = ∫ N_i over the part of the slave that faces the master, shape (n,), [length²] or
+            in plane problems [length].
+        weight: M_ij / D_i with M_ij = ∫ ψ_i N_j, N_j of the master, shape (n, len(master.nodes)); rows add up
+            to one.
+        normal: Unit normal from master to slave, the averaged slave normal turned round, shape (n, dim).
+        gap: n_i · (x_i − Σ_j weight_ij x_j), positive when open, shape (n,), [length].
+    """
+
+    node: np.ndarray
+    area: np.ndarray
+    weight: sparse.csr_matrix
+    normal: np.ndarray
+    gap: np.ndarray
+
+
+def mortar_coupling(
+    slave: FacetedSurface, master: FacetedSurface, comm: MPI.Comm = MPI.COMM_SELF
+) -> MortarCoupling:
+    """Integrate the coupling of two surfaces. Collective on ``comm``.
+
+    Every slave facet has an auxiliary plane (its centre and mean normal). Master facets that face it are
+    projected into that plane along its normal and clipped, the pieces are cut into triangles, and a
+    quadrature rule of degree 5 in the plane integrates the products of shape functions, which is exact for
+    triangles and parallelograms. In plane problems the same happens with edges, lines and intervals. The
+    measure is the plane's: that of the facet itself unless it is warped.
+
+    Each rank integrates some of the slave facets, and all receive the whole coupling.
+
+    Args:
+        slave: Surface that carries the multipliers.
+        master: Surface that it meets.
+        comm: Communicator of the ranks that share the work; all have the same surfaces.
+
+    Raises:
+        InvalidInputError: If a slave facet is not convex or the surfaces are not of the same dimension.
+
+    References:
+        Puso, M. A., Laursen, T. A.: A mortar segment-to-segment contact method for large deformation solid
+        mechanics. Computer Methods in Applied Mechanics and Engineering 193 (2004).
+        Popp, A., Gitterle, M., Gee, M. W., Wall, W. A.: A dual mortar approach for 3D finite deformation
+        contact with consistent linearization. International Journal for Numerical Methods in Engineering 83
+        (2010).
+    """
+    mine = np.arange(comm.rank, len(slave.facets), comm.size)
+    part: tuple[np.ndarray, sparse.csr_matrix] | None = None
+    with together(comm):
+        if slave.dim != master.dim:
+            raise InvalidInputError(
+                f"mortar coupling needs two surfaces of the same dimension, got a slave in {slave.dim} and a "
+                f"master in {master.dim}: build both from plane or both from solid bodies"
+            )
+        part = _integrals(slave, master, mine)
+    # All ranks add up in the same order, so that their sums agree to the last bit.
+    parts = [found for found in comm.allgather(part) if found is not None]
+    return _coupling(slave, master, sum(area for area, _ in parts), sum(m for _, m in parts))
+
+
+def _coupling(
+    slave: FacetedSurface, master: FacetedSurface, area: np.ndarray, integrals: sparse.csr_matrix
+) -> MortarCoupling:
+    """Keep the nodes that face the master, and divide."""
+    node = np.flatnonzero(area > LEAST_SHARE * slave.areas)
+    weight = (sparse.diags(1 / area[node]) @ integrals[node]).tocsr()
+    weight.sort_indices()
+    normal = -slave.normals[node]
+    gap = np.einsum("nd,nd->n", normal, slave.points[node] - weight @ master.points)
+    return MortarCoupling(node, area[node], weight, normal, gap)
+
+
+def _integrals(
+    slave: FacetedSurface, master: FacetedSurface, chosen: np.ndarray
+) -> tuple[np.ndarray, sparse.csr_matrix]:
+    """Return D, shape (slave nodes,), and M, shape (slave nodes, master nodes), of the chosen facets."""
+    area, shape = np.zeros(len(slave.nodes)), (len(slave.nodes), len(master.nodes))
+    total = sparse.csr_matrix(shape)
+    if len(chosen) == 0 or len(master.facets) == 0:
+        return area, total
+    planes = planes_of(slave, chosen)
+    check_convex(planes, chosen)
+    pairs = candidate_pairs(planes, planes_of(master, np.arange(len(master.facets))))
+    rows, columns, values = [], [], []
+    for pair_slave, pair_master in _chunks(*pairs):
+        cells, facets, at_slave, at_master = _cells(planes, pair_slave, pair_master, master)
+        coverage, integrals = dual_integrals(cells)
+        np.add.at(area, slave.facets[chosen[facets]], coverage)
+        row, column = slave.facets[chosen[at_slave]][:, :, None], master.facets[at_master][:, None]
+        rows.append(np.broadcast_to(row, integrals.shape).ravel())
+        columns.append(np.broadcast_to(column, integrals.shape).ravel())
+        values.append(integrals.ravel())
+    if values:
+        entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+        total = sparse.csr_matrix(entries, shape=shape)
+    return area, total
+
+
+def _chunks(pair_slave: np.ndarray, pair_master: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Cut the list of pairs where the slave facet changes, after about `CHUNK` of them."""
+    starts = np.flatnonzero(np.diff(pair_slave, prepend=-1))
+    cuts = starts[np.flatnonzero(np.diff(starts // CHUNK, prepend=-1))]
+    for begin, end in pairwise([*cuts, len(pair_slave)]):
+        yield pair_slave[begin:end], pair_master[begin:end]
+
+
+def _cells(
+    planes: Planes, pair_slave: np.ndarray, pair_master: np.ndarray, master: FacetedSurface
+) -> tuple[Cells, np.ndarray, np.ndarray, np.ndarray]:
+    """Clip pairs of facets and place quadrature points; return also what the cells' numbers stand for.
+
+    Returns:
+        The cells, the slave facet of each of their facets, and the slave and master facet of each pair.
+    """
+    window = planes.flat[pair_slave]
+    subject, _ = laid_flat(master.points[master.facets[pair_master]], planes, pair_slave)
+    apart = (subject.min(axis=1) >= window.max(axis=1)) | (subject.max(axis=1) <= window.min(axis=1))
+    near = ~apart.any(axis=1)
+    window, subject, pair_slave, pair_master = (
+        array[near] for array in (window, subject, pair_slave, pair_master)
+    )
+    simplices, pair = pieces(subject, window)
+    barycentric, share = rule(planes.flat.shape[2] + 1)
+    points = barycentric @ simplices
+    on_slave, on_master = (local_coordinates(points, flat[pair]) for flat in (window, subject))
+    used, pair = np.unique(pair, return_inverse=True)
+    facets, facet = np.unique(pair_slave[used], return_inverse=True)
+    cells = Cells(
+        facet.ravel()[pair.ravel()], pair.ravel(), measure(simplices)[:, None] * share, on_slave,
+        shape_values(on_slave, window.shape[1]), shape_values(on_master, subject.shape[1]),
+    )  # fmt: skip
+    return cells, facets, pair_slave[used], pair_master[used]

@@ -1,0 +1,169 @@
+"""The plan of a scene names what will be built, and what is built is what it names."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.contact import State, solve_scene
+from fenics_contact.feti import DirectSystem, DualSystem
+from fenics_contact.geometry import block, box_partition, rectangle
+from fenics_contact.scene import (
+    Body,
+    ConeKind,
+    ContactPair,
+    Coulomb,
+    Friction,
+    IsotropicElasticity,
+    Material,
+    PlaneStrain,
+    RigidPlane,
+    Scene,
+    SolverKind,
+    Support,
+    Surface,
+    Tie,
+    Traction,
+    Tresca,
+)
+
+STEEL = IsotropicElasticity(1000.0, 0.3)
+UNCUT = {"lower": (1, 1, 1), "upper": (1, 1, 1)}
+
+
+def stack(**parts: Any) -> Scene:
+    """Two cubes upon each other, the lower one held, the upper one pressed."""
+    lower, upper = block((0, 0, 0), (1, 1, 1), (4, 4, 4)), block((0, 0, 1), (1, 1, 2), (4, 4, 4))
+    scene = Scene(
+        {"lower": Body(lower, STEEL), "upper": Body(upper, STEEL)},
+        [Support("lower", "z0")],
+        [Traction("upper", "z1", (0.1, 0.0, -1.0))],
+    )
+    return replace(scene, **parts)
+
+
+def cuts(scene: Scene, boxes: tuple[int, ...] = (2, 1, 1)) -> dict[str, np.ndarray]:
+    return {name: box_partition(body.mesh, boxes) for name, body in scene.bodies.items()}
+
+
+def pair(friction: Friction = None) -> list[ContactPair]:
+    return [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), friction)]
+
+
+def solved(scene: Scene) -> State:
+    return solve_scene(scene, cuts(scene), MPI.COMM_SELF)
+
+
+GUIDE = [Support("lower", "z0"), Support("upper", "x0", (0.0, None, None)), Support("upper", "y0", (None, 0, None))]
+SCENES = {
+    "frictionless": (stack(contacts=pair(), supports=GUIDE), SolverKind.FACE_NEWTON, ConeKind.BOUNDS, False),
+    "no friction in a law": (
+        stack(contacts=pair(Coulomb(0.0)), supports=GUIDE), SolverKind.FACE_NEWTON, ConeKind.BOUNDS, False,
+    ),
+    "Tresca": (stack(contacts=pair(Tresca(0.3))), SolverKind.FACE_NEWTON, ConeKind.DISCS, False),
+    "Coulomb": (stack(contacts=pair(Coulomb(0.3))), SolverKind.FACE_NEWTON, ConeKind.COULOMB, True),
+    "tied": (
+        stack(ties=[Tie(Surface("upper", "z0"), Surface("lower", "z1"))]),
+        SolverKind.PROJECTED_CG, ConeKind.NONE, False,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_plan_names_the_solver_and_the_cone(name: str) -> None:
+    scene, solver, cone, fixed_point = SCENES[name]
+    plan = scene.plan(cuts(scene))
+    assert (plan.solver, plan.cone, plan.fixed_point) == (solver, cone, fixed_point)
+    assert plan.subdomains == 4
+    assert plan.coarse_motions == 24
+    assert not plan.adjoint
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_what_is_built_is_what_was_planned(name: str) -> None:
+    scene = SCENES[name][0]
+    plan, state = scene.plan(cuts(scene)), solved(scene)
+    counts = state.counts
+    assert counts["torn_unknowns"] == plan.unknowns
+    assert counts["subdomains"] == plan.subdomains
+    kinds = plan.multipliers
+    assert counts["equality_multipliers"] == kinds["gluing"] + kinds["prescribed"] + kinds["tied"]
+    assert counts["normal_multipliers"] == kinds["normal"]
+    assert counts["tangential_multipliers"] == kinds["tangential"]
+    assert state.dual.problem.coarse.m == plan.coarse_motions
+
+
+def test_prescribed_nodes_on_a_seam_have_one_multiplier_a_copy() -> None:
+    scene = stack(supports=[Support("lower", "x0")], ties=SCENES["tied"][0].ties)
+    kinds = scene.plan(cuts(scene)).multipliers
+    seam = replace(scene, supports=[Support("lower", "z0")]).plan(cuts(scene)).multipliers
+    assert kinds["prescribed"] == seam["prescribed"] == 75
+    assert solved(scene).counts["equality_multipliers"] == sum(kinds.values())
+
+
+def test_one_body_in_one_piece_is_factored() -> None:
+    scene = Scene({"lower": stack().bodies["lower"]}, stack().supports, [Traction("lower", "z1", (0.1, 0, -1))])
+    whole = {"lower": np.zeros(64, dtype=int)}
+    plan = scene.plan(whole)
+    assert (plan.solver, plan.coarse_motions, sum(plan.multipliers.values())) == (SolverKind.DIRECT, 0, 0)
+    state = solve_scene(scene, whole, MPI.COMM_SELF)
+    assert isinstance(state.system, DirectSystem)
+    torn = solve_scene(scene, {"lower": box_partition(scene.bodies["lower"].mesh, (2, 2, 1))}, MPI.COMM_SELF)
+    assert isinstance(torn.system, DualSystem)
+    size = np.abs(torn.gather_displacement("lower")).max()
+    difference = state.gather_displacement("lower") - torn.gather_displacement("lower")
+    assert np.abs(difference).max() < 1e-8 * size
+    assert state.energies.total_potential == pytest.approx(torn.energies.total_potential, rel=1e-9)
+    assert state.energies.dual == pytest.approx(state.energies.primal, rel=1e-9)
+    assert state.counts["f_products"] == 0
+    assert state.solution.gluing_residual < 1e-12
+
+
+def test_a_body_that_supports_do_not_hold_alone_is_not_factored() -> None:
+    rollers = [Support("lower", "z0", (None, None, 0.0))]
+    scene = Scene({"lower": stack().bodies["lower"]}, rollers, [Traction("lower", "z1", (0, 0, -1))])
+    whole = {"lower": np.zeros(64, dtype=int)}
+    assert scene.plan(whole).solver is SolverKind.PROJECTED_CG
+    state = solve_scene(scene, whole, MPI.COMM_SELF)
+    assert state.energies.primal == pytest.approx(-0.5 * 1.0**2 / 1000.0, rel=1e-9)
+
+
+def test_sensitivities_need_multipliers_and_an_adjoint() -> None:
+    scene = Scene({"lower": stack().bodies["lower"]}, stack().supports)
+    plan = scene.plan({"lower": np.zeros(64, dtype=int)}, sensitivity=True)
+    assert plan.adjoint
+    assert plan.solver is SolverKind.PROJECTED_CG
+
+
+def test_without_a_partition_the_plan_has_the_default_one() -> None:
+    plan = stack(contacts=pair()).plan()
+    assert plan.subdomains == 2
+    assert stack(contacts=pair()).plan(ranks=4).subdomains == 4
+
+
+def test_the_plan_in_words_names_every_decision() -> None:
+    words = str(SCENES["Coulomb"][0].plan(cuts(SCENES["Coulomb"][0])))
+    for part in (
+        "Coulomb friction (1 pair has a friction coefficient above zero)", "900 in 4 subdomains",
+        "50 tangential", "semismooth Newton on faces", "friction cones", "follow the normal forces",
+        "24 rigid motions", " MB",
+    ):  # fmt: skip
+        assert part in words, part
+
+
+def test_a_plane_scene_has_one_tangential_multiplier_a_node_and_three_motions_a_piece() -> None:
+    mesh = rectangle((0, 0), (2, 1), (8, 4))
+    floor = ContactPair(Surface("plate", "y0"), RigidPlane((0, 0), (0, 1)), Coulomb(0.5))
+    material: Material = PlaneStrain(1000.0, 0.3)
+    scene = Scene({"plate": Body(mesh, material)}, [Support("plate", "y1", (0.0, -0.01))], contacts=[floor])
+    cut = {"plate": box_partition(mesh, (2, 1))}
+    plan = scene.plan(cut)
+    assert plan.coarse_motions == 6
+    assert plan.multipliers["normal"] == plan.multipliers["tangential"] == 9
+    state = solve_scene(scene, cut, MPI.COMM_SELF)
+    assert state.counts["torn_unknowns"] == plan.unknowns == 2 * 2 * 25
+    assert state.counts["tangential_multipliers"] == 9
