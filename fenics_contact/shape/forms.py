@@ -164,7 +164,9 @@ def moving_loads(torn: TornSystem, moving: np.ndarray | None) -> list[Load]:
         nodes = np.arange(torn.scene.bodies[body].mesh.n_nodes)
         return moving is None or bool(moving[tearing.global_nodes(body, nodes)].any())
 
-    loads = [load for load in torn.scene.loads if isinstance(load, VolumeLoad) and moves(load.body)]
+    loads: list[Load] = [
+        load for load in torn.scene.loads if isinstance(load, VolumeLoad) and moves(load.body)
+    ]
     check_differentiable(loads)
     return loads
 
