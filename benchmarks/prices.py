@@ -16,10 +16,10 @@ from benchmarks.cases.scenes import block_mesh, block_on_plane
 from benchmarks.report import table
 from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.feti.condensation import Condensations
-from fenics_contact.linalg.cost_model import explicit_cost, implicit_cost, prefers_explicit
 from fenics_contact.feti.explicit import ExplicitOperator
 from fenics_contact.feti.implicit import ImplicitOperator
 from fenics_contact.feti.subdomain import Subdomain
+from fenics_contact.linalg.cost_model import explicit_cost, implicit_cost, prefers_explicit
 from fenics_contact.qp import CoarseSpace
 
 #: Elements along an edge of a cubic subdomain.

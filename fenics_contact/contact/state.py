@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -59,12 +59,21 @@ class State:
         Raises:
             InvalidInputError: If the state was found without one.
         """
+        self._require_multipliers()
+        return cast(DualSystem, self.system)
+
+    @property
+    def dual_solution(self) -> DualSolution:
+        """What the dual solver found; raises as `dual` does."""
+        self._require_multipliers()
+        return cast(DualSolution, self.solution)
+
+    def _require_multipliers(self) -> None:
         if isinstance(self.system, DirectSystem):
             raise InvalidInputError(
                 "this needs multipliers, but the state of one body that supports hold was found directly: "
                 "solve with sensitivity=True"
             )
-        return self.system
 
     @property
     def scene(self) -> Scene:

@@ -41,6 +41,7 @@ class DirectSystem:
     """
 
     products = 0
+    _factor: Factor
 
     def __init__(
         self, torn: TornSystem, timer: PhaseTimer | None = None, *, previous: DirectSystem | None = None

@@ -36,7 +36,7 @@ from fenics_contact.scene.obstacles import (
     RigidPlane,
     RigidSphere,
 )
-from fenics_contact.scene.pairs import ContactPair, Coulomb, Friction, Surface, Tie, Tresca
+from fenics_contact.scene.pairs import ContactPair, Coulomb, Discretisation, Friction, Surface, Tie, Tresca
 from fenics_contact.scene.plan import ConeKind, Plan, SolverKind, choose_solver
 from fenics_contact.scene.scene import Scene
 from fenics_contact.scene.steps import LoadStep
@@ -49,6 +49,7 @@ __all__ = [
     "ConeKind",
     "ContactPair",
     "Coulomb",
+    "Discretisation",
     "DistanceObstacle",
     "Effect",
     "EffectName",

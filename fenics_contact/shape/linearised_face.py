@@ -73,7 +73,7 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
         coupling: Leave out the growth of friction with the normal force if False; the derivative is then
             that of Tresca friction.
     """
-    system, solution = state.dual, state.solution
+    system, solution = state.dual, state.dual_solution
     layout, comm = system.problem.layout, system.problem.comm
     step = contact_step(layout, system.problem.diagonal)
     trial = solution.multiplier - step * solution.residual

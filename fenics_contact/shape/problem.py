@@ -159,7 +159,7 @@ class ShapeProblem:
             scene = self.scene_of(alpha)
         state = find_state(
             scene, self.decomposition, solver=self.solver, previous=self._previous,
-            start_geometry=self._previous is None, timer=self._timer,
+            start_geometry=self._previous is None, sensitivity=True, timer=self._timer,
         )  # fmt: skip
         self._previous = state
         return state

@@ -216,9 +216,7 @@ class ConicReference:
         """Return K u − f node by node, the forces that supports and contact must exert, (n_nodes, 3)."""
         return (self.K @ displacement.ravel() - self.f).reshape(-1, 3)
 
-    def solve(
-        self, slip_bound: np.ndarray | None = None, before: np.ndarray | None = None
-    ) -> ConicSolution:
+    def solve(self, slip_bound: np.ndarray | None = None, before: np.ndarray | None = None) -> ConicSolution:
         """Minimise at given slip bounds, those of the scene's Tresca pairs by default.
 
         Slip is measured from the displacement ``before``, shape (n_nodes, 3), or from rest.

@@ -58,7 +58,11 @@ def solved(scene: Scene) -> State:
     return solve_scene(scene, cuts(scene), MPI.COMM_SELF)
 
 
-GUIDE = [Support("lower", "z0"), Support("upper", "x0", (0.0, None, None)), Support("upper", "y0", (None, 0, None))]
+GUIDE = [
+    Support("lower", "z0"),
+    Support("upper", "x0", (0.0, None, None)),
+    Support("upper", "y0", (None, 0, None)),
+]
 SCENES = {
     "frictionless": (stack(contacts=pair(), supports=GUIDE), SolverKind.FACE_NEWTON, ConeKind.BOUNDS, False),
     "no friction in a law": (
@@ -106,7 +110,9 @@ def test_prescribed_nodes_on_a_seam_have_one_multiplier_a_copy() -> None:
 
 
 def test_one_body_in_one_piece_is_factored() -> None:
-    scene = Scene({"lower": stack().bodies["lower"]}, stack().supports, [Traction("lower", "z1", (0.1, 0, -1))])
+    scene = Scene(
+        {"lower": stack().bodies["lower"]}, stack().supports, [Traction("lower", "z1", (0.1, 0, -1))]
+    )
     whole = {"lower": np.zeros(64, dtype=int)}
     plan = scene.plan(whole)
     assert (plan.solver, plan.coarse_motions, sum(plan.multipliers.values())) == (SolverKind.DIRECT, 0, 0)

@@ -12,11 +12,10 @@ from scipy import sparse
 
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.mortar.candidates import candidate_pairs
-from fenics_contact.feti.mortar.clipping import pieces
-from fenics_contact.feti.mortar.dual_basis import Cells, dual_integrals
-from fenics_contact.feti.mortar.local_coordinates import local_coordinates, rule
-from fenics_contact.feti.mortar.planes import Planes, check_convex, laid_flat, measure, planes_of
-from fenics_contact.feti.surface import FacetedSurface, shape_values
+from fenics_contact.feti.mortar.cells import cells_of
+from fenics_contact.feti.mortar.dual_basis import dual_integrals
+from fenics_contact.feti.mortar.planes import check_convex, planes_of
+from fenics_contact.feti.surface import FacetedSurface
 
 #: Share of a node's area that has to face the master, or the node carries no multiplier.
 LEAST_SHARE = 1e-8
@@ -95,7 +94,9 @@ def _coupling(
 ) -> MortarCoupling:
     """Keep the nodes that face the master, and divide."""
     node = np.flatnonzero(area > LEAST_SHARE * slave.areas)
-    weight = (sparse.diags(1 / area[node]) @ integrals[node]).tocsr()
+    chosen = integrals[node]
+    # The sums of the rows are the areas, and with their own rounding errors they divide better.
+    weight = (sparse.diags(1 / np.asarray(chosen.sum(axis=1)).ravel()) @ chosen).tocsr()
     weight.sort_indices()
     normal = -slave.normals[node]
     gap = np.einsum("nd,nd->n", normal, slave.points[node] - weight @ master.points)
@@ -115,7 +116,7 @@ def _integrals(
     pairs = candidate_pairs(planes, planes_of(master, np.arange(len(master.facets))))
     rows, columns, values = [], [], []
     for pair_slave, pair_master in _chunks(*pairs):
-        cells, facets, at_slave, at_master = _cells(planes, pair_slave, pair_master, master)
+        cells, facets, at_slave, at_master = cells_of(planes, pair_slave, pair_master, master)
         coverage, integrals = dual_integrals(cells)
         np.add.at(area, slave.facets[chosen[facets]], coverage)
         row, column = slave.facets[chosen[at_slave]][:, :, None], master.facets[at_master][:, None]
@@ -134,31 +135,3 @@ def _chunks(pair_slave: np.ndarray, pair_master: np.ndarray) -> Iterator[tuple[n
     cuts = starts[np.flatnonzero(np.diff(starts // CHUNK, prepend=-1))]
     for begin, end in pairwise([*cuts, len(pair_slave)]):
         yield pair_slave[begin:end], pair_master[begin:end]
-
-
-def _cells(
-    planes: Planes, pair_slave: np.ndarray, pair_master: np.ndarray, master: FacetedSurface
-) -> tuple[Cells, np.ndarray, np.ndarray, np.ndarray]:
-    """Clip pairs of facets and place quadrature points; return also what the cells' numbers stand for.
-
-    Returns:
-        The cells, the slave facet of each of their facets, and the slave and master facet of each pair.
-    """
-    window = planes.flat[pair_slave]
-    subject, _ = laid_flat(master.points[master.facets[pair_master]], planes, pair_slave)
-    apart = (subject.min(axis=1) >= window.max(axis=1)) | (subject.max(axis=1) <= window.min(axis=1))
-    near = ~apart.any(axis=1)
-    window, subject, pair_slave, pair_master = (
-        array[near] for array in (window, subject, pair_slave, pair_master)
-    )
-    simplices, pair = pieces(subject, window)
-    barycentric, share = rule(planes.flat.shape[2] + 1)
-    points = barycentric @ simplices
-    on_slave, on_master = (local_coordinates(points, flat[pair]) for flat in (window, subject))
-    used, pair = np.unique(pair, return_inverse=True)
-    facets, facet = np.unique(pair_slave[used], return_inverse=True)
-    cells = Cells(
-        facet.ravel()[pair.ravel()], pair.ravel(), measure(simplices)[:, None] * share, on_slave,
-        shape_values(on_slave, window.shape[1]), shape_values(on_master, subject.shape[1]),
-    )  # fmt: skip
-    return cells, facets, pair_slave[used], pair_master[used]
