@@ -27,7 +27,7 @@ from fenics_contact.scene import (
     rigid_body_modes,
     strain,
 )
-from tests.models.elements import CELLS, PLANE, by_node, element_stiffness, isotropic_matrix, one_cell
+from tests.models.elements import CELLS, PLANE, by_node, element_stiffness, isotropic_matrix, one_cell, whole
 
 Kernel = Callable[[np.ndarray], np.ndarray]
 
@@ -214,6 +214,16 @@ def test_a_kernel_that_a_subdomain_resists_is_refused_with_its_name() -> None:
     check_kernel(K, R, "subdomain 3 of body 'plate'")
     with pytest.raises(InvalidInputError, match="that of subdomain 3 of body 'plate' does not"):
         check_kernel(K, R + 1e-6 * vertices.reshape(8, 1), "subdomain 3 of body 'plate'")
+
+
+def wrong_on_many_points(points: np.ndarray) -> np.ndarray:
+    return rigid_body_modes(points) if len(points) <= 8 else one_wrong(points)
+
+
+def test_the_kernel_is_checked_on_every_subdomain() -> None:
+    mesh = block((0,) * 3, (1,) * 3, (2, 1, 1))
+    with pytest.raises(InvalidInputError, match="that of subdomain 0 of body 'cell' does not .*annihilates"):
+        whole(Body(mesh, Model(wrong_on_many_points)))
 
 
 def test_a_material_that_lacks_a_member_is_refused() -> None:

@@ -15,6 +15,7 @@ from fenics_contact.scene import (
     IsotropicElasticity,
     Material,
     OrthotropicElasticity,
+    OrthotropicPlaneStress,
     PlaneStrain,
     PlaneStress,
     Scene,
@@ -78,6 +79,20 @@ def test_a_free_orthotropic_body_expands_along_its_axes(cell: str) -> None:
 
 def _linear(strain: np.ndarray) -> Any:
     return tuple(lambda points, row=row: points @ row for row in strain)
+
+
+@pytest.mark.parametrize("cell", PLANE)
+def test_a_free_orthotropic_plate_expands_along_its_axes(cell: str) -> None:
+    angle, along = 0.5, np.array([1e-3, 4e-3])
+    axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    plate = OrthotropicPlaneStress((110.0, 9.0), 0.4, 7.0, angle, tuple(along))
+    mesh, strain = bent(box(cell)), WARMER * axes.T @ np.diag(along) @ axes
+    supports = [Support("body", name, _linear(strain)) for name in ("x0", "x1")]
+    scene = Scene({"body": Body(mesh, plate)}, supports, [ThermalStrain("body", WARMER)])
+    state = solve_scene(scene, None, MPI.COMM_SELF)
+    np.testing.assert_allclose(state.gather_displacement("body"), mesh.points @ strain, atol=1e-9)
+    assert state.gather_von_mises("body").max() < 1e-7
+    assert abs(strain[0, 1]) > 0.01, "the axes are not turned: nothing was tested"
 
 
 @pytest.mark.parametrize("cell", CELLS)
