@@ -222,7 +222,7 @@ def wrong_on_many_points(points: np.ndarray) -> np.ndarray:
 
 def test_the_kernel_is_checked_on_every_subdomain() -> None:
     mesh = block((0,) * 3, (1,) * 3, (2, 1, 1))
-    with pytest.raises(InvalidInputError, match="that of subdomain 0 of body 'cell' does not .*annihilates"):
+    with pytest.raises(InvalidInputError, match=r"that of subdomain 0 of body 'cell' does not .*annihilates"):
         whole(Body(mesh, Model(wrong_on_many_points)))
 
 
