@@ -49,8 +49,8 @@ def main() -> None:
         "# What each effect adds\n\n"
         f"Two cubes upon each other, {unknowns} torn unknowns in 128 subdomains, two ranks, cold, compiled "
         f"forms at hand; medians of {REPEATS}, load at most {load:.1f}. Each line has the effects of those "
-        "above; friction laws replace each other. MB are those of both ranks beyond their libraries. Written by "
-        "`python -m benchmarks.effects`.\n\n"
+        "above; friction laws replace each other. MB are those of both ranks beyond their libraries. "
+        "Written by `python -m benchmarks.effects`.\n\n"
         + table(head, [row(level, found, before) for level, found in records.items()])
         + "\n"
     )

@@ -35,6 +35,6 @@ def _check(
         if count:
             remedy = f"use discretisation={instead!r} for it" if instead else "move another part of the body"
             raise InvalidInputError(
-                f"a design may move only surfaces whose rows have derivatives by the shape, but {what} lies on "
-                f"{surface.name!r} of body {surface.body!r}, of which {count} nodes move: {remedy}"
+                f"a design may move only surfaces whose rows have derivatives by the shape, but {what} lies "
+                f"on {surface.name!r} of body {surface.body!r}, of which {count} nodes move: {remedy}"
             )

@@ -104,8 +104,8 @@ class ShapeProblem:
         self._forms: ShapeForms | None = None
         if scene.dim != 3:
             raise InvalidInputError(
-                "shape problems are three-dimensional, the scene is plane: give it the thickness of one layer "
-                "of cells between symmetry planes"
+                "shape problems are three-dimensional, the scene is plane: give it the thickness of one "
+                "layer of cells between symmetry planes"
             )
         with self._timer.phase("decompose"):
             self.decomposition = decompose(scene, partitions, comm)
