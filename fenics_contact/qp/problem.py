@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from mpi4py import MPI
@@ -12,6 +13,9 @@ from fenics_contact.errors import InfeasibleError, InvalidInputError, together
 from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector, global_sum
+
+if TYPE_CHECKING:
+    from fenics_contact.qp.scaling import Scaling
 
 Operator = Callable[[Vector], Vector]
 
@@ -31,6 +35,7 @@ class DualProblem:
         layout: Positions of normal and tangential multipliers.
         diagonal: Approximate positive diagonal of F, owned, shape (size,); only contact rows are used.
         preconditioner: Approximation of F⁻¹, symmetric positive definite, owned to owned, collective.
+        scaling: Factors of multipliers between parts of different stiffness, or None.
     """
 
     comm: MPI.Comm
@@ -40,6 +45,7 @@ class DualProblem:
     layout: ContactLayout
     diagonal: Vector
     preconditioner: Operator | None = None
+    scaling: Scaling | None = None
 
     def dot(self, x: Vector, y: Vector) -> float:
         """Return the global inner product of two owned vectors. Collective."""
