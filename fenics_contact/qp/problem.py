@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
+import scipy.sparse as sp
 from mpi4py import MPI
 
 from fenics_contact.errors import InfeasibleError, InvalidInputError, together
@@ -18,6 +19,17 @@ if TYPE_CHECKING:
     from fenics_contact.qp.scaling import Scaling
 
 Operator = Callable[[Vector], Vector]
+
+
+@runtime_checkable
+class FacePreconditioner(Protocol):
+    """A preconditioner that can do better where it knows which multipliers are free."""
+
+    def __call__(self, residual: Vector) -> Vector:
+        """Approximate F⁻¹ r, owned. Collective."""
+
+    def on_face(self, restriction: sp.csr_matrix) -> Operator:
+        """Return the preconditioner of the face with basis Z, shape (n_owned, n_face). Collective."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.qp.coarse import CoarseSpace
-from fenics_contact.qp.problem import DualProblem
+from fenics_contact.qp.problem import DualProblem, FacePreconditioner, Operator
 from fenics_contact.qp.reductions import Vector
 from fenics_contact.qp.residual import measure
 from fenics_contact.qp.slip_law import SlipLaw
@@ -24,6 +24,28 @@ from fenics_contact.qp.solution import DualSolution
 
 #: Factors that differ by less than this, relatively, are not worth scaling with.
 EVEN = 1e-6
+
+
+def _scaled(precondition: Operator, s: Vector) -> Operator:
+    """Return x -> M(x / s) / s."""
+    if isinstance(precondition, FacePreconditioner):
+        return _ScaledPreconditioner(precondition, s)
+    return lambda x: precondition(x / s) / s
+
+
+@dataclass(frozen=True, eq=False)
+class _ScaledPreconditioner:
+    """x -> M(x / s) / s, on faces as well: s is even within a contact, so that Z is that of λ."""
+
+    inner: FacePreconditioner
+    factor: Vector
+
+    def __call__(self, residual: Vector) -> Vector:
+        return self.inner(residual / self.factor) / self.factor
+
+    def on_face(self, restriction: sp.csr_matrix) -> Operator:
+        precondition, s = self.inner.on_face(restriction), self.factor
+        return lambda x: precondition(x / s) / s
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +78,7 @@ class Scaling:
             rhs=s * problem.rhs,
             coarse=self.coarse,
             diagonal=s**2 * problem.diagonal,
-            preconditioner=None if precondition is None else (lambda x: precondition(x / s) / s),
+            preconditioner=None if precondition is None else _scaled(precondition, s),
             scaling=None,
         )
 
