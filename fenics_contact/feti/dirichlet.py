@@ -77,7 +77,7 @@ class DirichletPreconditioner:
 
 
 class _ContactBlock:
-    """(B D⁻¹ Bᵀ)⁻¹ on rows of ties and contacts by a sparse factor on every rank; other rows stay as they are.
+    """(B D⁻¹ Bᵀ)⁻¹ on rows of ties and contacts, by a sparse factor on every rank; others stay unchanged.
 
     Contact points are replicated as well; a message of one number a contact row is cheaper than the many of a
     factor that is spread over the ranks.
