@@ -92,7 +92,7 @@ QUADRATIC = (
 )
 """Why, and what to do."""
 
-_QUADRATIC_NODES = {2: (6, 8, 9), 3: (10, 20, 27)}
+_QUADRATIC_NODES = {2: (6, 9), 3: (10, 20, 27)}
 
 
 def cell_type_of(cells: np.ndarray, dim: int) -> CellType:
