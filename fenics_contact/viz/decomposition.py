@@ -13,7 +13,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import BodyMesh, boundary_faces
 from fenics_contact.scene import Scene
 from fenics_contact.viz.colours import INK, colour_subdomains, neighbours
-from fenics_contact.viz.plane import MOST_EDGES, draw_outline, window
+from fenics_contact.viz.plane import draw_cell_edges, draw_outline, window
 from fenics_contact.viz.sheet import TITLE, draw_on_one_rank, place_image, png_path, sheet
 from fenics_contact.viz.stage import Layer, render, segments, surface
 from fenics_contact.viz.view import frame_around, oblique_view
@@ -108,6 +108,8 @@ def _draw_in_plane(
         axes = figure.subplots()
         for family, (name, body) in enumerate(scene.bodies.items()):
             _draw_plane_body(axes, body.mesh, np.asarray(partitions[name]), family, explode)
+            if not explode:
+                draw_cell_edges(axes, body.mesh.points, body.mesh.cells, low, high)
         window(axes, low, high, "length")
         axes.set_axis_off()
 
@@ -118,8 +120,8 @@ def _draw_plane_body(axes: Any, mesh: BodyMesh, partition: np.ndarray, family: i
         cells = mesh.cells[partition == number]
         centre = mesh.points[np.unique(cells)].mean(axis=0)
         points = centre + (1.0 - explode) * (mesh.points - centre)
-        edges = {"edgecolors": INK, "linewidths": 0.3 if mesh.n_cells < MOST_EDGES else 0.0}
-        axes.add_collection(PolyCollection(points[cells], facecolors=colours[number], **edges))
+        # Faces bordered in their own colour: else the white sheet shines through between them.
+        axes.add_collection(PolyCollection(points[cells], color=colours[number], linewidths=0.4))
         draw_outline(axes, points, cells, width=2.0)
 
 

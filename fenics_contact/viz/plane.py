@@ -11,8 +11,8 @@ from matplotlib.tri import Triangulation
 from fenics_contact.geometry import boundary_faces
 from fenics_contact.viz.colours import INK
 
-#: More cells than this in a picture and their edges would blacken it.
-MOST_EDGES = 3000
+#: Edges closer than this, relative to the size of the picture, would blacken it.
+CLOSEST = 0.006
 
 
 def draw_field(
@@ -61,12 +61,13 @@ def draw_outline(axes: Any, points: np.ndarray, cells: np.ndarray, *, width: flo
 def draw_cell_edges(
     axes: Any, points: np.ndarray, cells: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> None:
-    """Draw the edges of cells inside a window faintly, unless there are too many to be told apart."""
-    middle = points[cells].mean(axis=1)
-    seen = np.all((middle > low) & (middle < high), axis=1)
-    if 0 < np.count_nonzero(seen) <= MOST_EDGES:
-        look = {"facecolors": "none", "edgecolors": INK, "linewidths": 0.4, "alpha": 0.25}
-        axes.add_collection(PolyCollection(points[cells[seen]], **look))
+    """Draw the edges of cells inside a window faintly, but of cells too small to be told apart."""
+    corners = points[cells]
+    inside = np.all((corners.max(axis=1) > low) & (corners.min(axis=1) < high), axis=1)
+    length = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).min(axis=1)
+    seen = inside & (length > CLOSEST * float(np.max(high - low)))
+    look = {"facecolors": "none", "edgecolors": INK, "linewidths": 0.4, "alpha": 0.25}
+    axes.add_collection(PolyCollection(corners[seen], **look))
 
 
 def window(axes: Any, low: np.ndarray, high: np.ndarray, unit: str) -> None:

@@ -63,6 +63,9 @@ def contact_trace(state: State, pair: int) -> ContactTrace:
     contact, slave = state.contact, state.scene.contacts[pair].slave
     mesh, edges = state.scene.bodies[slave.body].mesh, state.scene.facets(slave)
     order, starts = walk(edges)
+    if _runs_backwards(mesh.points[order], starts):
+        lengths = np.diff([*starts, len(order)])
+        order, starts = order[::-1], np.concatenate([[0], np.cumsum(lengths[::-1])[:-1]])
     forward, axis, places = _unrolled(mesh.points[order], starts)
     numbers = state.torn.decomposition.tearing.global_nodes(slave.body, order)
     chosen = contact.on_pair(pair)
@@ -106,12 +109,23 @@ def walk(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return nodes[np.concatenate(order)], starts
 
 
+def _steps(points: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ways from node to node, and which of them do not lead from one piece to the next."""
+    inside = np.ones(len(points) - 1, dtype=bool)
+    inside[starts[1:] - 1] = False
+    return np.diff(points, axis=0), inside
+
+
+def _runs_backwards(points: np.ndarray, starts: np.ndarray) -> bool:
+    """Whether a surface runs against the axis that it follows most: bodies lie left of their surfaces."""
+    steps, inside = _steps(points, starts)
+    total = steps[inside].sum(axis=0)
+    return bool(total[int(np.argmax(np.abs(total)))] < 0)
+
+
 def _unrolled(points: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, str, np.ndarray]:
     """Return the direction along the surface at each node, what the places are called, and the places."""
-    steps = np.diff(points, axis=0)
-    joints = starts[1:] - 1
-    inside = np.ones(len(steps), dtype=bool)
-    inside[joints] = False
+    steps, inside = _steps(points, starts)
     length = np.linalg.norm(steps, axis=1)
     unit = steps / np.where(length, length, 1.0)[:, None]
     mean = steps[inside].sum(axis=0)

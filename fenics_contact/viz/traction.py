@@ -36,6 +36,7 @@ def draw_traction(trace: ContactTrace, target: Path, look: TractionLook) -> None
     facts += f"normal force {written(trace.force)} {units.force}/{units.length}"
     if rubs:
         facts += f", tangential force {written(trace.shear)} {units.force}/{units.length}"
+    top = float(trace.pressure.max()) or 1.0
     height = round((0.62 if rubs else 0.4) * look.width)
     with sheet(target, (look.width, height), headline(look.title, facts), "constrained") as figure:
         rows = figure.subplots(2 if rubs else 1, 1, sharex=True, squeeze=False)[:, 0]
@@ -46,7 +47,7 @@ def draw_traction(trace: ContactTrace, target: Path, look: TractionLook) -> None
         if look.clim:
             rows[0].set_ylim(*look.clim)
         else:
-            rows[0].set_ylim(bottom=0.0)
+            rows[0].set_ylim(-0.05 * top, 1.08 * top)
         if rubs:
             _draw_friction(rows[1], trace, units)
         rows[-1].set_xlabel(f"{trace.axis} ({units.length})")
