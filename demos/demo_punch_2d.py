@@ -43,8 +43,9 @@ aluminium = PlaneStrain(young_modulus=7.0e4, poisson_ratio=0.33)
 
 # ## Scene
 #
-# The punch's flat top goes down by 0.06 mm. The force comes out of the calculation. How much way a force takes
-# depends on the size of the bodies, in the plane even its order of magnitude; the pressure under it does not.
+# The punch's flat top goes down by 0.06 mm. The force comes out of the calculation. How much way a force
+# takes depends on the size of the bodies, in the plane even its order of magnitude; the pressure under it
+# does not.
 
 scene = Scene(
     bodies={"punch": Body(punch, steel), "block": Body(block, aluminium)},

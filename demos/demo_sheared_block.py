@@ -8,9 +8,10 @@
 # $$ \|\tau\| \le \mu\,\lambda_N\ [\mathrm{N}], \qquad
 #    \tau = \mu\,\lambda_N\,\frac{\Delta u_T}{\|\Delta u_T\|} \ \text{where it slips}, $$
 #
-# with the normal force $\lambda_N$ [N] and the slip $\Delta u_T$ [mm] since the last load step. First the block
-# sticks and shears like a spring. Slip begins at its edges and spreads, until all of it slides and the shear
-# force stays at $\mu N$. On the way back it sticks again: the loop encloses the energy that friction takes.
+# with the normal force $\lambda_N$ [N] and the slip $\Delta u_T$ [mm] since the last load step. First the
+# block sticks and shears like a spring. Slip begins at its edges and spreads, until all of it slides and the
+# shear force stays at $\mu N$. On the way back it sticks again: the loop encloses the energy that friction
+# takes.
 #
 # Run it with `python3 demos/demo_sheared_block.py`, or on two ranks with `mpirun -n 2` before it.
 
@@ -57,7 +58,9 @@ scene = Scene(
 
 forth, back = np.linspace(0.0, 1.5, 7), np.linspace(1.5, -1.5, 13)
 path = np.concatenate([forth, back[1:], -back[1:]])  # mm
-steps = [LoadStep(f"{shift:+.2f} mm", supports=[Support("block", "z1", (shift, 0.0, -0.5))]) for shift in path]
+steps = [
+    LoadStep(f"{shift:+.2f} mm", supports=[Support("block", "z1", (shift, 0.0, -0.5))]) for shift in path
+]
 states = solve_steps(scene, steps, None, comm)
 
 # ## Shear force
@@ -72,12 +75,14 @@ sticking = np.array([state.contact.count(Status.STICK) for state in states])
 ends = [6, 18, 30]
 plateau = np.abs(shear[ends]) / (friction_coefficient * pressed[ends])
 loop = slice(6, 31)
-work = float(np.sum(np.convolve(shear[loop], [0.5, 0.5], "valid") * np.diff(path[loop])))  # of the closed loop, N mm
+work = float(
+    np.sum(np.convolve(shear[loop], [0.5, 0.5], "valid") * np.diff(path[loop]))
+)  # of the closed loop, N mm
 
 # ## Pictures
 #
-# The loop between the bounds $\pm\mu N$, and where the floor holds the block. $N$ changes a little on the way:
-# a block that bulges freely presses back less.
+# The loop between the bounds $\pm\mu N$, and where the floor holds the block. $N$ changes a little on the
+# way: a block that bulges freely presses back less.
 
 bound = friction_coefficient * pressed
 plot_curves(
