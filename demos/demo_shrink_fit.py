@@ -116,7 +116,8 @@ limit = friction_coefficient * pressure * 2 * np.pi * seat**2
 fitted = states[0].contact
 found_pressure = fitted.normal_force.sum() / (2 * np.pi * seat)
 place = np.concatenate([body.mesh.points for body in scene.bodies.values()])[fitted.points.slave]
-torques = np.array([np.cross(place, state.contact.force).sum() for state in states])  # on the hub
+around = np.column_stack([-place[:, 1], place[:, 0]])
+torques = np.array([np.sum(around * state.contact.force) for state in states])  # on the hub
 
 # ## Pictures
 
