@@ -179,12 +179,8 @@ def test_a_single_large_facet_meets_many_small_ones(slave_kind: str, master_kind
     slave = plate(slave_kind, 1, up=False, height=0.1)
     coupling = mortar_coupling(slave, plate(master_kind, 60, low=-0.1, high=1.1))
     np.testing.assert_allclose(coupling.area, slave.areas, rtol=1e-12)
-    back = mortar_coupling(plate(master_kind, 30, low=0.1, high=0.9), slave_of_one(slave_kind))
+    back = mortar_coupling(plate(master_kind, 30, low=0.1, high=0.9), slave)
     assert back.area.sum() == pytest.approx(0.8 ** (slave.dim - 1), rel=1e-12)
-
-
-def slave_of_one(kind: str) -> FacetedSurface:
-    return plate(kind, 1, up=False, height=0.1)
 
 
 @kinds
@@ -223,3 +219,30 @@ def test_only_the_nearest_of_several_layers_counts(slave_kind: str, master_kind:
     weights = np.hstack([np.zeros((len(slave.nodes), len(back.nodes))), alone.weight.toarray()])
     np.testing.assert_allclose(coupling.weight.toarray(), weights, atol=1e-12)
     np.testing.assert_allclose(coupling.gap, 0.02, atol=1e-13)
+
+
+@kinds
+def test_the_rear_side_of_a_thin_plate_is_not_met(slave_kind: str, master_kind: str) -> None:
+    front, rear = plate(master_kind, 6, low=-0.1), plate(master_kind, 5, low=-0.1, height=-0.01, up=False)
+    points = np.vstack([rear.points, front.points])
+    both = faceted_surface(points, np.vstack([rear.facets, front.facets + len(rear.points)]))
+    coupling = mortar_coupling(plate(slave_kind, 5, up=False, height=-0.008), both)
+    assert coupling.area.sum() == pytest.approx(1.0, rel=1e-12)
+    np.testing.assert_allclose(coupling.gap, -0.008, atol=1e-13)
+
+
+@kinds
+@pytest.mark.parametrize("chunk", [1, 7])
+def test_the_size_of_chunks_does_not_matter(
+    slave_kind: str, master_kind: str, chunk: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slave, master = (
+        plate(slave_kind, 6, up=False, skew=1.0),
+        plate(master_kind, 5, low=0.3, high=1.5, turn=0.4),
+    )
+    whole = mortar_coupling(slave, master)
+    monkeypatch.setattr("fenics_contact.feti.mortar.coupling.CHUNK", chunk)
+    cut = mortar_coupling(slave, master)
+    np.testing.assert_array_equal(cut.node, whole.node)
+    np.testing.assert_allclose(cut.area, whole.area, rtol=1e-13)
+    np.testing.assert_allclose(cut.weight.toarray(), whole.weight.toarray(), atol=1e-13)

@@ -47,8 +47,9 @@ def _half(
     crossing = used & (inside != (left_then >= 0))
     fraction = np.divide(left, left - left_then, out=np.zeros_like(left), where=crossing)
     cut = vertices + fraction[:, :, None] * (following - vertices)
-    keep = np.stack([used & inside, crossing], axis=2).reshape(len(vertices), -1)
-    offered = np.stack([vertices, cut], axis=2).reshape(len(vertices), -1, 2)
+    places = 2 * vertices.shape[1]
+    keep = np.stack([used & inside, crossing], axis=2).reshape(len(vertices), places)
+    offered = np.stack([vertices, cut], axis=2).reshape(len(vertices), places, 2)
     left_over = keep.sum(axis=1)
     clipped = np.zeros((len(vertices), int(left_over.max(initial=0)), 2))
     place = np.cumsum(keep, axis=1) - 1

@@ -21,6 +21,8 @@ References:
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from scipy import sparse
 
@@ -46,7 +48,7 @@ def dual_integrals(cells: Cells) -> tuple[np.ndarray, np.ndarray]:
         D_e = ∫ N_i over the covered part of each facet, shape (n_facets, corners), and ∫ ψ_i N_j of each
         pair, shape (n_pairs, corners, master corners), both [length²] or [length].
     """
-    over_facet, over_pair = _sum_by(cells.facet), _sum_by(cells.pair)
+    over_facet, over_pair = _SumsBy(cells.facet), _SumsBy(cells.pair)
     area = over_facet(cells.weight.sum(axis=1))
     coverage = over_facet(np.einsum("nq,nqk->nk", cells.weight, cells.slave))
     modes, at_corners = _modes(cells, area)
@@ -60,7 +62,7 @@ def dual_integrals(cells: Cells) -> tuple[np.ndarray, np.ndarray]:
     return coverage, coverage[facet][:, :, None] * values
 
 
-class _sum_by:
+class _SumsBy:
     """Sums of arrays over the entries with the same number."""
 
     def __init__(self, number: np.ndarray) -> None:
@@ -68,8 +70,9 @@ class _sum_by:
         self.matrix = sparse.csr_matrix((np.ones(count), (number, np.arange(count))), shape=(rows, count))
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
-        summed = self.matrix @ values.reshape(len(values), -1)
-        return np.asarray(summed.reshape(-1, *values.shape[1:]), dtype=np.float64)
+        shape = values.shape[1:]
+        summed = self.matrix @ values.reshape(len(values), math.prod(shape))
+        return np.asarray(summed.reshape(len(summed), *shape), dtype=np.float64)
 
 
 def _modes(cells: Cells, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -78,7 +81,7 @@ def _modes(cells: Cells, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Returns:
         At the quadrature points, shape (n, q, m), and at the corners of each facet, (n_facets, corners, m).
     """
-    over_facet, corners = _sum_by(cells.facet), cells.slave.shape[2]
+    over_facet, corners = _SumsBy(cells.facet), cells.slave.shape[2]
 
     def centred(modes: np.ndarray, at_corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         # Twice: where the covered part is small, the first subtraction leaves a mean of its rounding errors.
@@ -96,9 +99,8 @@ def _modes(cells: Cells, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _pseudo_inverse(covariance: np.ndarray) -> np.ndarray:
     """Invert symmetric matrices (n, m, m) except in directions of slivers, where the inverse is zero."""
-    scale = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-    floor = np.array([FLOOR, FLOOR, FLOOR**2])[: scale.shape[1]]
-    scale = np.maximum(scale, floor)
+    floor = np.array([FLOOR, FLOOR, FLOOR**2])[: covariance.shape[1]]
+    scale = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), floor**2))
     scaled = covariance / (scale[:, :, None] * scale[:, None])
     values, vectors = np.linalg.eigh(scaled)
     large = values > (SLIVER / FLOOR) ** 2
