@@ -15,7 +15,7 @@ from fenics_contact.geometry import boundary_faces
 from fenics_contact.scene import Scene
 from fenics_contact.viz.colours import INK, STRESS_MAP
 from fenics_contact.viz.fields import BodyFields, gather
-from fenics_contact.viz.obstacles import obstacle_layers
+from fenics_contact.viz.obstacles import obstacle_layers, obstacles_of
 from fenics_contact.viz.places import contact_places
 from fenics_contact.viz.section import Spot, section_frame, section_layers, section_views, strongest_contact
 from fenics_contact.viz.sheet import (
@@ -68,7 +68,8 @@ def plot_stress(
         path: PNG file to write.
         clim: Range of the colours, [force / length²]; from zero to the 99.5 % quantile unless given. Give two
             pictures the same range to compare them.
-        scale: Factor of the displacement in the upper picture; chosen and stated unless given.
+        scale: Factor of the displacement in the upper picture; chosen and stated unless given, 1 where there
+            are rigid obstacles.
         sections: Draw the sections too, if a contact carries force.
         reach: How far sections reach up and down from the contact's middle, [length]; chosen unless given.
         smooth: Show nodal means instead of the cells' own values.
@@ -91,7 +92,9 @@ def plot_stress(
     checked_reach(reach)
     given = None if clim is None else checked_range(clim)
     bodies = gather(state)
-    factor = chosen_scale(bodies) if scale is None else float(scale)
+    # Exaggerated, bodies would enter rigid obstacles.
+    chosen = 1.0 if obstacles_of(state.scene) else chosen_scale(bodies)
+    factor = chosen if scale is None else float(scale)
     shown, named = given or stress_range(bodies), units or Units()
     places = contact_places(state, {name: body.deformed(1.0) for name, body in bodies.items()})
     touching = sections and bool(np.any(state.contact.normal_force > 0))
