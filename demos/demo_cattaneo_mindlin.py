@@ -128,6 +128,8 @@ for name, state in list(states.items())[1:]:
     found[name] = (ratio, np.sqrt(-start / slope), half_width * np.sqrt(1 - ratio))
 
 # ## Pictures
+#
+# All tractions over the contact, beside what theory says.
 
 order = np.argsort(place)
 order = order[np.abs(place[order]) < 1.2 * half_width]
@@ -139,6 +141,10 @@ for name, (ratio, _, _) in found.items():
     traction = np.abs(contact.friction_force[:, 0]) / contact.points.area
     curves[f"q, Q = {ratio:.2f} μP"] = (place[order], traction[order])
     known[f"theory, {ratio:.2f}"] = (x, theory(x, ratio))
+
+# Symbols are nodes, lines are theory. Of one step also what each point does, and the stress around the
+# contact.
+
 plot_curves(
     curves,
     output / "traction.png",
@@ -171,6 +177,9 @@ record = {
     "largest_error": error,
 }
 write_json(output / "result.json", record, comm=comm)
+
+# Every rank has the same numbers; one prints them.
+
 if comm.rank == 0:
     ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"
     counts = last.counts
@@ -181,6 +190,8 @@ if comm.rank == 0:
     for ratio, measured, exact in found.values():
         print(f"  {ratio:6.4f} {measured:13.4f} {exact:10.4f} {measured / exact - 1:10.2%}")
     print(f"pictures and files in {output}/")
+
+# Stick width to 2 % in all three steps.
 
 assert error < 0.02
 

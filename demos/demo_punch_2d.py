@@ -106,6 +106,9 @@ record = {
     "errors": errors,
 }
 write_json(output / "result.json", record, comm=comm)
+
+# Every rank has the same numbers; one prints them.
+
 if comm.rank == 0:
     ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"
     counts = state.counts
@@ -116,10 +119,12 @@ if comm.rank == 0:
     print(f"  peak pressure  {found_peak:10.2f} {peak:10.2f} {errors['peak_pressure']:10.2%}   MPa")
     print(f"pictures and files in {output}/")
 
+# Half width and peak must be Hertz's to 1 %.
+
 assert max(abs(error) for error in errors.values()) < 0.01
 
 # ## What to try next
 #
 # - `discretisation="node"`: nodes that do not match make the pressure uneven.
-# - `RigidSphere((0.0, 50.0), 50.0)` as the master: a rigid punch, $1/E^*$ loses a term.
+# - A rigid punch: `RigidSphere((0.0, 50.0), 50.0)` as the master, the base of the block pushed up.
 # - A flat punch, `rectangle((-5.0, 0.0), (5.0, 20.0), (20, 40))`: the pressure peaks at its edges.

@@ -95,6 +95,9 @@ plot_curves(
     title=f"Hysteresis of a sheared block, μ = {friction_coefficient:g}",
     comm=comm,
 )
+
+# Six of the steps as maps: the edges slip first. On the way back, all sticks at once before they slip again.
+
 chosen = [0, 2, 4, 6, 10, 14]
 names = ["pressed", "forth", "forth", "all slides", "back", "back"]
 maps = {f"{name}, {steps[k].name}": states[k] for name, k in zip(names, chosen, strict=True)}
@@ -121,6 +124,9 @@ record = {
     "dissipated_energy": work,
 }
 write_json(output / "result.json", record, comm=comm)
+
+# Every rank has the same numbers; one prints them.
+
 if comm.rank == 0:
     ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"
     print(f"sheared block: {len(states)} load steps, {ranks}")
@@ -130,6 +136,8 @@ if comm.rank == 0:
     print(f"  dissipated in a loop {work:.2f} N mm")
     print(f"  plateau / μN at the ends of the strokes: {', '.join(f'{value:.4f}' for value in plateau)}")
     print(f"pictures and files in {output}/")
+
+# At the ends of the strokes nothing sticks, and the plateau is $\mu N$ to 1 %.
 
 assert np.all(sticking[ends] == 0)
 assert np.all(np.abs(plateau - 1.0) < 0.01)

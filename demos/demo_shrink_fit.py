@@ -100,24 +100,22 @@ steps = [LoadStep(f"{angle:g}", loads=shrunk, supports=held(angle)) for angle in
 states = solve_steps(scene, steps, None, comm)
 
 # ## Lamé
+#
+# The formulas above, and the torque that the pressure holds.
 
-
-def lame(ratio: float, nu: float) -> tuple[float, float]:
-    """Return E C_h and E C_s."""
-    hub = (rim**2 + seat**2) / (rim**2 - seat**2) + nu
-    shaft = (1 - nu**2) * (1 - ratio) / ((1 + nu) + (1 - nu) * ratio)
-    return hub, shaft
-
-
-strain = steel.thermal_expansion * cooling
-pressure = steel.young_modulus * strain / sum(lame((arbor / seat) ** 2, steel.poisson_ratio))
+young, nu, ratio = steel.young_modulus, steel.poisson_ratio, (arbor / seat) ** 2
+hub = ((rim**2 + seat**2) / (rim**2 - seat**2) + nu) / young
+shaft = (1 - nu**2) / young * (1 - ratio) / ((1 + nu) + (1 - nu) * ratio)
+pressure = steel.thermal_expansion * cooling / (hub + shaft)
 limit = friction_coefficient * pressure * 2 * np.pi * seat**2
+
+# Found: the mean pressure, and the moment of the contact forces on the hub about the axis.
 
 fitted = states[0].contact
 found_pressure = fitted.normal_force.sum() / (2 * np.pi * seat)
 place = np.concatenate([body.mesh.points for body in scene.bodies.values()])[fitted.points.slave]
 around = np.column_stack([-place[:, 1], place[:, 0]])
-torques = np.array([np.sum(around * state.contact.force) for state in states])  # on the hub
+torques = np.array([np.sum(around * state.contact.force) for state in states])
 
 # ## Pictures
 
@@ -136,6 +134,9 @@ plot_curves(
     title=f"Torque of a shrink fit, Lamé's pressure {pressure:.1f} MPa",
     comm=comm,
 )
+
+# Stress when fitted and when turned, and pressure and friction along the seat.
+
 plot_stress(states[0], output / "stress_fitted.png", title="Fitted")
 plot_stress(states[turned], output / "stress_turned.png", title="Turned until it slips", scale=1.0)
 plot_contact_pressure(states[turned], output / "contact.png", title="All of the seat slips")
@@ -159,6 +160,9 @@ record = {
     "torque": torques,
 }
 write_json(output / "result.json", record, comm=comm)
+
+# Every rank has the same numbers; one prints them.
+
 if comm.rank == 0:
     ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"
     counts = states[0].counts
@@ -169,6 +173,8 @@ if comm.rank == 0:
     )
     print(f"  torque limit  {found_limit:10.0f} {limit:10.0f} {found_limit / limit - 1:10.2%}   N mm/mm")
     print(f"pictures and files in {output}/")
+
+# Lamé's pressure, and the torque that it holds, to 1 %.
 
 assert abs(found_pressure / pressure - 1) < 0.01
 assert abs(found_limit / limit - 1) < 0.01

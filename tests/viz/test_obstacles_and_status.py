@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene import RigidCylinder, RigidPlane, RigidSphere
 from fenics_contact.viz import plot_contact_status, plot_stress
 from fenics_contact.viz.obstacles import obstacle_layers, obstacles_of
+from fenics_contact.viz.section import strongest_contact
 from fenics_contact.viz.view import oblique_view
 from tests.viz.plane_states import caged_block, plane_block
 from tests.viz.states import contains, painted, pixels, touching_blocks
@@ -45,6 +47,24 @@ def test_a_scene_with_obstacles_is_drawn(tmp_path: Path) -> None:
     image = pixels(plot_stress(caged_block(), tmp_path / "caged.png", width=640))
     assert painted(image) > 0.3
     assert contains(image, "#e3e6e8"), "the floor"
+
+
+def test_bodies_on_obstacles_are_drawn_in_true_scale(tmp_path: Path) -> None:
+    left, true, large = (
+        pixels(plot_stress(plane_block(), tmp_path / f"{k}.png", width=640, **options))
+        for k, options in enumerate([{}, {"scale": 1.0}, {"scale": 10.0}])
+    )
+    np.testing.assert_array_equal(left, true)
+    assert large.shape != true.shape or np.abs(large - true).max() > 0.1
+
+
+def test_where_normals_cancel_the_strongest_point_gives_the_direction() -> None:
+    angle = 2 * np.pi * np.arange(12) / 12
+    normal = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(12)])
+    points = SimpleNamespace(pair=np.zeros(12, dtype=int), normal=normal, area=np.ones(12))
+    force = np.where(np.arange(12) == 3, 1.0 + 1e-6, 1.0)
+    spot = strongest_contact(SimpleNamespace(normal_force=force, points=points), normal)
+    np.testing.assert_allclose(spot.normal, normal[3])
 
 
 def test_status_maps_show_stick_and_slip_of_each_state(tmp_path: Path) -> None:
