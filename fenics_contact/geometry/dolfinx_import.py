@@ -14,10 +14,10 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.geometry.bodies import bodies_of
-from fenics_contact.geometry.cell_types import CELL_TYPES
+from fenics_contact.geometry.cell_types import CELL_TYPES, QUADRATIC
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.plane import flattened, turned_right_handed
-from fenics_contact.geometry.tagged_mesh import QUADRATIC, Label, TaggedMesh
+from fenics_contact.geometry.tagged_mesh import Label, TaggedMesh
 from fenics_contact.geometry.xdmf_grids import Grid, chosen_grid, grids_of
 
 if TYPE_CHECKING:

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry.cell_types import QUADRATIC
 from fenics_contact.geometry.plane import flattened, turned_counter_clockwise
-from fenics_contact.geometry.tagged_mesh import QUADRATIC, Label, TaggedMesh
+from fenics_contact.geometry.tagged_mesh import Label, TaggedMesh
 
 _TYPES = {2: "triangle", 3: "quadrilateral", 4: "tetrahedron", 5: "hexahedron"}
 """gmsh's numbers of the cells that a body may have."""

@@ -13,12 +13,6 @@ from fenics_contact.errors import InvalidInputError
 Label = str | int
 """A physical name of gmsh, or a numeric tag."""
 
-QUADRATIC = (
-    "quadratic cells are not supported: the contact constraints are one for every node and need nodal forces "
-    "that are positive under a uniform pressure, which those of quadratic facets are not; write the mesh "
-    "with linear cells (gmsh: Mesh.ElementOrder = 1)"
-)
-
 
 @dataclass(frozen=True, eq=False)
 class TaggedMesh:

@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry.tagged_mesh import QUADRATIC
+from fenics_contact.geometry.cell_types import QUADRATIC
 
 _FACETS = {
     "tetrahedron": ("triangle",),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
@@ -58,6 +59,11 @@ class DualProblem:
     diagonal: Vector
     preconditioner: Operator | None = None
     scaling: Scaling | None = None
+
+    @cached_property
+    def evened(self) -> DualProblem:
+        """The problem in multipliers scaled by `scaling`, itself where there is none."""
+        return self if self.scaling is None else self.scaling.applied_to(self)
 
     def dot(self, x: Vector, y: Vector) -> float:
         """Return the global inner product of two owned vectors. Collective."""

@@ -69,8 +69,8 @@ class Scaling:
         """Return the scaling of a problem with another right side e; what is factored is shared."""
         return replace(self, coarse=self.coarse.with_load(load))
 
-    def problem(self, problem: DualProblem) -> DualProblem:
-        """Return the problem for μ."""
+    def applied_to(self, problem: DualProblem) -> DualProblem:
+        """Return the problem for μ, see `DualProblem.evened`."""
         s, precondition = self.factor, problem.preconditioner
         return replace(
             problem,
@@ -88,12 +88,16 @@ class Scaling:
             return None
         return np.asarray(slip_bound, dtype=np.float64) / self.factor[problem.layout.tangential[:, 0]]
 
-    def start(self, start: DualSolution | Vector | None) -> Vector | None:
+    def start(
+        self, problem: DualProblem, start: DualSolution | Vector | None
+    ) -> DualSolution | Vector | None:
         """Return where to start for μ."""
-        if start is None:
-            return None
-        multiplier = start.multiplier if isinstance(start, DualSolution) else np.asarray(start)
-        return np.asarray(multiplier / self.factor, dtype=np.float64)
+        s = self.factor
+        if not isinstance(start, DualSolution):
+            return None if start is None else np.asarray(start / s, dtype=np.float64)
+        multiplier, product, residual = start.multiplier / s, start.product * s, start.residual * s
+        same = problem.evened if start.problem is problem else start.problem
+        return replace(start, problem=same, multiplier=multiplier, product=product, residual=residual)
 
     def solution(self, problem: DualProblem, law: SlipLaw, found: DualSolution) -> DualSolution:
         """Return the solution for λ, with its residuals. Collective."""

@@ -27,6 +27,9 @@ class DualSolver(Protocol):
     def tolerance(self) -> float:
         """Largest relative residual of an answer."""
 
+    def with_tolerance(self, tolerance: float) -> DualSolver:
+        """Return the solver with another tolerance."""
+
     def run(self, problem: DualProblem, law: SlipLaw, start: Start) -> DualSolution:
         """Solve from ``start`` or raise `ConvergenceError`. Collective."""
 
@@ -87,13 +90,12 @@ def _solve_scaled(
     """Solve in scaled multipliers until the residuals of the unscaled ones are small, too. Collective."""
     scaling = problem.scaling
     assert scaling is not None
-    inner, bound = scaling.problem(problem), scaling.bound(problem, slip_bound)
-    begin: DualSolution | Vector | None = scaling.start(start)
+    bound, begin = scaling.bound(problem, slip_bound), scaling.start(problem, start)
     tolerance, products = solver.tolerance, 0
     history: tuple[SolverStep, ...] = ()
     for _ in range(SCALED_ATTEMPTS):
-        stricter = replace(solver, tolerance=tolerance)  # type: ignore[type-var]
-        begin = solve(inner, bound, stricter, begin, friction_coefficient=friction_coefficient)
+        stricter = solver.with_tolerance(tolerance)
+        begin = solve(problem.evened, bound, stricter, begin, friction_coefficient=friction_coefficient)
         products, history = products + begin.products, (*history, *begin.history)
         solution = scaling.solution(problem, law, begin)
         if solution.residuals.within(solver.tolerance):

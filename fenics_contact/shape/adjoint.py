@@ -95,4 +95,4 @@ def _evened_out(problem: DualProblem, face: Face) -> tuple[DualProblem, Face, np
         return problem, face, 1.0
     factor = problem.scaling.factor
     flexibility = face.flexibility * factor[problem.layout.tangential[:, 0]] ** 2
-    return problem.scaling.problem(problem), replace(face, flexibility=flexibility), factor
+    return problem.evened, replace(face, flexibility=flexibility), factor
