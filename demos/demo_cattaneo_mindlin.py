@@ -11,7 +11,7 @@
 #
 # the second root only where $|x| < c$ (Cattaneo 1938, Mindlin 1949; Johnson, Contact Mechanics, section 7.2).
 #
-# Run it with `python3 demos/demo_cattaneo_mindlin.py`, or on two ranks with `mpirun -n 2` before it.
+# Run it with `make demo DEMO=cattaneo_mindlin`, on two ranks with `make demo DEMO=cattaneo_mindlin NP=2`.
 
 from pathlib import Path
 

@@ -10,7 +10,7 @@
 #    p_0 = \sqrt{\frac{F E^*}{\pi R}}, \qquad
 #    \frac{1}{E^*} = \frac{1 - \nu_1^2}{E_1} + \frac{1 - \nu_2^2}{E_2}. $$
 #
-# Run it with `python3 demos/demo_punch_2d.py`, or on two ranks with `mpirun -n 2` before it.
+# Run it with `make demo DEMO=punch_2d`, on two ranks with `make demo DEMO=punch_2d NP=2`.
 
 from pathlib import Path
 

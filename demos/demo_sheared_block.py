@@ -13,7 +13,7 @@
 # shear force stays at $\mu N$. On the way back it sticks again: the loop encloses the energy that friction
 # takes.
 #
-# Run it with `python3 demos/demo_sheared_block.py`, or on two ranks with `mpirun -n 2` before it.
+# Run it with `make demo DEMO=sheared_block`, on two ranks with `make demo DEMO=sheared_block NP=2`.
 
 from pathlib import Path
 

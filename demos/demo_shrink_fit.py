@@ -14,7 +14,7 @@
 # radius $a$. Friction then transmits a torque a unit of thickness [N mm/mm] up to $T = \mu\,p\,2\pi b^2$,
 # beyond which the hub slips.
 #
-# Run it with `python3 demos/demo_shrink_fit.py`, or on two ranks with `mpirun -n 2` before it.
+# Run it with `make demo DEMO=shrink_fit`, on two ranks with `make demo DEMO=shrink_fit NP=2`.
 
 from pathlib import Path
 
