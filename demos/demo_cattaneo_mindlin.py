@@ -118,12 +118,10 @@ place = place[states["pressed"].contact.points.slave, 0]
 found = {}
 for name, state in list(states.items())[1:]:
     contact = state.contact
-    bound, traction = (
-        friction_coefficient * contact.pressure,
-        contact.friction_force[:, 0] / contact.points.area,
-    )
     sticks = contact.status == Status.STICK
-    slope, start = np.polyfit(place[sticks] ** 2, (bound - np.abs(traction))[sticks] ** 2, 1)
+    traction = np.abs(contact.friction_force[:, 0]) / contact.points.area
+    lack = (friction_coefficient * contact.pressure - traction)[sticks]
+    slope, start = np.polyfit(place[sticks] ** 2, lack**2, 1)
     ratio = abs(contact.friction_force.sum()) / (friction_coefficient * contact.normal_force.sum())
     found[name] = (ratio, np.sqrt(-start / slope), half_width * np.sqrt(1 - ratio))
 
