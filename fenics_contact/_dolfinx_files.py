@@ -138,7 +138,7 @@ def mesh_arrays(mesh: Any) -> MeshArrays:
     node = np.argsort(np.argsort(geometry.input_global_indices))
     cell = np.argsort(np.argsort(topology.original_cell_index[:n_cells]))
     dofmap = np.asarray(getattr(geometry.dofmap, "array", geometry.dofmap)).reshape(n_cells, -1)
-    cells = np.empty(dofmap.shape, dtype=np.int64)
+    cells: np.ndarray = np.empty(dofmap.shape, dtype=np.int64)
     cells[cell] = node[dofmap]
     linear = cells.shape[1] == _VERTICES.get(name)
     points = np.empty((node.size, geometry.dim))
