@@ -28,6 +28,7 @@ class ContactPatch:
         status: Of the contact points.
         slip: Of the contact points in the picture, (n_points, 2).
         force: Normal force of the pair.
+        rubs: Whether the pair has friction.
         low: Lower left corner of what is shown.
         high: Upper right corner.
     """
@@ -41,6 +42,7 @@ class ContactPatch:
     status: np.ndarray
     slip: np.ndarray
     force: float
+    rubs: bool
     low: np.ndarray
     high: np.ndarray
 
@@ -72,7 +74,7 @@ def contact_patch(state: State, pair: int, reach: float | None) -> ContactPatch:
     window = _window(places, points, pressure[points], contact.points.area[chosen], reach)
     return ContactPatch(
         view, f"{slave.body}, {slave.name}", places, local.reshape(-1, facets.shape[1]), pressure, points,
-        contact.status[chosen], view.project(slip), force, *window,
+        contact.status[chosen], view.project(slip), force, state.scene.contacts[pair].has_friction, *window,
     )  # fmt: skip
 
 

@@ -111,6 +111,9 @@ def _draw_pressure(axes: Any, patch: ContactPatch, clim: tuple[float, float]) ->
 
 def _draw_status(axes: Any, patch: ContactPatch, units: Units) -> None:
     draw_status(axes, patch)
+    if not patch.rubs:
+        axes.set_title("status, no friction")
+        return
     slips = patch.status == Status.SLIP
     longest = float(np.linalg.norm(patch.slip[slips], axis=1).max(initial=0.0))
     axes.set_title(

@@ -15,7 +15,7 @@ from fenics_contact.viz.colours import INK, PALE
 from fenics_contact.viz.patch import ContactPatch, contact_patch
 from fenics_contact.viz.patch_axes import label_axes
 from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet
-from fenics_contact.viz.symbols import SYMBOLS, label_of
+from fenics_contact.viz.symbols import symbols_of
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.words import written
 
@@ -104,9 +104,9 @@ def draw_status(axes: Any, patch: ContactPatch, *, counted: bool = True) -> None
     """Draw facets laid flat, a symbol on each contact point, and how those that slip move."""
     axes.add_collection(PolyCollection(patch.places[patch.facets], facecolors=PALE, edgecolors="white"))
     places = patch.places[patch.points]
-    for status, look in SYMBOLS.items():
+    for status, (name, look) in symbols_of(patch.rubs).items():
         chosen = patch.status == status
-        label = label_of(status, np.count_nonzero(chosen) if counted else None)
+        label = f"{name} ({np.count_nonzero(chosen)})" if counted else name
         axes.scatter(*places[chosen].T, label=label, zorder=3, linewidths=1.0, **look)
     slips = patch.status == Status.SLIP
     longest = float(np.linalg.norm(patch.slip[slips], axis=1).max(initial=0.0))

@@ -15,6 +15,16 @@ SYMBOLS: dict[Status, dict[str, Any]] = {
 }
 
 
-def label_of(status: Status, count: int | None = None) -> str:
-    """Return what the legend calls a status: "slip (12)"."""
-    return status.name.lower() if count is None else f"{status.name.lower()} ({count})"
+#: Without friction a closed point neither sticks nor slips.
+CLOSED = {**SYMBOLS[Status.STICK], "marker": "D", "s": 70}
+
+
+def symbols_of(rubs: bool) -> dict[Status, tuple[str, dict[str, Any]]]:
+    """Return name and keywords of ``Axes.scatter`` of the statuses that points of a pair can have.
+
+    Args:
+        rubs: Whether the pair has friction.
+    """
+    if rubs:
+        return {status: (status.name.lower(), look) for status, look in SYMBOLS.items()}
+    return {Status.OPEN: ("open", SYMBOLS[Status.OPEN]), Status.SLIP: ("closed", CLOSED)}

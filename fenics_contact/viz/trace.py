@@ -32,6 +32,7 @@ class ContactTrace:
         slip: Largest slip of the last load step, [length].
         force: Normal force of the pair, a unit of thickness.
         shear: Sum of the tangential forces on the slave, a unit of thickness.
+        rubs: Whether the pair has friction.
     """
 
     name: str
@@ -46,6 +47,7 @@ class ContactTrace:
     slip: float
     force: float
     shear: float
+    rubs: bool
 
     def window(self, reach: float | None) -> tuple[float, float]:
         """Return the range of places to show: what is closed with room beside it, or as far as told."""
@@ -80,6 +82,7 @@ def contact_trace(state: State, pair: int) -> ContactTrace:
         f"{slave.body}, {slave.name}", axis, places, starts[1:] - 1, values[0], values[1], values[2],
         points, contact.status[chosen], float(np.abs(contact.slip[chosen]).max(initial=0.0)),
         float(contact.normal_force[chosen].sum()), float(shear.sum()),
+        state.scene.contacts[pair].has_friction,
     )  # fmt: skip
 
 

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from fenics_contact.contact import Status
 from fenics_contact.viz.colours import BLUE, GREY, INK, ORANGE, PALE
 from fenics_contact.viz.sheet import sheet
-from fenics_contact.viz.symbols import SYMBOLS, label_of
+from fenics_contact.viz.symbols import symbols_of
 from fenics_contact.viz.trace import ContactTrace
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.words import headline, written
@@ -31,7 +30,7 @@ class TractionLook:
 
 def draw_traction(trace: ContactTrace, target: Path, look: TractionLook) -> None:
     """Draw the pressure above and, where friction acts, the tangential traction on the slave below."""
-    units, rubs = look.units, bool(np.any(trace.bound > 0))
+    units, rubs = look.units, trace.rubs
     facts = f"largest pressure {written(float(trace.pressure.max()))} {units.stress}, "
     facts += f"normal force {written(trace.force)} {units.force}/{units.length}"
     if rubs:
@@ -85,14 +84,13 @@ def _symbols(axes: Any, trace: ContactTrace, values: np.ndarray) -> None:
     low, high = trace.window(None)
     seen = np.count_nonzero((trace.places > low) & (trace.places < high))
     size = float(np.clip(60 / max(seen, 1), 0.12, 0.6))
-    for status in Status:
+    for status, (name, look) in symbols_of(trace.rubs).items():
         chosen = trace.points[trace.status == status]
-        look = {**SYMBOLS[status], "s": size * SYMBOLS[status]["s"]}
         axes.scatter(
             trace.places[chosen],
             values[chosen],
-            label=label_of(status, len(chosen)),
+            label=f"{name} ({len(chosen)})",
             zorder=3,
             linewidths=0.6,
-            **look,
+            **{**look, "s": size * look["s"]},
         )

@@ -26,6 +26,7 @@ DEMOS: dict[str, tuple[dict[str, float | list[float]], set[str]]] = {
         {"pressure": 58.9595, "torque_limit": 33340.8},
         {"torque", "stress_fitted", "stress_turned", "contact", "decomposition"},
     ),
+    "patch_test": ({}, {"node", "mortar"}),
     "sheared_block": (
         {"plateau_over_bound": [0.992253, 0.999573, 0.999655], "dissipated_energy": 162.774},
         {"loop", "status", "stress"},
