@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fenics_contact.geometry.block import block, box_lattice
 from fenics_contact.geometry.cell_types import CELL_TYPES, CellType, cell_type_of
+from fenics_contact.geometry.chain import Chain, chain
 from fenics_contact.geometry.coincidence import merge_duplicate_nodes
 from fenics_contact.geometry.default_partition import default_partition, target_parts
 from fenics_contact.geometry.faces import boundary_faces, orient, vector_areas
@@ -38,6 +39,7 @@ __all__ = [
     "PULL_AXIS",
     "BodyMesh",
     "CellType",
+    "Chain",
     "DesignSurface",
     "Link",
     "LinkShape",
@@ -49,6 +51,7 @@ __all__ = [
     "box_lattice",
     "box_partition",
     "cell_type_of",
+    "chain",
     "chain_link",
     "check_face_connected",
     "check_one_piece",
