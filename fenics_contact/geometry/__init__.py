@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from fenics_contact.geometry.block import block, box_lattice
+from fenics_contact.geometry.bolted import bolt, drilled_plate
 from fenics_contact.geometry.cell_types import CELL_TYPES, CellType, cell_type_of
 from fenics_contact.geometry.chain import Chain, chain
 from fenics_contact.geometry.coincidence import merge_duplicate_nodes
 from fenics_contact.geometry.default_partition import default_partition, target_parts
+from fenics_contact.geometry.extrusion import extrude
 from fenics_contact.geometry.faces import boundary_faces, orient, vector_areas
 from fenics_contact.geometry.graph_partition import graph_partition
 from fenics_contact.geometry.half_disc import half_disc
@@ -47,6 +49,7 @@ __all__ = [
     "axial_clearance",
     "bisection_partition",
     "block",
+    "bolt",
     "boundary_faces",
     "box_lattice",
     "box_partition",
@@ -58,6 +61,8 @@ __all__ = [
     "check_penetration",
     "combine",
     "default_partition",
+    "drilled_plate",
+    "extrude",
     "graph_partition",
     "half_cylinder",
     "half_disc",

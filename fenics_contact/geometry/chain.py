@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -75,7 +76,7 @@ def chain(shapes: Sequence[LinkShape], *, gap: float = 0.0, comm: MPI.Comm | Non
             f"a chain needs at least two links, got {len(shapes)}: give the shape of every link, such as "
             "[LinkShape()] * 5"
         )
-    for number, (one, other) in enumerate(zip(shapes[:-1], shapes[1:], strict=True), 1):
+    for number, (one, other) in enumerate(pairwise(shapes), 1):
         check_fit(one, other, (f"link {number}", f"link {number + 1}"))
     faceting = max(shape.faceting for shape in shapes)
     check_penetration(gap, faceting)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -21,7 +23,7 @@ def test_neighbours_touch_and_all_others_are_apart(five: Chain) -> None:
     assert five.pairs == ((0, 1), (1, 2), (2, 3), (3, 4))
     assert five.clearances == pytest.approx([0.0] * 4, abs=1e-12)
     reach = [(link.mesh.points[:, 0].min(), link.mesh.points[:, 0].max()) for link in five.links]
-    assert all(low < high for (_, high), (low, _) in zip(reach[:-1], reach[1:], strict=True))
+    assert all(low < high for (_, high), (low, _) in pairwise(reach))
     assert all(high < low for (_, high), (low, _) in zip(reach[:-2], reach[2:], strict=True))
 
 
