@@ -1,7 +1,8 @@
 # `make demo` and `make test` do all the set-up they need on Debian 12 and 13; elsewhere name a Python that has FEniCSx:
 #     make demo PYTHON=/path/to/python
 
-SIZE ?= paper
+DEMO ?= chain_links
+SIZE ?=
 NP ?= 1
 BENCH ?= full
 PYTHON ?=
@@ -17,19 +18,23 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow benchmark lint setup
+.PHONY: help demo demos test test-slow benchmark lint setup
 
 help: ## Show this list
 	@echo "Targets:"
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 20
 	@echo "Settings:"
-	@echo "  SIZE=small|paper     size of the demo (paper)"
-	@echo "  NP=2                 MPI ranks of the demo (1)"
+	@echo "  DEMO=hertz_sphere    which demo (chain_links); all are in demos/"
+	@echo "  SIZE=small|paper     size of the chain links (paper)"
+	@echo "  NP=2                 MPI ranks of a demo (1)"
 	@echo "  BENCH=quick|full     small cases once, or all of them (full)"
 	@echo "  PYTHON=/some/python  use this Python and its FEniCSx instead of setting up .venv"
 
-demo: $(prepare) ## Optimise the contact shape of two chain links; results in output/chain_links/
-	$(launch) $(NP) $(python) demos/demo_chain_links.py --size $(SIZE)
+demo: $(prepare) ## Optimise the contact shape of two chain links, or run DEMO=...; results in output/
+	$(launch) $(NP) $(python) demos/demo_$(DEMO).py $(if $(SIZE),--size $(SIZE))
+
+demos: $(prepare) ## Run every demo
+	for demo in demos/demo_*.py; do $(launch) $(NP) $(python) $$demo || exit 1; done
 
 test: lint ## Check style and types, run the quick tests
 	$(launch) 1 $(python) -m pytest -m "not slow"

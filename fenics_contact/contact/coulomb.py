@@ -59,6 +59,10 @@ class FixedPoint:
         """Largest residual of an answer with the slip bound that belongs to its own normal force."""
         return self.solver.tolerance
 
+    def with_tolerance(self, tolerance: float) -> FixedPoint:
+        """Return the fixed point around its solver with another tolerance."""
+        return replace(self, solver=self.solver.with_tolerance(tolerance))
+
     def run(self, problem: DualProblem, law: SlipLaw, start: Start) -> DualSolution:
         """Solve from ``start``; called by `fenics_contact.qp.solve`. Collective.
 
@@ -100,7 +104,7 @@ class FixedPoint:
         """Return the solver of the next Tresca problem, given the error that its slip bound has anyway."""
         # The inner answers may be as bad as their tolerance; half of it is left to the fixed point.
         tolerance = max(0.5 * self.tolerance, min(self.loosest, self.forcing * residual))
-        return replace(self.solver, tolerance=tolerance)  # type: ignore[type-var]
+        return self.solver.with_tolerance(tolerance)
 
     def _failure(self, sequence: SlipBoundSequence, reached: float) -> str:
         needed = (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import clarabel
 import numpy as np
 import scipy.sparse as sp
 
@@ -109,6 +108,8 @@ def _infeasibility_ray(
     Returns:
         None if there is one, else the rigid motion that certifies that there is none.
     """
+    import clarabel  # not before some loaded body floats
+
     balance = sp.hstack([support, contact])
     n_normal, discs = torn.points.count, len(torn.frictional)
     first = support.shape[1]

@@ -12,7 +12,6 @@ from mpi4py import MPI
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.contact_points import ContactPoints, join_points, tangent_frames
 from fenics_contact.feti.copies import Tearing
-from fenics_contact.feti.mortar import mortar_coupling
 from fenics_contact.feti.projection import Projection, join, project
 from fenics_contact.feti.surface import FacetedSurface, faceted_surface, shape_functions
 from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie
@@ -123,6 +122,8 @@ def _by_mortar(
     comm: MPI.Comm,
 ) -> ContactPoints:
     """Let each slave node meet the mean of the master under its dual basis function. Collective."""
+    from fenics_contact.feti.mortar import mortar_coupling  # not before a pair asks for it
+
     found = mortar_coupling(slave, master, comm)
     kept = np.flatnonzero(movable[found.node])
     spread = sp.csr_matrix(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -51,51 +53,91 @@ class DirichletPreconditioner:
         self._Bt = self._B.T.tocsr()
         diagonal = numbering.to_owned(np.asarray(B.multiply(self._B).sum(axis=1)).ravel())
         self._equality = 1.0 / np.where(numbering.owned < n_gluing, diagonal, 1.0)
-        self._contact = _ContactBlock(B, self._B, numbering, n_gluing)
+        self._contact = _ContactBlock.of_rows(B, self._B, numbering, n_gluing)
 
     def __call__(self, residual: np.ndarray) -> np.ndarray:
         """Return M r for an owned vector. Collective."""
-        jump = self._Bt @ self._numbering.to_local(self._unweighted(residual))
-        force = self._B @ self._inverse.stiffen(jump)
-        return self._unweighted(self._numbering.to_owned(force))
+        return self._apply(residual, self._contact)
 
-    def _unweighted(self, x: np.ndarray) -> np.ndarray:
-        """Return (B D⁻¹ Bᵀ)⁻¹ x, owned. Collective."""
-        return self._contact.solve(self._equality * x)
+    def on_face(self, restriction: sp.csr_matrix) -> Callable[[np.ndarray], np.ndarray]:
+        """Return the preconditioner of a face, whose rows alone enter B D⁻¹ Bᵀ. Collective.
+
+        Rows that are not on the face would stiffen their neighbours, the more the stiffer the slave.
+
+        Args:
+            restriction: Z with orthonormal columns, shape (n_owned, n_face), owned.
+        """
+        contact = self._contact.on_face(restriction)
+        return lambda residual: self._apply(residual, contact)
+
+    def _apply(self, residual: np.ndarray, contact: _ContactBlock) -> np.ndarray:
+        jump = self._Bt @ self._numbering.to_local(contact.solve(self._equality * residual))
+        force = self._B @ self._inverse.stiffen(jump)
+        return self._equality * contact.solve(self._numbering.to_owned(force))
 
 
 class _ContactBlock:
-    """(B D⁻¹ Bᵀ)⁻¹ on contact rows by a sparse factor on every rank; other rows stay as they are.
+    """(B D⁻¹ Bᵀ)⁻¹ on rows of ties and contacts, by a sparse factor on every rank; others stay unchanged.
 
     Contact points are replicated as well; a message of one number a contact row is cheaper than the many of a
     factor that is spread over the ranks.
     """
 
     def __init__(
-        self, B: sp.csr_matrix, weighted: sp.csr_matrix, numbering: DualNumbering, n_gluing: int
+        self,
+        numbering: DualNumbering,
+        n_gluing: int,
+        gram: sp.csr_matrix,
+        basis: sp.csr_matrix | None = None,
     ) -> None:
-        self._comm = numbering.comm
+        """Factor the matrix, or its part on the columns of a basis, shape (n_rows, n_face)."""
+        self._numbering, self._n_gluing, self._gram, self._basis = numbering, n_gluing, gram, basis
         self._owned = np.flatnonzero(numbering.owned >= n_gluing)
         self._place = numbering.owned[self._owned] - n_gluing
-        self._count = numbering.total - n_gluing
-        if self._count == 0:
-            return
+        matrix = gram if basis is None else (basis.T @ gram @ basis).tocsr()
+        self._size = matrix.shape[0]
+        if self._size:
+            self._factor = Factor((matrix + REGULARISATION * sp.diags(matrix.diagonal())).tocsr())
+
+    @classmethod
+    def of_rows(
+        cls, B: sp.csr_matrix, weighted: sp.csr_matrix, numbering: DualNumbering, n_gluing: int
+    ) -> _ContactBlock:
+        """Gather B D⁻¹ Bᵀ of ties and contacts on every rank. Collective."""
         mine = np.flatnonzero(numbering.local_rows >= n_gluing)
         place = numbering.local_rows[mine] - n_gluing
         share = (B[mine] @ weighted[mine].T).tocoo()
         entries = (share.data, place[share.row], place[share.col])
         value, row, column = (
-            np.concatenate(part) for part in zip(*self._comm.allgather(entries), strict=True)
+            np.concatenate(part) for part in zip(*numbering.comm.allgather(entries), strict=True)
         )
-        gram = sp.csr_matrix((value, (row, column)), shape=(self._count, self._count))
-        self._factor = Factor((gram + REGULARISATION * sp.diags(gram.diagonal())).tocsr())
+        count = numbering.total - n_gluing
+        return cls(numbering, n_gluing, sp.csr_matrix((value, (row, column)), shape=(count, count)))
+
+    def on_face(self, restriction: sp.csr_matrix) -> _ContactBlock:
+        """Return the block of the rows of a face. Collective."""
+        mine = restriction[self._owned].tocoo()
+        used, column = np.unique(mine.col, return_inverse=True)
+        parts = self._numbering.comm.allgather((self._place[mine.row], column.ravel(), mine.data, len(used)))
+        starts = np.cumsum([0] + [part[3] for part in parts])
+        row = np.concatenate([part[0] for part in parts])
+        where = np.concatenate([part[1] + start for part, start in zip(parts, starts, strict=False)])
+        value = np.concatenate([part[2] for part in parts])
+        basis = sp.csr_matrix((value, (row, where)), shape=(self._gram.shape[0], int(starts[-1])))
+        return _ContactBlock(self._numbering, self._n_gluing, self._gram, basis)
 
     def solve(self, x: np.ndarray) -> np.ndarray:
-        if self._count == 0:
+        """Return the solution on these rows, zero on those that are not on the face. Collective."""
+        if self._gram.shape[0] == 0:
             return x
-        right, solution = np.zeros(self._count), np.empty(self._count)
+        right = np.zeros(self._gram.shape[0])
         right[self._place] = x[self._owned]
-        self._factor.solve(global_sum(self._comm, right), solution)
+        right = global_sum(self._numbering.comm, right)
+        right = right if self._basis is None else self._basis.T @ right
+        solution = np.empty(self._size)
+        if self._size:
+            self._factor.solve(right, solution)
+        solution = solution if self._basis is None else self._basis @ solution
         result = x.copy()
         result[self._owned] = solution[self._place]
         return result

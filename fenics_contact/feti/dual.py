@@ -14,6 +14,7 @@ from fenics_contact.feti.inverse import LocalKind, TornInverse, kernel_matrix
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.linalg import sweep
 from fenics_contact.qp import CoarseSpace, ContactLayout, DualProblem
+from fenics_contact.qp.scaling import EVEN, Scaling
 from fenics_contact.timing import PhaseTimer
 
 #: A resultant below this fraction of the loads' sum is rounding: the loads balance each other.
@@ -81,7 +82,9 @@ class DualSystem:
         self.kernel = previous.kernel
         with timer.phase("coarse space"):
             coarse = previous.problem.coarse.with_load(self._resultants(self.torn.numbering.comm))
-        self.problem = replace(previous.problem, operator=self.apply, coarse=coarse)
+            scaling = previous.problem.scaling
+            scaling = None if scaling is None else scaling.with_load(coarse.load)
+        self.problem = replace(previous.problem, operator=self.apply, coarse=coarse, scaling=scaling)
 
     def _set_up(self, timer: PhaseTimer) -> None:
         """Build coarse space and preconditioner. Collective."""
@@ -96,9 +99,10 @@ class DualSystem:
                 self.inverse, self._B_interface, self._compliance(), torn.numbering, torn.n_gluing
             )
             diagonal = self._diagonal()
+            scaling = self._scaling(coarse)
         nothing = np.zeros(len(torn.numbering.owned))
         self.problem = DualProblem(
-            comm, self.apply, nothing, coarse, self._layout(), diagonal, preconditioner
+            comm, self.apply, nothing, coarse, self._layout(), diagonal, preconditioner, scaling
         )
 
     def apply(self, multiplier: np.ndarray) -> np.ndarray:
@@ -171,6 +175,20 @@ class DualSystem:
         of_block = np.empty(int(decomposition.block_offset[-1]))
         of_block[decomposition.copy_block[here]] = 1.0 / decomposition.tearing.copy_stiffness[here]
         return of_block[self.inverse.interface // self.torn.dim]
+
+    def _scaling(self, coarse: CoarseSpace) -> Scaling | None:
+        """Return factors √(b·b / b·D⁻¹b) of the rows b of B, None where stiffness is even. Collective."""
+        B, numbering = self._B_interface, self.torn.numbering
+        squares = B.multiply(B)
+        plain, weighted = (
+            numbering.to_owned(np.asarray(squares @ weight)).clip(np.finfo(float).tiny)
+            for weight in (np.ones(B.shape[1]), self._compliance())
+        )
+        factor, layout = np.sqrt(plain / weighted), self._layout()
+        factor[layout.tangential] = factor[layout.tangential_frictional, None]
+        low = numbering.comm.allreduce(factor.min(initial=np.inf), op=MPI.MIN)
+        high = numbering.comm.allreduce(factor.max(initial=0.0), op=MPI.MAX)
+        return None if high - low <= EVEN * high else Scaling.build(factor / high, coarse)
 
     def _diagonal(self) -> np.ndarray:
         """Return the diagonal of F on contact rows, one elsewhere, owned. Collective."""

@@ -8,8 +8,10 @@ from fenics_contact.geometry.cell_types import CELL_TYPES, CellType, cell_type_o
 from fenics_contact.geometry.chain import Chain, chain
 from fenics_contact.geometry.coincidence import merge_duplicate_nodes
 from fenics_contact.geometry.default_partition import default_partition, target_parts
+from fenics_contact.geometry.dolfinx_import import from_dolfinx, read_xdmf
 from fenics_contact.geometry.extrusion import extrude
 from fenics_contact.geometry.faces import boundary_faces, orient, vector_areas
+from fenics_contact.geometry.gmsh_import import from_gmsh_model, read_msh
 from fenics_contact.geometry.graph_partition import graph_partition
 from fenics_contact.geometry.half_disc import half_disc
 from fenics_contact.geometry.hemisphere import half_cylinder, hemisphere
@@ -63,6 +65,8 @@ __all__ = [
     "default_partition",
     "drilled_plate",
     "extrude",
+    "from_dolfinx",
+    "from_gmsh_model",
     "graph_partition",
     "half_cylinder",
     "half_disc",
@@ -71,6 +75,8 @@ __all__ = [
     "merge_pieces",
     "mutual_clearance",
     "orient",
+    "read_msh",
+    "read_xdmf",
     "rectangle",
     "rectangle_lattice",
     "split_hexahedra",

@@ -85,6 +85,16 @@ CELL_TYPES = {cell.name: cell for cell in (TRIANGLE, QUADRILATERAL, TETRAHEDRON,
 """Name to type, all there are."""
 
 
+QUADRATIC = (
+    "quadratic cells are not supported: the contact constraints are one for every node and need nodal forces "
+    "that are positive under a uniform pressure, which those of quadratic facets are not; write the mesh "
+    "with linear cells (gmsh: Mesh.ElementOrder = 1)"
+)
+"""Why, and what to do."""
+
+_QUADRATIC_NODES = {2: (6, 9), 3: (10, 20, 27)}
+
+
 def cell_type_of(cells: np.ndarray, dim: int) -> CellType:
     """Return the type of cells; those of four nodes need the dimension to be told apart.
 
@@ -98,6 +108,8 @@ def cell_type_of(cells: np.ndarray, dim: int) -> CellType:
     for cell in CELL_TYPES.values():
         if cell.dim == dim and cells.ndim == 2 and cells.shape[1] == cell.vertices.shape[0]:
             return cell
+    if cells.ndim == 2 and cells.shape[1] in _QUADRATIC_NODES.get(dim, ()):
+        raise InvalidInputError(f"cells of {cells.shape[1]} nodes in {dim} dimensions: {QUADRATIC}")
     known = " or ".join(
         f"(n_cells, {cell.vertices.shape[0]}) for {cell.plural}"
         for cell in CELL_TYPES.values()

@@ -19,8 +19,8 @@ TARGET_NODES = {3: 700, 2: 1000}
 """Nodes of a subdomain by dimension: about 2000 displacements in both.
 
 In 3D these are 9 nodes along an edge, as in the published chain of links. As many displacements make 32 nodes
-along an edge in 2D: the matrices are as large, their factors sparser and the interface smaller, and the condition
-number grows with the logarithm, squared, of the cells along an edge only."""
+along an edge in 2D: the matrices are as large, their factors sparser and the interface smaller, and the
+condition number grows with the logarithm, squared, of the cells along an edge only."""
 
 _NODES_PER_CELL = {"hexahedron": 1.0, "tetrahedron": 1.0 / 5.5, "quadrilateral": 1.0, "triangle": 0.5}
 """In the interior of a large mesh; for tetrahedra as mesh generators make them (6 in a split hexahedron)."""
@@ -58,8 +58,8 @@ def default_partition(
     """Cut a body into as many subdomains as suit its size, and at least one for every rank.
 
     A structured mesh is cut into boxes where these have no more torn nodes in all than METIS's subdomains:
-    they are as good then, and all alike. A count like 7 would give slabs; METIS cuts those better. Only a body
-    with fewer cells than ranks gets fewer subdomains than there are ranks.
+    they are as good then, and all alike. A count like 7 would give slabs; METIS cuts those better. Only a
+    body with fewer cells than ranks gets fewer subdomains than there are ranks.
 
     Args:
         mesh: Any mesh that is connected through faces.

@@ -64,6 +64,17 @@ def gmsh_model(name: str) -> Iterator[ModuleType]:
                 gmsh.finalize()
 
 
+def running_gmsh() -> ModuleType | None:
+    """Return the module ``gmsh`` if it is initialised, else None.
+
+    Raises:
+        MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
+    """
+    with _interrupt_handler_kept():
+        gmsh = _import_gmsh()
+        return gmsh if _is_initialised(gmsh) else None
+
+
 def _initialise(gmsh: ModuleType) -> None:
     known = inspect.signature(gmsh.initialize).parameters
     gmsh.initialize(readConfigFiles=False, **({"interruptible": False} if "interruptible" in known else {}))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -68,6 +68,10 @@ class FaceNewton:
     patience: int = 6
     rescue: Smalse = field(default_factory=Smalse)
     rescue_products: int = 300
+
+    def with_tolerance(self, tolerance: float) -> FaceNewton:
+        """Return the solver with another tolerance."""
+        return replace(self, tolerance=tolerance)
 
     def run(self, problem: DualProblem, law: SlipLaw, start: Start) -> DualSolution:
         """Solve from ``start``; called by `solve`. Collective.

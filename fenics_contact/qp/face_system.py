@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from fenics_contact.qp.coarse import CoarseSpace, gram_matrix
 from fenics_contact.qp.face import Face
-from fenics_contact.qp.problem import DualProblem, Operator
+from fenics_contact.qp.problem import DualProblem, FacePreconditioner, Operator
 from fenics_contact.qp.reductions import Vector, global_sum
 
 
@@ -86,4 +86,7 @@ class FaceSystems:
         gram = self._equality_gram + gram_matrix(problem.comm, columns)
         load = coarse.load - coarse.apply(face.fixed)
         restricted = coarse.restricted(face.restriction, load, gram=gram)
-        return FaceSystem(problem.comm, face, self._operator, restricted, problem.preconditioner)
+        preconditioner = problem.preconditioner
+        if isinstance(preconditioner, FacePreconditioner):
+            preconditioner = preconditioner.on_face(face.restriction)
+        return FaceSystem(problem.comm, face, self._operator, restricted, preconditioner)

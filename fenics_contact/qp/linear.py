@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.qp.face_newton import FaceNewton
@@ -27,6 +27,10 @@ class ProjectedCG:
     tolerance: float = 1e-9
     max_products: int = 5000
     max_restarts: int = 10
+
+    def with_tolerance(self, tolerance: float) -> ProjectedCG:
+        """Return the solver with another tolerance."""
+        return replace(self, tolerance=tolerance)
 
     def run(self, problem: DualProblem, law: SlipLaw, start: Start) -> DualSolution:
         """Solve from ``start``; called by `solve`. Collective.

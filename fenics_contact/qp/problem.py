@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
+import scipy.sparse as sp
 from mpi4py import MPI
 
 from fenics_contact.errors import InfeasibleError, InvalidInputError, together
@@ -13,7 +16,21 @@ from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector, global_sum
 
+if TYPE_CHECKING:
+    from fenics_contact.qp.scaling import Scaling
+
 Operator = Callable[[Vector], Vector]
+
+
+@runtime_checkable
+class FacePreconditioner(Protocol):
+    """A preconditioner that can do better where it knows which multipliers are free."""
+
+    def __call__(self, residual: Vector) -> Vector:
+        """Approximate F⁻¹ r, owned. Collective."""
+
+    def on_face(self, restriction: sp.csr_matrix) -> Operator:
+        """Return the preconditioner of the face with basis Z, shape (n_owned, n_face). Collective."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +48,7 @@ class DualProblem:
         layout: Positions of normal and tangential multipliers.
         diagonal: Approximate positive diagonal of F, owned, shape (size,); only contact rows are used.
         preconditioner: Approximation of F⁻¹, symmetric positive definite, owned to owned, collective.
+        scaling: Factors of multipliers between parts of different stiffness, or None.
     """
 
     comm: MPI.Comm
@@ -40,6 +58,12 @@ class DualProblem:
     layout: ContactLayout
     diagonal: Vector
     preconditioner: Operator | None = None
+    scaling: Scaling | None = None
+
+    @cached_property
+    def evened(self) -> DualProblem:
+        """The problem in multipliers scaled by `scaling`, itself where there is none."""
+        return self if self.scaling is None else self.scaling.applied_to(self)
 
     def dot(self, x: Vector, y: Vector) -> float:
         """Return the global inner product of two owned vectors. Collective."""

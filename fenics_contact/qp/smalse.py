@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -49,6 +49,10 @@ class Smalse:
     loosest: float = 0.1
     balance_reduction: float = 0.1
     mpgp: Mpgp = field(default_factory=Mpgp)
+
+    def with_tolerance(self, tolerance: float) -> Smalse:
+        """Return the solver with another tolerance."""
+        return replace(self, tolerance=tolerance)
 
     def run(self, problem: DualProblem, law: SlipLaw, start: Start) -> DualSolution:
         """Solve from ``start``; called by `solve`. Collective.

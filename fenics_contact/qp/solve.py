@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -13,7 +14,10 @@ from fenics_contact.qp.problem import CountedOperator, DualProblem
 from fenics_contact.qp.reductions import Vector
 from fenics_contact.qp.rigid import fit_rigid_motions
 from fenics_contact.qp.slip_law import Coulomb, SlipLaw, Tresca
-from fenics_contact.qp.solution import DualSolution
+from fenics_contact.qp.solution import DualSolution, SolverStep
+
+#: How often a solution in scaled multipliers is made more accurate before it is given up.
+SCALED_ATTEMPTS = 4
 
 
 class DualSolver(Protocol):
@@ -22,6 +26,9 @@ class DualSolver(Protocol):
     @property
     def tolerance(self) -> float:
         """Largest relative residual of an answer."""
+
+    def with_tolerance(self, tolerance: float) -> DualSolver:
+        """Return the solver with another tolerance."""
 
     def run(self, problem: DualProblem, law: SlipLaw, start: Start) -> DualSolution:
         """Solve from ``start`` or raise `ConvergenceError`. Collective."""
@@ -58,6 +65,8 @@ def solve(
     problem.check()
     with together(problem.comm):
         law = _slip_law(problem, slip_bound, friction_coefficient)
+    if problem.scaling is not None:
+        return _solve_scaled(problem, law, slip_bound, solver, start, friction_coefficient)
     if start is None:
         require_equilibrium(problem, law)
     solution = solver.run(problem, law, _begin(problem, law, start))
@@ -68,6 +77,35 @@ def solve(
             solution.history,
         )
     return solution
+
+
+def _solve_scaled(
+    problem: DualProblem,
+    law: SlipLaw,
+    slip_bound: Vector | None,
+    solver: DualSolver,
+    start: DualSolution | Vector | None,
+    friction_coefficient: Vector | None,
+) -> DualSolution:
+    """Solve in scaled multipliers until the residuals of the unscaled ones are small, too. Collective."""
+    scaling = problem.scaling
+    assert scaling is not None
+    bound, begin = scaling.bound(problem, slip_bound), scaling.start(problem, start)
+    tolerance, products = solver.tolerance, 0
+    history: tuple[SolverStep, ...] = ()
+    for _ in range(SCALED_ATTEMPTS):
+        stricter = solver.with_tolerance(tolerance)
+        begin = solve(problem.evened, bound, stricter, begin, friction_coefficient=friction_coefficient)
+        products, history = products + begin.products, (*history, *begin.history)
+        solution = scaling.solution(problem, law, begin)
+        if solution.residuals.within(solver.tolerance):
+            return replace(solution, products=products, iterations=len(history), history=history)
+        tolerance *= 0.3 * solver.tolerance / solution.residuals.worst
+    raise ConvergenceError(
+        f"a solution needs residuals below {solver.tolerance:.1e}, got {solution.residuals} after "
+        f"{SCALED_ATTEMPTS} attempts with ever stricter scaled ones: loosen the tolerance",
+        history,
+    )
 
 
 def _slip_law(

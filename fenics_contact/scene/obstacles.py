@@ -49,6 +49,11 @@ class RigidPlane:
         direction = unit_vector("RigidPlane.normal", self.normal, len(self.point))
         object.__setattr__(self, "normal", direction)
 
+    @property
+    def dim(self) -> int:
+        """Dimension of the space that it divides."""
+        return len(self.point)
+
     def distance(self, points: np.ndarray) -> np.ndarray:
         """Return n·(x − point)."""
         return np.asarray((points - np.asarray(self.point)) @ np.asarray(self.normal))
@@ -118,6 +123,11 @@ class RigidSphere(_Round):
         _require_place(self, self.centre)
         _require_radius(self, self.radius)
 
+    @property
+    def dim(self) -> int:
+        """Dimension of the space that it lies in."""
+        return len(self.centre)
+
     def _arm(self, points: np.ndarray) -> np.ndarray:
         return np.asarray(points - np.asarray(self.centre))
 
@@ -143,6 +153,11 @@ class RigidCylinder(_Round):
         object.__setattr__(self, "axis", unit_vector("RigidCylinder.axis", self.axis, 3))
         _require_place(self, self.point, (3,))
         _require_radius(self, self.radius)
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space that it lies in: 3."""
+        return 3
 
     def _arm(self, points: np.ndarray) -> np.ndarray:
         return np.asarray((points - np.asarray(self.point)) @ self._across(3))

@@ -13,6 +13,7 @@ from fenics_contact.scene.body import Body
 from fenics_contact.scene.effects import Effect, effects_of
 from fenics_contact.scene.loads import Load, SurfaceLoad, ThermalStrain
 from fenics_contact.scene.materials import can_expand
+from fenics_contact.scene.obstacles import RigidObstacle
 from fenics_contact.scene.pairs import ContactPair, Surface, Tie
 from fenics_contact.scene.plan import Plan, make_plan
 from fenics_contact.scene.supports import Support
@@ -54,6 +55,8 @@ class Scene:
             self._require(pair.slave.body, pair.slave.name, f"{kind}.slave")
             if isinstance(pair.master, Surface):
                 self._require(pair.master.body, pair.master.name, f"{kind}.master")
+            else:
+                self._require_dimension(pair.master)
 
     def _require(self, body: str, surface: str | None, user: str) -> None:
         if body not in self.bodies:
@@ -77,6 +80,16 @@ class Scene:
             raise InvalidInputError(
                 f"{type(part).__name__}.value of body {part.body!r} must hold {needed}, got {part.value!r}: "
                 f"give {dim} of them"
+            )
+
+    def _require_dimension(self, obstacle: RigidObstacle) -> None:
+        """Refuse an obstacle of another dimension than the bodies'; one that does not tell may be of any."""
+        dim = getattr(obstacle, "dim", self.dim)
+        if dim != self.dim:
+            raise InvalidInputError(
+                f"an obstacle must lie in the space of the bodies, {type(obstacle).__name__} is for {dim} "
+                f"dimensions and the bodies have {self.dim}: give it {self.dim} coordinates, or in the plane "
+                "a RigidSphere for a round bar"
             )
 
     def _require_expansion(self, load: ThermalStrain) -> None:

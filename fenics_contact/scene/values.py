@@ -18,6 +18,9 @@ OfPosition = Callable[[np.ndarray], np.ndarray]
 class Ufl:
     """A value written in UFL: compiled into the form and evaluated at its quadrature points.
 
+    Numbers in it are compiled in, too: for a load that changes from step to step a function of position,
+    which needs no compiler, is cheaper. Only numbers and UFL can be differentiated by the shape of a body.
+
     Attributes:
         function: Takes the spatial coordinate (UFL), returns a UFL vector or scalar.
 

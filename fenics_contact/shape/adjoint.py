@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fenics_contact.contact import State
 from fenics_contact.errors import ConvergenceError
-from fenics_contact.qp import CoupledSystem, FaceSystems, Stop, projected_gmres
+from fenics_contact.qp import CoupledSystem, DualProblem, Face, FaceSystems, Stop, projected_gmres
 from fenics_contact.shape.linearised_face import LinearisedFace
 from fenics_contact.shape.objective import Partials
 
@@ -55,8 +55,9 @@ def solve_adjoint(
     Raises:
         ConvergenceError: If the face does not hold every body, or the tolerance was not reached.
     """
-    system, problem = state.dual, state.dual.problem
-    face_system = FaceSystems(problem, system.apply).build(linearised.face)
+    system = state.dual
+    problem, face, factor = _evened_out(system.problem, linearised.face)
+    face_system = FaceSystems(problem, problem.operator).build(face)
     transposed = CoupledSystem.build(face_system, problem.coarse, linearised.moving, linearised.tested)
     if transposed is None:
         raise ConvergenceError(
@@ -64,11 +65,11 @@ def solve_adjoint(
             "without resistance: choose WeakChoice.HELD, or a design away from this one"
         )
     flexed = system.inverse(partials.by_displacement)
-    right = linearised.moving.T @ (system.jump(flexed) - partials.by_multiplier)
+    right = linearised.moving.T @ (factor * (system.jump(flexed) - partials.by_multiplier))
     load = np.asarray(problem.comm.allreduce(system.kernel.T @ partials.by_displacement))
     # At a minimum of the energy without slip the adjoint multiplier is minus the multiplier itself.
-    start = transposed.balanced(-(linearised.tested.T @ state.solution.multiplier), load)
-    gradient = transposed.operate(start, system.apply(linearised.tested @ start)) - right
+    start = transposed.balanced(-(linearised.tested.T @ (state.solution.multiplier / factor)), load)
+    gradient = transposed.operate(start, problem.operator(linearised.tested @ start)) - right
     scale = max(problem.norm(transposed.oblique(right)), problem.norm(transposed.oblique(gradient)))
     weights = np.ones(len(start))
     solved = projected_gmres(transposed, gradient, weights, tolerance * scale, max_iterations)
@@ -78,8 +79,20 @@ def solve_adjoint(
             f"{solved.measure / scale:.1e} after {solved.iterations} iterations ({solved.stop.value}): "
             "raise max_iterations or loosen the tolerance"
         )
-    multiplier = linearised.tested @ (start + solved.step)
+    multiplier = factor * (linearised.tested @ (start + solved.step))
     final = gradient + transposed.operate(solved.step, solved.product)
     beta = transposed.oblique.coefficients(final)
     displacement = system.inverse(partials.by_displacement - system.force(multiplier)) + system.kernel @ beta
     return Adjoint(displacement, multiplier, solved.iterations)
+
+
+def _evened_out(problem: DualProblem, face: Face) -> tuple[DualProblem, Face, np.ndarray | float]:
+    """Return problem and face in multipliers scaled by stiffness, and the factors, see `Scaling`.
+
+    The factors are even within a contact, so that both bases of a face stay what they are.
+    """
+    if problem.scaling is None:
+        return problem, face, 1.0
+    factor = problem.scaling.factor
+    flexibility = face.flexibility * factor[problem.layout.tangential[:, 0]] ** 2
+    return problem.evened, replace(face, flexibility=flexibility), factor

@@ -123,12 +123,7 @@ def work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndar
     Raises:
         InvalidInputError: If a load on a body that moves is a function of position without a derivative.
     """
-    loads = [
-        load
-        for load in torn.scene.loads
-        if isinstance(load, VolumeLoad) and _moves(torn, load.body, forms.moving)
-    ]
-    check_differentiable(loads)
+    loads = moving_loads(torn, forms.moving)
     for name, body in torn.scene.bodies.items():  # all ranks compile, also for bodies they hold no part of
         for materials in possible(body):
             forms.virtual_work_by_shape(materials, body.mesh.cell_type)
@@ -153,11 +148,27 @@ def work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndar
     return sum_over_subdomains(torn, [u, w], on_subdomain, forms.moving)
 
 
-def _moves(torn: TornSystem, body: str, moving: np.ndarray | None) -> bool:
-    if moving is None:
-        return True
-    nodes = np.arange(torn.scene.bodies[body].mesh.n_nodes)
-    return bool(moving[torn.decomposition.tearing.global_nodes(body, nodes)].any())
+def moving_loads(torn: TornSystem, moving: np.ndarray | None) -> list[Load]:
+    """Return the loads that act on moving volumes.
+
+    Args:
+        torn: The torn system.
+        moving: Marks of nodes of all bodies, or None for all.
+
+    Raises:
+        InvalidInputError: If one of them has no derivative.
+    """
+    tearing = torn.decomposition.tearing
+
+    def moves(body: str) -> bool:
+        nodes = np.arange(torn.scene.bodies[body].mesh.n_nodes)
+        return moving is None or bool(moving[tearing.global_nodes(body, nodes)].any())
+
+    loads: list[Load] = [
+        load for load in torn.scene.loads if isinstance(load, VolumeLoad) and moves(load.body)
+    ]
+    check_differentiable(loads)
+    return loads
 
 
 def check_differentiable(loads: Sequence[Load]) -> None:

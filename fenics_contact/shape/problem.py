@@ -21,6 +21,7 @@ from fenics_contact.shape.forms import ShapeForms, work_by_shape
 from fenics_contact.shape.linearised_face import WeakChoice, WeakPoints, linearise_face
 from fenics_contact.shape.motion import HarmonicExtension
 from fenics_contact.shape.objective import Objective
+from fenics_contact.shape.pairs import check_pairs
 from fenics_contact.shape.volume import volume_by_points
 from fenics_contact.timing import PhaseTimer
 
@@ -101,10 +102,16 @@ class ShapeProblem:
         self.last: DesignPoint | None = None
         self._previous: State | None = None
         self._forms: ShapeForms | None = None
+        if scene.dim != 3:
+            raise InvalidInputError(
+                "shape problems are three-dimensional, the scene is plane: give it the thickness of one "
+                "layer of cells between symmetry planes"
+            )
         with self._timer.phase("decompose"):
             self.decomposition = decompose(scene, partitions, comm)
         with self._timer.phase("mesh motion"):
             self._motions = [self._motion(design) for design in self.designs]
+        check_pairs(scene, self._moving_nodes())
 
     @property
     def size(self) -> int:
@@ -236,13 +243,15 @@ class ShapeProblem:
 
     def _shape_forms(self, state: State) -> ShapeForms:
         if self._forms is None:
-            tearing = self.decomposition.tearing
-            moving = np.zeros(int(tearing.node_offset[-1]), dtype=bool)
-            for design, motion in zip(self.designs, self._motions, strict=True):
-                nodes = np.arange(self.scene.bodies[design.body].mesh.n_nodes)
-                moving[tearing.global_nodes(design.body, np.setdiff1d(nodes, motion.held))] = True
-            self._forms = ShapeForms(state.torn, moving)
+            self._forms = ShapeForms(state.torn, np.concatenate(list(self._moving_nodes().values())))
         return self._forms
+
+    def _moving_nodes(self) -> dict[str, np.ndarray]:
+        """Return which nodes of each body the designs move, body name -> marks, shape (n_nodes,)."""
+        moving = {name: np.zeros(body.mesh.n_nodes, dtype=bool) for name, body in self.scene.bodies.items()}
+        for design, motion in zip(self.designs, self._motions, strict=True):
+            moving[design.body][np.setdiff1d(np.arange(len(moving[design.body])), motion.held)] = True
+        return moving
 
     def _motion(self, design: SurfaceDesign) -> HarmonicExtension:
         scene, name = self.scene, design.body

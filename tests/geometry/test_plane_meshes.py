@@ -25,6 +25,7 @@ from fenics_contact.geometry import (
 from fenics_contact.geometry.cell_types import CELL_TYPES, QUADRILATERAL
 from fenics_contact.geometry.faces import cell_faces, neighbours
 from fenics_contact.geometry.quality import jacobian_ratio, jacobians, scaled_jacobian, volume
+from fenics_contact.geometry.structured import structured_cells
 
 CELLS = ["quadrilateral", "triangle"]
 NORMALS = {"x0": [-3, 0], "x1": [3, 0], "y0": [0, -2], "y1": [0, 2]}
@@ -238,3 +239,13 @@ def test_a_half_disc_is_round_rests_on_the_origin_and_has_good_cells(symmetry: s
     whole = np.pi * 2.0 if not symmetry else np.pi
     coarse, fine = (1.0 - half_disc(2.0, n, symmetry=symmetry).volume / whole for n in (6, 12))
     assert np.log2(coarse / fine) == pytest.approx(2.0, abs=0.25)
+
+
+def test_a_closed_lattice_of_two_directions_is_a_ring() -> None:
+    cells, grid = structured_cells((6, 1), closed=True)
+    angle = np.repeat(np.arange(6) * np.pi / 3.0, 2)
+    radius = np.tile([2.0, 1.0], 6)  # inwards: counter-clockwise cells
+    ring = BodyMesh(radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]), cells, grid=grid)
+    assert (ring.n_nodes, ring.n_cells) == (12, 6)
+    assert ring.volume == pytest.approx(0.5 * 6 * np.sin(np.pi / 3.0) * (4.0 - 1.0))
+    assert boundary_faces(ring.cells, dim=2)[0].shape == (12, 2)

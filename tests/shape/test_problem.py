@@ -11,7 +11,8 @@ from mpi4py import MPI
 
 from fenics_contact.contact import ContactResult
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
-from fenics_contact.scene import Coulomb, Scene
+from fenics_contact.geometry import rectangle
+from fenics_contact.scene import Body, Coulomb, PlaneStrain, Scene, Surface, Tie
 from fenics_contact.shape import ContactForces, ShapeProblem, SurfaceDesign, TotalPotential, VolumeIntegral
 from tests.contact.gallery import partitions
 from tests.shape.blocks import block_on_block, designs_of, problem, side
@@ -145,3 +146,25 @@ def test_evaluations_and_products_are_counted_and_the_best_design_is_kept() -> N
     assert value == pytest.approx(values[0], rel=1e-5)
     assert gradient.shape == (12,)
     assert {"decompose", "mesh motion", "solve", "adjoint", "gradient"} <= set(blocks.seconds)
+
+
+def test_a_surface_of_mortar_contact_may_not_move_and_one_by_nodes_may() -> None:
+    by_mortar = replace(scene(), contacts=[replace(scene().contacts[0], discretisation="mortar")])
+    message = r"mortar contact pair 0 lies on 'z0' of body 'upper', of which \d+ nodes move: use discr"
+    with pytest.raises(InvalidInputError, match=message):
+        ShapeProblem(by_mortar, partitions(scene()), designs_of(scene()), TotalPotential(), MPI.COMM_SELF)
+    assert fresh().size == 12
+
+
+def test_a_tied_surface_may_not_move() -> None:
+    tied = replace(scene(), contacts=[], ties=[Tie(Surface("upper", "z0"), Surface("lower", "z1"))])
+    with pytest.raises(
+        InvalidInputError, match=r"tie 0 lies on 'z0' of body 'upper', of which \d+ nodes move"
+    ):
+        ShapeProblem(tied, partitions(scene()), designs_of(scene()), TotalPotential(), MPI.COMM_SELF)
+
+
+def test_a_plane_scene_is_refused() -> None:
+    plate = Scene({"plate": Body(rectangle((0, 0), (1, 1), (2, 2)), PlaneStrain(1.0, 0.3))})
+    with pytest.raises(InvalidInputError, match="shape problems are three-dimensional, the scene is plane"):
+        ShapeProblem(plate, {"plate": np.zeros(4, dtype=int)}, (), TotalPotential(), MPI.COMM_SELF)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.feti.surface import FacetedSurface, faceted_surface
-from fenics_contact.geometry import BodyMesh, block
+from fenics_contact.geometry import BodyMesh, block, rectangle
 from fenics_contact.shape.surface_derivative import areas_pulled_back, normals_pulled_back
 from fenics_contact.shape.volume import volume_by_points
 
@@ -73,3 +73,15 @@ def test_inner_nodes_do_not_change_the_volume(cell: str) -> None:
     assert len(inside) > 5
     assert np.all(gradient[inside] == 0.0)
     assert np.abs(gradient[outside]).max(axis=1).min() > 1e-3
+
+
+@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+def test_the_area_of_a_plane_body_agrees_with_central_differences(cell: str) -> None:
+    rng = np.random.default_rng(3)
+    mesh = rectangle((0.0, 0.0), (2.0, 1.5), (4, 3), cell)
+    mesh = mesh.moved(mesh.points + 0.04 * rng.standard_normal(mesh.points.shape))
+    move = rng.standard_normal(mesh.points.shape)
+    up, down = (mesh.moved(mesh.points + sign * STEP * move).volume for sign in (1, -1))
+    adjoint = np.sum(volume_by_points(mesh) * move)
+    assert abs(adjoint) > 0.1
+    assert adjoint == pytest.approx((up - down) / (2 * STEP), rel=1e-7)

@@ -16,9 +16,9 @@ from fenics_contact.scene.materials.voigt import (
     as_tensor,
     checked_stiffness,
     rotated_stiffness,
-    strain_rotation,
     strain_vector,
     symmetric_product,
+    thermal_stresses,
     upper_triangle,
 )
 
@@ -119,11 +119,7 @@ class OrthotropicElasticity(Elasticity):
     def parameters(self) -> tuple[float, ...]:
         """Upper triangle of the stiffness matrix, and the thermal stress a degree where it was given."""
         C = self.stiffness_matrix
-        if self.thermal_expansion is None:
-            return upper_triangle(C)
-        along = np.array([*self.thermal_expansion, 0.0, 0.0, 0.0])
-        expansion = np.linalg.solve(strain_rotation(np.array(self.orientation)), along)
-        return (*upper_triangle(C), *(float(value) for value in C @ expansion))
+        return upper_triangle(C) + thermal_stresses(C, np.array(self.orientation), self.thermal_expansion)
 
     def stress(self, u: Any, parameters: Any) -> Any:
         """Return C : ε(u)."""
@@ -143,17 +139,23 @@ class OrthotropicPlaneStress(Elasticity):
         poisson_ratio: ν_12, dimensionless.
         shear_modulus: G_12 > 0, [force / length²].
         angle: From the x-axis to material axis 1, counterclockwise, in radians.
+        thermal_expansion: Strain a degree along the material axes, or None for a body that no temperature
+            changes.
     """
 
     young_moduli: tuple[float, float]
     poisson_ratio: float
     shear_modulus: float
     angle: float = 0.0
+    thermal_expansion: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         """Refuse constants for which the energy is not positive."""
         moduli = numbers("young_moduli", self.young_moduli, 2, "give those of the axes 1 and 2")
         object.__setattr__(self, "young_moduli", moduli)
+        if self.thermal_expansion is not None:
+            values = numbers("thermal_expansion", self.thermal_expansion, 2, "give those of the axes 1 and 2")
+            object.__setattr__(self, "thermal_expansion", values)
         others = (self.poisson_ratio, self.shear_modulus, self.angle)
         if not np.isfinite(others).all() or min(*moduli, self.shear_modulus) <= 0:
             raise InvalidInputError(
@@ -174,14 +176,28 @@ class OrthotropicPlaneStress(Elasticity):
         (E1, E2), coupling = self.young_moduli, -self.poisson_ratio / self.young_moduli[0]
         compliance = np.array([[1 / E1, coupling, 0], [coupling, 1 / E2, 0], [0, 0, 1 / self.shear_modulus]])
         constants = f"young_moduli {self.young_moduli} with poisson_ratio {self.poisson_ratio}"
+        return rotated_stiffness(checked_stiffness(compliance, constants), self._axes)
+
+    @property
+    def _axes(self) -> np.ndarray:
         c, s = np.cos(self.angle), np.sin(self.angle)
-        return rotated_stiffness(checked_stiffness(compliance, constants), np.array([[c, s], [-s, c]]))
+        return np.array([[c, s], [-s, c]])
+
+    @property
+    def expands(self) -> bool:
+        """Whether thermal expansions were given."""
+        return self.thermal_expansion is not None
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """Upper triangle of the stiffness matrix."""
-        return upper_triangle(self.stiffness_matrix)
+        """Upper triangle of the stiffness matrix, and the thermal stress a degree where it was given."""
+        C = self.stiffness_matrix
+        return upper_triangle(C) + thermal_stresses(C, self._axes, self.thermal_expansion)
 
     def stress(self, u: Any, parameters: Any) -> Any:
         """Return C : ε(u)."""
-        return as_tensor(symmetric_product(parameters, strain_vector(strain(u), 2)), 2)
+        return as_tensor(symmetric_product(parameters[:6], strain_vector(strain(u), 2)), 2)
+
+    def thermal_stress(self, parameters: Any) -> Any:
+        """Return C : α, with the expansions as a strain."""
+        return as_tensor(list(parameters[6:]), 2)

@@ -60,6 +60,23 @@ def strain_rotation(axes: np.ndarray) -> np.ndarray:
     return T
 
 
+def thermal_stresses(
+    C: np.ndarray, axes: np.ndarray, expansion: tuple[float, ...] | None
+) -> tuple[float, ...]:
+    """Return C : α in Voigt order, nothing without an expansion.
+
+    Args:
+        C: Stiffness in the scene's axes, Voigt.
+        axes: Material axes as rows, shape (dim, dim).
+        expansion: α along them.
+    """
+    if expansion is None:
+        return ()
+    along = np.zeros(len(C))
+    along[: len(axes)] = expansion
+    return tuple(float(value) for value in C @ np.linalg.solve(strain_rotation(axes), along))
+
+
 def checked_stiffness(compliance: np.ndarray, constants: str) -> np.ndarray:
     """Invert a compliance matrix, shape (n, n).
 

@@ -1,0 +1,160 @@
+"""Meshes that dolfinx reads from files or has in memory, as plain arrays; knows dolfinx's versions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_contact import _dolfinx  # imports dolfinx first and undoes what that leaves behind
+from fenics_contact.errors import InvalidInputError
+
+import dolfinx.io  # isort: skip
+from dolfinx import cpp  # isort: skip
+
+__all__ = ["MeshArrays", "TagArrays", "mesh_arrays", "read_mesh", "read_tags", "tag_arrays"]
+
+#: Vertex order of VTK -> tensor-product order of dolfinx; each permutation is its own inverse.
+_VERTEX_ORDER = {"hexahedron": [0, 1, 3, 2, 4, 5, 7, 6], "quadrilateral": [0, 1, 3, 2]}
+_VERTICES = {"triangle": 3, "quadrilateral": 4, "tetrahedron": 4, "hexahedron": 8, "prism": 6, "pyramid": 5}
+
+
+@dataclass(frozen=True, eq=False)
+class MeshArrays:
+    """A mesh on one rank.
+
+    Attributes:
+        cell_type: dolfinx's name of the cells.
+        dim: Topological dimension of the cells.
+        points: Coordinates, (n_nodes, geometric dimension), in the order they were handed to dolfinx.
+        cells: Node numbers, (n_cells, nodes of a cell), in the order they were handed to dolfinx; vertices in
+            VTK order where the cells are linear.
+        linear: Whether a cell has no nodes but its vertices.
+        node: Number of every node of dolfinx's geometry among ``points``.
+        cell: Number of every cell of dolfinx's topology among ``cells``.
+    """
+
+    cell_type: str
+    dim: int
+    points: np.ndarray
+    cells: np.ndarray
+    linear: bool
+    node: np.ndarray
+    cell: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class TagArrays:
+    """Tags on cells or facets of one mesh.
+
+    Attributes:
+        entities: Cell numbers, (n,), or node numbers of facets in any order, (n, nodes of a facet).
+        values: Their tags, (n,).
+    """
+
+    entities: np.ndarray
+    values: np.ndarray
+
+
+def read_mesh(path: Path, name: str, inline: bool) -> Any:
+    """Read a grid of an XDMF file onto this rank alone.
+
+    Args:
+        path: The file.
+        name: Name of the grid.
+        inline: Whether the numbers are in the file itself and not in an HDF5 file beside it.
+
+    Raises:
+        InvalidInputError: If a node belongs to no cell, at which dolfinx 0.5 ends the whole process.
+    """
+    with _opened(path, inline) as file:
+        n_nodes = len(file.read_geometry_data(name, "/Xdmf/Domain"))
+        used = np.unique(file.read_topology_data(name, "/Xdmf/Domain"))
+        unused = np.setdiff1d(np.arange(n_nodes), used)
+        if unused.size:
+            raise InvalidInputError(
+                f"every node must belong to a cell, {unused.size} of {n_nodes} in grid '{name}' of "
+                f"file '{path}' "
+                f"do not, first node {unused[0]}: remove them (meshio: mesh.remove_orphaned_nodes())"
+            )
+        return file.read_mesh(name=name)
+
+
+def read_tags(path: Path, mesh: Any, name: str, inline: bool, own_points: bool) -> Any:
+    """Read the first attribute of a grid of an XDMF file as tags on ``mesh``.
+
+    Args:
+        path: As in `read_mesh`.
+        mesh: The mesh.
+        name: As in `read_mesh`.
+        inline: As in `read_mesh`.
+        own_points: Whether the grid has points of its own, which must be those of the mesh then.
+
+    Raises:
+        InvalidInputError: If the points are others, or some of the tagged cells or facets are not in the
+            mesh.
+    """
+    tdim = mesh.topology.dim
+    mesh.topology.create_connectivity(tdim - 1, tdim)
+    with _opened(path, inline) as file:
+        if own_points:
+            _check_points(mesh, file.read_geometry_data(name, "/Xdmf/Domain"), path)
+        tagged = len(file.read_topology_data(name, "/Xdmf/Domain"))
+        tags = file.read_meshtags(mesh, name=name)
+    if len(tags.indices) != tagged:
+        raise InvalidInputError(
+            f"tags must be on cells or facets of the mesh, {tagged - len(tags.indices)} of {tagged} in grid "
+            f"'{name}' of file '{path}' are on none: write both files from one mesh, with all its nodes"
+        )
+    return tags
+
+
+def _check_points(mesh: Any, points: np.ndarray, path: Path) -> None:
+    """Refuse tags on other nodes: they would be taken for those with the same numbers."""
+    own = np.empty((len(mesh.geometry.x), mesh.geometry.dim))
+    own[mesh.geometry.input_global_indices] = mesh.geometry.x[:, : mesh.geometry.dim]
+    if own.shape != points.shape or not np.allclose(own, points, rtol=0.0, atol=1e-8 * np.abs(own).max()):
+        raise InvalidInputError(
+            f"the facets of file '{path}' must be on the nodes of the mesh, they are on {len(points)} "
+            f"nodes of "
+            f"their own, the mesh has {len(own)}: write both files with all nodes, in the same order"
+        )
+
+
+def _opened(path: Path, inline: bool) -> Any:
+    kind = dolfinx.io.XDMFFile
+    encoding = kind.Encoding.ASCII if inline else kind.Encoding.HDF5
+    return kind(MPI.COMM_SELF, str(path), "r", encoding)
+
+
+def mesh_arrays(mesh: Any) -> MeshArrays:
+    """Take the arrays out of a mesh on one rank."""
+    topology, geometry = mesh.topology, mesh.geometry
+    n_cells = topology.index_map(topology.dim).size_local
+    name = topology.cell_name()
+    node = np.argsort(np.argsort(geometry.input_global_indices))
+    cell = np.argsort(np.argsort(topology.original_cell_index[:n_cells]))
+    dofmap = np.asarray(getattr(geometry.dofmap, "array", geometry.dofmap)).reshape(n_cells, -1)
+    cells = np.empty(dofmap.shape, dtype=np.int64)
+    cells[cell] = node[dofmap]
+    linear = cells.shape[1] == _VERTICES.get(name)
+    points = np.empty((node.size, geometry.dim))
+    points[node] = geometry.x[:, : geometry.dim]
+    if linear:
+        cells = cells[:, _VERTEX_ORDER.get(name, slice(None))]
+    return MeshArrays(name, topology.dim, points, cells, linear, node, cell)
+
+
+def tag_arrays(mesh: Any, arrays: MeshArrays, tags: Any) -> TagArrays:
+    """Take the arrays out of tags on the cells or facets of a mesh on one rank."""
+    if tags.dim == arrays.dim:
+        return TagArrays(arrays.cell[tags.indices], np.asarray(tags.values))
+    topology = mesh.topology
+    topology.create_connectivity(tags.dim, arrays.dim)
+    topology.create_connectivity(arrays.dim, tags.dim)
+    core = mesh._mesh if _dolfinx.VERSION < (0, 7) else mesh._cpp_object
+    rows = cpp.mesh.entities_to_geometry(core, tags.dim, np.asarray(tags.indices, dtype=np.int32), False)
+    return TagArrays(arrays.node[np.asarray(rows).reshape(len(tags.indices), -1)], np.asarray(tags.values))

@@ -1,0 +1,125 @@
+"""What a mesh file holds, whichever it was: points, cells, and labels on cells and facets."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+
+Label = str | int
+"""A physical name of gmsh, or a numeric tag."""
+
+
+@dataclass(frozen=True, eq=False)
+class TaggedMesh:
+    """Points, cells and their labels.
+
+    Attributes:
+        source: Where it comes from, for messages: ``"file 'beam.msh'"``.
+        points: Coordinates, (n_nodes, 3 | 2).
+        cells: Cell type to node numbers in VTK order, (n_cells, n_vertices).
+        groups: Label to cell type to the numbers of its cells.
+        facets: Label to node numbers, one array for each number of nodes of a facet; in any order.
+        words: What its labels are called, for messages: ``"physical volume"``, ``"physical surface"``.
+    """
+
+    source: str
+    points: np.ndarray
+    cells: Mapping[str, np.ndarray]
+    groups: Mapping[Label, Mapping[str, np.ndarray]]
+    facets: Mapping[Label, Sequence[np.ndarray]]
+    words: tuple[str, str]
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space, 2 or 3."""
+        return int(self.points.shape[1])
+
+
+@dataclass(frozen=True)
+class BodyParts:
+    """Which groups make up a body.
+
+    Attributes:
+        labels: The groups.
+        regions: The names they get as regions, or None for a body without regions.
+    """
+
+    labels: tuple[Label, ...]
+    regions: tuple[str, ...] | None
+
+
+def chosen_bodies(mesh: TaggedMesh, bodies: Any) -> dict[str, BodyParts]:
+    """Resolve what the caller says about bodies.
+
+    Args:
+        mesh: The mesh with its groups.
+        bodies: None for every group; a list of labels; or name of the body to a label, to a list of labels,
+            or to a mapping from the name of a region to a label.
+
+    Returns:
+        Name of the body to its groups.
+
+    Raises:
+        InvalidInputError: If a label is not there.
+    """
+    if bodies is None:
+        bodies = list(mesh.groups)
+    if isinstance(bodies, (str, int)):
+        bodies = [bodies]
+    if not isinstance(bodies, Mapping):
+        bodies = {str(label): label for label in bodies}
+    chosen = {name: _parts(wanted) for name, wanted in bodies.items()}
+    for name, parts in chosen.items():
+        _check_known(parts.labels, mesh.groups, f"body '{name}'", mesh.words[0], mesh.source)
+    if not chosen:
+        raise InvalidInputError(
+            f"{mesh.source} must have a {mesh.words[0]} for a body, there is none: name what the bodies are"
+        )
+    return chosen
+
+
+def chosen_surfaces(mesh: TaggedMesh, surfaces: Any) -> dict[str, list[np.ndarray]]:
+    """Resolve what the caller says about surfaces, in the same forms but without regions.
+
+    Returns:
+        Name of the surface to blocks of facets.
+
+    Raises:
+        InvalidInputError: If a label is not there.
+    """
+    if surfaces is None:
+        surfaces = list(mesh.facets)
+    if isinstance(surfaces, (str, int)):
+        surfaces = [surfaces]
+    if not isinstance(surfaces, Mapping):
+        surfaces = {str(label): label for label in surfaces}
+    chosen = {}
+    for name, wanted in surfaces.items():
+        labels = _parts(wanted).labels
+        _check_known(labels, mesh.facets, f"surface '{name}'", mesh.words[1], mesh.source)
+        chosen[name] = [block for label in labels for block in mesh.facets[label]]
+    return chosen
+
+
+def _parts(wanted: Any) -> BodyParts:
+    if isinstance(wanted, Mapping):
+        return BodyParts(tuple(wanted.values()), tuple(map(str, wanted)))
+    if isinstance(wanted, (str, int, np.integer)):
+        return BodyParts((wanted,), None)  # type: ignore[arg-type]
+    return BodyParts(tuple(wanted), tuple(map(str, wanted)))
+
+
+def _check_known(
+    labels: Iterable[Label], known: Mapping[Label, object], what: str, word: str, source: str
+) -> None:
+    for label in labels:
+        if not isinstance(label, Hashable) or label not in known:
+            there = ", ".join(map(repr, known)) or "none at all"
+            raise InvalidInputError(
+                f"{what} needs the {word} {label!r}, which {source} does not have: it has {there}"
+            )

@@ -1,0 +1,40 @@
+"""Which pairs of surfaces a design may move: those whose rows have derivatives by the shape."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.scene import Scene, Surface
+
+
+def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
+    """Refuse designs that move surfaces of mortar contact or of ties.
+
+    Args:
+        scene: The scene.
+        moving: Body name -> whether a design moves each node, shape (n_nodes,).
+
+    Raises:
+        InvalidInputError: Names the pair and the surface.
+    """
+    for number, pair in enumerate(scene.contacts):
+        if pair.discretisation == "mortar" and isinstance(pair.master, Surface):
+            _check(scene, moving, (pair.slave, pair.master), f"mortar contact pair {number}", "node")
+    for number, tie in enumerate(scene.ties):
+        _check(scene, moving, (tie.slave, tie.master), f"tie {number}", "")
+
+
+def _check(
+    scene: Scene, moving: Mapping[str, np.ndarray], surfaces: tuple[Surface, Surface], what: str, instead: str
+) -> None:
+    for surface in surfaces:
+        count = int(np.count_nonzero(moving[surface.body][np.unique(scene.facets(surface))]))
+        if count:
+            remedy = f"use discretisation={instead!r} for it" if instead else "move another part of the body"
+            raise InvalidInputError(
+                f"a design may move only surfaces whose rows have derivatives by the shape, but {what} lies "
+                f"on {surface.name!r} of body {surface.body!r}, of which {count} nodes move: {remedy}"
+            )

@@ -1,0 +1,297 @@
+"""A material that contradicts itself is refused before anything is built on it, and told why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+from mpi4py import MPI
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.forms import FormLibrary
+from fenics_contact.feti.model_checks import check_kernel
+from fenics_contact.geometry import block, rectangle
+from fenics_contact.scene import (
+    Body,
+    Elasticity,
+    EnergyModel,
+    IsotropicElasticity,
+    Material,
+    OrthotropicElasticity,
+    PlaneStrain,
+    Scene,
+    rigid_body_modes,
+    strain,
+)
+from tests.models.elements import CELLS, PLANE, by_node, element_stiffness, isotropic_matrix, one_cell, whole
+
+Kernel = Callable[[np.ndarray], np.ndarray]
+
+
+def prepare(material: Material, cell: str) -> FormLibrary:
+    mesh = (
+        rectangle((0, 0), (1, 1), (1, 1), cell)
+        if cell in PLANE
+        else block((0,) * 3, (1,) * 3, (1,) * 3, cell)
+    )
+    forms = FormLibrary(MPI.COMM_SELF)
+    forms.prepare(Scene({"body": Body(mesh, material)}))
+    return forms
+
+
+@dataclass(frozen=True)
+class Model(Elasticity):
+    """Elasticity with a claim about its kernel, and parts of the stress that should not be there."""
+
+    claim: Kernel = rigid_body_modes
+    bulk: float = 1.0
+    shear: float = 1.0
+    one_sided: float = 0.0
+
+    @property
+    def parameters(self) -> tuple[float, float, float]:
+        return self.bulk, self.shear, self.one_sided
+
+    def stress(self, u: Any, parameters: Any) -> Any:
+        bulk, shear, one_sided = parameters
+        e, dim = strain(u), len(u)
+        unsymmetric = ufl.as_tensor(
+            [[e[1, 1] if i == j == 0 else 0 * e[0, 0] for j in range(dim)] for i in range(dim)]
+        )
+        return bulk * ufl.tr(e) * ufl.Identity(dim) + 2 * shear * ufl.dev(e) + one_sided * unsymmetric
+
+    def kernel(self, points: np.ndarray) -> np.ndarray:
+        return self.claim(points)
+
+
+def one_too_few(points: np.ndarray) -> np.ndarray:
+    return rigid_body_modes(points)[..., :-1]
+
+
+def one_too_many(points: np.ndarray) -> np.ndarray:
+    return np.concatenate([rigid_body_modes(points), points[..., None]], axis=-1)
+
+
+def one_wrong(points: np.ndarray) -> np.ndarray:
+    modes = rigid_body_modes(points)
+    modes[:, 0, -1] += points[:, 0]
+    return modes
+
+
+def one_twice(points: np.ndarray) -> np.ndarray:
+    modes = rigid_body_modes(points)
+    return np.concatenate([modes, modes[..., :1] + 2 * modes[..., 1:2]], axis=-1)
+
+
+def flat(points: np.ndarray) -> np.ndarray:
+    return rigid_body_modes(points).reshape(points.size, -1)
+
+
+def no_numbers(points: np.ndarray) -> np.ndarray:
+    return np.nan * rigid_body_modes(points)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_consistent_model_passes(cell: str) -> None:
+    assert prepare(Model(), cell).compiled == (("stiffness", Model, cell),)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize(
+    ("claim", "message"),
+    [
+        (
+            one_too_few,
+            r"must hold every motion without energy, that of Model has [25] modes and a \w+ has [36]",
+        ),
+        (
+            one_too_many,
+            r"must hold motions without energy alone, that of material Model does not .*annihilates",
+        ),
+        (one_wrong, r"must hold motions without energy alone, that of material Model does not .*annihilates"),
+        (one_twice, r"modes in the kernel of Model must be independent, the [47] given are not: leave out"),
+        (flat, r"kernel\(points\) of Model must return finite modes of shape .* \+ \(n_modes,\), got shape"),
+        (no_numbers, r"kernel\(points\) of Model must return finite modes"),
+    ],
+)
+def test_a_wrong_kernel_is_refused(claim: Kernel, message: str, cell: str) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        prepare(Model(claim), cell)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_stress_without_an_energy_is_refused(cell: str) -> None:
+    with pytest.raises(
+        InvalidInputError, match=r"stiffness of a material must be symmetric, that of Model is not"
+    ):
+        prepare(Model(one_sided=1e-6), cell)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_negative_energy_is_refused(cell: str) -> None:
+    with pytest.raises(
+        InvalidInputError, match=r"energy of a material must not be negative, Model has the eigen"
+    ):
+        prepare(Model(shear=-0.1), cell)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_motion_that_the_material_does_not_resist_must_be_in_the_kernel(cell: str) -> None:
+    """Without shear stiffness a body has more than rigid motions."""
+    with pytest.raises(
+        InvalidInputError, match=r"must hold every motion without energy, that of Model has [36]"
+    ):
+        prepare(Model(shear=0.0), cell)
+
+
+def test_an_infinite_stiffness_is_refused() -> None:
+    with pytest.raises(
+        InvalidInputError, match=r"NaN or infinity in the stiffness of IsotropicElasticity: check"
+    ):
+        prepare(IsotropicElasticity(1e308, 0.49), "hexahedron")
+
+
+@dataclass(frozen=True)
+class Foundation(Elasticity):
+    """Springs that hold every point of the body: no motion is free."""
+
+    stiffness_of_springs: float
+
+    @property
+    def parameters(self) -> tuple[float]:
+        return (self.stiffness_of_springs,)
+
+    def stress(self, u: Any, parameters: Any) -> Any:
+        return ufl.tr(strain(u)) * ufl.Identity(len(u)) + 2 * strain(u)
+
+    def stiffness(self, u: Any, v: Any, parameters: Any) -> Any:
+        return ufl.inner(self.stress(u, parameters), strain(v)) + parameters[0] * ufl.inner(u, v)
+
+    def kernel(self, points: np.ndarray) -> np.ndarray:
+        return np.zeros((*points.shape, 0))
+
+
+@pytest.mark.parametrize("cell", ["quadrilateral", "hexahedron"])
+def test_a_kernel_may_be_empty(cell: str) -> None:
+    assert prepare(Foundation(1.0), cell).compiled
+
+
+@pytest.mark.parametrize(
+    "density",
+    [
+        lambda e: ufl.tr(e) ** 3 + ufl.inner(e, e),
+        lambda e: ufl.inner(e, e) ** 2,
+        lambda e: ufl.sqrt(1 + ufl.inner(e, e)),
+        lambda e: ufl.inner(e, e) + ufl.tr(e),
+        lambda e: ufl.inner(e, e) + 1,
+        lambda e: ufl.sqrt(ufl.inner(e, e)) ** 2,
+    ],
+    ids=["cubic", "quartic", "root", "prestressed", "not zero at rest", "hidden"],
+)
+def test_an_energy_that_is_not_quadratic_is_refused(density: Callable[[Any], Any]) -> None:
+    @dataclass(frozen=True)
+    class Odd(EnergyModel):
+        @property
+        def parameters(self) -> tuple[float, ...]:
+            return ()
+
+        def energy(self, strain: Any, parameters: Any) -> Any:
+            return density(strain)
+
+    for cell in ("triangle", "hexahedron"):
+        with pytest.raises(InvalidInputError, match=r"Odd.energy must be a quadratic function of the strain"):
+            prepare(Odd(), cell)
+
+
+def test_a_kernel_that_a_subdomain_resists_is_refused_with_its_name() -> None:
+    vertices = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
+    K = element_stiffness(vertices, "quadrilateral", isotropic_matrix(1.0, 0.3, 2))
+    R = rigid_body_modes(vertices).reshape(8, 3)
+    check_kernel(K, R, "subdomain 3 of body 'plate'")
+    with pytest.raises(InvalidInputError, match="that of subdomain 3 of body 'plate' does not"):
+        check_kernel(K, R + 1e-6 * vertices.reshape(8, 1), "subdomain 3 of body 'plate'")
+
+
+def wrong_on_many_points(points: np.ndarray) -> np.ndarray:
+    return rigid_body_modes(points) if len(points) <= 8 else one_wrong(points)
+
+
+def test_the_kernel_is_checked_on_every_subdomain() -> None:
+    mesh = block((0,) * 3, (1,) * 3, (2, 1, 1))
+    with pytest.raises(InvalidInputError, match=r"that of subdomain 0 of body 'cell' does not .*annihilates"):
+        whole(Body(mesh, Model(wrong_on_many_points)))
+
+
+def test_a_material_that_lacks_a_member_is_refused() -> None:
+    class Nothing:
+        dims = (3,)
+
+    mesh = block((0,) * 3, (1,) * 3, (1,) * 3)
+    with pytest.raises(
+        InvalidInputError, match=r"must have dims, .* Nothing lacks \['parameters', 'stress', 's"
+    ):
+        Body(mesh, Nothing())  # type: ignore[arg-type]
+
+
+def test_a_material_must_be_hashable() -> None:
+    @dataclass(frozen=True)
+    class WithArray(Model):
+        table: Any = None
+
+    mesh = block((0,) * 3, (1,) * 3, (1,) * 3)
+    with pytest.raises(
+        InvalidInputError, match=r"a material must be hashable, WithArray is not .*frozen datacl"
+    ):
+        Body(mesh, WithArray(table=np.zeros(3)))
+
+
+def test_a_material_must_suit_the_dimension_of_the_mesh() -> None:
+    message = (
+        r"must be made for the dimension of the mesh, {} is for \({},\) and the mesh has {}: use PlaneSt"
+    )
+    plane, space = rectangle((0, 0), (1, 1), (1, 1)), block((0,) * 3, (1,) * 3, (1,) * 3)
+    with pytest.raises(InvalidInputError, match=message.format("IsotropicElasticity", 3, 2)):
+        Body(plane, IsotropicElasticity(1.0, 0.3))
+    with pytest.raises(InvalidInputError, match=message.format("PlaneStrain", 2, 3)):
+        Body(space, PlaneStrain(1.0, 0.3))
+
+
+def test_orthotropic_constants_must_give_a_positive_energy() -> None:
+    with pytest.raises(
+        InvalidInputError, match=r"must give a positive energy, young_moduli .* reduce the Poisson"
+    ):
+        OrthotropicElasticity((1.0, 1.0, 1.0), (0.6, 0.6, 0.6), (1.0, 1.0, 1.0))
+    with pytest.raises(InvalidInputError, match=r"young_moduli and shear_moduli must be positive, got"):
+        OrthotropicElasticity((1.0, -1.0, 1.0), (0.1, 0.1, 0.1), (1.0, 1.0, 1.0))
+    with pytest.raises(
+        InvalidInputError, match=r"young_moduli must be 3 finite numbers, got .*: give those of the"
+    ):
+        OrthotropicElasticity((1.0, 1.0), (0.1, 0.1, 0.1), (1.0, 1.0, 1.0))  # type: ignore[arg-type]
+
+
+def test_an_orientation_must_be_a_rotation() -> None:
+    with pytest.raises(
+        InvalidInputError, match=r"orientation must hold three orthonormal material axes as rows"
+    ):
+        OrthotropicElasticity((1.0,) * 3, (0.1,) * 3, (1.0,) * 3, ((1, 0, 0), (0, 1, 0), (0, 0, 2)))
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_the_typical_modulus_is_the_mean_diagonal_of_a_unit_cell(cell: str) -> None:
+    dim = 2 if cell in PLANE else 3
+    sides = {
+        "triangle": np.vstack([np.zeros(2), np.eye(2)]),
+        "tetrahedron": np.vstack([np.zeros(3), np.eye(3)]),
+        "quadrilateral": np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]),
+        "hexahedron": block((0,) * 3, (1,) * 3, (1,) * 3).points[
+            block((0,) * 3, (1,) * 3, (1,) * 3).cells[0]
+        ],
+    }[cell]
+    material = PlaneStrain(7.0, 0.3) if dim == 2 else IsotropicElasticity(7.0, 0.3)
+    expected = np.diag(element_stiffness(sides, cell, isotropic_matrix(7.0, 0.3, dim))).mean()
+    assert prepare(material, cell).typical_modulus(material, cell) == pytest.approx(expected, rel=1e-12)
+    assert expected == pytest.approx(np.diag(by_node(one_cell(material, cell, sides))).mean(), rel=1e-12)

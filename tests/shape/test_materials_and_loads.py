@@ -1,0 +1,86 @@
+"""Derivatives of a block of two materials that is heated and drawn by a force that varies in space."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry import block
+from fenics_contact.scene import (
+    Body,
+    BodyForce,
+    ContactPair,
+    IsotropicElasticity,
+    OrthotropicElasticity,
+    Pressure,
+    Scene,
+    Surface,
+    ThermalStrain,
+    Tresca,
+    Ufl,
+)
+from fenics_contact.shape import Objective, forms
+from tests.contact.gallery import FLOOR, crowned
+from tests.shape.blocks import problem
+from tests.shape.objectives import objectives
+from tests.shape.quotients import Line
+from tests.shape.test_left_out_terms import miss_without
+
+WOOD = OrthotropicElasticity(
+    (90.0, 60.0, 80.0), (0.2, 0.3, 0.25), (30.0, 35.0, 25.0), thermal_expansion=(1e-3, 2e-3, 0.0)
+)
+JUDGES = objectives("block")
+
+
+def two_materials() -> Scene:
+    mesh = crowned(block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (6, 3, 3)), 0.02)
+    left = mesh.points[mesh.cells].mean(axis=1)[:, 0] < 0.7
+    mesh = replace(mesh, regions={"left": np.flatnonzero(left), "right": np.flatnonzero(~left)})
+    materials = {"left": IsotropicElasticity(120.0, 0.3, 1e-3), "right": WOOD}
+    return Scene(
+        {"block": Body(mesh, materials)},
+        loads=[
+            Pressure("block", "z1", lambda points: 2.0 + 0.2 * points[:, 0]),
+            BodyForce("block", Ufl(lambda x: [0.3 * x[2], 0.1, -0.2 * x[0]])),
+            ThermalStrain("block", 5.0),
+            ThermalStrain("block", Ufl(lambda x: 3.0 * x[2] * x[0])),
+        ],
+        contacts=[ContactPair(Surface("block", "z0"), FLOOR, Tresca(0.6))],
+    )
+
+
+@cache
+def line() -> Line:
+    blocks = problem(two_materials())
+    alpha = 0.01 * np.random.default_rng(1).standard_normal(blocks.size)
+    return Line(blocks, alpha, np.random.default_rng(6).standard_normal(blocks.size), 1e-5)
+
+
+@pytest.mark.parametrize("objective", JUDGES)
+def test_the_adjoint_agrees_with_central_differences(objective: str) -> None:
+    assert line().is_smooth()
+    assert line().steepness(JUDGES[objective]) > 0.02
+    assert line().miss(JUDGES[objective]) < 1e-5
+
+
+def test_heat_and_the_force_count() -> None:
+    """Without their derivatives the adjoint misses."""
+
+    def left_out(patch: pytest.MonkeyPatch) -> None:
+        patch.setattr(forms, "moving_loads", lambda torn, moving: [])
+
+    judge: Objective = JUDGES["energy"]
+    assert miss_without(left_out, line(), judge) > 1e-3
+
+
+def test_a_function_of_position_has_no_derivative() -> None:
+    scene = two_materials()
+    heated = replace(scene, loads=[*scene.loads, ThermalStrain("block", lambda points: points[:, 0])])
+    blocks = problem(heated)
+    message = r"a ThermalStrain on body 'block', whose shape changes, must be numbers or Ufl, got a function"
+    with pytest.raises(InvalidInputError, match=message):
+        blocks.evaluate(np.zeros(blocks.size))
