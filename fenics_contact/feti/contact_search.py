@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -52,15 +52,39 @@ def surface_of(scene: Scene, surface: Surface) -> FacetedSurface:
     return faceted_surface(scene.bodies[surface.body].mesh.points, scene.facets(surface))
 
 
+@dataclass(frozen=True)
+class _Side:
+    """One of two surfaces that meet.
+
+    Attributes:
+        surface: The surface.
+        nodes: Its nodes among those of all bodies, shape (n,).
+        n_nodes: Number of nodes of all bodies.
+    """
+
+    surface: FacetedSurface
+    nodes: np.ndarray
+    n_nodes: int
+
+    @classmethod
+    def of(cls, scene: Scene, surface: Surface, tearing: Tearing) -> _Side:
+        """Return a named surface as a side."""
+        own = surface_of(scene, surface)
+        return cls(own, tearing.global_nodes(surface.body, own.nodes), tearing.n_nodes)
+
+
 def _points_of_pairs(
     scene: Scene, pairs: Sequence[ContactPair | Tie], tearing: Tearing, fixed: np.ndarray, comm: MPI.Comm
 ) -> ContactPoints:
     parts = []
     for index, pair in enumerate(pairs):
-        slave = surface_of(scene, pair.slave)
-        nodes = tearing.global_nodes(pair.slave.body, slave.nodes)
-        movable = ~fixed[nodes].all(axis=1)
-        points = _points_of_pair(scene, pair, slave, movable, tearing, comm)
+        slave = _Side.of(scene, pair.slave, tearing)
+        movable = ~fixed[slave.nodes].all(axis=1)
+        if not isinstance(pair.master, Surface):
+            points = _on_obstacle(slave, movable, pair.master)
+        else:
+            find = _by_mortar if pair.discretisation == "mortar" else _by_projection
+            points = find(slave, movable, _Side.of(scene, pair.master, tearing), comm)
         if points.count == 0:
             raise InvalidInputError(
                 f"{type(pair).__name__} {index} needs slave nodes that face the master, but none of the "
@@ -71,85 +95,50 @@ def _points_of_pairs(
     return join_points(parts, scene.dim, len(fixed))
 
 
-def _points_of_pair(
-    scene: Scene,
-    pair: ContactPair | Tie,
-    slave: FacetedSurface,
-    movable: np.ndarray,
-    tearing: Tearing,
-    comm: MPI.Comm,
-) -> ContactPoints:
-    """Return the points of one pair, ``pair`` not yet numbered. Collective."""
-    nodes = tearing.global_nodes(pair.slave.body, slave.nodes)
-    if not isinstance(pair.master, Surface):
-        return _on_obstacle(slave, np.flatnonzero(movable), nodes, pair.master, tearing.n_nodes)
-    master = surface_of(scene, pair.master)
-    master_nodes = tearing.global_nodes(pair.master.body, master.nodes)
-    find = _by_mortar if pair.discretisation == "mortar" else _by_projection
-    return find(slave, movable, nodes, master, master_nodes, tearing.n_nodes, comm)
-
-
-def _by_projection(
-    slave: FacetedSurface,
-    movable: np.ndarray,
-    nodes: np.ndarray,
-    master: FacetedSurface,
-    master_nodes: np.ndarray,
-    n_nodes: int,
-    comm: MPI.Comm,
-) -> ContactPoints:
+def _by_projection(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm) -> ContactPoints:
     """Let each slave node meet the master facet that it projects on. Collective."""
     candidates = np.flatnonzero(movable)
-    hit = _shared_projection(slave, candidates, master, comm)
-    values, _ = shape_functions(hit.local, master.corners)
-    corners = master_nodes[master.facets[hit.facet]]
-    row = np.repeat(np.arange(len(hit.point)), master.corners)
-    weight = sp.csr_matrix((values.ravel(), (row, corners.ravel())), shape=(len(hit.point), n_nodes))
+    hit = _shared_projection(slave.surface, candidates, master.surface, comm)
+    values, _ = shape_functions(hit.local, master.surface.corners)
+    corners = master.nodes[master.surface.facets[hit.facet]]
+    row = np.repeat(np.arange(len(hit.point)), master.surface.corners)
+    shape = (len(hit.point), slave.n_nodes)
+    weight = sp.csr_matrix((values.ravel(), (row, corners.ravel())), shape=shape)
     chosen = candidates[hit.point]
-    return ContactPoints(
-        np.zeros(len(chosen), dtype=np.int64), nodes[chosen], weight, hit.normal, tangent_frames(hit.normal),
-        hit.gap, slave.areas[chosen], hit.facet, hit.local,
-    )  # fmt: skip
+    return replace(_points(slave, chosen, hit.normal, hit.gap, weight), facet=hit.facet, local=hit.local)
 
 
-def _by_mortar(
-    slave: FacetedSurface,
-    movable: np.ndarray,
-    nodes: np.ndarray,
-    master: FacetedSurface,
-    master_nodes: np.ndarray,
-    n_nodes: int,
-    comm: MPI.Comm,
-) -> ContactPoints:
+def _by_mortar(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm) -> ContactPoints:
     """Let each slave node meet the mean of the master under its dual basis function. Collective."""
     from fenics_contact.feti.mortar import mortar_coupling  # not before a pair asks for it
 
-    found = mortar_coupling(slave, master, comm)
+    found = mortar_coupling(slave.surface, master.surface, comm)
     kept = np.flatnonzero(movable[found.node])
-    spread = sp.csr_matrix(
-        (np.ones(len(master_nodes)), (np.arange(len(master_nodes)), master_nodes)),
-        shape=(len(master_nodes), n_nodes),
-    )
-    normal = found.normal[kept]
-    return ContactPoints(
-        np.zeros(len(kept), dtype=np.int64), nodes[found.node[kept]], (found.weight[kept] @ spread).tocsr(),
-        normal, tangent_frames(normal), found.gap[kept], found.area[kept], np.full(len(kept), -1),
-        np.zeros((len(kept), normal.shape[1] - 1)),
-    )  # fmt: skip
+    count = len(master.nodes)
+    spread = sp.csr_matrix((np.ones(count), (np.arange(count), master.nodes)), shape=(count, master.n_nodes))
+    weight = (found.weight[kept] @ spread).tocsr()
+    points = _points(slave, found.node[kept], found.normal[kept], found.gap[kept], weight)
+    return replace(points, area=found.area[kept])
 
 
-def _on_obstacle(
-    slave: FacetedSurface, movable: np.ndarray, nodes: np.ndarray, obstacle: RigidObstacle, n_nodes: int
-) -> ContactPoints:
+def _on_obstacle(slave: _Side, movable: np.ndarray, obstacle: RigidObstacle) -> ContactPoints:
     """Let each slave node that faces a rigid obstacle meet it."""
-    normals = obstacle.normals(slave.points[movable])
-    facing = np.einsum("nd,nd->n", slave.normals[movable], normals) < 0
-    chosen, normals = movable[facing], normals[facing]
+    candidates = np.flatnonzero(movable)
+    normals = obstacle.normals(slave.surface.points[candidates])
+    facing = np.einsum("nd,nd->n", slave.surface.normals[candidates], normals) < 0
+    chosen = candidates[facing]
+    gap = obstacle.distance(slave.surface.points[chosen])
+    return _points(slave, chosen, normals[facing], gap, sp.csr_matrix((len(chosen), slave.n_nodes)))
+
+
+def _points(
+    slave: _Side, chosen: np.ndarray, normal: np.ndarray, gap: np.ndarray, weight: sp.csr_matrix
+) -> ContactPoints:
+    """Return points on chosen nodes of a slave, not yet numbered by pair and on no facet."""
     count = len(chosen)
     return ContactPoints(
-        np.zeros(count, dtype=np.int64), nodes[chosen], sp.csr_matrix((count, n_nodes)), normals,
-        tangent_frames(normals), obstacle.distance(slave.points[chosen]), slave.areas[chosen],
-        np.full(count, -1), np.zeros((count, slave.points.shape[1] - 1)),
+        np.zeros(count, dtype=np.int64), slave.nodes[chosen], weight, normal, tangent_frames(normal), gap,
+        slave.surface.areas[chosen], np.full(count, -1), np.zeros((count, normal.shape[1] - 1)),
     )  # fmt: skip
 
 

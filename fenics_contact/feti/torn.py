@@ -116,7 +116,6 @@ def build_torn_system(
         InvalidInputError: If the bodies overlap at the start, or matrices are not finite.
     """
     comm = decomposition.comm
-    decomposition.forms.prepare(scene)
     loads = as_tractions(scene)
     decomposition.forms.prepare(scene)  # a new load may be of a kind that the first scene did not have
     with together(comm):

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import LoadSequence, State, held, solve_scene
-from fenics_contact.feti import TornSystem, contact_search, dual, mortar, torn
+from fenics_contact.contact import LoadSequence, State, find_state, held, solve_scene
+from fenics_contact.feti import TornSystem, contact_search, decompose, dual, mortar, torn
 from fenics_contact.geometry import block, box_partition
 from fenics_contact.qp import coupled, face_newton, slip_law
 from fenics_contact.scene import (
@@ -205,6 +205,16 @@ def test_the_direct_solve_has_no_coarse_problem_and_no_products() -> None:
     assert not hasattr(state.system, "problem")
     assert not hasattr(state.system, "kernel")
     assert np.abs(state.gather_displacement("upper")).max() > 1e-3
+
+
+@pytest.mark.parametrize("sensitivity", [False, True])
+def test_only_sensitivities_put_one_held_body_on_multipliers(sensitivity: bool, calls: Counter[str]) -> None:
+    case = CASES["surface load"]
+    decomposition = decompose(case.scene, cuts(case), MPI.COMM_SELF)
+    state = find_state(case.scene, decomposition, sensitivity=sensitivity)
+    assert set(calls) == (LINEAR if sensitivity else set())
+    compiled = {kind for kind, *_ in state.torn.decomposition.forms.compiled}
+    assert compiled == {"stiffness", "surface load"}, "derivatives by the shape are not compiled for a state"
 
 
 def test_without_a_load_nothing_moves_and_nothing_is_iterated() -> None:
