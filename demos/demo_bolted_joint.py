@@ -1,6 +1,6 @@
 # # A bolted joint: friction carries the load until the plates slide
 #
-# ![Load over displacement](../docs/pictures/bolted_joint_curve.png)
+# ![Von Mises stress in the sliding joint](../docs/pictures/bolted_joint_stress.png)
 #
 # An aluminium plate lies between two steel straps; a bolt through all three clamps them with the force $P$
 # [N]. The bolt does not touch the wall of its hole, which is 0.5 mm wider: friction alone carries the load.
@@ -125,8 +125,10 @@ for displacement in moved:
     if displacement == 0.0:
         plot_contact_pressure(state, output / "pressure_tightened.png", title="Plate under the upper strap")
 
+# ![Load over displacement](../docs/pictures/bolted_joint_curve.png)
+#
 # The force in the bolt is what its head presses with. Tightening gives a preload; pulling loses a little of
-# it, as the plate gets thinner.
+# it, as the plate gets thinner. At zero the plate already pushes a little: it was squeezed between its ends.
 
 if comm.rank == 0:
     print("bolted joint\n  end moved [mm]   pull [N]   bolt force [N]   pull / 2 μ P   stick   slip")
@@ -137,7 +139,7 @@ if comm.rank == 0:
 # ## Pictures and files for ParaView
 
 write_vtu(state, output, "sliding")
-plot_stress(state, output / "stress.png", clim=(0, 250), scale=50, reach=20.0, title="Sliding joint")
+plot_stress(state, output / "stress.png", clim=(0, 400), scale=50, reach=19.0, title="Sliding joint")
 plot_contact_pressure(state, output / "pressure_sliding.png", title="Plate under the upper strap")
 
 

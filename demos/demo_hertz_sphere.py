@@ -115,6 +115,10 @@ if comm.rank == 0:
         )
 
 # ## Pictures and files for ParaView
+#
+# ![Von Mises stress](../docs/pictures/hertz_sphere_stress.png)
+#
+# The largest von Mises stress lies below the surface, in a depth of about $a / 2$.
 
 state = states["mortar"]
 write_vtu(state, output, "hertz")

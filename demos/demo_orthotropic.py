@@ -141,6 +141,8 @@ if comm.rank == 0:
     print(f"  own model against the package's: contact forces differ by {difference:.1e}")
 
 # ## Pictures and files for ParaView
+#
+# ![Von Mises stress](../docs/pictures/orthotropic_stress.png)
 
 write_vtu(state, output, "wood")
 plot_stress(state, output / "stress.png", scale=1, reach=6.0, title="Wood under a ball")

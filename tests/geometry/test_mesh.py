@@ -199,7 +199,5 @@ def test_a_mesh_needs_no_surfaces_and_no_grid() -> None:
 @pytest.mark.parametrize(("dim", "nodes"), [(3, 10), (3, 20), (3, 27), (2, 6), (2, 9)])
 def test_quadratic_cells_are_refused_with_the_reason(dim: int, nodes: int) -> None:
     points = np.random.default_rng(0).random((nodes, dim))
-    with pytest.raises(
-        InvalidInputError, match=r"quadratic cells are not supported: .* positive under a"
-    ):
+    with pytest.raises(InvalidInputError, match=r"quadratic cells are not supported: .* positive under a"):
         BodyMesh(points, np.arange(nodes)[None])
