@@ -35,8 +35,9 @@ class _Frame:
     def sphere(self, cube: np.ndarray) -> np.ndarray:
         """Map cube coordinates, (n, 3), to the round surface: angles, not lengths, follow the coordinates."""
         reach = self._reach(cube)
-        rays = np.tan(np.pi / 4.0 * cube / np.maximum(reach, np.finfo(float).tiny))
-        rays[:, self.flat] = 0.0
+        bent = cube.copy()
+        bent[:, self.flat] = 0.0
+        rays = np.tan(np.pi / 4.0 * bent / np.maximum(reach, np.finfo(float).tiny))
         length = np.linalg.norm(rays, axis=1, keepdims=True)
         length[length == 0.0] = 1.0  # the middle of the body, which has no direction
         return self._straight(cube, self.radius * rays / length)

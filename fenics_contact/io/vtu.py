@@ -14,12 +14,19 @@ from fenics_contact.io.fields import contact_fields
 from fenics_contact.io.names import file_of_each
 from fenics_contact.io.replacing import replacing
 
+_MESHIO_NAMES = {
+    "hexahedron": "hexahedron",
+    "tetrahedron": "tetra",
+    "quadrilateral": "quad",
+    "triangle": "triangle",
+}
+
 
 def write_vtu(state: State, folder: str | Path, name: str = "state") -> Path:
     """Write a state for ParaView: a file for each body and a multi-block file to open. Collective.
 
     On points: ``displacement`` and the fields of `contact_fields`. On cells: ``von_mises`` and ``subdomain``,
-    numbered over all bodies.
+    numbered over all bodies. Plane bodies lie in the plane z = 0, their vectors have no z component.
 
     Args:
         state: The state.
@@ -57,13 +64,19 @@ def _gathered(state: State, body: str) -> meshio.Mesh:
     tearing = decomposition.tearing
     first = int(tearing.subdomain_offset[tearing.body_names.index(body)])
     subdomain = np.asarray(decomposition.partitions[body], dtype=np.int32) + np.int32(first)
-    kind = {"hexahedron": "hexahedron", "tetrahedron": "tetra"}[mesh.cell_type]
+    fields = {"displacement": state.gather_displacement(body), **contact_fields(state, body)}
     return meshio.Mesh(
-        mesh.points,
-        [(kind, mesh.cells)],
-        point_data={"displacement": state.gather_displacement(body), **contact_fields(state, body)},
+        _in_space(mesh.points),
+        [(_MESHIO_NAMES[mesh.cell_type], mesh.cells)],
+        point_data={key: _in_space(values) for key, values in fields.items()},
         cell_data={"von_mises": [state.gather_von_mises(body)], "subdomain": [subdomain]},
     )
+
+
+def _in_space(values: np.ndarray) -> np.ndarray:
+    """Give plane points and vectors the third component that the format knows alone."""
+    plane = values.ndim == 2 and values.shape[1] == 2
+    return np.pad(values, ((0, 0), (0, 1))) if plane else values
 
 
 def _multi_block(bodies: list[str], files: list[Path]) -> str:

@@ -1,15 +1,18 @@
 """Pictures of scenes, states and optimisations as PNG files, drawn without a display.
 
 Three-dimensional parts are rendered by pyvista, everything around them (titles, colour bars, diagrams) is set
-by matplotlib. On several ranks the fields are gathered by all and drawn by rank 0.
+by matplotlib, which draws plane bodies as well. On several ranks the fields are gathered by all and drawn by
+rank 0.
 """
 
 from fenics_contact.viz._libraries import check_libraries
 from fenics_contact.viz.control_net import plot_control_net
 from fenics_contact.viz.convergence import plot_convergence
+from fenics_contact.viz.curves import plot_curves
 from fenics_contact.viz.decomposition import plot_decomposition
 from fenics_contact.viz.pressure import plot_contact_pressure
 from fenics_contact.viz.renderer import check_renderer
+from fenics_contact.viz.status import plot_contact_status
 from fenics_contact.viz.stress import plot_stress
 from fenics_contact.viz.units import Units
 
@@ -18,8 +21,10 @@ __all__ = [
     "check_libraries",
     "check_renderer",
     "plot_contact_pressure",
+    "plot_contact_status",
     "plot_control_net",
     "plot_convergence",
+    "plot_curves",
     "plot_decomposition",
     "plot_stress",
 ]

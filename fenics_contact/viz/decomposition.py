@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.collections import PolyCollection
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import BodyMesh, boundary_faces
 from fenics_contact.scene import Scene
 from fenics_contact.viz.colours import INK, colour_subdomains, neighbours
+from fenics_contact.viz.plane import draw_cell_edges, draw_outline, window
 from fenics_contact.viz.sheet import TITLE, draw_on_one_rank, place_image, png_path, sheet
 from fenics_contact.viz.stage import Layer, render, segments, surface
 from fenics_contact.viz.view import frame_around, oblique_view
@@ -71,19 +73,56 @@ def _check_partition(name: str, mesh: BodyMesh, partitions: Mapping[str, np.ndar
 def _draw(
     scene: Scene, partitions: Mapping[str, np.ndarray], target: Path, explode: float, width: int
 ) -> None:
+    count = sum(np.unique(partitions[name]).size for name in scene.bodies)
+    cells = sum(body.mesh.n_cells for body in scene.bodies.values())
+    title = f"{_number(count, 'subdomain')} of {_number(len(scene.bodies), 'body', 'bodies')}, "
+    title += f"{written(cells)} cells"
+    if scene.dim == 2:
+        _draw_in_plane(scene, partitions, target, (explode, title, width))
+        return
     layers = []
     for family, (name, body) in enumerate(scene.bodies.items()):
         layers += _body_layers(body.mesh, np.asarray(partitions[name]), family, explode)
     points = np.concatenate([body.mesh.points for body in scene.bodies.values()])
     view = oblique_view(points)
     frame = frame_around(view, points)
-    count = sum(np.unique(partitions[name]).size for name in scene.bodies)
-    cells = sum(body.mesh.n_cells for body in scene.bodies.values())
-    title = f"{count} subdomains of {len(scene.bodies)} bodies, {written(cells)} cells"
     image = render(layers, view, frame, width)
     band = round(TITLE * width)
     with sheet(target, (width, band + image.shape[0]), title) as figure:
         place_image(figure, image, 0, band)
+
+
+def _number(count: int, one: str, many: str = "") -> str:
+    return f"{count} {one if count == 1 else many or one + 's'}"
+
+
+def _draw_in_plane(
+    scene: Scene, partitions: Mapping[str, np.ndarray], target: Path, look: tuple[float, str, int]
+) -> None:
+    explode, title, width = look
+    points = np.concatenate([body.mesh.points for body in scene.bodies.values()])
+    border = 0.03 * float(np.ptp(points, axis=0).max())
+    low, high = points.min(axis=0) - border, points.max(axis=0) + border
+    height = float(np.clip(0.85 * (high - low)[1] / (high - low)[0] + 0.1, 0.3, 1.0))
+    with sheet(target, (width, round(height * width)), title, "constrained") as figure:
+        axes = figure.subplots()
+        for family, (name, body) in enumerate(scene.bodies.items()):
+            _draw_plane_body(axes, body.mesh, np.asarray(partitions[name]), family, explode)
+            if not explode:
+                draw_cell_edges(axes, body.mesh.points, body.mesh.cells, low, high)
+        window(axes, low, high, "length")
+        axes.set_axis_off()
+
+
+def _draw_plane_body(axes: Any, mesh: BodyMesh, partition: np.ndarray, family: int, explode: float) -> None:
+    colours = colour_subdomains(neighbours(mesh.cells, partition), family)
+    for number in np.unique(partition):
+        cells = mesh.cells[partition == number]
+        centre = mesh.points[np.unique(cells)].mean(axis=0)
+        points = centre + (1.0 - explode) * (mesh.points - centre)
+        # Faces bordered in their own colour: else the white sheet shines through between them.
+        axes.add_collection(PolyCollection(points[cells], color=colours[number], linewidths=0.4))
+        draw_outline(axes, points, cells, width=2.0)
 
 
 def _body_layers(mesh: BodyMesh, partition: np.ndarray, family: int, explode: float) -> list[Layer]:

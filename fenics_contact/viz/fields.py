@@ -16,7 +16,7 @@ class BodyFields:
 
     Attributes:
         mesh: The body's mesh in the state's geometry.
-        displacement: (n_nodes, 3), [length].
+        displacement: (n_nodes, dim), [length].
         von_mises: Constant on cells, (n_cells,), [force / length²].
     """
 
@@ -25,7 +25,7 @@ class BodyFields:
     von_mises: np.ndarray
 
     def deformed(self, scale: float) -> np.ndarray:
-        """Return the coordinates moved by ``scale`` times the displacement, (n_nodes, 3), [length]."""
+        """Return the coordinates moved by ``scale`` times the displacement, (n_nodes, dim), [length]."""
         return self.mesh.points + scale * self.displacement
 
     @property

@@ -9,23 +9,18 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
-from matplotlib.ticker import FuncFormatter
 
 from fenics_contact.contact import State, Status
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.viz.colours import BLUE, GREY, INK, ORANGE, PALE, PRESSURE_MAP
+from fenics_contact.viz.colours import GREY, PRESSURE_MAP
 from fenics_contact.viz.patch import ContactPatch, contact_patch, refined
+from fenics_contact.viz.patch_axes import label_axes
 from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet
+from fenics_contact.viz.status import draw_status
+from fenics_contact.viz.trace import contact_trace
+from fenics_contact.viz.traction import TractionLook, draw_traction
 from fenics_contact.viz.units import Units
-from fenics_contact.viz.view import axis_label
 from fenics_contact.viz.words import checked_range, checked_reach, headline, written
-
-#: Symbols of the points: how they are drawn and what the legend calls them.
-_SYMBOLS: dict[Status, dict[str, Any]] = {
-    Status.OPEN: {"marker": "o", "facecolors": "none", "edgecolors": GREY, "s": 30},
-    Status.STICK: {"marker": "s", "facecolors": BLUE, "edgecolors": "white", "s": 90},
-    Status.SLIP: {"marker": "^", "facecolors": ORANGE, "edgecolors": "white", "s": 110},
-}
 
 
 def plot_contact_pressure(
@@ -42,13 +37,14 @@ def plot_contact_pressure(
     """Draw a contact pair's slave surface as its master sees it. Collective.
 
     Left the nodal pressure, right the status of the points with the direction in which those that slip move
-    on the master.
+    on the master. Of a plane scene the pressure along the slave surface, below it the tangential traction on
+    the slave between its bounds, with the status of the points.
 
     Args:
         state: The state.
         path: PNG file to write.
         pair: Number of the contact pair in the scene.
-        clim: Range of the colours, [force / length²]; from zero to the largest pressure unless given. Give
+        clim: Range of the pressure, [force / length²]; from zero to the largest pressure unless given. Give
             two pictures the same range to compare them.
         reach: How far the picture reaches around the contact's middle, [length]; chosen unless given.
         title: What comes before the facts in the title.
@@ -69,11 +65,16 @@ def plot_contact_pressure(
         )
     checked_reach(reach)
     given = None if clim is None else checked_range(clim)
-    units = units or Units()
-    draw_on_one_rank(
-        state.torn.decomposition.comm,
-        lambda: _draw(contact_patch(state, pair, reach), target, given, title, units, width),
-    )
+    named = units or Units()
+
+    def draw() -> None:
+        if state.scene.dim == 2:
+            look = TractionLook(given, reach, title, named, width)
+            draw_traction(contact_trace(state, pair), target, look)
+        else:
+            _draw(contact_patch(state, pair, reach), target, given, title, named, width)
+
+    draw_on_one_rank(state.torn.decomposition.comm, draw)
     return target
 
 
@@ -95,7 +96,7 @@ def _draw(
         figure.colorbar(ScalarMappable(Normalize(*shown), PRESSURE_MAP), ax=left, label=label, extend=extend)
         _draw_status(right, patch, units)
         for axes in (left, right):
-            _label(axes, patch, units)
+            label_axes(axes, patch, units)
         handles, labels = right.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower right", ncols=3, handletextpad=0.2)
 
@@ -109,35 +110,9 @@ def _draw_pressure(axes: Any, patch: ContactPatch, clim: tuple[float, float]) ->
 
 
 def _draw_status(axes: Any, patch: ContactPatch, units: Units) -> None:
-    axes.add_collection(PolyCollection(patch.places[patch.facets], facecolors=PALE, edgecolors="white"))
-    places = patch.places[patch.points]
-    for status, look in _SYMBOLS.items():
-        chosen = patch.status == status
-        label = f"{status.name.lower()} ({np.count_nonzero(chosen)})"
-        axes.scatter(*places[chosen].T, label=label, zorder=3, linewidths=1.0, **look)
+    draw_status(axes, patch)
     slips = patch.status == Status.SLIP
-    length = np.linalg.norm(patch.slip[slips], axis=1)
-    longest = float(length.max(initial=0.0))
-    if longest > 0:
-        _draw_arrows(axes, patch, places[slips], patch.slip[slips] / longest)
+    longest = float(np.linalg.norm(patch.slip[slips], axis=1).max(initial=0.0))
     axes.set_title(
         f"status, largest slip {written(longest, 2)} {units.length}" if longest > 0 else "status, no slip"
     )
-
-
-def _draw_arrows(axes: Any, patch: ContactPatch, places: np.ndarray, slip: np.ndarray) -> None:
-    reach = 0.1 * float(np.max(patch.high - patch.low))
-    axes.quiver(
-        *places.T, *(reach * slip).T, angles="xy", scale_units="xy", scale=1, color=INK, width=0.004, zorder=4
-    )
-
-
-def _label(axes: Any, patch: ContactPatch, units: Units) -> None:
-    axes.set_aspect("equal")
-    axes.set_xlim(patch.low[0], patch.high[0])
-    axes.set_ylim(patch.low[1], patch.high[1])
-    for axis, direction, word in ((axes.xaxis, patch.view.right, "right"), (axes.yaxis, patch.view.up, "up")):
-        name = axis_label(direction)
-        axis.set_label_text(f"{name.strip('−') or word} ({units.length})")
-        if name.startswith("−"):
-            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{0 - value:g}".replace("-", "−")))

@@ -51,6 +51,9 @@ def strongest_contact(contact: ContactResult, places: np.ndarray) -> Spot:
     pair = int(np.argmax(np.bincount(points.pair, weights=force)))
     weight = np.where(points.pair == pair, force, 0.0)
     normal = weight @ points.normal
+    # Around a pin the normals cancel: there the strongest point speaks for all.
+    if np.linalg.norm(normal) < 1e-3 * weight.sum():
+        normal = points.normal[int(np.argmax(weight))]
     area = float(points.area[weight > 0].sum())
     return Spot(weight @ places / weight.sum(), normal / np.linalg.norm(normal), float(np.sqrt(area / np.pi)))
 

@@ -12,8 +12,10 @@ import numpy as np
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import boundary_faces
+from fenics_contact.scene import Scene
 from fenics_contact.viz.colours import INK, STRESS_MAP
 from fenics_contact.viz.fields import BodyFields, gather
+from fenics_contact.viz.obstacles import obstacle_layers, obstacles_of
 from fenics_contact.viz.places import contact_places
 from fenics_contact.viz.section import Spot, section_frame, section_layers, section_views, strongest_contact
 from fenics_contact.viz.sheet import (
@@ -26,6 +28,7 @@ from fenics_contact.viz.sheet import (
     sheet,
 )
 from fenics_contact.viz.stage import Layer, render, surface
+from fenics_contact.viz.stress_in_plane import PlaneLook, contact_window, draw_stress_in_plane
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.view import View, axis_label, frame_around, oblique_view
 from fenics_contact.viz.words import checked_range, checked_reach, headline, nice_number, written
@@ -56,14 +59,17 @@ def plot_stress(
     """Draw the von Mises stress on the deformed bodies. Collective.
 
     Below, two sections through the middle of the strongest contact, in true deformation: bodies whose
-    displacement is exaggerated overlap where they touch.
+    displacement is exaggerated overlap where they touch. Plane bodies are shown in their plane, and beside
+    them where they touch, if that is small. Rigid obstacles are shaded in the plane; in space planes are
+    shown as sheets, spheres and cylinders by their outlines, others not at all.
 
     Args:
         state: The state.
         path: PNG file to write.
         clim: Range of the colours, [force / length²]; from zero to the 99.5 % quantile unless given. Give two
             pictures the same range to compare them.
-        scale: Factor of the displacement in the upper picture; chosen and stated unless given.
+        scale: Factor of the displacement in the upper picture; chosen and stated unless given, 1 where there
+            are rigid obstacles.
         sections: Draw the sections too, if a contact carries force.
         reach: How far sections reach up and down from the contact's middle, [length]; chosen unless given.
         smooth: Show nodal means instead of the cells' own values.
@@ -86,13 +92,24 @@ def plot_stress(
     checked_reach(reach)
     given = None if clim is None else checked_range(clim)
     bodies = gather(state)
-    factor = chosen_scale(bodies) if scale is None else float(scale)
-    look = _Look(given or stress_range(bodies), factor, smooth, reach, title, units or Units(), width)
-    spot = None
-    if sections and np.any(state.contact.normal_force > 0):
-        places = contact_places(state, {name: body.deformed(1.0) for name, body in bodies.items()})
-        spot = strongest_contact(state.contact, places)
-    draw_on_one_rank(state.torn.decomposition.comm, lambda: _draw(bodies, spot, target, look))
+    # Exaggerated, bodies would enter rigid obstacles.
+    chosen = 1.0 if obstacles_of(state.scene) else chosen_scale(bodies)
+    factor = chosen if scale is None else float(scale)
+    shown, named = given or stress_range(bodies), units or Units()
+    places = contact_places(state, {name: body.deformed(1.0) for name, body in bodies.items()})
+    touching = sections and bool(np.any(state.contact.normal_force > 0))
+
+    def draw() -> None:
+        if state.scene.dim == 2:
+            window = contact_window(state.contact, places, reach) if touching else None
+            plain = PlaneLook(shown, factor, smooth, title, named, width)
+            draw_stress_in_plane(state.scene, bodies, window, target, plain)
+            return
+        look = _Look(shown, factor, smooth, reach, title, named, width)
+        spot = strongest_contact(state.contact, places) if touching else None
+        _draw(state.scene, bodies, spot, target, look)
+
+    draw_on_one_rank(state.torn.decomposition.comm, draw)
     return target
 
 
@@ -139,14 +156,16 @@ class _Detail:
     size: float
 
 
-def _draw(bodies: Mapping[str, BodyFields], spot: Spot | None, target: Path, look: _Look) -> None:
+def _draw(
+    scene: Scene, bodies: Mapping[str, BodyFields], spot: Spot | None, target: Path, look: _Look
+) -> None:
     points = np.concatenate([body.deformed(look.scale) for body in bodies.values()])
     view = oblique_view(points)
-    frame = frame_around(view, points)
+    obstacles, corners = obstacle_layers(scene, points, view)
+    frame = frame_around(view, np.concatenate([points, corners]))
     wide = min(WIDE, 0.5 * float(frame.size[0] / frame.size[1]))
-    whole = render(
-        [_body_layer(body, look) for body in bodies.values()], view, frame, round(wide * look.width)
-    )
+    layers = [*obstacles, *(_body_layer(body, look) for body in bodies.values())]
+    whole = render(layers, view, frame, round(wide * look.width))
     details = [] if spot is None else _sections(bodies, spot, view, look)
     peak = max(float(body.von_mises.max()) for body in bodies.values())
     facts = f"von Mises stress, largest {written(peak)} {look.units.stress}; displacement × {look.scale:g}"

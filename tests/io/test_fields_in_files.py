@@ -16,6 +16,7 @@ from fenics_contact.io import write_vtu, write_xdmf
 from fenics_contact.io.names import file_of_each
 from tests.contact.gallery import partitions
 from tests.io.states import touching_blocks
+from tests.viz.plane_states import plane_block
 
 CELLS = ("hexahedron", "tetrahedron")
 VTK_CELLS = {"hexahedron": pv.CellType.HEXAHEDRON, "tetrahedron": pv.CellType.TETRA}
@@ -76,6 +77,26 @@ def test_vtu_files_hold_the_contact_of_the_slave(tmp_path: Path) -> None:
     assert slips[upper["contact_status"] == Status.SLIP].min() > 0
     assert set(lower["contact_status"]) == {-1}
     assert not np.any(lower["contact_force"])
+
+
+@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+def test_vtu_and_xdmf_files_of_plane_bodies_lie_in_the_plane(cell: str, tmp_path: Path) -> None:
+    state = plane_block(cell)
+    read = pv.read(write_vtu(state, tmp_path))["block"]
+    mesh = state.scene.bodies["block"].mesh
+    kind = {"quadrilateral": pv.CellType.QUAD, "triangle": pv.CellType.TRIANGLE}[cell]
+    np.testing.assert_array_equal(read.cells_dict[kind], mesh.cells)
+    np.testing.assert_array_equal(read.points[:, :2], mesh.points)
+    displacement, force = read.point_data["displacement"], read.point_data["contact_force"]
+    np.testing.assert_array_equal(displacement[:, :2], state.gather_displacement("block"))
+    np.testing.assert_allclose(force[:, :2].sum(axis=0), state.contact.force.sum(axis=0))
+    for vectors in (read.points, displacement, force):
+        assert vectors.shape == (mesh.n_nodes, 3)
+        assert not np.any(vectors[:, 2])
+    assert_stress_of(state, "block", read)
+    write_xdmf(state, tmp_path / "plane.xdmf")
+    grids = pv.read(tmp_path / "plane_block.xdmf")
+    assert {name for grid in grids for name in grid.array_names} >= {"displacement", "von_mises"}
 
 
 def test_vtu_files_are_read_by_meshio_too(tmp_path: Path) -> None:

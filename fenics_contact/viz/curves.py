@@ -1,0 +1,129 @@
+"""Diagram of curves: what was computed beside what theory says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.viz.colours import BLUE, GREEN, GREY, INK, ORANGE
+from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+#: Places and values of one curve, (n,) each.
+Curve: TypeAlias = tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]
+
+#: Colours and symbols of the series, told apart without colours too.
+_LOOKS = (
+    (BLUE, "o"),
+    (ORANGE, "^"),
+    (GREEN, "s"),
+    ("#cc79a7", "D"),
+    ("#56b4e9", "v"),
+    ("#e69f00", "P"),
+)
+#: With more points than this a series is drawn as a line.
+MOST_SYMBOLS = 90
+
+
+def plot_curves(
+    series: Mapping[str, Curve],
+    path: str | Path,
+    *,
+    xlabel: str,
+    ylabel: str,
+    reference: Mapping[str, Curve] | None = None,
+    connected: bool = False,
+    logarithmic: bool = False,
+    title: str = "",
+    width: int = 1200,
+    comm: MPI.Comm | None = None,
+) -> Path:
+    """Draw series of points, each in its colour and symbol, on top of dark reference curves.
+
+    Args:
+        series: Name -> places and values, what was computed or measured. NaN leaves a gap.
+        path: PNG file to write.
+        xlabel: Name of the places with their unit.
+        ylabel: Name of the values with their unit.
+        reference: Name -> places and values, what they are compared with.
+        connected: Connect the points of a series in their order.
+        logarithmic: Both axes logarithmic, for convergence.
+        title: Title.
+        width: Width of the picture in pixels.
+        comm: If given, only rank 0 draws, and all ranks learn of an error.
+
+    Returns:
+        The path.
+
+    Raises:
+        InvalidInputError: If there is nothing to draw or a curve has not as many places as values.
+
+    Note:
+        Collective on ``comm`` if given.
+
+    Example:
+        >>> shear = {"computed": ([0.0, 1.0], [0.0, 2.0])}
+        >>> plot_curves(shear, "shear.png", xlabel="x (mm)", ylabel="q (MPa)")  # doctest: +SKIP
+    """
+    target = png_path(path)
+    shown = {name: _checked(name, curve) for name, curve in series.items()}
+    behind = {name: _checked(name, curve) for name, curve in (reference or {}).items()}
+    if not shown and not behind:
+        raise InvalidInputError("a diagram needs at least one curve, got none: pass series={'name': (x, y)}")
+
+    def draw() -> None:
+        size = (width, round(0.6 * width))
+        with sheet(target, size, title, "constrained") as figure:
+            axes = figure.subplots()
+            _draw_reference(axes, behind)
+            _draw_series(axes, shown, connected)
+            axes.set_xlabel(xlabel)
+            axes.set_ylabel(ylabel)
+            if logarithmic:
+                axes.set_xscale("log")
+                axes.set_yscale("log")
+            axes.grid(color=GREY, alpha=0.3)
+            axes.set_axisbelow(True)
+            figure.legend(loc="outside lower center", ncols=_columns([*shown, *behind]))
+
+    draw_on_one_rank(comm, draw)
+    return target
+
+
+def _checked(name: str, curve: Curve) -> tuple[np.ndarray, np.ndarray]:
+    x, y = (np.asarray(values, dtype=np.float64) for values in curve)
+    if x.ndim != 1 or x.shape != y.shape or not len(x):
+        raise InvalidInputError(
+            f"curve {name!r} must have one value for each place, got {y.shape} for {x.shape}: pass two "
+            "arrays of the same length"
+        )
+    return x, y
+
+
+def _columns(names: Sequence[str]) -> int:
+    """Return how many names fit beside each other."""
+    longest = max(len(name) for name in names)
+    return max(1, min(len(names), 110 // (longest + 8)))
+
+
+def _draw_reference(axes: Any, curves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> None:
+    styles = ("-", "--", ":", "-.")
+    for number, (name, (x, y)) in enumerate(curves.items()):
+        axes.plot(x, y, styles[number % 4], color=INK, lw=1.6, label=name, zorder=2)
+
+
+def _draw_series(axes: Any, curves: Mapping[str, tuple[np.ndarray, np.ndarray]], connected: bool) -> None:
+    for number, (name, (x, y)) in enumerate(curves.items()):
+        colour, symbol = _LOOKS[number % len(_LOOKS)]
+        few = len(x) <= MOST_SYMBOLS
+        line = "-" if connected or not few else "none"
+        axes.plot(
+            x, y, linestyle=line, marker=symbol if few else "none", color=colour, lw=2.2, ms=7,
+            markeredgecolor="white", markeredgewidth=0.6, label=name, zorder=3,
+        )  # fmt: skip

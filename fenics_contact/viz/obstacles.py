@@ -1,0 +1,119 @@
+"""Rigid obstacles in pictures: the shaded half of the plane, and outlines in space where they are plain."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fenics_contact.scene import RigidCylinder, RigidObstacle, RigidPlane, RigidSphere, Scene, Surface
+from fenics_contact.viz.colours import GREY, PALE
+from fenics_contact.viz.stage import Layer, segments, surface
+from fenics_contact.viz.view import View
+
+#: Samples along each side of a plane picture.
+SAMPLES = 400
+#: Pieces of a circle.
+PIECES = 180
+#: How far the shown part of a plane reaches beyond the bodies, relative to their size.
+BORDER = 0.06
+
+
+def obstacles_of(scene: Scene) -> list[RigidObstacle]:
+    """Return the different rigid obstacles of a scene."""
+    found: list[RigidObstacle] = []
+    for pair in scene.contacts:
+        if not isinstance(pair.master, Surface) and pair.master not in found:
+            found.append(pair.master)
+    return found
+
+
+def shade_obstacles(axes: Any, scene: Scene, low: np.ndarray, high: np.ndarray) -> None:
+    """Shade what lies inside a plane scene's obstacles, whatever their shape: where the distance is negative.
+
+    Args:
+        axes: matplotlib Axes.
+        scene: A scene in the plane.
+        low: Lower left corner of what is shown, (2,).
+        high: Upper right corner, (2,).
+    """
+    x, y = (np.linspace(a, b, SAMPLES) for a, b in zip(low, high, strict=True))
+    grid = np.stack(np.meshgrid(x, y), axis=-1)
+    for obstacle in obstacles_of(scene):
+        distance = obstacle.distance(grid.reshape(-1, 2)).reshape(SAMPLES, SAMPLES)
+        if distance.min() < 0 < distance.max():
+            axes.contourf(x, y, distance, levels=[distance.min(), 0.0], colors=[PALE], zorder=0)
+            axes.contour(x, y, distance, levels=[0.0], colors=[GREY], linewidths=1.5, zorder=0.5)
+
+
+def obstacle_layers(scene: Scene, points: np.ndarray, view: View) -> tuple[list[Layer], np.ndarray]:
+    """Draw planes as sheets, spheres and cylinders by their outlines; other shapes in space are left out.
+
+    Args:
+        scene: A scene in space.
+        points: All nodes of the bodies as they are drawn, (n, 3).
+        view: From which side it is seen.
+
+    Returns:
+        What to draw, and points that the picture should hold, (n, 3).
+    """
+    layers: list[Layer] = []
+    held = [np.zeros((0, 3))]
+    for obstacle in obstacles_of(scene):
+        match obstacle:
+            case RigidPlane():
+                corners = _sheet(obstacle, points)
+                layers += _plane_layers(corners, float(np.asarray(obstacle.normal) @ view.towards))
+                held.append(corners)
+            case RigidSphere():
+                layers.append(_lines(_circle(obstacle, view), closed=True))
+            case RigidCylinder():
+                layers += [_lines(edge, closed=False) for edge in _edges(obstacle, points, view)]
+    return layers, np.concatenate(held)
+
+
+def _plane_layers(corners: np.ndarray, facing: float) -> list[Layer]:
+    """A sheet seen from its free side lies behind all bodies; seen from behind it would hide them."""
+    sheet = Layer(surface(corners, np.arange(4)[None]), {"color": PALE, "lighting": False})
+    outline = _lines(corners, closed=True)
+    return [sheet, outline] if facing > 0.05 else [outline]
+
+
+def _sheet(plane: RigidPlane, points: np.ndarray) -> np.ndarray:
+    """Return the corners of the part of a plane under the bodies, (4, 3)."""
+    normal = np.asarray(plane.normal)
+    first = np.eye(3)[int(np.argmin(np.round(np.abs(normal), 6)))]
+    first = first - (first @ normal) * normal
+    axes = np.stack([first / np.linalg.norm(first), np.cross(normal, first / np.linalg.norm(first))])
+    flat = (points - np.asarray(plane.point)) @ axes.T
+    border = BORDER * float(np.ptp(points, axis=0).max())
+    (x0, y0), (x1, y1) = flat.min(axis=0) - border, flat.max(axis=0) + border
+    return np.asarray(plane.point) + np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]) @ axes
+
+
+def _circle(sphere: RigidSphere, view: View) -> np.ndarray:
+    """Return the outline of a sphere in parallel projection, (n, 3)."""
+    angle = np.linspace(0, 2 * np.pi, PIECES, endpoint=False)[:, None]
+    return np.asarray(
+        np.asarray(sphere.centre) + sphere.radius * (np.cos(angle) * view.right + np.sin(angle) * view.up)
+    )
+
+
+def _edges(cylinder: RigidCylinder, points: np.ndarray, view: View) -> list[np.ndarray]:
+    """Return the edges of a cylinder's outline beside the bodies, (2, 3) each; none if it is seen end on."""
+    axis = np.asarray(cylinder.axis)
+    across = np.cross(axis, view.towards)
+    length = float(np.linalg.norm(across))
+    if length < 0.05:
+        return []
+    along = (points - np.asarray(cylinder.point)) @ axis
+    line = np.asarray(cylinder.point) + np.array([along.min(), along.max()])[:, None] * axis
+    return [line + side * cylinder.radius * across / length for side in (-1.0, 1.0)]
+
+
+def _lines(points: np.ndarray, *, closed: bool) -> Layer:
+    number = np.arange(len(points))
+    pairs = np.stack([number, np.roll(number, -1)], axis=1)
+    return Layer(
+        segments(points, pairs if closed else pairs[:-1]), {"color": GREY, "line_width": 3, "lighting": False}
+    )

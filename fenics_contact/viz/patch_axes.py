@@ -1,0 +1,32 @@
+"""Axes that show a contact surface laid flat."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from matplotlib.ticker import FuncFormatter
+
+from fenics_contact.viz.patch import ContactPatch
+from fenics_contact.viz.units import Units
+from fenics_contact.viz.view import axis_label
+
+
+def label_axes(axes: Any, patch: ContactPatch, units: Units, *, from_slave: bool = False) -> None:
+    """Show the patch's window with equal scales; an axis that runs backwards counts backwards.
+
+    Args:
+        axes: matplotlib Axes.
+        patch: The surface.
+        units: Names of the units.
+        from_slave: Mirror it, as it is seen from inside the slave, where that lets the axis run forwards.
+    """
+    axes.set_aspect("equal")
+    axes.set_xlim(patch.low[0], patch.high[0])
+    axes.set_ylim(patch.low[1], patch.high[1])
+    for axis, direction, word in ((axes.xaxis, patch.view.right, "right"), (axes.yaxis, patch.view.up, "up")):
+        name = axis_label(direction)
+        axis.set_label_text(f"{name.strip('−') or word} ({units.length})")
+        if name.startswith("−"):
+            if from_slave and axis is axes.xaxis:
+                axes.set_xlim(patch.high[0], patch.low[0])
+            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{0 - value:g}".replace("-", "−")))

@@ -1,0 +1,79 @@
+"""Plane bodies drawn by matplotlib: meshes, fields and outlines on their coordinates."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.tri import Triangulation
+
+from fenics_contact.geometry import boundary_faces
+from fenics_contact.viz.colours import INK
+
+#: Edges closer than this, relative to the size of the picture, would blacken it.
+CLOSEST = 0.006
+
+
+def draw_field(
+    axes: Any, points: np.ndarray, cells: np.ndarray, values: np.ndarray, look: dict[str, Any]
+) -> None:
+    """Colour plane cells by values on their nodes or on themselves.
+
+    Args:
+        axes: matplotlib Axes.
+        points: Coordinates, (n_nodes, 2).
+        cells: Node numbers, (n_cells, 3 | 4).
+        values: Shape (n_nodes,) or (n_cells,).
+        look: ``cmap``, ``vmin`` and ``vmax``.
+    """
+    if len(values) == len(points):
+        mesh, shown = centred(points, cells, values)
+        axes.tripcolor(mesh, shown, shading="gouraud", rasterized=True, **look)
+        return
+    faces = PolyCollection(points[cells], array=values, edgecolors="face", linewidths=0.2, cmap=look["cmap"])
+    faces.set_clim(look["vmin"], look["vmax"])
+    axes.add_collection(faces)
+
+
+def centred(points: np.ndarray, cells: np.ndarray, values: np.ndarray) -> tuple[Triangulation, np.ndarray]:
+    """Cut quadrilaterals into four triangles about their middles, which favours no diagonal.
+
+    Returns:
+        The triangulation and the values on its nodes.
+    """
+    if cells.shape[1] == 3:
+        return Triangulation(*points.T, cells), values
+    middle = len(points) + np.arange(len(cells))
+    sides = [np.column_stack([cells[:, k], cells[:, (k + 1) % 4], middle]) for k in range(4)]
+    places = np.concatenate([points, points[cells].mean(axis=1)])
+    return Triangulation(*places.T, np.concatenate(sides)), np.concatenate(
+        [values, values[cells].mean(axis=1)]
+    )
+
+
+def draw_outline(axes: Any, points: np.ndarray, cells: np.ndarray, *, width: float = 1.2) -> None:
+    """Draw the boundary of a plane body."""
+    edges, _ = boundary_faces(cells, 2)
+    axes.add_collection(LineCollection(points[edges], colors=INK, linewidths=width, capstyle="round"))
+
+
+def draw_cell_edges(
+    axes: Any, points: np.ndarray, cells: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> None:
+    """Draw the edges of cells inside a window faintly, but of cells too small to be told apart."""
+    corners = points[cells]
+    inside = np.all((corners.max(axis=1) > low) & (corners.min(axis=1) < high), axis=1)
+    length = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).min(axis=1)
+    seen = inside & (length > CLOSEST * float(np.max(high - low)))
+    look = {"facecolors": "none", "edgecolors": INK, "linewidths": 0.4, "alpha": 0.25}
+    axes.add_collection(PolyCollection(corners[seen], **look))
+
+
+def window(axes: Any, low: np.ndarray, high: np.ndarray, unit: str) -> None:
+    """Show a rectangle of the plane with equal scales and named axes."""
+    axes.set_aspect("equal")
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.set_xlabel(f"x ({unit})")
+    axes.set_ylabel(f"y ({unit})")

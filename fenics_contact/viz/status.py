@@ -1,0 +1,116 @@
+"""Maps of what contact points do, one for each state of a history."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.collections import PolyCollection
+
+from fenics_contact.contact import State, Status
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.viz.colours import INK, PALE
+from fenics_contact.viz.patch import ContactPatch, contact_patch
+from fenics_contact.viz.patch_axes import label_axes
+from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet
+from fenics_contact.viz.symbols import SYMBOLS, label_of
+from fenics_contact.viz.units import Units
+from fenics_contact.viz.words import written
+
+#: Length of the longest arrow, relative to the map.
+ARROW = 0.07
+#: Maps in one row at most.
+COLUMNS = 3
+
+
+def plot_contact_status(
+    states: Mapping[str, State],
+    path: str | Path,
+    *,
+    pair: int = 0,
+    reach: float | None = None,
+    title: str = "",
+    units: Units | None = None,
+    width: int = 1600,
+) -> Path:
+    """Draw where a contact pair is open, sticks and slips, in one map for each state. Collective.
+
+    Arrows show how points that slip moved on the master in the last load step. The surface is seen from the
+    master's side, or from inside the slave where that lets the axes run to the right.
+
+    Args:
+        states: Name -> state of a scene in space, for instance after each load step.
+        path: PNG file to write.
+        pair: Number of the contact pair in the scenes.
+        reach: How far a map reaches around the contact's middle, [length]; chosen unless given.
+        title: Title.
+        units: Names of the units, mm, N and MPa unless given.
+        width: Width of the picture in pixels.
+
+    Returns:
+        The path.
+
+    Raises:
+        InvalidInputError: If there is no state, one has no such pair, or one is plane.
+    """
+    target = png_path(path)
+    if not states:
+        raise InvalidInputError("maps of the status need a state, got none: pass {'name': state}")
+    for name, state in states.items():
+        if state.scene.dim == 2 or not 0 <= pair < len(state.scene.contacts):
+            raise InvalidInputError(
+                f"maps of the status need states in space with a contact pair {pair}, got {name!r} with "
+                f"{len(state.scene.contacts)} pairs in {state.scene.dim} dimensions: plot_contact_pressure "
+                "draws plane states"
+            )
+    comm = next(iter(states.values())).torn.decomposition.comm
+
+    def draw() -> None:
+        patches = {name: contact_patch(state, pair, reach) for name, state in states.items()}
+        _draw(patches, target, title or next(iter(patches.values())).name, units or Units(), width)
+
+    draw_on_one_rank(comm, draw)
+    return target
+
+
+def _draw(patches: Mapping[str, ContactPatch], target: Path, title: str, units: Units, width: int) -> None:
+    columns = min(COLUMNS, len(patches))
+    rows = -(-len(patches) // columns)
+    size = next(iter(patches.values()))
+    proportion = float((size.high - size.low)[1] / (size.high - size.low)[0])
+    height = round((0.09 + rows * (0.075 + 0.9 * proportion / columns)) * width)
+    with sheet(target, (width, height), title, "constrained") as figure:
+        panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+        for axes, (name, patch) in zip(panels, patches.items(), strict=False):
+            draw_status(axes, patch, counted=False)
+            axes.set_title(f"{name}\n{_words(patch, units)}")
+            label_axes(axes, patch, units, from_slave=True)
+        for axes in panels[len(patches) :]:
+            axes.set_axis_off()
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower right", ncols=3, handletextpad=0.2)
+
+
+def _words(patch: ContactPatch, units: Units) -> str:
+    slips = patch.status == Status.SLIP
+    longest = float(np.linalg.norm(patch.slip[slips], axis=1).max(initial=0.0))
+    share = f"{np.count_nonzero(slips)} of {len(slips)} slip"
+    return f"{share}, by up to {written(longest, 2)} {units.length}" if longest > 0 else "none slips"
+
+
+def draw_status(axes: Any, patch: ContactPatch, *, counted: bool = True) -> None:
+    """Draw facets laid flat, a symbol on each contact point, and how those that slip move."""
+    axes.add_collection(PolyCollection(patch.places[patch.facets], facecolors=PALE, edgecolors="white"))
+    places = patch.places[patch.points]
+    for status, look in SYMBOLS.items():
+        chosen = patch.status == status
+        label = label_of(status, np.count_nonzero(chosen) if counted else None)
+        axes.scatter(*places[chosen].T, label=label, zorder=3, linewidths=1.0, **look)
+    slips = patch.status == Status.SLIP
+    longest = float(np.linalg.norm(patch.slip[slips], axis=1).max(initial=0.0))
+    if longest > 0:
+        reach = ARROW * float(np.max(patch.high - patch.low)) / longest
+        arrows = {"angles": "xy", "scale_units": "xy", "scale": 1, "color": INK, "width": 0.004, "zorder": 4}
+        axes.quiver(*places[slips].T, *(reach * patch.slip[slips]).T, **arrows)

@@ -1,0 +1,139 @@
+"""Picture of the stress of plane bodies: all of them, and where they touch at a larger scale."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+
+from fenics_contact.contact import ContactResult
+from fenics_contact.scene import Scene
+from fenics_contact.viz.colours import STRESS_MAP
+from fenics_contact.viz.fields import BodyFields
+from fenics_contact.viz.obstacles import shade_obstacles
+from fenics_contact.viz.plane import draw_cell_edges, draw_field, draw_outline, window
+from fenics_contact.viz.sheet import sheet
+from fenics_contact.viz.units import Units
+from fenics_contact.viz.words import headline, written
+
+#: Half size of the detail, in half lengths of the closed part of the contact surface.
+REACH = 2.5
+#: A detail that shows more than this part of the bodies is left out.
+LARGEST_DETAIL = 0.4
+#: Room around the bodies, relative to their size.
+BORDER = 0.04
+
+
+@dataclass(frozen=True)
+class PlaneLook:
+    """How the picture is made; as the arguments of `plot_stress`."""
+
+    clim: tuple[float, float]
+    scale: float
+    smooth: bool
+    title: str
+    units: Units
+    width: int
+
+    @property
+    def colours(self) -> dict[str, Any]:
+        """Keywords of matplotlib."""
+        return {"cmap": STRESS_MAP, "vmin": self.clim[0], "vmax": self.clim[1]}
+
+
+@dataclass(frozen=True)
+class _Part:
+    title: str
+    scale: float
+    low: np.ndarray
+    high: np.ndarray
+
+    @property
+    def proportion(self) -> float:
+        """Width by height."""
+        return float((self.high - self.low)[0] / (self.high - self.low)[1])
+
+
+def contact_window(
+    contact: ContactResult, places: np.ndarray, reach: float | None
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the corners of a square around the pair with the largest force; None if no force acts.
+
+    Args:
+        contact: What happens on the contact points.
+        places: Their places, (n, 2), [length].
+        reach: Half size of the square, [length], or None.
+    """
+    force, points = contact.normal_force, contact.points
+    if not np.any(force > 0):
+        return None
+    pair = int(np.argmax(np.bincount(points.pair, weights=force)))
+    closed = (points.pair == pair) & (force > 0)
+    weight = np.where(closed, force, 0.0)
+    middle = weight @ places / weight.sum()
+    half = REACH * float(points.area[closed].sum()) / 2 if reach is None else reach
+    return middle - half, middle + half
+
+
+def draw_stress_in_plane(
+    scene: Scene,
+    bodies: Mapping[str, BodyFields],
+    detail: tuple[np.ndarray, np.ndarray] | None,
+    target: Path,
+    look: PlaneLook,
+) -> None:
+    """Draw von Mises stress on the deformed bodies, and beside it the contact in true deformation."""
+    parts = _parts(bodies, detail, look.scale)
+    peak = max(float(body.von_mises.max()) for body in bodies.values())
+    facts = f"von Mises stress, largest {written(peak)} {look.units.stress}; displacement × {look.scale:g}"
+    upright = len(parts) > 1 and parts[0].proportion > 2.2
+    # Sizes in parts of the sheet's width, with room for tick labels, titles and the colour bar.
+    if upright:
+        height = 0.84 / parts[0].proportion + 0.36 + 0.2
+    else:
+        height = 0.8 / sum(part.proportion for part in parts) + 0.13
+    height = float(np.clip(height, 0.3, 1.0))
+    with sheet(
+        target, (look.width, round(height * look.width)), headline(look.title, facts), "constrained"
+    ) as figure:
+        ratios = {"height_ratios": [0.84 / parts[0].proportion, 0.36]} if upright else None
+        ratios = ratios or {"width_ratios": [part.proportion for part in parts]}
+        shape = (len(parts), 1) if upright else (1, len(parts))
+        panels = figure.subplots(*shape, squeeze=False, gridspec_kw=ratios).ravel()
+        for axes, part in zip(panels, parts, strict=True):
+            _draw_part(axes, scene, bodies, part, look)
+        label = f"von Mises stress ({look.units.stress})"
+        extend = "max" if peak > look.clim[1] else "neither"
+        colours = ScalarMappable(Normalize(*look.clim), STRESS_MAP)
+        figure.colorbar(colours, ax=panels.tolist(), label=label, extend=extend, aspect=30, shrink=0.95)
+
+
+def _parts(
+    bodies: Mapping[str, BodyFields], detail: tuple[np.ndarray, np.ndarray] | None, scale: float
+) -> list[_Part]:
+    points = np.concatenate([body.deformed(scale) for body in bodies.values()])
+    low, high = points.min(axis=0), points.max(axis=0)
+    border = BORDER * float(np.max(high - low))
+    parts = [_Part("", scale, low - border, high + border)]
+    if detail is not None and np.max(detail[1] - detail[0]) < LARGEST_DETAIL * np.max(high - low):
+        parts.append(_Part("where they touch; displacement × 1", 1.0, *detail))
+    return parts
+
+
+def _draw_part(
+    axes: Any, scene: Scene, bodies: Mapping[str, BodyFields], part: _Part, look: PlaneLook
+) -> None:
+    shade_obstacles(axes, scene, part.low, part.high)
+    for body in bodies.values():
+        points, cells = body.deformed(part.scale), body.mesh.cells
+        values = body.nodal_von_mises if look.smooth else body.von_mises
+        draw_field(axes, points, cells, values, look.colours)
+        draw_cell_edges(axes, points, cells, part.low, part.high)
+        draw_outline(axes, points, cells)
+    axes.set_title(part.title)
+    window(axes, part.low, part.high, look.units.length)

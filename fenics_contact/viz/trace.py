@@ -1,0 +1,149 @@
+"""A plane contact surface unrolled: its nodes one after the other, and what acts on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+from fenics_contact.contact import State
+from fenics_contact.viz.view import axis_label
+
+#: A surface whose edges turn less than this from their mean is shown over a coordinate, else over its length.
+STRAIGHT = np.cos(np.radians(60.0))
+
+
+@dataclass(frozen=True)
+class ContactTrace:
+    """What acts along the slave surface of a pair in the plane.
+
+    Attributes:
+        name: Body and surface.
+        axis: What the places are: "x", "−y", or "along the surface".
+        places: Of all nodes of the surface, ascending, (n,), [length].
+        breaks: Numbers of nodes after which the surface is interrupted.
+        pressure: On all nodes, zero where there is no contact point, (n,), [force / length²].
+        traction: Tangential traction on the slave in the direction of the places, (n,).
+        bound: The largest that friction allows, (n,).
+        points: Numbers of the nodes that are contact points.
+        status: Of the contact points.
+        slip: Largest slip of the last load step, [length].
+        force: Normal force of the pair, a unit of thickness.
+        shear: Sum of the tangential forces on the slave, a unit of thickness.
+    """
+
+    name: str
+    axis: str
+    places: np.ndarray
+    breaks: np.ndarray
+    pressure: np.ndarray
+    traction: np.ndarray
+    bound: np.ndarray
+    points: np.ndarray
+    status: np.ndarray
+    slip: float
+    force: float
+    shear: float
+
+    def window(self, reach: float | None) -> tuple[float, float]:
+        """Return the range of places to show: what is closed with room beside it, or as far as told."""
+        closed = np.flatnonzero(self.pressure > 0)
+        closed = closed if len(closed) else np.arange(len(self.places))
+        low, high = float(self.places[closed].min()), float(self.places[closed].max())
+        if reach is not None:
+            return (low + high) / 2 - reach, (low + high) / 2 + reach
+        room = 0.12 * max(high - low, float(np.ptp(self.places)) / 20)
+        return max(low - room, float(self.places[0])), min(high + room, float(self.places[-1]))
+
+
+def contact_trace(state: State, pair: int) -> ContactTrace:
+    """Unroll the slave surface of a pair of a plane scene."""
+    contact, slave = state.contact, state.scene.contacts[pair].slave
+    mesh, edges = state.scene.bodies[slave.body].mesh, state.scene.facets(slave)
+    order, starts = walk(edges)
+    if _runs_backwards(mesh.points[order], starts):
+        lengths = np.diff([*starts, len(order)])
+        order, starts = order[::-1], np.concatenate([[0], np.cumsum(lengths[::-1])[:-1]])
+    forward, axis, places = _unrolled(mesh.points[order], starts)
+    numbers = state.torn.decomposition.tearing.global_nodes(slave.body, order)
+    chosen = contact.on_pair(pair)
+    sorting = np.argsort(numbers)
+    points = sorting[np.searchsorted(numbers, contact.points.slave[chosen], sorter=sorting)]
+    shear = np.einsum("na,nad->nd", -contact.friction_force[chosen], contact.points.tangents[chosen])
+    shear = np.einsum("nd,nd->n", shear, forward[points])
+    values = np.zeros((3, len(order)))
+    area = contact.points.area[chosen]
+    values[:, points] = np.stack([contact.normal_force[chosen], shear, contact.slip_bound[chosen]]) / area
+    return ContactTrace(
+        f"{slave.body}, {slave.name}", axis, places, starts[1:] - 1, values[0], values[1], values[2],
+        points, contact.status[chosen], float(np.abs(contact.slip[chosen]).max(initial=0.0)),
+        float(contact.normal_force[chosen].sum()), float(shear.sum()),
+    )  # fmt: skip
+
+
+def walk(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Order the nodes of directed edges one after the other.
+
+    Args:
+        edges: Pairs of nodes, (n, 2); every node begins and ends at most one of them.
+
+    Returns:
+        The nodes in their order, piece by piece, and where the pieces begin, (n_pieces,). Of a closed curve
+        the first node is not repeated.
+    """
+    nodes, local = np.unique(edges, return_inverse=True)
+    local = local.reshape(edges.shape)
+    graph = sp.csr_matrix((np.ones(len(edges)), local.T), shape=(len(nodes), len(nodes)))
+    count, piece = connected_components(graph, directed=False)
+    first = np.ones(len(nodes), dtype=bool)
+    first[local[:, 1]] = False
+    order = []
+    for number in range(count):
+        mine = np.flatnonzero(piece == number)
+        heads = mine[first[mine]]
+        head = int(heads[0]) if len(heads) else int(mine[0])
+        order.append(breadth_first_order(graph, head, return_predecessors=False))
+    starts = np.cumsum([0, *(len(part) for part in order[:-1])])
+    return nodes[np.concatenate(order)], starts
+
+
+def _steps(points: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ways from node to node, and which of them do not lead from one piece to the next."""
+    inside = np.ones(len(points) - 1, dtype=bool)
+    inside[starts[1:] - 1] = False
+    return np.diff(points, axis=0), inside
+
+
+def _runs_backwards(points: np.ndarray, starts: np.ndarray) -> bool:
+    """Whether a surface runs against the axis that it follows most: bodies lie left of their surfaces."""
+    steps, inside = _steps(points, starts)
+    total = steps[inside].sum(axis=0)
+    return bool(total[int(np.argmax(np.abs(total)))] < 0)
+
+
+def _unrolled(points: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, str, np.ndarray]:
+    """Return the direction along the surface at each node, what the places are called, and the places."""
+    steps, inside = _steps(points, starts)
+    length = np.linalg.norm(steps, axis=1)
+    unit = steps / np.where(length, length, 1.0)[:, None]
+    mean = steps[inside].sum(axis=0)
+    mean = mean / max(float(np.linalg.norm(mean)), np.finfo(float).tiny)
+    if np.all(unit[inside] @ mean > STRAIGHT):
+        return _over_a_coordinate(points, mean)
+    along = np.concatenate([[0.0], np.cumsum(np.where(inside, length, 0.0))])
+    # A node's direction is the mean of the edges at it, which belong to its own piece.
+    total = np.zeros_like(points)
+    total[:-1][inside] += unit[inside]
+    total[1:][inside] += unit[inside]
+    return total / np.linalg.norm(total, axis=1)[:, None], "along the surface", along
+
+
+def _over_a_coordinate(points: np.ndarray, mean: np.ndarray) -> tuple[np.ndarray, str, np.ndarray]:
+    """Show a surface that is nearly straight over x or y where it runs along one, else over its direction."""
+    axis = int(np.argmax(np.abs(mean)))
+    plain = abs(mean[axis]) > np.cos(np.radians(20.0))
+    direction = np.eye(2)[axis] if plain else mean
+    name = axis_label(np.append(direction, 0.0)) if plain else "along the surface"
+    return np.tile(direction, (len(points), 1)), name, points @ direction

@@ -1,0 +1,98 @@
+"""Picture of a plane contact surface: pressure and tangential traction along it, and what its points do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+
+from fenics_contact.contact import Status
+from fenics_contact.viz.colours import BLUE, GREY, INK, ORANGE, PALE
+from fenics_contact.viz.sheet import sheet
+from fenics_contact.viz.symbols import SYMBOLS, label_of
+from fenics_contact.viz.trace import ContactTrace
+from fenics_contact.viz.units import Units
+from fenics_contact.viz.words import headline, written
+
+
+@dataclass(frozen=True)
+class TractionLook:
+    """How the picture is made; as the arguments of `plot_contact_pressure`."""
+
+    clim: tuple[float, float] | None
+    reach: float | None
+    title: str
+    units: Units
+    width: int
+
+
+def draw_traction(trace: ContactTrace, target: Path, look: TractionLook) -> None:
+    """Draw the pressure above and, where friction acts, the tangential traction on the slave below."""
+    units, rubs = look.units, bool(np.any(trace.bound > 0))
+    facts = f"largest pressure {written(float(trace.pressure.max()))} {units.stress}, "
+    facts += f"normal force {written(trace.force)} {units.force}/{units.length}"
+    if rubs:
+        facts += f", tangential force {written(trace.shear)} {units.force}/{units.length}"
+    top = float(trace.pressure.max()) or 1.0
+    height = round((0.62 if rubs else 0.4) * look.width)
+    with sheet(target, (look.width, height), headline(look.title, facts), "constrained") as figure:
+        rows = figure.subplots(2 if rubs else 1, 1, sharex=True, squeeze=False)[:, 0]
+        _curve(rows[0], trace, trace.pressure, BLUE)
+        _symbols(rows[0], trace, trace.pressure)
+        rows[0].set_ylabel(f"contact pressure ({units.stress})")
+        rows[0].set_title(f"pressure on {trace.name}")
+        if look.clim:
+            rows[0].set_ylim(*look.clim)
+        else:
+            rows[0].set_ylim(-0.05 * top, 1.08 * top)
+        if rubs:
+            _draw_friction(rows[1], trace, units)
+        rows[-1].set_xlabel(f"{trace.axis} ({units.length})")
+        rows[-1].set_xlim(*trace.window(look.reach))
+        for axes in rows:
+            axes.grid(color=GREY, alpha=0.25)
+            axes.yaxis.set_major_locator(MaxNLocator(6))
+        handles, labels = rows[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower right", ncols=3, handletextpad=0.2)
+
+
+def _draw_friction(axes: Any, trace: ContactTrace, units: Units) -> None:
+    places, bound = _broken(trace, trace.places), _broken(trace, trace.bound)
+    axes.fill_between(places, -bound, bound, color=PALE, linewidth=0)
+    for side in (-bound, bound):
+        axes.plot(places, side, "--", color=INK, lw=1.2)
+    _curve(axes, trace, trace.traction, ORANGE)
+    _symbols(axes, trace, trace.traction)
+    axes.axhline(0.0, color=INK, lw=0.8)
+    axes.set_ylabel(f"tangential traction ({units.stress})")
+    end = f", largest slip {written(trace.slip, 2)} {units.length}" if trace.slip > 0 else ", no slip"
+    axes.set_title(f"tangential traction, slip bound dashed{end}")
+
+
+def _curve(axes: Any, trace: ContactTrace, values: np.ndarray, colour: str) -> None:
+    axes.plot(_broken(trace, trace.places), _broken(trace, values), color=colour, lw=1.8, zorder=2.5)
+
+
+def _broken(trace: ContactTrace, values: np.ndarray) -> np.ndarray:
+    """Put a gap where the surface is interrupted."""
+    return np.insert(values, trace.breaks + 1, np.nan)
+
+
+def _symbols(axes: Any, trace: ContactTrace, values: np.ndarray) -> None:
+    low, high = trace.window(None)
+    seen = np.count_nonzero((trace.places > low) & (trace.places < high))
+    size = float(np.clip(60 / max(seen, 1), 0.12, 0.6))
+    for status in Status:
+        chosen = trace.points[trace.status == status]
+        look = {**SYMBOLS[status], "s": size * SYMBOLS[status]["s"]}
+        axes.scatter(
+            trace.places[chosen],
+            values[chosen],
+            label=label_of(status, len(chosen)),
+            zorder=3,
+            linewidths=0.6,
+            **look,
+        )

@@ -1,0 +1,53 @@
+"""The demos with known answers find the same numbers on one rank and on two, and leave pictures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+#: Of each demo: what its result holds, on any number of ranks, and its pictures. That the numbers are those
+#: of theory is for the demos to assert; they end with an error otherwise.
+DEMOS: dict[str, tuple[dict[str, float | list[float]], set[str]]] = {
+    "punch_2d": (
+        {"force": 1248.07, "half_width": 1.15517, "peak_pressure": 686.547},
+        {"hertz", "stress", "pressure", "decomposition"},
+    ),
+    "cattaneo_mindlin": (
+        {"stick_half_width": [0.811537, 0.613885, 0.381714]},
+        {"traction", "contact", "stress"},
+    ),
+    "shrink_fit": (
+        {"pressure": 58.9595, "torque_limit": 33340.8},
+        {"torque", "stress_fitted", "stress_turned", "contact", "decomposition"},
+    ),
+    "sheared_block": (
+        {"plateau_over_bound": [0.992253, 0.999573, 0.999655], "dissipated_energy": 162.774},
+        {"loop", "status", "stress"},
+    ),
+}
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("name", DEMOS)
+def test_a_demo_finds_its_number_on_one_rank_and_on_two(
+    name: str, ranks: int, mpirun: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    numbers, pictures = DEMOS[name]
+    monkeypatch.chdir(tmp_path)
+    printed = mpirun(ROOT / "demos" / f"demo_{name}.py", ranks, timeout=120.0)
+    assert printed.count("pictures and files in") == 1, "one rank prints"
+    assert ("1 rank\n" if ranks == 1 else "2 ranks\n") in printed
+    output = tmp_path / "output" / name
+    result = json.loads((output / "result.json").read_text())
+    assert result["ranks"] == ranks
+    for key, value in numbers.items():
+        np.testing.assert_allclose(result[key], value, rtol=2e-4, err_msg=key)
+    assert {path.stem for path in output.glob("*.png")} == pictures
+    assert min(path.stat().st_size for path in output.glob("*.png")) > 10_000
+    assert list(output.glob("*.vtm"))

@@ -1,0 +1,86 @@
+"""Rigid obstacles in pictures, and maps of the status."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.scene import RigidCylinder, RigidPlane, RigidSphere
+from fenics_contact.viz import plot_contact_status, plot_stress
+from fenics_contact.viz.obstacles import obstacle_layers, obstacles_of
+from fenics_contact.viz.section import strongest_contact
+from fenics_contact.viz.view import oblique_view
+from tests.viz.plane_states import caged_block, plane_block
+from tests.viz.states import contains, painted, pixels, touching_blocks
+
+
+def test_obstacles_in_space_are_drawn_where_they_are() -> None:
+    scene = caged_block().scene
+    points = scene.bodies["block"].mesh.points
+    view = oblique_view(points)
+    layers, corners = obstacle_layers(scene, points, view)
+    assert [type(obstacle).__name__ for obstacle in obstacles_of(scene)] == [
+        "RigidPlane", "RigidSphere", "RigidCylinder", "DistanceObstacle", "RigidPlane"
+    ]  # fmt: skip
+    # The floor as sheet and outline, ball and bar by outlines, the front wall, which would hide all, too.
+    assert len(layers) == 2 + 1 + 2 + 1
+    assert corners.shape == (8, 3)
+    np.testing.assert_allclose(corners[:4, 2], 0.0, atol=1e-12)
+    _, ball, bar, wall = (
+        o for o in obstacles_of(scene) if isinstance(o, RigidPlane | RigidSphere | RigidCylinder)
+    )
+    circle = np.asarray(layers[2].mesh.points)
+    np.testing.assert_allclose(ball.distance(circle), 0.0, atol=1e-6)
+    np.testing.assert_allclose((circle - ball.centre) @ view.towards, 0.0, atol=1e-6)
+    for layer in layers[3:5]:
+        np.testing.assert_allclose(bar.distance(np.asarray(layer.mesh.points)), 0.0, atol=1e-6)
+    np.testing.assert_allclose(wall.distance(np.asarray(layers[5].mesh.points)), 0.0, atol=1e-6)
+    assert wall.normal == (0.0, 1.0, 0.0)
+    assert view.towards[1] < 0, "it stands between the viewer and the block"
+
+
+def test_a_scene_with_obstacles_is_drawn(tmp_path: Path) -> None:
+    image = pixels(plot_stress(caged_block(), tmp_path / "caged.png", width=640))
+    assert painted(image) > 0.3
+    assert contains(image, "#e3e6e8"), "the floor"
+
+
+def test_bodies_on_obstacles_are_drawn_in_true_scale(tmp_path: Path) -> None:
+    left, true, large = (
+        pixels(plot_stress(plane_block(), tmp_path / f"{k}.png", width=640, **options))
+        for k, options in enumerate([{}, {"scale": 1.0}, {"scale": 10.0}])
+    )
+    np.testing.assert_array_equal(left, true)
+    assert large.shape != true.shape or np.abs(large - true).max() > 0.1
+
+
+def test_where_normals_cancel_the_strongest_point_gives_the_direction() -> None:
+    angle = 2 * np.pi * np.arange(12) / 12
+    normal = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(12)])
+    points = SimpleNamespace(pair=np.zeros(12, dtype=int), normal=normal, area=np.ones(12))
+    force = np.where(np.arange(12) == 3, 1.0 + 1e-6, 1.0)
+    spot = strongest_contact(SimpleNamespace(normal_force=force, points=points), normal)
+    np.testing.assert_allclose(spot.normal, normal[3])
+
+
+def test_status_maps_show_stick_and_slip_of_each_state(tmp_path: Path) -> None:
+    state = touching_blocks()
+    one = pixels(plot_contact_status({"a": state}, tmp_path / "one.png", width=1200))
+    four = pixels(plot_contact_status(dict.fromkeys("abcd", state), tmp_path / "four.png", width=1200))
+    for colour in ("#0072b2", "#d55e00"):
+        assert contains(one, colour)
+        assert contains(four, colour)
+
+
+def test_status_maps_refuse_what_they_cannot_show(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match=r"maps of the status need a state, got none"):
+        plot_contact_status({}, tmp_path / "maps.png")
+    with pytest.raises(InvalidInputError, match=r"contact pair 1, got 'a' with 1 pairs in 3 dimensions"):
+        plot_contact_status({"a": touching_blocks()}, tmp_path / "maps.png", pair=1)
+    with pytest.raises(InvalidInputError, match=r"got 'flat' with 1 pairs in 2 dimensions"):
+        plot_contact_status({"flat": plane_block()}, tmp_path / "maps.png")
+    assert not list(tmp_path.iterdir())
