@@ -17,7 +17,6 @@
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from fenics_contact.contact import LoadSequence, Status
@@ -36,7 +35,7 @@ from fenics_contact.scene import (
     ThermalStrain,
     Tie,
 )
-from fenics_contact.viz import plot_contact_pressure, plot_stress
+from fenics_contact.viz import plot_contact_pressure, plot_curves, plot_stress
 
 comm = MPI.COMM_WORLD
 output = Path("output/bolted_joint")
@@ -141,22 +140,17 @@ if comm.rank == 0:
 write_vtu(state, output, "sliding")
 plot_stress(state, output / "stress.png", clim=(0, 400), scale=50, reach=19.0, title="Sliding joint")
 plot_contact_pressure(state, output / "pressure_sliding.png", title="Plate under the upper strap")
-
-
-def plot_load_over_displacement(path):
-    figure = Figure(figsize=(10, 6), layout="constrained")
-    axes = figure.subplots()
-    limit = 2 * friction.friction_coefficient * np.array(clamped)
-    axes.plot(moved, limit / 1e3, color="#d55e00", lw=2, label="2 μ P with the force in the bolt")
-    axes.plot(moved, np.array(pulled) / 1e3, "-o", color="#0072b2", lw=2, label="pull")
-    axes.axhline(0, color="#9a9a9a", lw=0.8)
-    axes.set(xlabel="displacement of the plate's end (mm)", ylabel="force (kN)")
-    axes.legend(frameon=False, loc="center right")
-    figure.savefig(path, dpi=130)
-
-
-if comm.rank == 0:
-    plot_load_over_displacement(output / "curve.png")
+limit = 2 * friction.friction_coefficient * np.array(clamped)
+plot_curves(
+    {"pull": (moved, np.array(pulled) / 1e3)},
+    output / "curve.png",
+    xlabel="displacement of the plate's end (mm)",
+    ylabel="force (kN)",
+    reference={"2 μ P with the force in the bolt": (moved, limit / 1e3)},
+    connected=True,
+    title="Bolted joint",
+    comm=comm,
+)
 
 # The pull ends at the closed formula to 1 %; the rest of it is what the bent straps press beside the bolt.
 # While less is pulled, some of the joint sticks; in the end all of it slides.

@@ -18,7 +18,6 @@
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
@@ -33,7 +32,7 @@ from fenics_contact.scene import (
     Surface,
     TotalForce,
 )
-from fenics_contact.viz import plot_contact_pressure, plot_stress
+from fenics_contact.viz import plot_contact_pressure, plot_curves, plot_stress
 
 comm = MPI.COMM_WORLD
 output = Path("output/hertz_sphere")
@@ -127,22 +126,19 @@ plot_contact_pressure(state, output / "pressure.png", clim=(0, 1.02 * p0), title
 
 # Pressure over radius: every contact point is a dot.
 
-
-def plot_pressure_over_radius(path):
-    figure = Figure(figsize=(10, 6), layout="constrained")
-    axes = figure.subplots()
-    line = np.linspace(0, a, 400)
-    axes.plot(line / a, hertz(line) / p0, color="#222222", lw=2, label="Hertz")
-    for (name, got), look in zip(found.items(), ("o", "x"), strict=True):
-        near = got["r"] < 1.5 * a
-        axes.plot(got["r"][near] / a, got["pressure"][near] / p0, look, ms=7, label=name)
-    axes.set(xlabel="distance from the axis r / a", ylabel="contact pressure p / p₀", xlim=(0, 1.5))
-    axes.legend(frameon=False)
-    figure.savefig(path, dpi=130)
-
-
-if comm.rank == 0:
-    plot_pressure_over_radius(output / "curve.png")
+line = np.linspace(0, a, 400)
+plot_curves(
+    {
+        name: (got["r"][got["r"] < 1.5 * a] / a, got["pressure"][got["r"] < 1.5 * a] / p0)
+        for name, got in found.items()
+    },
+    output / "curve.png",
+    xlabel="distance from the axis r / a",
+    ylabel="contact pressure p / p₀",
+    reference={"Hertz": (line / a, hertz(line) / p0)},
+    title="Ball on block",
+    comm=comm,
+)
 
 # Peak pressure and contact radius of the mortar method agree with Hertz to 2 %; the node method does not.
 
