@@ -12,7 +12,7 @@
 # Friction remembers: in every load step it opposes the slip since the step before,
 # $\|\tau\| \le \mu \lambda_N$ with $\tau$ along $u_T(t) - u_T(t-1)$ where the bodies slide.
 #
-# Run it with `python demos/demo_bolted_joint.py` or `mpirun -n 2 python demos/demo_bolted_joint.py`.
+# Run it with `make demo DEMO=bolted_joint`, on two ranks with `make demo DEMO=bolted_joint NP=2`.
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import LoadSequence, Status
 from fenics_contact.geometry import block, bolt, drilled_plate
-from fenics_contact.io import write_vtu
+from fenics_contact.io import write_json, write_vtu
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,
@@ -129,8 +129,14 @@ for displacement in moved:
 # The force in the bolt is what its head presses with. Tightening gives a preload; pulling loses a little of
 # it, as the plate gets thinner. At zero the plate already pushes a little: it was squeezed between its ends.
 
+record = {"ranks": comm.size, "moved": moved, "pull": pulled, "bolt_force": clamped}
+write_json(output / "result.json", record, comm=comm)
+
 if comm.rank == 0:
-    print("bolted joint\n  end moved [mm]   pull [N]   bolt force [N]   pull / 2 μ P   stick   slip")
+    ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"
+    sizes = state.counts
+    print(f"bolted joint: {sizes['torn_unknowns']} unknowns in {sizes['subdomains']} subdomains, {ranks}")
+    print("  end moved [mm]   pull [N]   bolt force [N]   pull / 2 μ P   stick   slip")
     for displacement, pull, P, (stick, slip) in zip(moved, pulled, clamped, counts, strict=True):
         ratio = pull / (2 * friction.friction_coefficient * P)
         print(f"  {displacement:14.3f} {pull:10.1f} {P:16.1f} {ratio:14.4f} {stick:7d} {slip:6d}")
@@ -151,6 +157,9 @@ plot_curves(
     title="Bolted joint",
     comm=comm,
 )
+
+if comm.rank == 0:
+    print(f"pictures and files in {output}/")
 
 # The pull ends at the closed formula to 1 %; the rest of it is what the bent straps press beside the bolt.
 # While less is pulled, some of the joint sticks; in the end all of it slides.

@@ -12,7 +12,7 @@
 # point. Without contact the stiffness of this chain is singular: 24 rigid motions. The equilibrium is
 # statically determined, so we know what has to come out: every contact carries $F$.
 #
-# Run it with `python demos/demo_five_links.py` or `mpirun -n 2 python demos/demo_five_links.py`.
+# Run it with `make demo DEMO=five_links`, on two ranks with `make demo DEMO=five_links NP=2`.
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import Status, solve_scene
 from fenics_contact.geometry import LinkShape, chain
-from fenics_contact.io import write_vtu
+from fenics_contact.io import write_json, write_vtu
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -85,8 +85,13 @@ state = solve_scene(scene, partitions, comm)
 contact = state.contact
 forces = np.array([contact.force[contact.on_pair(pair)].sum(axis=0) for pair in range(len(links.pairs))])
 moved = [state.gather_displacement(name)[:, 0].mean() for name in names]
+record = {"ranks": comm.size, "forces": -forces[:, 0], "displacements": moved}
+write_json(output / "result.json", record, comm=comm)
+
 if comm.rank == 0:
-    print(f"five links: {state.counts['torn_unknowns']} unknowns, {state.counts['subdomains']} subdomains")
+    ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"
+    counts = state.counts
+    print(f"five links: {counts['torn_unknowns']} unknowns in {counts['subdomains']} subdomains, {ranks}")
     for pair, (i, j) in enumerate(links.pairs):
         status = contact.status[contact.on_pair(pair)]
         kinds = f"{np.sum(status == Status.STICK)} stick, {np.sum(status == Status.SLIP)} slip"
@@ -102,6 +107,9 @@ write_vtu(state, output, "chain")
 plot_decomposition(scene, partitions, output / "decomposition.png", comm=comm)
 plot_stress(state, output / "stress.png", clim=(0, 1000), reach=14.0, title="Five links")
 plot_contact_pressure(state, output / "pressure.png", pair=1, title="Link 3 on link 2")
+
+if comm.rank == 0:
+    print(f"pictures and files in {output}/")
 
 # Every contact transmits the whole force, along the chain and nowhere else. The chain is periodic: inner
 # links follow one another at equal distances.

@@ -13,7 +13,7 @@
 # has: "mortar" is the accurate one, to 1 % here; "node" errs by tens of percents, because forces between
 # single nodes and facets cannot represent an even pressure on such meshes.
 #
-# Run it with `python demos/demo_hertz_sphere.py` or `mpirun -n 2 python demos/demo_hertz_sphere.py`.
+# Run it with `make demo DEMO=hertz_sphere`, on two ranks with `make demo DEMO=hertz_sphere NP=2`.
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
 from fenics_contact.geometry import box_lattice, hemisphere
-from fenics_contact.io import write_vtu
+from fenics_contact.io import write_json, write_vtu
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -104,8 +104,14 @@ for name, state in states.items():
         "a": measured,
     }
 
+record = {"ranks": comm.size, "peak_pressure": found["mortar"]["peak"], "radius": found["mortar"]["a"]}
+write_json(output / "result.json", record, comm=comm)
+
 if comm.rank == 0:
-    print("ball on block    peak pressure [N/mm²]      contact radius [mm]")
+    ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"
+    counts = states["mortar"].counts
+    print(f"ball on block: {counts['torn_unknowns']} unknowns in {counts['subdomains']} subdomains, {ranks}")
+    print("                 peak pressure [N/mm²]      contact radius [mm]")
     print(f"  Hertz          {p0:10.1f}                {a:10.4f}")
     for name, got in found.items():
         errors = got["peak"] / p0 - 1, got["a"] / a - 1
@@ -139,6 +145,9 @@ plot_curves(
     title="Ball on block",
     comm=comm,
 )
+
+if comm.rank == 0:
+    print(f"pictures and files in {output}/")
 
 # Peak pressure and contact radius of the mortar method agree with Hertz to 2 %; the node method does not.
 

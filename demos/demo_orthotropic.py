@@ -15,7 +15,7 @@
 # The package derives stress and stiffness from it by UFL. We compare with the package's own orthotropic
 # model, which is written in another way, for the same constants.
 #
-# Run it with `python demos/demo_orthotropic.py` or `mpirun -n 2 python demos/demo_orthotropic.py`.
+# Run it with `make demo DEMO=orthotropic`, on two ranks with `make demo DEMO=orthotropic NP=2`.
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +26,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
 from fenics_contact.geometry import box_lattice
-from fenics_contact.io import write_vtu
+from fenics_contact.io import write_json, write_vtu
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -133,8 +133,13 @@ turned = np.degrees(np.arccos(abs(axes[:, 1] @ fibre[:2])))
 # The forces of both models, point by point.
 
 difference = np.abs(force - compared.contact.normal_force).max() / force.max()
+record = {"ranks": comm.size, "force": force.sum(), "half_axes": [long, short], "angle": turned}
+write_json(output / "result.json", record, comm=comm)
+
 if comm.rank == 0:
-    print(f"wood under a ball: {state.counts['torn_unknowns']} unknowns, {np.sum(force > 0)} points closed")
+    ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"
+    counts = state.counts
+    print(f"ball on wood: {counts['torn_unknowns']} unknowns in {counts['subdomains']} subdomains, {ranks}")
     print(f"  force                {force.sum():9.1f} N")
     print(f"  half axes of patch   {long:9.3f} mm and {short:.3f} mm")
     print(f"  long axis to fibres  {turned:9.1f} °")
@@ -147,6 +152,9 @@ if comm.rank == 0:
 write_vtu(state, output, "wood")
 plot_stress(state, output / "stress.png", scale=1, reach=6.0, title="Wood under a ball")
 plot_contact_pressure(state, output / "pressure.png", title="Wood under a ball")
+
+if comm.rank == 0:
+    print(f"pictures and files in {output}/")
 
 # Both models are the same material. The patch is longer across the fibres: these are stiff, and resist being
 # bent to the curvature of the ball.
