@@ -7,12 +7,7 @@ import numpy as np
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry.graph_partition import graph_partition
 from fenics_contact.geometry.mesh import BodyMesh
-from fenics_contact.geometry.partition import (
-    box_partition,
-    check_face_connected,
-    check_one_piece,
-    torn_node_counts,
-)
+from fenics_contact.geometry.partition import box_partition, check_face_connected, check_one_piece
 from fenics_contact.geometry.structured import check_count
 
 TARGET_NODES = {3: 700, 2: 1000}
@@ -21,6 +16,12 @@ TARGET_NODES = {3: 700, 2: 1000}
 In 3D these are 9 nodes along an edge, as in the published chain of links. As many displacements make 32 nodes
 along an edge in 2D: the matrices are as large, their factors sparser and the interface smaller, and the
 condition number grows with the logarithm, squared, of the cells along an edge only."""
+
+NEAR = (0.8, 1.25)
+"""By which factors the number of boxes may miss the target."""
+
+COMPACT = 2.0
+"""Largest ratio of the sides of a box, in cells."""
 
 _NODES_PER_CELL = {"hexahedron": 1.0, "tetrahedron": 1.0 / 5.5, "quadrilateral": 1.0, "triangle": 0.5}
 """In the interior of a large mesh; for tetrahedra as mesh generators make them (6 in a split hexahedron)."""
@@ -57,9 +58,9 @@ def default_partition(
 ) -> np.ndarray:
     """Cut a body into as many subdomains as suit its size, and at least one for every rank.
 
-    A structured mesh is cut into boxes where these have no more torn nodes in all than METIS's subdomains:
-    they are as good then, and all alike. A count like 7 would give slabs; METIS cuts those better. Only a
-    body with fewer cells than ranks gets fewer subdomains than there are ranks.
+    A structured mesh is cut into boxes of about the size aimed at, where some are compact: they are all
+    alike then, so that their matrices have one pattern. Otherwise METIS cuts it. Only a body with fewer cells
+    than ranks gets fewer subdomains than there are ranks.
 
     Args:
         mesh: Any mesh that is connected through faces.
@@ -76,30 +77,38 @@ def default_partition(
     """
     check_count(ranks, "ranks")
     check_one_piece(mesh, body)
-    parts = max(target_parts(mesh, nodes), min(ranks, mesh.n_cells))
-    graph = graph_partition(mesh, parts, body)
-    boxes = _boxes(mesh, parts)
-    if boxes is None:
-        return graph
-    fewer = torn_node_counts(mesh, boxes).sum() <= torn_node_counts(mesh, graph).sum()
-    return boxes if fewer else graph
+    target, least = target_parts(mesh, nodes), min(ranks, mesh.n_cells)
+    boxes = _boxes(mesh, target, least)
+    return graph_partition(mesh, max(target, least), body) if boxes is None else boxes
 
 
-def _boxes(mesh: BodyMesh, parts: int) -> np.ndarray | None:
-    """Cut a structured mesh into boxes with the least surface; None where there are none that will do."""
+def _boxes(mesh: BodyMesh, target: int, least: int) -> np.ndarray | None:
+    """Cut a structured mesh into compact boxes; None where there are none of about the size aimed at."""
     if mesh.grid is None:
         return None
     counts = mesh.grid.max(axis=0) + 1
-    choices = [boxes for boxes in _factorisations(parts, mesh.dim) if np.all(np.array(boxes) <= counts)]
+    first, last = (max(least, round(factor * target)) for factor in NEAR)
+    choices = [
+        boxes
+        for number in range(max(first, 1), last + 1)
+        for boxes in _factorisations(number, mesh.dim)
+        if np.all(np.array(boxes) <= counts) and _aspect(counts, boxes) <= COMPACT
+    ]
     if not choices:
         return None
-    best = min(choices, key=lambda boxes: float(np.prod(counts + np.array(boxes))))
+    best = min(choices, key=lambda boxes: (bool(np.any(counts % boxes)), _aspect(counts, boxes)))
     try:
         partition = box_partition(mesh, best)
         check_face_connected(mesh, partition)
     except InvalidInputError:  # the grid has holes
         return None
     return partition
+
+
+def _aspect(counts: np.ndarray, boxes: tuple[int, ...]) -> float:
+    """Return the longest over the shortest side of a box, in cells."""
+    sides = counts / np.array(boxes)
+    return float(sides.max() / sides.min())
 
 
 def _factorisations(number: int, factors: int) -> list[tuple[int, ...]]:

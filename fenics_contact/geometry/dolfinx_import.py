@@ -23,7 +23,7 @@ from fenics_contact.geometry.xdmf_grids import Grid, chosen_grid, grids_of
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-    from fenics_contact._dolfinx_files import MeshArrays, TagArrays
+    from fenics_contact._dolfinx.reading import MeshArrays, TagArrays
 
 Bodies = Sequence[Label] | Mapping[str, Label | Sequence[Label] | Mapping[str, Label]]
 """Tags; or body to tag, to tags that become regions, or to region to tag."""
@@ -117,7 +117,7 @@ def from_dolfinx(
 
 
 def _read(path: Path, facet_path: Path, names: tuple[str | None, str | None, str | None]) -> TaggedMesh:
-    from fenics_contact import _dolfinx_files
+    from fenics_contact._dolfinx import reading
 
     grids = grids_of(path)
     others = grids if facet_path == path else grids_of(facet_path)
@@ -130,13 +130,11 @@ def _read(path: Path, facet_path: Path, names: tuple[str | None, str | None, str
 
     def tags(file: Path, grid: Grid | None) -> Any:
         return (
-            None
-            if grid is None
-            else _dolfinx_files.read_tags(file, mesh, grid.name, grid.inline, grid.has_points)
+            None if grid is None else reading.read_tags(file, mesh, grid.name, grid.inline, grid.has_points)
         )
 
     try:
-        mesh = _dolfinx_files.read_mesh(path, place.name, place.inline)
+        mesh = reading.read_mesh(path, place.name, place.inline)
         return _tagged_mesh(mesh, tags(path, cells), tags(facet_path, facets), f"file '{path}'")
     except RuntimeError as reason:  # dolfinx raises no other class
         raise InvalidInputError(
@@ -147,9 +145,9 @@ def _read(path: Path, facet_path: Path, names: tuple[str | None, str | None, str
 
 
 def _tagged_mesh(mesh: Any, cell_tags: Any, facet_tags: Any, source: str) -> TaggedMesh:
-    from fenics_contact import _dolfinx_files
+    from fenics_contact._dolfinx import reading
 
-    arrays = _dolfinx_files.mesh_arrays(mesh)
+    arrays = reading.mesh_arrays(mesh)
     if not arrays.linear:
         raise InvalidInputError(
             f"{source} has cells of type '{arrays.cell_type}' with more nodes: {QUADRATIC}"
@@ -165,11 +163,11 @@ def _tagged_mesh(mesh: Any, cell_tags: Any, facet_tags: Any, source: str) -> Tag
         points = flattened(points, np.unique(arrays.cells), source)
     cells = {arrays.cell_type: turned_right_handed(points, arrays.cells, source)}
     groups = _groups(
-        arrays, None if cell_tags is None else _dolfinx_files.tag_arrays(mesh, arrays, cell_tags), source
+        arrays, None if cell_tags is None else reading.tag_arrays(mesh, arrays, cell_tags), source
     )
     facets: dict[Label, list[np.ndarray]] = {}
     if facet_tags is not None:
-        tagged = _dolfinx_files.tag_arrays(mesh, arrays, facet_tags)
+        tagged = reading.tag_arrays(mesh, arrays, facet_tags)
         facets = {int(tag): [tagged.entities[tagged.values == tag]] for tag in np.unique(tagged.values)}
     return TaggedMesh(source, points, cells, groups, facets, ("cell tag", "facet tag"))
 

@@ -14,7 +14,6 @@ FLOORS = [
     {"errors"},
     {"_requirements", "timing"},
     {"_dolfinx"},
-    {"_dolfinx_files"},
     {"geometry", "linalg"},
     {"scene", "qp"},
     {"feti"},
@@ -141,9 +140,9 @@ def test_fenics_reached_through_another_room_is_found() -> None:
     assert "dolfinx" in reached("feti", modules())
 
 
-def test_only_the_private_modules_import_dolfinx() -> None:
+def test_only_the_private_module_imports_dolfinx() -> None:
     importing = {module.room for module in modules() if dolfinx_imports(module)}
-    assert importing == {"_dolfinx", "_dolfinx_files"}
+    assert importing == {"_dolfinx"}
 
 
 def test_dolfinx_is_found_inside_functions_and_allowed_for_types(tmp_path: Path) -> None:

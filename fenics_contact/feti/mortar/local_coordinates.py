@@ -60,9 +60,9 @@ def rule(dim: int) -> tuple[np.ndarray, np.ndarray]:
         x = 0.5 + np.sqrt(0.15) * np.array([-1.0, 0.0, 1.0])
         return np.column_stack([1 - x, x]), np.array([5.0, 8.0, 5.0]) / 18
     root = np.sqrt(15.0)
-    points, weights = [[1 / 3] * 3], [0.225]
+    points, weights = [np.full((1, 3), 1 / 3)], [0.225]
     for sign in (-1, 1):
         near, share = (6 + sign * root) / 21, (155 + sign * root) / 1200
-        points += np.where(np.eye(3, dtype=bool), 1 - 2 * near, near).tolist()
+        points.append(np.where(np.eye(3, dtype=bool), 1 - 2 * near, near))
         weights += [share] * 3
-    return np.array(points), np.array(weights)
+    return np.concatenate(points), np.array(weights)

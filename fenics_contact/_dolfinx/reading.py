@@ -1,4 +1,4 @@
-"""Meshes that dolfinx reads from files or has in memory, as plain arrays; knows dolfinx's versions."""
+"""Meshes that dolfinx reads from files or has in memory, as plain arrays; imported only for that."""
 
 from __future__ import annotations
 
@@ -9,16 +9,12 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact import _dolfinx  # imports dolfinx first and undoes what that leaves behind
+from fenics_contact._dolfinx.cells import VERTEX_ORDER
+from fenics_contact._dolfinx.loading import OLD, cpp, dolfinx
 from fenics_contact.errors import InvalidInputError
-
-import dolfinx.io  # isort: skip
-from dolfinx import cpp  # isort: skip
 
 __all__ = ["MeshArrays", "TagArrays", "mesh_arrays", "read_mesh", "read_tags", "tag_arrays"]
 
-#: Vertex order of VTK -> tensor-product order of dolfinx; each permutation is its own inverse.
-_VERTEX_ORDER = {"hexahedron": [0, 1, 3, 2, 4, 5, 7, 6], "quadrilateral": [0, 1, 3, 2]}
 _VERTICES = {"triangle": 3, "quadrilateral": 4, "tetrahedron": 4, "hexahedron": 8, "prism": 6, "pyramid": 5}
 
 
@@ -138,13 +134,13 @@ def mesh_arrays(mesh: Any) -> MeshArrays:
     node = np.argsort(np.argsort(geometry.input_global_indices))
     cell = np.argsort(np.argsort(topology.original_cell_index[:n_cells]))
     dofmap = np.asarray(getattr(geometry.dofmap, "array", geometry.dofmap)).reshape(n_cells, -1)
-    cells = np.empty(dofmap.shape, dtype=np.int64)
+    cells: np.ndarray = np.empty(dofmap.shape, dtype=np.int64)
     cells[cell] = node[dofmap]
     linear = cells.shape[1] == _VERTICES.get(name)
     points = np.empty((node.size, geometry.dim))
     points[node] = geometry.x[:, : geometry.dim]
     if linear:
-        cells = cells[:, _VERTEX_ORDER.get(name, slice(None))]
+        cells = cells[:, VERTEX_ORDER.get(name, slice(None))]
     return MeshArrays(name, topology.dim, points, cells, linear, node, cell)
 
 
@@ -155,6 +151,6 @@ def tag_arrays(mesh: Any, arrays: MeshArrays, tags: Any) -> TagArrays:
     topology = mesh.topology
     topology.create_connectivity(tags.dim, arrays.dim)
     topology.create_connectivity(arrays.dim, tags.dim)
-    core = mesh._mesh if _dolfinx.VERSION < (0, 7) else mesh._cpp_object
+    core = mesh._mesh if OLD else mesh._cpp_object
     rows = cpp.mesh.entities_to_geometry(core, tags.dim, np.asarray(tags.indices, dtype=np.int32), False)
     return TagArrays(arrays.node[np.asarray(rows).reshape(len(tags.indices), -1)], np.asarray(tags.values))
