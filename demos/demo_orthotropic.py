@@ -148,6 +148,8 @@ if comm.rank == 0:
 # ## Pictures and files for ParaView
 #
 # ![Von Mises stress](../docs/pictures/orthotropic_stress.png)
+#
+# The thin arc is the outline of the ball.
 
 write_vtu(state, output, "wood")
 plot_stress(state, output / "stress.png", scale=1, reach=6.0, title="Wood under a ball")
