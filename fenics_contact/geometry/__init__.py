@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from fenics_contact.geometry.block import block, box_lattice
+from fenics_contact.geometry.bolted import bolt, drilled_plate
 from fenics_contact.geometry.cell_types import CELL_TYPES, CellType, cell_type_of
+from fenics_contact.geometry.chain import Chain, chain
 from fenics_contact.geometry.coincidence import merge_duplicate_nodes
 from fenics_contact.geometry.default_partition import default_partition, target_parts
 from fenics_contact.geometry.dolfinx_import import from_dolfinx, read_xdmf
+from fenics_contact.geometry.extrusion import extrude
 from fenics_contact.geometry.faces import boundary_faces, orient, vector_areas
 from fenics_contact.geometry.gmsh_import import from_gmsh_model, read_msh
 from fenics_contact.geometry.graph_partition import graph_partition
@@ -40,6 +43,7 @@ __all__ = [
     "PULL_AXIS",
     "BodyMesh",
     "CellType",
+    "Chain",
     "DesignSurface",
     "Link",
     "LinkShape",
@@ -47,16 +51,20 @@ __all__ = [
     "axial_clearance",
     "bisection_partition",
     "block",
+    "bolt",
     "boundary_faces",
     "box_lattice",
     "box_partition",
     "cell_type_of",
+    "chain",
     "chain_link",
     "check_face_connected",
     "check_one_piece",
     "check_penetration",
     "combine",
     "default_partition",
+    "drilled_plate",
+    "extrude",
     "from_dolfinx",
     "from_gmsh_model",
     "graph_partition",

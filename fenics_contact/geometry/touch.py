@@ -77,7 +77,7 @@ def two_links(
     """
     shape = LinkShape() if shape is None else shape
     other = shape if other is None else other
-    _check_fit(shape, other)
+    check_fit(shape, other)
     faceting = max(shape.faceting, other.faceting)
     check_penetration(gap, faceting)
     first = chain_link(shape, comm)
@@ -180,9 +180,18 @@ def _height_over(places: np.ndarray, triangles: np.ndarray, candidates: int = 32
     return np.where(inside.min(axis=1) > -1e-9, np.sum(inside * heights, axis=1), np.nan)
 
 
-def _check_fit(first: LinkShape, second: LinkShape) -> None:
-    """Refuse links that cannot be interlocked or would not touch at one spot."""
-    for wire, ring, one, two in ((first, second, "link 1", "link 2"), (second, first, "link 2", "link 1")):
+def check_fit(first: LinkShape, second: LinkShape, names: tuple[str, str] = ("link 1", "link 2")) -> None:
+    """Refuse links that cannot be interlocked or would not touch at one spot.
+
+    Args:
+        first: A link.
+        second: Its neighbour.
+        names: What messages call them.
+
+    Raises:
+        InvalidInputError: Naming the wire that is too large.
+    """
+    for wire, ring, one, two in ((first, second, *names), (second, first, *names[::-1])):
         if wire.width >= 2.0 * ring.inner_radius or wire.thickness >= ring.opening:
             raise InvalidInputError(
                 f"the wire of {one} must pass through the opening of {two}, got a wire {wire.width:g} wide "

@@ -31,6 +31,25 @@ DEMOS: dict[str, tuple[dict[str, float | list[float]], set[str]]] = {
         {"plateau_over_bound": [0.992253, 0.999573, 0.999655], "dissipated_energy": 162.774},
         {"loop", "status", "stress"},
     ),
+    "hertz_sphere": (
+        {"peak_pressure": 7287.7, "radius": 0.987318},
+        {"stress", "pressure", "curve"},
+    ),
+    "bolted_joint": (
+        {
+            "pull": [-916.4, 4462.9, 9606.9, 14259.4, 15827.3, 15932.4],
+            "bolt_force": [27576.2, 27267.6, 26966.4, 26686.9, 26508.3, 26459.1],
+        },
+        {"stress", "pressure_tightened", "pressure_sliding", "curve"},
+    ),
+    "five_links": (
+        {"forces": [40e3] * 4, "displacements": [0.020548, 0.141450, 0.279922, 0.418392, 0.553923]},
+        {"stress", "pressure", "decomposition"},
+    ),
+    "orthotropic": (
+        {"force": 1849.15, "half_axes": [3.20134, 2.71753], "angle": 89.153},
+        {"stress", "pressure"},
+    ),
 }
 
 
