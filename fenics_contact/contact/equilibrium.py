@@ -104,7 +104,7 @@ def find_state(
             previous=None if previous is None else previous.torn,
         )
         if slip_from is not None:
-            torn = torn.with_slip_from(torn.jump(slip_from.torn_displacement))
+            torn = torn.with_slip_from(slip_from.torn.relative(slip_from.torn_displacement))
         if previous is None or torn.scene.loads != previous.scene.loads:
             check_held(torn)
     kind = choose_solver(scene, decomposition.tearing.n_subdomains, sensitivity=sensitivity)
@@ -181,7 +181,14 @@ def contact_result(system: DualSystem, solution: DualSolution) -> ContactResult:
         full[frictional] = values
         return full
 
-    origin = torn.numbering.gather(torn.right, torn.tangential_rows.ravel()).reshape(-1, torn.dim - 1)
+    origin = torn.numbering.gather(torn.right + torn.supported, torn.tangential_rows.ravel())
     return ContactResult(
-        torn.points, normal, spread(tau), spread(bound), gap, spread(-minus_slip), spread(origin), status
+        torn.points,
+        normal,
+        spread(tau),
+        spread(bound),
+        gap,
+        spread(-minus_slip),
+        spread(origin.reshape(-1, torn.dim - 1)),
+        status,
     )

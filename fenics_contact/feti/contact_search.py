@@ -16,9 +16,6 @@ from fenics_contact.feti.projection import Projection, join, project
 from fenics_contact.feti.surface import FacetedSurface, faceted_surface, shape_functions
 from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie
 
-#: Penetration of the start geometry that faceting explains, relative to the size of a slave facet.
-FACETING = 0.1
-
 
 def find_contact_points(
     scene: Scene, tearing: Tearing, fixed: np.ndarray, comm: MPI.Comm = MPI.COMM_SELF
@@ -153,22 +150,3 @@ def _shared_projection(
         hit = project(slave.points[chosen], slave.normals[chosen], master)
         found = replace(hit, point=mine[hit.point])
     return join([part for part in comm.allgather(found) if part is not None])
-
-
-def check_no_penetration(scene: Scene, points: ContactPoints) -> None:
-    """Refuse a start geometry whose bodies overlap by more than their faceting explains.
-
-    Raises:
-        InvalidInputError: Names the pair, the number of nodes and the depth.
-    """
-    size = points.area ** (1.0 / (scene.dim - 1))
-    allowed = -FACETING * size
-    deep = points.gap < allowed
-    if deep.any():
-        worst = int(np.argmin(points.gap))
-        pair = scene.contacts[int(points.pair[worst])]
-        raise InvalidInputError(
-            f"bodies must not overlap at the start: {int(deep.sum())} nodes of {pair.slave.body!r} lie up to "
-            f"{-points.gap[worst]:.3g} inside the master, more than the faceting of the surfaces explains "
-            f"({-allowed[worst]:.3g}): move the bodies apart"
-        )

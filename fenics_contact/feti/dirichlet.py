@@ -97,7 +97,10 @@ class _ContactBlock:
         matrix = gram if basis is None else (basis.T @ gram @ basis).tocsr()
         self._size = matrix.shape[0]
         if self._size:
-            self._factor = Factor((matrix + REGULARISATION * sp.diags(matrix.diagonal())).tocsr())
+            diagonal = matrix.diagonal()
+            # Rows that supports determine alone are empty.
+            share = np.where(diagonal > 0.0, REGULARISATION * diagonal, 1.0)
+            self._factor = Factor((matrix + sp.diags(share)).tocsr())
 
     @classmethod
     def of_rows(

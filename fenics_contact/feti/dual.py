@@ -17,6 +17,8 @@ from fenics_contact.qp import CoarseSpace, ContactLayout, DualProblem
 from fenics_contact.qp.scaling import EVEN, Scaling
 from fenics_contact.timing import PhaseTimer
 
+#: Flexibility of rows that have none, relative to the mean of all contact rows.
+STIFF = 1e-6
 #: A resultant below this fraction of the loads' sum is rounding: the loads balance each other.
 BALANCED = 1e-13
 
@@ -198,4 +200,21 @@ class DualSystem:
         local[contact] = self.inverse.row_flexibility(self._B_interface[contact])
         diagonal = numbering.to_owned(local)
         diagonal[numbering.owned < self.torn.n_equality] = 1.0
+        return self._filled(diagonal)
+
+    def _filled(self, diagonal: np.ndarray) -> np.ndarray:
+        """Give rows that supports determine alone the diagonal of their disc, or a small one. Collective.
+
+        A small one, as such a row has no flexibility: any slip that supports prescribe counts as slip.
+        """
+        layout, comm = self._layout(), self.torn.numbering.comm
+        total, count = comm.allreduce(
+            np.array([diagonal[layout.contact].sum(), np.count_nonzero(diagonal[layout.contact])])
+        )
+        if count == 0:
+            total, count = 1.0, 1.0
+        discs = diagonal[layout.tangential]
+        diagonal[layout.tangential] = np.where(discs > 0, discs, discs.max(axis=1, initial=0.0)[:, None])
+        contact = diagonal[layout.contact]
+        diagonal[layout.contact] = np.where(contact > 0, contact, STIFF * total / count)
         return diagonal

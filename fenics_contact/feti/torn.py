@@ -9,13 +9,19 @@ import scipy.sparse as sp
 
 from fenics_contact.errors import together
 from fenics_contact.feti.contact_points import ContactPoints, join_points
-from fenics_contact.feti.contact_rows import contact_rows, tied_rows
-from fenics_contact.feti.contact_search import check_no_penetration, find_contact_points, find_tied_points
+from fenics_contact.feti.contact_rows import (
+    Relations,
+    normal_relations,
+    tangential_relations,
+    tied_relations,
+)
+from fenics_contact.feti.contact_search import find_contact_points, find_tied_points
 from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.forms import as_tractions
 from fenics_contact.feti.friction import friction_data
 from fenics_contact.feti.gluing import prescribed_displacements
 from fenics_contact.feti.numbering import DualNumbering
+from fenics_contact.feti.room import check_no_penetration, gap_with_room
 from fenics_contact.feti.rows import Rows, stack
 from fenics_contact.feti.subdomain import Subdomain, assemble
 from fenics_contact.scene import Scene
@@ -39,8 +45,12 @@ class TornSystem:
         friction_coefficient: μ of each frictional point (zero under Tresca), replicated, shape (n_friction,).
         tresca_bound: Fixed slip bound of each frictional point, replicated, shape (n_friction,), [force].
         numbering: Owners and exchange of multipliers.
-        B: This rank's part of B, shape (n_local_rows, torn_size).
-        right: c of the owned rows, shape (n_owned,), [length].
+        relations: What the rows of ties and contacts measure, in their order, replicated.
+        B: This rank's part of B, shape (n_local_rows, torn_size); rows of ties and contacts act on free
+            components only.
+        supported: What prescribed displacements contribute to the owned rows of ties and contacts, shape
+            (n_owned,), zero on other rows, [length].
+        right: c of the owned rows less what supports contribute, shape (n_owned,), [length].
     """
 
     scene: Scene
@@ -53,21 +63,27 @@ class TornSystem:
     friction_coefficient: np.ndarray
     tresca_bound: np.ndarray
     numbering: DualNumbering
+    relations: tuple[Relations, ...]
     B: sp.csr_matrix
+    supported: np.ndarray
     right: np.ndarray
 
     def jump(self, displacement: np.ndarray) -> np.ndarray:
         """Return B u for a torn displacement of this rank, owned, [length]. Collective."""
         return self.numbering.to_owned(self.B @ displacement)
 
-    def with_slip_from(self, jump: np.ndarray) -> TornSystem:
+    def relative(self, displacement: np.ndarray) -> np.ndarray:
+        """Return B u with what supports contribute, owned, [length]. Collective."""
+        return self.jump(displacement) + self.supported
+
+    def with_slip_from(self, relative: np.ndarray) -> TornSystem:
         """Return the system in which slip is measured from an earlier displacement.
 
         Args:
-            jump: B u of the earlier displacement, owned, shape (n_owned,), [length].
+            relative: What `relative` gave for it, owned, shape (n_owned,), [length].
         """
         tangential = self.numbering.owned >= self.n_equality + self.points.count
-        return replace(self, right=np.where(tangential, jump, self.right))
+        return replace(self, right=np.where(tangential, relative - self.supported, self.right))
 
     @property
     def dim(self) -> int:
@@ -132,9 +148,14 @@ def build_torn_system(
         system = replace(previous, scene=scene, subdomains=subdomains)
     else:
         system = _joined(scene, decomposition, subdomains, start_geometry, previous)
-    right = np.concatenate([right, np.zeros(system.n_equality - len(right)), system.points.gap])
-    right = np.concatenate([right, np.zeros(system.tangential_rows.size)])
-    return replace(system, right=right[system.numbering.owned])
+    with together(comm):
+        gap = gap_with_room(system.relations[1], decomposition.fixed, prescribed)
+    supported = np.concatenate([relation.of_supports(prescribed) for relation in system.relations])
+    tied, slip = np.zeros(system.n_equality - len(right)), np.zeros(system.tangential_rows.size)
+    supported = np.concatenate([np.zeros(len(right)), supported])
+    owned = system.numbering.owned
+    right = np.concatenate([right, tied, gap, slip]) - supported
+    return replace(system, supported=supported[owned], right=right[owned])
 
 
 def _meets_alike(scene: Scene, other: Scene) -> bool:
@@ -155,13 +176,14 @@ def _joined(
     points, ties = _meeting_points(scene, decomposition, start_geometry)
     has_friction, coefficient, tresca = friction_data(scene.contacts, points)
     frictional = np.flatnonzero(has_friction)
-    gluing, tearing = decomposition.gluing.rows, decomposition.tearing
-    tied = tied_rows(ties, scene.ties, tearing, decomposition.fixed)
-    rows = stack([gluing, tied, contact_rows(points, tearing, frictional)])
+    gluing, tearing, fixed = decomposition.gluing.rows, decomposition.tearing, decomposition.fixed
+    tied = tied_relations(ties, scene.ties, fixed)
+    relations = (tied, normal_relations(points), tangential_relations(points, frictional))
+    rows = stack([gluing, *(relation.rows(tearing, fixed) for relation in relations)])
     numbering, B = _own_part(rows, decomposition, None if previous is None else previous.numbering)
     return TornSystem(
         scene, decomposition, subdomains, points, ties, gluing.count + tied.count, frictional,
-        coefficient[frictional], tresca[frictional], numbering, B, np.zeros(0),
+        coefficient[frictional], tresca[frictional], numbering, relations, B, np.zeros(0), np.zeros(0),
     )  # fmt: skip
 
 
