@@ -118,7 +118,7 @@ class Coulomb:
         normal = multiplier[layout.tangential_frictional]
         tau = multiplier[layout.tangential]
         length = np.linalg.norm(tau, axis=1)
-        outside = length > self.given + mu_f * normal
+        outside = (length > self.given + mu_f * normal) & (length > 0.0)
         # The nearest point of the mantle; where it has no normal force, of the disc at the cone's end.
         peak = np.maximum((normal + mu_f * (length - self.given)) / (1.0 + mu_f**2), 0.0)
         shrink = np.divide(self.given + mu_f * peak, length, out=np.ones_like(length), where=outside)

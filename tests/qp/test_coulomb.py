@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import ConvergenceError, InvalidInputError
-from fenics_contact.qp import Coulomb, FaceNewton, Smalse, Tresca, find_equilibrium, solve
+from fenics_contact.qp import ContactLayout, Coulomb, FaceNewton, Smalse, Tresca, find_equilibrium, solve
 from tests.qp.random_problems import random_problem
 from tests.qp.torn_bricks import Bricks, torn_problem
 
@@ -167,3 +167,10 @@ def test_tresca_bound_does_not_depend_on_the_multiplier():
     problem = random_problem(3)
     law = Tresca(problem.layout, problem.slip_bound)
     np.testing.assert_array_equal(law.bound(np.zeros(problem.layout.size)), problem.slip_bound)
+
+
+def test_forces_that_pull_without_any_friction_are_admitted_as_none() -> None:
+    layout = ContactLayout.build(6, normal=[0, 3], tangential=[[1, 2], [4, 5]])
+    law = Coulomb(layout, np.array([0.3, 0.3]), 0.0)
+    admitted = law.admit(np.array([-1.0, 0.0, 0.0, 2.0, 0.0, 0.0]))
+    np.testing.assert_array_equal(admitted, [0.0, 0.0, 0.0, 2.0, 0.0, 0.0])
