@@ -6,12 +6,12 @@ import statistics
 from pathlib import Path
 from typing import Any
 
-from benchmarks.cases.effects import LEVELS
+from benchmarks.cases.scene_data import LEVELS  # not from the case: its MPI would end the ranks
 from benchmarks.plan import Run
 from benchmarks.report import table, write_json, write_text
 from benchmarks.running import ROOT, measure
 
-REPEATS = 3
+REPEATS = 5
 
 
 def row(level: str, records: list[dict[str, Any]], before: dict[str, float]) -> tuple[str, ...]:

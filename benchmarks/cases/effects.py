@@ -11,6 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from benchmarks.cases.measuring import run_case, slowest, state_record
+from benchmarks.cases.scene_data import LEVELS
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.geometry import BodyMesh, DesignSurface, block, box_partition
 from fenics_contact.scene import (
@@ -28,8 +29,6 @@ from fenics_contact.scene import (
 )
 from fenics_contact.shape import ShapeProblem, SurfaceDesign, TotalPotential
 
-#: From nothing but elasticity on; each level has all that the one before has, friction laws replaced.
-LEVELS = ("none", "contact", "Tresca", "Coulomb", "thermal", "sensitivity")
 CELLS, BOXES = 24, 4
 PRESSED, SHEARED, HEAT, WEIGHT = -0.004, 0.006, 10.0, -50.0
 LAWS: dict[str, Friction] = {"none": None, "contact": None, "Tresca": Tresca(60.0)}

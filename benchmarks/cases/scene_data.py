@@ -17,3 +17,6 @@ PLANE_HEIGHT = -0.02
 YOUNG_MODULUS, POISSON_RATIO = 1.0, 0.3
 #: On the upper side of the block; the side x = 0 is clamped.
 TRACTION = (0.02, 0.01, -0.05)
+
+#: Effects of one scene: each level has all that the one before has, friction laws replaced.
+LEVELS = ("none", "contact", "Tresca", "Coulomb", "thermal", "sensitivity")
