@@ -132,7 +132,7 @@ if comm.rank == 0:
     print(f"sheared block: {len(states)} load steps, {ranks}")
     print("  shift [mm]   shear [N]   bound μN [N]   sticking   slipping")
     for k in range(0, len(path), 2):
-        print(f"  {path[k]:10.2f} {shear[k]:11.2f} {bound[k]:14.2f} {sticking[k]:10d} {slipping[k]:10d}")
+        print(f"  {path[k]:z10.2f} {shear[k]:z11.2f} {bound[k]:14.2f} {sticking[k]:10d} {slipping[k]:10d}")
     print(f"  dissipated in a loop {work:.2f} N mm")
     print(f"  plateau / μN at the ends of the strokes: {', '.join(f'{value:.4f}' for value in plateau)}")
     print(f"pictures and files in {output}/")
