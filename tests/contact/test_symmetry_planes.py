@@ -141,3 +141,18 @@ def test_supports_that_press_surfaces_into_one_another_are_refused() -> None:
     )
     with pytest.raises(InvalidInputError, match=message):
         solved(replace(scene, supports=sunk))
+
+
+def test_a_row_that_is_free_but_for_a_slight_tilt_counts_as_held() -> None:
+    """Normals of a crowned face are tilted by less than a percent at the plane of symmetry."""
+    scene = stack(1.0, 4)
+    points = scene.bodies["lower"].mesh.points.copy()
+    points[:, 2] -= 0.004 * points[:, 1] * points[:, 2]
+    tilted = scene.moved({"lower": points})
+    torn = solved(tilted).torn
+    slip = torn.relations[2]
+    across = np.abs(slip.directions[:, 1]) > 0.99
+    on_plane = torn.decomposition.fixed[slip.points.slave[slip.which], 1]
+    assert 0.0 < np.abs(slip.directions[across & on_plane, 2]).max() < 0.02
+    assert slip.held(torn.decomposition.fixed)[across & on_plane].all()
+    assert not slip.held(torn.decomposition.fixed)[~on_plane].any()
