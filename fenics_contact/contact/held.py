@@ -9,9 +9,7 @@ from fenics_contact.errors import ConvergenceError, InfeasibleError, together
 from fenics_contact.feti import ContactPoints, TornSystem
 from fenics_contact.feti.dual import BALANCED
 from fenics_contact.scene import rigid_body_modes
-
-#: Support reactions below this fraction of the largest count as none: the motion is not resisted.
-RANK_TOLERANCE = 1e-9
+from fenics_contact.scene.held import resisted_motions
 
 
 def check_held(torn: TornSystem) -> None:
@@ -57,11 +55,8 @@ class _RigidBody:
         self.name = tearing.body_names[index]
         self._nodes = slice(int(tearing.node_offset[index]), int(tearing.node_offset[index + 1]))
         self._modes = rigid_body_modes(torn.scene.bodies[self.name].mesh.points)
-        held = self._modes[torn.decomposition.fixed[self._nodes]]
-        left, size, _ = np.linalg.svd(held.T @ held)
-        resisted = size > RANK_TOLERANCE * size[0]
         #: Wrenches that supports can exert in both directions, shape (n_modes, n), orthonormal columns.
-        self.support = left[:, resisted]
+        self.support = resisted_motions(self._modes, torn.decomposition.fixed[self._nodes])
 
     @property
     def held(self) -> bool:
