@@ -196,8 +196,8 @@ def test_a_mesh_needs_no_surfaces_and_no_grid() -> None:
     assert boundary_faces(plain.cells)[0].shape == (6, 4)
 
 
-@pytest.mark.parametrize(("dim", "nodes"), [(3, 10), (3, 20), (3, 27), (2, 6), (2, 9)])
-def test_quadratic_cells_are_refused_with_the_reason(dim: int, nodes: int) -> None:
+@pytest.mark.parametrize(("dim", "nodes"), [(3, 10), (3, 20), (2, 8)])
+def test_quadratic_cells_without_force_at_corners_are_refused_with_the_reason(dim: int, nodes: int) -> None:
     points = np.random.default_rng(0).random((nodes, dim))
     with pytest.raises(InvalidInputError, match=r"quadratic cells are not supported: .* positive under a"):
         BodyMesh(points, np.arange(nodes)[None])
