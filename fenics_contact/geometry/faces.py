@@ -145,7 +145,7 @@ def orient(cells: np.ndarray, facets: np.ndarray, dim: int = 3) -> np.ndarray:
         InvalidInputError: If a facet is not on the boundary.
     """
     boundary, _ = boundary_faces(cells, dim)
-    found = match_faces(facets, boundary)
+    found = match_faces(corners_of(facets, dim), corners_of(boundary, dim))
     if np.any(found < 0):
         lost = np.flatnonzero(found < 0)
         raise InvalidInputError(

@@ -10,6 +10,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry.cell_types import HEXAHEDRON27, QUADRILATERAL9, TRIANGLE6, CellType, cell_type_of
 from fenics_contact.geometry.faces import boundary_faces, corners_of, match_faces
 from fenics_contact.geometry.mesh import BodyMesh
+from fenics_contact.geometry.validation import check_jacobians
 
 Place = Callable[[np.ndarray], np.ndarray]
 """Points near a surface, (n, dim), to points on it, (n, dim), [length]."""
@@ -33,7 +34,10 @@ def quadratic(mesh: BodyMesh, onto: Mapping[str, Place] | None = None) -> BodyMe
             not there, or its nodes are moved so far that a cell is inverted.
 
     Example:
-        >>> ball = quadratic(hemisphere(10.0, 4), {"contact": lambda x: 10 * x / norm(x)})  # doctest: +SKIP
+        >>> def on_disc(x):
+        ...     away = x - (0.0, 1.0)
+        ...     return (0.0, 1.0) + away / np.linalg.norm(away, axis=1)[:, None]
+        >>> disc = quadratic(half_disc(1.0, 8), {"contact": on_disc})  # doctest: +SKIP
     """
     linear = cell_type_of(mesh.cells, mesh.dim)
     kind = _QUADRATIC.get(linear.vertices.shape)
@@ -48,6 +52,7 @@ def quadratic(mesh: BodyMesh, onto: Mapping[str, Place] | None = None) -> BodyMe
         name: boundary[match_faces(facets, corners_of(boundary, mesh.dim))]
         for name, facets in mesh.surfaces.items()
     }
+    placed = np.zeros(len(points), dtype=bool)
     for name, place in (onto or {}).items():
         if name not in surfaces:
             raise InvalidInputError(
@@ -56,6 +61,12 @@ def quadratic(mesh: BodyMesh, onto: Mapping[str, Place] | None = None) -> BodyMe
         own = np.unique(surfaces[name])
         own = own[own >= mesh.n_nodes]
         points[own] = place(points[own])
+        placed[own] = True
+    if placed.any():
+        _follow(points, cells, kind, placed)
+    check_jacobians(
+        points, cells, "refine the mesh along the surfaces that onto moves nodes to, or move less"
+    )
     return BodyMesh(points, cells, surfaces, mesh.grid, mesh.regions, coincident_nodes=mesh.coincident_nodes)
 
 
@@ -71,6 +82,27 @@ def _with_more_nodes(points: np.ndarray, cells: np.ndarray, kind: CellType) -> t
         result[:, where] = number.reshape(len(cells), -1) + len(points)
         points = np.concatenate([points, points[found].mean(axis=1)])
     return points, result
+
+
+def _follow(points: np.ndarray, cells: np.ndarray, kind: CellType, placed: np.ndarray) -> None:
+    """Move the centres of faces and cells after the midpoints of edges, so that thin cells keep their shape.
+
+    A centre lies where serendipity functions have it: ½ Σ midpoints − ¼ Σ corners of a face, ¼ Σ midpoints
+    − ¼ Σ corners of a hexahedron.
+    """
+    if kind is TRIANGLE6:
+        return
+    if kind is HEXAHEDRON27:
+        for face in kind.faces:
+            centre = cells[:, face[8]]
+            found = 0.5 * points[cells[:, face[4:8]]].sum(axis=1) - 0.25 * points[cells[:, face[:4]]].sum(
+                axis=1
+            )
+            free = ~placed[centre]
+            points[centre[free]] = found[free]
+        points[cells[:, 26]] = 0.25 * (points[cells[:, 8:20]].sum(axis=1) - points[cells[:, :8]].sum(axis=1))
+        return
+    points[cells[:, 8]] = 0.5 * points[cells[:, 4:8]].sum(axis=1) - 0.25 * points[cells[:, :4]].sum(axis=1)
 
 
 def _around(kind: CellType, place: np.ndarray) -> list[int]:

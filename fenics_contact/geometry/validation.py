@@ -116,7 +116,7 @@ def checked_surfaces(
 
 def _facets_found(name: str, facets: np.ndarray, boundary: np.ndarray, dim: int) -> np.ndarray:
     """Return which boundary faces the facets are, (n_facets,)."""
-    found = match_faces(facets, boundary)
+    found = match_faces(corners_of(facets, dim), corners_of(boundary, dim))
     lost = np.flatnonzero(found < 0)
     if lost.size:
         raise InvalidInputError(
