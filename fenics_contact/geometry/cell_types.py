@@ -228,7 +228,7 @@ QUADRATIC_FILE = (
 )
 """What to do."""
 
-_QUADRATIC_NODES = {2: (8,), 3: (10, 20)}
+_QUADRATIC_NODES = (10, 20)
 
 
 def cell_type_of(cells: np.ndarray, dim: int) -> CellType:
@@ -244,7 +244,7 @@ def cell_type_of(cells: np.ndarray, dim: int) -> CellType:
     for cell in CELL_TYPES.values():
         if cell.dim == dim and cells.ndim == 2 and cells.shape[1] == cell.nodes.shape[0]:
             return cell
-    if cells.ndim == 2 and cells.shape[1] in _QUADRATIC_NODES.get(dim, ()):
+    if dim == 3 and cells.ndim == 2 and cells.shape[1] in _QUADRATIC_NODES:
         raise InvalidInputError(f"cells of {cells.shape[1]} nodes in {dim} dimensions: {QUADRATIC}")
     known = " or ".join(
         f"(n_cells, {cell.nodes.shape[0]}) for {cell.plural}"
