@@ -51,6 +51,11 @@ class FormLibrary:
         """Names of the forms compiled so far."""
         return self._templates.names
 
+    @property
+    def templates(self) -> Templates:
+        """The compiled forms; what floors above write joins them, when it is asked for."""
+        return self._templates
+
     def prepare(self, scene: Scene) -> None:
         """Compile what the scene calls for and is not there yet. Collective on the library's communicator.
 
