@@ -2,8 +2,8 @@
 
 The true error is the energy norm of the difference to the solution on a nested mesh that is two to four
 times finer than the finest (lattices: coarse displacements are interpolated exactly), with what that solution
-misses itself added, see `true_errors`. Bodies of Hertz are boxes, so that the geometry is exact on all meshes; those
-of Cattaneo and Mindlin are curved by a thousandth, which the lattices follow at their nodes.
+misses itself added, see `true_errors`. Bodies of Hertz are boxes, so that the geometry is exact on all
+meshes; those of Cattaneo and Mindlin are curved by a thousandth, which the lattices follow at their nodes.
 """
 
 from __future__ import annotations
