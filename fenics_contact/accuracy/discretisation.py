@@ -8,11 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from mpi4py import MPI
 
+from fenics_contact.accuracy.moduli import moduli
 from fenics_contact.accuracy.recovery import recovered_gradients
 from fenics_contact.accuracy.sites import find_sites, nodal_displacement
-from fenics_contact.accuracy.strain_energy import Forms, energy_of_difference, prepare
+from fenics_contact.accuracy.strain_energy import energy_of_difference
+from fenics_contact.accuracy.varying_moduli import compile_energy, energy_on_subdomain
 from fenics_contact.feti import TornSystem
 from fenics_contact.feti.subdomain import Subdomain
+from fenics_contact.feti.templates import Template
 from fenics_contact.scene import Body
 
 
@@ -58,54 +61,58 @@ def discretisation_error(torn: TornSystem, displacement: np.ndarray) -> Discreti
     Returns:
         The estimate.
     """
-    scene, decomposition = torn.scene, torn.decomposition
-    forms = prepare(decomposition, scene.bodies.values())
+    scene, comm = torn.scene, torn.decomposition.comm
+    energies = {name: _Energies(torn, body) for name, body in scene.bodies.items()}
     sites = find_sites(torn)
-    nodal = nodal_displacement(torn, displacement)
-    gradients = recovered_gradients(sites, nodal[sites.node])
-    cells: dict[str, list[np.ndarray]] = {name: [np.zeros(0, dtype=np.int64)] for name in scene.bodies}
-    squares: dict[str, list[np.ndarray]] = {name: [np.zeros(0)] for name in scene.bodies}
+    nodal = nodal_displacement(torn, displacement)[sites.node]
+    gradients = recovered_gradients(sites, nodal)
+    cells = {name: [np.zeros(0, dtype=np.int64)] for name in scene.bodies}
+    squares = {name: [np.zeros(0)] for name in scene.bodies}
     for subdomain, of_cells in zip(torn.subdomains, sites.of_cells, strict=True):
         mesh = subdomain.mesh
         cells[mesh.body].append(mesh.cells)
-        body = scene.bodies[mesh.body]
-        u = nodal[decomposition.tearing.global_nodes(mesh.body, mesh.nodes)]
-        squares[mesh.body].append(_squares(subdomain, body, forms, u, gradients, of_cells))
+        values = energies[mesh.body].by_cell(subdomain, nodal[of_cells], gradients[of_cells])
+        squares[mesh.body].append(values)
     own = {name: (np.concatenate(cells[name]), np.concatenate(squares[name])) for name in scene.bodies}
-    sums = decomposition.comm.allreduce(np.array([values.sum() for _, values in own.values()]))
+    sums = comm.allreduce(np.array([values.sum() for _, values in own.values()]))
     by_body = {name: float(np.sqrt(value)) for name, value in zip(own, sums, strict=True)}
     sizes = {name: body.mesh.n_cells for name, body in scene.bodies.items()}
-    return DiscretisationError(float(np.sqrt(sums.sum())), by_body, decomposition.comm, sizes, own)
+    return DiscretisationError(float(np.sqrt(sums.sum())), by_body, comm, sizes, own)
 
 
-def _squares(
-    subdomain: Subdomain,
-    body: Body,
-    forms: Forms,
-    displacement: np.ndarray,
-    gradients: np.ndarray,
-    of_cells: np.ndarray,
-) -> np.ndarray:
-    """Return η² of the cells of one subdomain, shape (n_cells,), [force · length].
+class _Energies:
+    """Energies of differences of gradients in one body. Collective."""
 
-    Args:
-        subdomain: The subdomain.
-        body: Its body.
-        forms: Forms of all materials.
-        displacement: Displacement by block of the subdomain, shape (n, dim), [length].
-        gradients: Recovered gradient of every site, shape (n_sites, dim, dim).
-        of_cells: Sites of its cells, shape (n_cells, n_vertices).
-    """
-    mesh = subdomain.mesh
-    order = np.argsort(mesh.nodes)
-    block = order[np.searchsorted(mesh.nodes[order], body.mesh.cells[mesh.cells])]
-    kind = body.material_of_cells[mesh.cells]
-    result = np.zeros(len(mesh.cells))
-    for number in np.unique(kind):
+    def __init__(self, torn: TornSystem, body: Body) -> None:
+        forms, cell_type = torn.decomposition.forms, body.mesh.cell_type
+        self._body = body
+        self._ways: list[np.ndarray | Template] = [
+            compile_energy(forms, material, cell_type)
+            if forms.varies(material, cell_type)
+            else moduli(forms, material, cell_type)
+            for material in body.materials
+        ]
+
+    def by_cell(self, subdomain: Subdomain, displacement: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+        """Return ∫ C (g − ∇u) : (g − ∇u) over each cell of a subdomain, shape (n_cells,), [force · length].
+
+        Args:
+            subdomain: A subdomain of the body.
+            displacement: u at the vertices of its cells, shape (n_cells, n_vertices, dim), [length].
+            gradient: g there, shape (n_cells, n_vertices, dim, dim), dimensionless.
+        """
+        mesh, whole = subdomain.mesh, self._body.mesh
+        nodes, kind = whole.cells[mesh.cells], self._body.material_of_cells[mesh.cells]
+        result = np.zeros(len(nodes))
         # Where materials meet a node has several recovered gradients: one material at a time.
-        cells, material = np.flatnonzero(kind == number), body.materials[number]
-        by_block = np.zeros((len(mesh.nodes), *gradients.shape[1:]))
-        by_block[block[cells]] = gradients[of_cells[cells]]
-        form = forms[material, body.mesh.cell_type]
-        result[cells] = energy_of_difference(form, material, subdomain, displacement, by_block)[cells]
-    return result
+        for number in np.unique(kind):
+            cells, way = np.flatnonzero(kind == number), self._ways[number]
+            u, g = displacement[cells], gradient[cells]
+            if isinstance(way, np.ndarray):
+                result[cells] = energy_of_difference(way, whole.cell_type, whole.points[nodes[cells]], u, g)
+            else:
+                order = np.argsort(mesh.nodes)
+                blocks = order[np.searchsorted(mesh.nodes[order], nodes[cells])]
+                material = self._body.materials[number]
+                result[cells] = energy_on_subdomain(way, material, subdomain, blocks, u, g)[cells]
+        return result

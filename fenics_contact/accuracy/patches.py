@@ -100,13 +100,15 @@ def find_patches(sites: Sites) -> Patches:
     """Give every patch its coordinates. Collective."""
     dim, table, points = sites.points.shape[1], sites.neighbours, sites.points
     row = np.repeat(np.arange(sites.count), np.diff(table.indptr))
-    away = points[table.indices] - points[row]
-    products = (away[:, :, None] * away[:, None, :]).reshape(-1, dim * dim)
-    columns = np.column_stack([np.ones(len(row)), products]) * table.data[:, None]
+    away = (points[table.indices] - points[row]).T
+    i, j = np.triu_indices(dim)
+    columns = (table.data, *(table.data * away[a] * away[b] for a, b in zip(i, j, strict=True)))
     # Every site has neighbours: those of its own cells.
-    total = sites.sharing.add_up(np.add.reduceat(columns, table.indptr[:-1], axis=0))
-    mean = (total[:, 1:] / total[:, :1]).reshape(-1, dim, dim)
-    return Patches(sites, np.linalg.inv(np.linalg.cholesky(mean)), total[:, 0])
+    sums = np.column_stack([np.add.reduceat(column, table.indptr[:-1]) for column in columns])
+    weight, *products = sites.sharing.add_up(sums).T
+    mean = np.empty((sites.count, dim, dim))
+    mean[:, i, j] = mean[:, j, i] = np.stack(products, axis=1) / weight[:, None]
+    return Patches(sites, np.linalg.inv(np.linalg.cholesky(mean)), weight)
 
 
 def padded(sites: Sites, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

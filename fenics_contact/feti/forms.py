@@ -103,6 +103,10 @@ class FormLibrary:
         functions = fields_of(load, space, points)
         return template.bind([space], load_parameters(load, parts), functions, facets, cells=cells)
 
+    def varies(self, material: Material, cell_type: str) -> bool:
+        """Return whether the stiffness of a material mentions the place that it is at."""
+        return self._templates["stiffness", (material,), cell_type].mentions(ufl.geometry.SpatialCoordinate)
+
     def typical_modulus(self, material: Material, cell_type: str) -> float:
         """Return the mean diagonal entry of the stiffness of a cell of edge length one.
 
