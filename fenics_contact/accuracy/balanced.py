@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from fenics_contact.accuracy.state_errors import SolverErrors
 from fenics_contact.errors import InvalidInputError
 
@@ -66,9 +68,9 @@ class Balanced:
             errors: What the solver left.
             discretisation: Estimated error of the mesh, [√(force · length)].
         """
-        allowed = self.share * discretisation
-        # What is far below the rounding of the residuals will not get better by small steps.
-        if allowed <= self.finest * errors.together:
+        allowed, have = self.share * discretisation, errors.together
+        # Where so little is allowed no step on the way is of any use; where nothing is known each is.
+        if np.isfinite(have) and allowed <= self.finest * have:
             return self.finest
-        ratio = MARGIN * allowed / errors.together
+        ratio = MARGIN * allowed / have
         return max(self.finest, reached * min(max(ratio, STEP[0]), STEP[1]))
