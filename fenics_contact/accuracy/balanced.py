@@ -23,11 +23,11 @@ class Balanced:
     bounded (`StateErrors`), and if the latter is more than its share, the solver goes on from where it is to
     a tolerance that the ratio tells. A mesh that represents the solution exactly is solved to ``finest``.
 
-    Displacements, contact pressures and energies then are as good as the mesh allows. That is not the same
-    for what jumps: whether a point at the edge of the contact is closed, or sticks, may still change, and
-    derivatives by the shape, which belong to one choice of these statuses, with it. Where statuses or
-    differences between neighbouring states matter, give a number: 1e-6 settles nearly all, 1e-8 all that are
-    not weakly active.
+    Displacements, contact pressures and energies then are as good as the mesh allows. So are supports and the
+    seams between subdomains, which hold by multipliers. That is not the same for what jumps: whether a point
+    at the edge of the contact is closed, or sticks, may still change, and derivatives by the shape, which
+    belong to one choice of these statuses, with it. Where statuses or differences between neighbouring
+    states matter, give a number: 1e-6 settles nearly all, 1e-8 all that are not weakly active.
 
     Attributes:
         share: Largest error of the solver, law of friction included, relative to that of the mesh.
