@@ -29,8 +29,8 @@ from fenics_contact.accuracy.patches import (
 from fenics_contact.accuracy.sites import Sites
 
 #: Weight of second derivatives beside the moments of a patch, which are of order one: it decides only on what
-#: the patch leaves open.
-SLIGHT = 1e-8
+#: the patch leaves open, and keeps rounding from deciding on it.
+SLIGHT = 1e-5
 #: A patch leaves second derivatives open if the inverse of its moments adds up to more than this on them; on
 #: regular meshes inside a body it is below 20.
 OPEN = 60.0
@@ -54,7 +54,9 @@ def recovered_gradients(sites: Sites, displacement: np.ndarray) -> np.ndarray:
     waiting, missing = [], []
     for moments in patches.moments(displacement):
         inverse = np.linalg.inv(moments.matrix + SLIGHT * _penalty(dim))
-        found[moments.rows] = inverse @ moments.right
+        first = inverse @ moments.right
+        # Once more with what is left, which takes the weight's own share off.
+        found[moments.rows] = first + inverse @ (moments.right - moments.matrix @ first)
         spread = np.einsum("nii->n", inverse[:, dim:, dim:])
         open_ = np.flatnonzero(spread > OPEN)
         waiting.append(moments.part(open_))

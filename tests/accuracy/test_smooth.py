@@ -63,9 +63,7 @@ def test_the_estimate_becomes_exact(cell: str, shake: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("cell", CELLS)
-def test_locking_is_seen(cell: str) -> None:
-    """Near incompressibility the solution, whose divergence is not small, has large stresses."""
+def test_the_estimate_stays_close_near_incompressibility(cell: str) -> None:
     sizes = (4, 8, 16, 32) if cell in PLANE else (3, 6, 12)
     error, found = series(cell, sizes, 0.0, 0.499)
-    assert np.all(found / error > 0.5)
-    assert np.all(found / error < 2.0)
+    np.testing.assert_allclose(found / error, 1.0, atol=0.08)
