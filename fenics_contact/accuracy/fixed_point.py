@@ -31,7 +31,7 @@ def friction_error(system: DualSystem, solution: DualSolution, certificate: Cert
     """
     torn, layout, known = system.torn, system.problem.layout, certificate.known
     coefficient = torn.friction_coefficient[system.owned_discs()]
-    change = np.where(known.slip, coefficient * certificate.error[layout.tangential_frictional], 0.0)
+    change = np.where(known.statuses.slip, coefficient * certificate.error[layout.tangential_frictional], 0.0)
     raised = known.slip_bound - solution.slip_bound
     flexibility = system.problem.diagonal[layout.tangential].mean(axis=1)
     square = global_sum(system.problem.comm, flexibility @ (change**2 + raised**2))[0]
