@@ -3,8 +3,8 @@
 Around each site the differences of the displacement to the neighbouring nodes are fitted by a quadratic
 polynomial; the recovered gradient is the polynomial's at the site, exact for quadratic displacements on any
 mesh. A patch at the boundary mostly leaves some second derivatives open (two layers of nodes tell no
-curvature normal to them): these come from the neighbours, all the rest from the patch's own nodes. What no
-neighbour knows better, as in a plate one cell thick, is zero.
+curvature normal to them): these come from the neighbours inside the body, all the rest from the patch's own
+nodes. Where none is inside, as in a plate one cell thick, what the best patches leave open is zero.
 
 Patches are of one material: strains may jump where materials meet.
 
@@ -17,6 +17,7 @@ References:
 from __future__ import annotations
 
 import numpy as np
+from mpi4py import MPI
 
 from fenics_contact.accuracy.patches import (
     Moments,
@@ -31,11 +32,14 @@ from fenics_contact.accuracy.sites import Sites
 #: Weight of second derivatives beside the moments of a patch, which are of order one: it decides only on what
 #: the patch leaves open, and keeps rounding from deciding on it.
 SLIGHT = 1e-5
-#: A patch leaves second derivatives open if the inverse of its moments adds up to more than this on them; on
-#: regular meshes inside a body it is below 20.
-OPEN = 60.0
+#: A patch is not trusted with second derivatives if the inverse of its moments adds up to more than this on
+#: them, by dimension. It is 5.5 and 13.1 inside regular meshes; on curved boundaries it may be finite by the
+#: little that two layers of nodes are bent, which tells nothing but noise.
+OPEN = {2: 8.0, 3: 18.0}
 #: Their weight where neighbours tell what they should be.
-FIRM = 0.02
+FIRM = 0.2
+#: Where no patch is trusted, those are that are worse than the best by up to this factor.
+ALIKE = 1.5
 
 
 def recovered_gradients(sites: Sites, displacement: np.ndarray) -> np.ndarray:
@@ -51,32 +55,30 @@ def recovered_gradients(sites: Sites, displacement: np.ndarray) -> np.ndarray:
     patches = find_patches(sites)
     dim = patches.dim
     found = np.zeros((sites.count, polynomials(dim), dim))
-    waiting, missing = [], []
+    waiting, doubts = [], []
     for moments in patches.moments(displacement):
         inverse = np.linalg.inv(moments.matrix + SLIGHT * _penalty(dim))
         first = inverse @ moments.right
         # Once more with what is left, which takes the weight's own share off.
         found[moments.rows] = first + inverse @ (moments.right - moments.matrix @ first)
         spread = np.einsum("nii->n", inverse[:, dim:, dim:])
-        open_ = np.flatnonzero(spread > OPEN)
+        open_ = spread > OPEN[dim]
         waiting.append(moments.part(open_))
-        missing.append(np.rint(SLIGHT * spread[open_]))
-    _ask_neighbours(patches, _joined(waiting), np.concatenate(missing), found)
+        doubts.append(spread[open_])
+    _ask_neighbours(patches, _joined(waiting), np.concatenate(doubts), found)
     return np.asarray(np.einsum("njk,nji->nki", found[:, :dim], patches.turn))
 
 
-def _ask_neighbours(patches: Patches, open_: Moments, missing: np.ndarray, found: np.ndarray) -> None:
+def _ask_neighbours(patches: Patches, open_: Moments, doubt: np.ndarray, found: np.ndarray) -> None:
     """Fit again what was left open, with second derivatives of neighbours; layer by layer. Collective.
-
-    Where no site of a body knows all, those that know most begin.
 
     Args:
         patches: The patches.
         open_: Normal equations of the sites whose patches leave something open, n of them.
-        missing: How many second derivatives of a component each of them cannot tell, shape (n,).
+        doubt: How little each of them tells, shape (n,).
         found: Coefficients of all sites, which are overwritten, shape (n_sites, m, dim), [length].
     """
-    comm, allowed = patches.sites.sharing.comm, 0
+    comm = patches.sites.sharing.comm
     known = np.ones(patches.sites.count, dtype=bool)
     known[open_.rows] = False
     while comm.allreduce(len(open_.rows)):
@@ -85,10 +87,9 @@ def _ask_neighbours(patches: Patches, open_: Moments, missing: np.ndarray, found
             ready = open_.part(heard)
             found[ready.rows] = _fitted(patches, ready, curvature[heard])
         else:
-            allowed += 1
-            heard = missing <= allowed
+            heard = doubt <= ALIKE * comm.allreduce(float(doubt.min(initial=np.inf)), op=MPI.MIN)
         known[open_.rows[heard]] = True
-        open_, missing = open_.part(~heard), missing[~heard]
+        open_, doubt = open_.part(~heard), doubt[~heard]
 
 
 def _fitted(patches: Patches, moments: Moments, curvature: np.ndarray) -> np.ndarray:
