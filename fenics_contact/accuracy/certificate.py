@@ -51,6 +51,9 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
     ||w| − |u − u*|| ≤ |v − u*|, |u − u*| is at most (|w| + √(4 gap − |w|²))/2. What moved the multiplier of
     the solution into the cone, δ, counts with its own energy δᵀF δ.
 
+    The way w is that of the preconditioner, and the bound is as close as this is good: mostly within a factor
+    of two of the error, for nearly incompressible bodies and thin plates of one of ten to thirty.
+
     The bound is for Tresca's problem with the slip bounds of the solution. Where these follow the normal
     forces see `friction_error` for the rest.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -18,6 +18,7 @@ from fenics_contact.geometry import (
     box_partition,
     graph_partition,
     hemisphere,
+    quadratic,
     rectangle,
 )
 from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG, solve
@@ -91,6 +92,14 @@ def belt() -> Scene:
     )
 
 
+def curved() -> Scene:
+    """The pressed plate of quadratic cells, whose corners and midpoints are contact points."""
+    scene = effect_cases.plane()
+    return replace(
+        scene, bodies={name: replace(b, mesh=quadratic(b.mesh)) for name, b in scene.bodies.items()}
+    )
+
+
 @dataclass(frozen=True)
 class Case:
     """A scene with its partition, and the tolerance of the solution that counts as exact."""
@@ -116,6 +125,7 @@ CASES = {
     "a stiff body on a soft one": Case(effect_cases.stiff_on_soft, graph(4)),
     "a tie": Case(effect_cases.tied, graph(4)),
     "a thin belt": Case(belt, boxes(6, 1), 1e-9),
+    "quadratic cells": Case(curved, graph(4)),
     "two dimensions": Case(effect_cases.plane, graph(4)),
 }
 
