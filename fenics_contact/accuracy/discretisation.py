@@ -60,12 +60,12 @@ def discretisation_error(torn: TornSystem, displacement: np.ndarray) -> Discreti
     recovered gradient, which is continuous within one material of one body (see `recovery`). Strains by
     temperature are in both and drop out.
 
-    It is no bound. Estimate over error tends to 1 where the solution is smooth; it was between 0.7 and 1.1
-    under contact that two or more nodes hold, 0.7 where re-entrant or clamped corners or edges between
-    materials dominate, and 0.9 for hexahedra and quadrilaterals that lock at ν = 0.499. A body one cell thick
-    does not show how strains vary across it: there the estimate may be a third of the error, and of a body of
-    one cell it tells nothing. It knows nothing of the geometry's error where facets stand for a curved
-    surface. Where a mesh locks completely, error and estimate may exceed the norm of the displacement.
+    It is no bound. Estimate over error tends to 1 where the solution is smooth. It was measured between 0.7
+    and 1.1 under contact that two or more nodes hold, at 0.7 where clamped corners and edges between
+    materials dominate, and at 0.9 for quadrilaterals that lock at ν = 0.499. A body one cell thick does not
+    show how strains vary across it: there the estimate may be a quarter of the error; of a body of one cell
+    it tells nothing. Where a mesh locks completely, the error exceeds the displacement and the estimate does
+    not follow. The error of the geometry, where facets stand for a curved surface, is not in it.
 
     Args:
         torn: The torn system.
