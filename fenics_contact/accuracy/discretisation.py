@@ -13,6 +13,7 @@ from fenics_contact.accuracy.recovery import recovered_gradients
 from fenics_contact.accuracy.sites import find_sites, nodal_displacement
 from fenics_contact.accuracy.strain_energy import energy_of_difference
 from fenics_contact.accuracy.varying_moduli import compile_energy, energy_on_subdomain
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import TornSystem
 from fenics_contact.feti.subdomain import Subdomain
 from fenics_contact.feti.templates import Template
@@ -38,7 +39,14 @@ class DiscretisationError:
         """Return the part of each cell of a body in the body's order, shape (n_cells,), replicated.
 
         Collective.
+
+        Raises:
+            InvalidInputError: If there is no such body.
         """
+        if body not in self._sizes:
+            raise InvalidInputError(
+                f"body must be one of {sorted(self._sizes)}, got {body!r}: take a name of the scene"
+            )
         values = np.zeros(self._sizes[body])
         cells, squares = self._own[body]
         values[cells] = np.sqrt(squares)
@@ -50,9 +58,14 @@ def discretisation_error(torn: TornSystem, displacement: np.ndarray) -> Discreti
 
     On each cell η² = ∫ C (ε* − ε) : (ε* − ε) with the strain ε of the displacement and the strain ε* of a
     recovered gradient, which is continuous within one material of one body (see `recovery`). Strains by
-    temperature are in both and drop out. The estimate is asymptotically exact where the solution is smooth;
-    it is no bound. It knows nothing of the geometry's error where facets stand for a curved surface, and
-    nothing of a body of one cell.
+    temperature are in both and drop out.
+
+    It is no bound. Estimate over error tends to 1 where the solution is smooth. It was measured between 0.7
+    and 1.1 under contact that two or more nodes hold, at 0.7 where clamped corners and edges between
+    materials dominate, and at 0.9 for quadrilaterals that lock at ν = 0.499. A body one cell thick does not
+    show how strains vary across it: there the estimate may be a quarter of the error; of a body of one cell
+    it tells nothing. Where a mesh locks completely, the error exceeds the displacement and the estimate does
+    not follow. The error of the geometry, where facets stand for a curved surface, is not in it.
 
     Args:
         torn: The torn system.
@@ -119,4 +132,5 @@ class _Energies:
                 blocks = order[np.searchsorted(mesh.nodes[order], nodes[cells])]
                 material = self._body.materials[number]
                 result[cells] = energy_on_subdomain(way, material, subdomain, blocks, u, g)[cells]
-        return result
+        # Moduli without resistance to rotations have eigenvalues of zero, to rounding.
+        return np.maximum(result, 0.0)

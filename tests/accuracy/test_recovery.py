@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import BodyMesh, block, half_disc, hemisphere, rectangle
 from fenics_contact.geometry import quadratic as quadratic_cells
 from fenics_contact.geometry.rectangle import rectangle_lattice
@@ -141,6 +142,20 @@ def test_the_estimate_is_independent_of_units_and_directions() -> None:
     turned = replace(mesh, points=mesh.points @ turn.T)
     found = estimated(scene_of(turned), lambda p: field(p @ turn) @ turn.T)
     np.testing.assert_allclose(found.by_cell("body"), known.by_cell("body"), rtol=1e-9)
+
+
+def test_a_pure_rotation_leaves_no_energy_below_zero() -> None:
+    scene = scene_of(bent(box("tetrahedron")))
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    for size in (1e-3, 1.0, 1e3):
+        parts = estimated(scene, lambda points, size=size: size * points @ turn.T).by_cell("body")
+        assert np.all(np.isfinite(parts))
+        assert parts.max() < 1e-9 * size
+
+
+def test_an_unknown_body_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match=r"body must be one of \['body'\], got 'wheel': take a name"):
+        estimated(scene_of(box("triangle")), np.zeros_like).by_cell("wheel")
 
 
 def test_parts_add_up_and_do_not_depend_on_the_partition() -> None:
