@@ -11,44 +11,47 @@ from fenics_contact.io.replacing import replacing
 INTRODUCTION = """\
 # Hard cases
 
-What makes contact problems fail, one case a row: what came out, how exact it is and what it cost. Every case is
-a test of `tests/hard/`; `make test-hard` runs them all and writes this page from their records, only if all of
-them ran and none failed. Where the outcome is a refusal or a failure, the test requires that very error: no case
-ends in a wrong answer.
+What makes contact problems fail, one case a row: what came out, how exact it is and what it cost. Every
+case is a test of `tests/hard/`; `make test-hard` runs them all and writes this page from their records,
+only if all of them ran and none failed. Where the outcome is a refusal or a failure, the test requires that
+very error: no case ends in a wrong answer.
 
-Of every solved case is checked, recomputed on the bodies in one piece from displacements and contact forces, with
-no figure of the solver's:
+Of every solved case is checked, recomputed on the bodies in one piece from displacements and contact
+forces, with no figure of the solver's:
 
-- *natural*: ‖λ − P(λ − r/diag F)‖ relative to the normal forces, with a fresh product, at most the tolerance;
+- *natural*: ‖λ − P(λ − r/diag F)‖ relative to the normal forces, with a fresh product, at most the
+  tolerance;
 - *balance*: resultant and moment of load and contact forces along every motion that no support of the body
   resists, and the balance of every single node, relative to the forces that cancel there (the larger one);
 - *cone*: the largest tension or excess of friction over its bound, relative to the largest normal force;
-- *contact law*: the largest of penetration, normal force × gap, and what friction does not oppose of the slip,
-  bound × ‖slip‖ + friction · slip, relative to the largest force and displacement;
-- *same*: the largest relative difference of contact forces and displacements when the scene is given in other
-  units of length and force, when its bodies are cut otherwise, and when it is solved on two (some on four) ranks.
+- *contact law*: the largest of penetration, normal force × gap, and what friction does not oppose of the
+  slip, bound × ‖slip‖ + friction · slip, relative to the largest force and displacement;
+- *same*: the largest relative difference of contact forces and displacements when the scene is given in
+  other units of length and force, when its bodies are cut otherwise, and when it is solved on two (some on
+  four) ranks.
 
-"Unknowns" are torn displacements; products are those with the dual operator F. A *rescue* is a call of SMALSE
-where the active set cycled or the residual stood still; a *cut* is a Newton step that was shortened.
+"Unknowns" are torn displacements; products are those with the dual operator F. A *rescue* is a call of
+SMALSE where the active set cycled or the residual stood still; a *cut* is a Newton step that was shortened.
 """
 
 #: Groups in the order of the page: key to heading and advice.
 GROUPS: dict[str, tuple[str, str]] = {
     "floating": (
         "Bodies that only contact and friction hold",
-        "A body that nothing holds is refused before anything is factored, and the message names body and motion: "
-        "support that motion, or give the pair friction. What rigid bodies could hold and elastic ones cannot, only "
-        "the solver finds out, and says that it did not converge.",
+        "A body that nothing holds is refused before anything is factored, and the message names body and "
+        "motion: support that motion, or give the pair friction. What rigid bodies could hold and elastic "
+        "ones cannot, only the solver finds out, and says that it did not converge.",
     ),
     "touching": (
         "Contact that is nowhere, everywhere, or only just",
-        "Gaps of any size do no harm. A body that rolls by far more than it deforms is the hardest of these: give "
-        "it a support that keeps it from rolling, or shape and mesh that touch at more than one row of nodes.",
+        "Gaps of any size do no harm. A body that rolls by far more than it deforms is the hardest of "
+        "these: give it a support that keeps it from rolling, or shape and mesh that touch at more than "
+        "one row of nodes.",
     ),
     "friction": (
         "Friction from none to ten",
-        "Coefficients may be as large as one likes. A floating body exactly at the limit of its friction has no "
-        "unique slide and is refused; one that is dragged by a support has, and is solved.",
+        "Coefficients may be as large as one likes. A floating body exactly at the limit of its friction "
+        "has no unique slide and is refused; one that is dragged by a support has, and is solved.",
     ),
     "stiffness": (
         "Stiff beside soft, thin, nearly incompressible",
@@ -62,10 +65,22 @@ GROUPS: dict[str, tuple[str, str]] = {
         "Partitions, supports and shared nodes",
         "",
     ),
-    "meshes": ("Meshes turned, mirrored, renumbered, distorted", ""),
-    "published": ("Published friction problems", ""),
-    "optimisation": ("Shape optimisation", ""),
-    "interrupted": ("Interrupted runs", ""),
+    "meshes": (
+        "Meshes turned, mirrored, renumbered, distorted",
+        "",
+    ),
+    "published": (
+        "Published friction problems",
+        "",
+    ),
+    "optimisation": (
+        "Shape optimisation",
+        "",
+    ),
+    "interrupted": (
+        "Interrupted runs",
+        "",
+    ),
 }
 
 COLUMNS = {

@@ -59,6 +59,7 @@ def other_answers(case: Trial, sentence: str, on_ranks: OnRanks) -> dict[str, An
     answers = {"units": scaled.in_units(1 / length, 1 / force)}
     if case.other is not None:
         answers["partition"] = Answer.of(case.solve(cut=case.other))
+    answers |= {name: twin() for name, twin in case.twins.items()}
     for ranks in case.ranks:
         told = on_ranks(sentence, ranks)
         assert "answer" in told, told
@@ -78,6 +79,7 @@ def test_hard_scene(sentence: str, record: Record, on_ranks: OnRanks) -> None:
     assert_holds(found, case.solver.tolerance)
     if case.checks is not None:
         case.checks(state)
+    remark = f"; {case.remark(state)}" if case.remark else ""
     answer = Answer.of(state)
     differences = {
         name: answer.difference(other, case)
@@ -87,7 +89,7 @@ def test_hard_scene(sentence: str, record: Record, on_ranks: OnRanks) -> None:
     record(
         entry.group, sentence, tolerance=case.solver.tolerance, balance=max(found.balance, found.nodal),
         natural=found.natural, cone=found.cone, law=found.law, same=max(differences.values()),
-        **work(state),
+        outcome=f"solved{remark}",         **work(state),
     )  # fmt: skip
 
 
