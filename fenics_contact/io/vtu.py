@@ -19,6 +19,9 @@ _MESHIO_NAMES = {
     "tetrahedron": "tetra",
     "quadrilateral": "quad",
     "triangle": "triangle",
+    "hexahedron27": "hexahedron27",
+    "quadrilateral9": "quad9",
+    "triangle6": "triangle6",
 }
 
 

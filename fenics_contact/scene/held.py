@@ -11,8 +11,8 @@ from fenics_contact.scene.kernels import rigid_body_modes
 if TYPE_CHECKING:
     from fenics_contact.scene.scene import Scene
 
-#: A motion counts as not resisted if supported nodes move by less than this part of what they move by in others,
-#: each motion taken so large that it moves the body by about one.
+#: A motion counts as not resisted if supported nodes move by less than this part of what they move by in
+#: others, each motion taken so large that it moves the body by about one.
 RANK_TOLERANCE = 1e-9
 
 
@@ -26,8 +26,8 @@ def resisted_motions(modes: np.ndarray, fixed: np.ndarray) -> np.ndarray:
     Returns:
         Coefficients of the modes as columns, shape (n_modes, rank).
     """
-    # The edge of a thin plate moves little when the plate turns about it: singular values show how much, their
-    # squares would drown in rounding. Scaling makes lengths and angles comparable in all units.
+    # The edge of a thin plate moves little when the plate turns about it: singular values show how much,
+    # their squares would drown in rounding. Scaling makes lengths and angles comparable in all units.
     scale = np.abs(modes).max(axis=(0, 1), initial=0.0)
     scale = np.where(scale > 0.0, scale, 1.0)
     _, size, motions = np.linalg.svd(modes[fixed] / scale, full_matrices=False)

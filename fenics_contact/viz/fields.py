@@ -15,7 +15,7 @@ class BodyFields:
     """Displacement and stress of one body, replicated on all ranks.
 
     Attributes:
-        mesh: The body's mesh in the state's geometry.
+        mesh: The body's mesh in the state's geometry, quadratic cells cut into linear ones.
         displacement: (n_nodes, dim), [length].
         von_mises: Constant on cells, (n_cells,), [force / length²].
     """
@@ -39,7 +39,9 @@ class BodyFields:
 
 def gather(state: State) -> dict[str, BodyFields]:
     """Collect displacement and stress of all bodies on every rank. Collective."""
-    return {
-        name: BodyFields(body.mesh, state.gather_displacement(name), state.gather_von_mises(name))
-        for name, body in state.scene.bodies.items()
-    }
+    found = {}
+    for name, body in state.scene.bodies.items():
+        linear = body.mesh.linear
+        stress = np.repeat(state.gather_von_mises(name), linear.n_cells // body.mesh.n_cells)
+        found[name] = BodyFields(linear, state.gather_displacement(name), stress)
+    return found

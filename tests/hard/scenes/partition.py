@@ -139,7 +139,7 @@ def master_nodes_that_a_support_holds() -> Trial:
 
 @trial(GROUP)
 def a_node_that_is_slave_of_two_pairs_and_master_of_a_third() -> Trial:
-    """A block between a floor and a second block, whose side faces a third one: shared edges have two roles."""
+    """A block between a floor and a second one, its side at a third one: shared edges have two roles."""
     base = block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (6, 3, 3))
     top = block((0.1, 0.1, 1.0), (1.9, 0.9, 1.8), (5, 3, 2))
     side = block((2.0, 0.0, 0.0), (2.8, 1.0, 1.0), (2, 4, 4))
@@ -181,6 +181,6 @@ def two_pairs_with_the_same_slave_surface_and_floors_one_below_the_other() -> Tr
 
 @trial(GROUP)
 def the_same_pair_given_twice() -> Trial:
-    """Every node has two equal normal rows: forces are shared between them in any way, their sum is unique."""
+    """Every node has two equal rows: forces are shared between them in any way, their sum is unique."""
     scene = block_on_plane(Coulomb(0.6))
     return cut_trial(replace(scene, contacts=[*scene.contacts, *scene.contacts]), forces=False)

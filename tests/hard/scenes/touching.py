@@ -11,6 +11,7 @@ from fenics_contact.contact import State, Status
 from fenics_contact.geometry import BodyMesh, block, hemisphere, rectangle
 from fenics_contact.scene import (
     Body,
+    BodyForce,
     ContactPair,
     Coulomb,
     IsotropicElasticity,
@@ -202,4 +203,20 @@ def almost_unloaded(scale: float) -> Trial:
 for _scale in (1e-2, 1e-4, 1e-6, 1e-8):
     trial(GROUP, f"a crowned brick that rolls on its crown under a load of {_scale:g}")(
         partial(almost_unloaded, _scale)
+    )
+
+
+@trial(GROUP)
+def a_plate_that_moves_by_a_millionth_of_a_millionth_of_its_gap() -> Trial:
+    """The gap is a number of another size than all displacements; its rounding must not drown them."""
+    mesh = block((0.0, 0.0, 1e-5), (8e-3, 4e-3, 2e-5), (8, 4, 1))
+    pair = ContactPair(Surface("plate", "z0"), FLOOR, None)
+    scene = Scene(
+        {"plate": Body(mesh, IsotropicElasticity(1e5, 0.3))},
+        [Support("plate", "x0")],
+        [BodyForce("plate", (0.0, 0.0, 1e-9))],
+        [pair],
+    )
+    return failing_trial(
+        scene, "the gap's rounding in the recomputed residual, larger than the displacements"
     )
