@@ -11,8 +11,7 @@ from fenics_contact.scene.kernels import rigid_body_modes
 if TYPE_CHECKING:
     from fenics_contact.scene.scene import Scene
 
-#: A motion counts as not resisted if supported nodes move by less than this part of what they move by in
-#: others, each motion taken so large that it moves the body by about one.
+#: A motion counts as not resisted if it moves supported nodes by less than this part of what others do.
 RANK_TOLERANCE = 1e-9
 
 
@@ -27,13 +26,9 @@ def resisted_motions(modes: np.ndarray, fixed: np.ndarray) -> np.ndarray:
         Coefficients of the modes as columns, shape (n_modes, rank).
     """
     # The edge of a thin plate moves little when the plate turns about it: singular values show how much,
-    # their squares would drown in rounding. Scaling makes lengths and angles comparable in all units.
-    scale = np.abs(modes).max(axis=(0, 1), initial=0.0)
-    scale = np.where(scale > 0.0, scale, 1.0)
-    _, size, motions = np.linalg.svd(modes[fixed] / scale, full_matrices=False)
-    resisted = motions[size > RANK_TOLERANCE * size.max(initial=0.0)]
-    basis, _ = np.linalg.qr(scale[:, None] * resisted.T)
-    return np.asarray(basis)
+    # their squares would drown in rounding.
+    _, size, motions = np.linalg.svd(modes[fixed], full_matrices=False)
+    return np.asarray(motions[size > RANK_TOLERANCE * size.max(initial=0.0)].T)
 
 
 def held_by_supports(scene: Scene, body: str) -> bool:
