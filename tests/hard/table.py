@@ -55,19 +55,32 @@ GROUPS: dict[str, tuple[str, str]] = {
     ),
     "stiffness": (
         "Stiff beside soft, thin, nearly incompressible",
-        "",
+        "Any contrast between bodies, or between layers, costs next to nothing. Soft and stiff side by "
+        "side in the same subdomains on a friction floor cost much: cut along the boundary of the "
+        "materials, or make bodies of them and tie them. Let the softer or the finer surface be the "
+        "slave. Linear cells lock as Poisson's ratio nears one half, the errors are in the outcomes: take "
+        "quadratic hexahedra, whose contact radius stays right while the pressures of single nodes "
+        "oscillate. Solid cells ten times as long as thick do no harm, a hundred times cost many "
+        "products, and a thousand times are beyond what the dual solvers manage; belts that slide round a "
+        "disc take some hundred.",
     ),
     "units": (
         "Units",
-        "Any consistent units serve; every case above and below is solved in two.",
+        "Any consistent units serve: forces of the same scene differ by rounding, and every case of this "
+        "page is solved in two systems.",
     ),
     "partition": (
         "Partitions, supports and shared nodes",
-        "",
+        "Any partition gives the same answer. Subdomains may be jagged, tiny, or have no contact at all; "
+        "ones of a cell or two cost time, not products. Supports may overlap where they agree, and nodes "
+        "may belong to several pairs; forces at nodes with more multipliers than displacements are not "
+        "unique one by one, their sum is.",
     ),
     "meshes": (
         "Meshes turned, mirrored, renumbered, distorted",
-        "",
+        "The answer does not depend on how a mesh is turned or numbered, and cells that are nearly flat "
+        "do no harm to the solver. Cells that are flat or inverted are refused with their place when the "
+        "mesh is made.",
     ),
     "published": (
         "Published friction problems",

@@ -42,6 +42,7 @@ class Trial:
         ranks: Numbers of ranks on which the answer must be the same.
         forces: Whether the forces of single contact points are unique, else only their sum over all is.
         displacements: Whether displacements are unique, else only their differences of energy are.
+        amplification: What conditioning may make of the tolerance in the balance of nodes and in distances.
         agreement: Largest relative difference between answers that should be one.
         force_scale: The smallest force that contact forces are compared with, [force].
         checks: Asserts what is known of this very answer.
@@ -60,6 +61,7 @@ class Trial:
     ranks: tuple[int, ...] = (2,)
     forces: bool = True
     displacements: bool = True
+    amplification: float = 10.0
     agreement: float = 1e-6
     force_scale: float = 0.0
     checks: Callable[[State], None] | None = None
