@@ -19,7 +19,7 @@ from tests.hard.scenes import TRIALS
 from tests.hard.trial import OTHER_UNITS, Answer, Trial, fallbacks, scene_size, statuses
 
 #: The largest number of ranks of any case, and the seconds that all of them may take there.
-TIMEOUT = 1500.0
+TIMEOUT = 3000.0
 OnRanks = Callable[[str, int], dict[str, Any]]
 
 
@@ -55,9 +55,10 @@ def assert_holds(found: Violations, tolerance: float, amplification: float) -> N
 
 def other_answers(case: Trial, sentence: str, on_ranks: OnRanks) -> dict[str, Answer]:
     """Return the answers that should be the same one, each in the units of the trial."""
-    length, force = OTHER_UNITS
-    scaled = Answer.of(case.in_units(length, force).solve())
-    answers = {"units": scaled.in_units(1 / length, 1 / force)}
+    answers = {}
+    if case.units:
+        length, force = OTHER_UNITS
+        answers["units"] = Answer.of(case.in_units(length, force).solve()).in_units(1 / length, 1 / force)
     if case.other is not None:
         answers["partition"] = Answer.of(case.solve(cut=case.other))
     answers |= {name: twin() for name, twin in case.twins.items()}

@@ -39,6 +39,7 @@ class Trial:
         other: Another partition, with another number of subdomains; None where the bodies have one cell.
         solver: Dual solver with its tolerance.
         steps: Load steps; the state after the last is judged.
+        units: Whether the answer is found in other units, too.
         ranks: Numbers of ranks on which the answer must be the same.
         forces: Whether the forces of single contact points are unique, else only their sum over all is.
         displacements: Whether displacements are unique, else only their differences of energy are.
@@ -58,6 +59,7 @@ class Trial:
     other: Cut | None = None
     solver: DualSolver = SOLVER
     steps: tuple[LoadStep, ...] = ()
+    units: bool = True
     ranks: tuple[int, ...] = (2,)
     forces: bool = True
     displacements: bool = True
