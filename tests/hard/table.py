@@ -31,7 +31,8 @@ forces, with no figure of the solver's:
   four) ranks.
 
 "Unknowns" are torn displacements; products are those with the dual operator F. A *rescue* is a call of
-SMALSE where the active set cycled or the residual stood still; a *cut* is a Newton step that was shortened.
+SMALSE or of proximal points where the active set cycled or the residual stood still; a *cut* is a Newton
+step that was shortened.
 """
 
 #: Groups in the order of the page: key to heading and advice.
