@@ -80,7 +80,9 @@ class FaceNewton:
         history: list[SolverStep] = []
         first = start.iterate if start.cold else newton.settled(start.iterate)
         iterate = best = first
-        since_best, rescued, budget = 0, None, self.rescue_products
+        since_best, budget = 0, self.rescue_products
+        rescued: Iterate | None = None
+        origin: Iterate | None = None
         while len(history) < self.max_steps and operator.products < self.max_products:
             iterate, line = newton.step(iterate, len(history))
             history.append(line)
@@ -93,13 +95,15 @@ class FaceNewton:
             if since_best < self.patience and np.isfinite(after.worst):
                 continue
             # Where Newton could do nothing with the last rescue, the next one must go further.
-            budget = 2 * budget if best is rescued else self.rescue_products
+            origin, last = _sound(problem, best, first), origin
+            budget = 2 * budget if best is rescued or origin is last else self.rescue_products
             found, memory = rescue(
                 problem,
                 law,
-                Start(_sound(problem, best, first), operator, memory, cold=False),
+                Start(origin, operator, memory, cold=False),
                 self,
                 budget=min(budget, max(self.max_products - operator.products, 1)),
+                further=origin is last,
                 reason=newton.stall(),
                 history=history,
             )

@@ -26,6 +26,8 @@ SPRINGS = 10.0
 PROXIMAL_STEPS = 60
 #: The centre moves once the residual with springs is this small, or so much smaller than that without.
 CENTRED, AHEAD = 0.03, 0.3
+#: A residual from which nothing comes back.
+DIVERGED = 1e12
 #: Largest inner tolerances, relative to the residual and of all.
 FORCING, LOOSEST = 0.25, 0.1
 
@@ -37,6 +39,7 @@ def rescue(
     parameters: FaceNewton,
     *,
     budget: int,
+    further: bool = False,
     reason: str,
     history: list[SolverStep],
 ) -> tuple[Iterate, SmalseMemory | None]:
@@ -50,6 +53,7 @@ def rescue(
         start: The iterate that Newton could not improve.
         parameters: Those of Newton's method.
         budget: Largest number of products to spend.
+        further: Whether an earlier rescue from the same iterate was of no use.
         reason: Why Newton's method needs it, in words.
         history: Gets one record.
 
@@ -61,9 +65,9 @@ def rescue(
     if problem.preconditioner is None:
         found, line, memory = _by_smalse(problem, law, start, parameters, limit)
     else:
-        found, line = _by_proximal_points(problem, law, start, parameters, limit)
+        found, line = _by_proximal_points(problem, law, start, parameters, limit, further)
     before = start.iterate.residuals
-    reached = "met its target" if _improved(found.residuals, before) else "used its budget"
+    reached = "met its target" if _improved(found.residuals, before, further) else "used its budget"
     note = f"rescue from {before.worst:.1e} because {reason}: {reached}"
     products = start.operator.products
     history.append(
@@ -72,12 +76,14 @@ def rescue(
     return found, memory
 
 
-def _improved(after: Residuals, before: Residuals) -> bool:
-    return after.worst_beside(before) <= REDUCTION * before.worst_beside(after)
+def _improved(after: Residuals, before: Residuals, further: bool) -> bool:
+    better = after.worst_beside(before) <= REDUCTION * before.worst_beside(after)
+    # From a very bad iterate any other is better by far, but not always one from which Newton gets anywhere.
+    return better and (not further or after.worst <= REDUCTION)
 
 
 def _by_proximal_points(
-    problem: DualProblem, law: SlipLaw, start: Start, parameters: FaceNewton, limit: int
+    problem: DualProblem, law: SlipLaw, start: Start, parameters: FaceNewton, limit: int, further: bool
 ) -> tuple[Iterate, SolverStep]:
     """Take Newton steps with springs, and move their centre whenever they come to rest. Collective."""
     point = ProximalPoint.build(problem, law, start.operator, SPRINGS).centred(start.iterate.multiplier)
@@ -89,7 +95,10 @@ def _by_proximal_points(
     for number in range(PROXIMAL_STEPS):
         current, line = steps.step(current, number)
         found = point.leave(current)
-        if _improved(found.residuals, start.iterate.residuals) or start.operator.products >= limit:
+        if not found.residuals.worst < DIVERGED:
+            found = start.iterate
+            break
+        if _improved(found.residuals, start.iterate.residuals, further) or start.operator.products >= limit:
             break
         if found.residuals.within(parameters.tolerance):
             break
