@@ -26,9 +26,10 @@ from fenics_contact.scene import (
     Tresca,
 )
 from tests.contact.gallery import SOFT, block_on_plane, pressed_block, stack
+from tests.hard.invariants import violations
 from tests.hard.scenes.parts import FLOOR, cubes, force
 from tests.hard.transform import turned
-from tests.hard.trial import Trial, cut_trial, failing_trial, trial
+from tests.hard.trial import Answer, Trial, cut_trial, failing_trial, trial
 
 GROUP = "friction"
 
@@ -55,8 +56,21 @@ for _value in (0.0, 1e-6, 1e-3, 0.3, 1.0, 10.0):
 
 @trial(GROUP)
 def a_block_that_floats_on_friction_10() -> Trial:
-    """A coefficient far beyond where the fixed point is known to be unique; the push tips the block."""
-    return cut_trial(replace(block_on_plane(Coulomb(10.0)), loads=[force(3.9, 1.0, -4.0)]))
+    """A coefficient far beyond where the equilibrium is known to be unique; the push tips the block."""
+    scene = replace(block_on_plane(Coulomb(10.0)), loads=[force(3.9, 1.0, -4.0)])
+
+    def another(state: State) -> str:
+        """Solve it cut otherwise, require all that must hold of that answer, too, and compare the two."""
+        trial_ = cut_trial(scene)
+        other = trial_.solve(cut=trial_.other)
+        found = violations(other)
+        assert max(found.natural, found.balance, found.nodal, found.cone, found.law) < 1e-8
+        difference = Answer.of(state).difference(Answer.of(other), trial_)
+        if difference < 1e-6:
+            return "the same in another partition"
+        return f"another partition finds another equilibrium, {difference:.0e} away: forces are not unique"
+
+    return cut_trial(scene, other=None, remark=another)
 
 
 @trial(GROUP, "a block with friction 0, 0.3 and 10 on its three sides")

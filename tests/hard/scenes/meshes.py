@@ -37,7 +37,8 @@ def turned_back(trial_: Trial, turn: np.ndarray) -> Answer:
 
 
 def with_twin(scene: Scene, name: str, twin: Callable[[], Answer]) -> Trial:
-    return cut_trial(scene, twins={name: twin})
+    """Return the trial of a scene with a twin; other cases of this scene are cut otherwise and on ranks."""
+    return cut_trial(scene, twins={name: twin}, other=None, ranks=())
 
 
 TURNS = {

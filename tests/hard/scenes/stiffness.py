@@ -130,7 +130,9 @@ class Pad:
             [TotalForce("body", "z0", (0.0, 0.0, total / 4))],
             [ContactPair(Surface("body", "z1"), RigidSphere((0.0, 0.0, 1.0), 1.0))],
         )
-        return Trial(scene, cut=boxes(scene, (1, 2, 2)), other=bisected(scene, 7), remark=self.remark)
+        return Trial(
+            scene, cut=boxes(scene, (1, 2, 2)), other=bisected(scene, 7), ranks=(), remark=self.remark
+        )
 
     @property
     def modulus(self) -> float:
@@ -218,9 +220,7 @@ def a_plate_in_three_pieces() -> Trial:
 @trial(GROUP)
 def a_plate_of_cells_of_aspect_1000_dragged_over_its_floor_in_one_subdomain() -> Trial:
     scene = dragged(1e-3)
-    return Trial(
-        scene, cut=boxes(scene, (1, 1, 1)), ranks=(), amplification=1e4, agreement=1e-4, checks=borne
-    )
+    return failing_trial(scene, FLAT, cut=boxes(scene, (1, 1, 1)), other=None, checks=borne)
 
 
 @trial(GROUP)
@@ -275,3 +275,9 @@ for _thickness, _angle, _name, _friction in (
     trial(GROUP, f"a belt of {_thickness:g} of the radius, {_name} round a disc, friction {_friction:g}")(
         partial(capstan, _thickness, _angle, _friction, 120)
     )
+
+
+@trial(GROUP, "a belt of 0.01 of the radius, half a turn round a disc, friction 0.5, finer, in three pieces")
+def a_fine_belt() -> Trial:
+    scene = capstan(0.01, np.pi, 0.5, 200).scene
+    return failing_trial(scene, "the residual stands still while all points slip", cut=bisected(scene, 3))
