@@ -40,7 +40,8 @@ class ExplicitOperator:
         """
         stiffness, self._interface = subdomain.stiffness, interface
         schur = condensations.schur_complement(stiffness, interface)
-        self._stiff, _ = lapack.strttp(schur.astype(np.float32, order="F"), uplo="L")
+        self._unit = float(np.abs(schur).max(initial=0.0)) or 1.0
+        self._stiff, _ = lapack.strttp((schur / self._unit).astype(np.float32, order="F"), uplo="L")
         self._flexible = _packed_inverse(schur, subdomain.kernel[interface])
         self._size = len(interface)
         self._inside = np.setdiff1d(np.arange(subdomain.mesh.size), interface, assume_unique=True)
@@ -53,8 +54,17 @@ class ExplicitOperator:
         blas.dspmv(self._size, 1.0, self._flexible, force, y=displacement, overwrite_y=1, lower=1)
 
     def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
-        """Write S, rounded to single precision, times an interface displacement into ``force``."""
-        force[:] = blas.sspmv(self._size, 1.0, self._stiff, displacement.astype(np.float32), lower=1)
+        """Write S, rounded to single precision, times an interface displacement into ``force``.
+
+        Single precision has no room for all units, nor for iterates that diverge: both factors are scaled.
+        """
+        size = float(np.abs(displacement).max(initial=0.0))
+        if size == 0.0 or not np.isfinite(size):
+            force[:] = size
+            return
+        scaled = (displacement / size).astype(np.float32)
+        force[:] = blas.sspmv(self._size, 1.0, self._stiff, scaled, lower=1)
+        force *= self._unit * size
 
     @property
     def stiffening_error(self) -> float:

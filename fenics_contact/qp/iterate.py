@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.qp.problem import CountedOperator, DualProblem
+from fenics_contact.qp.problem import CountedOperator, DualProblem, Operator
 from fenics_contact.qp.reductions import Vector
 from fenics_contact.qp.residual import Residuals, measure
 from fenics_contact.qp.slip_law import SlipLaw
@@ -56,6 +56,6 @@ def iterate_at(
     return Iterate(multiplier, product, residual, residuals)
 
 
-def apply_unless_zero(problem: DualProblem, operator: CountedOperator, x: Vector) -> Vector:
+def apply_unless_zero(problem: DualProblem, operator: Operator, x: Vector) -> Vector:
     """Return F x, without a product where x is zero on all ranks. Collective."""
     return operator(x) if problem.norm(x) > 0.0 else np.zeros_like(x)

@@ -122,6 +122,23 @@ class CountedOperator:
         return self._operator(x)
 
 
+class ShiftedOperator:
+    """x ↦ F x + D x with D diagonal; what is counted are the products of F."""
+
+    def __init__(self, operator: CountedOperator, shift: Vector) -> None:
+        """Add ``shift``, the diagonal of D, shape (n_owned,), to F."""
+        self._operator, self._shift = operator, shift
+
+    def __call__(self, x: Vector) -> Vector:
+        """Apply F + D to an owned vector and count. Collective."""
+        return self._operator(x) + self._shift * x
+
+    @property
+    def products(self) -> int:
+        """Products of F so far."""
+        return self._operator.products
+
+
 def _require_shape(name: str, array: Vector, size: int) -> None:
     if array.shape[0] != size:
         raise InvalidInputError(

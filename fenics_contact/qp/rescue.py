@@ -1,54 +1,125 @@
-"""The fallback of the face Newton method: SMALSE steps until the residual falls again."""
+"""The fallbacks of the face Newton method: proximal points or SMALSE steps until the residual falls again."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from fenics_contact.qp.certify import certify
 from fenics_contact.qp.iterate import Iterate, Start
+from fenics_contact.qp.newton_steps import NewtonSteps
 from fenics_contact.qp.problem import DualProblem
+from fenics_contact.qp.proximal import ProximalPoint
+from fenics_contact.qp.residual import Residuals
 from fenics_contact.qp.slip_law import SlipLaw, Tresca
-from fenics_contact.qp.smalse import Smalse, outer_iterations
+from fenics_contact.qp.smalse import outer_iterations
 from fenics_contact.qp.solution import SmalseMemory, SolverStep
+
+if TYPE_CHECKING:
+    from fenics_contact.qp.face_newton import FaceNewton
+
+#: A rescue aims at a residual smaller by this factor.
+REDUCTION = 0.1
+#: Stiffness of the springs of a proximal point in units of 1/diag F: soft for Newton, stiff for the centre.
+SPRINGS = 10.0
+#: Newton steps of a rescue by proximal points.
+PROXIMAL_STEPS = 60
+#: The centre moves once the residual with springs is this small, or so much smaller than that without.
+CENTRED, AHEAD = 0.03, 0.3
+#: A residual from which nothing comes back.
+DIVERGED = 1e12
+#: Largest inner tolerances, relative to the residual and of all.
+FORCING, LOOSEST = 0.25, 0.1
 
 
 def rescue(
     problem: DualProblem,
     law: SlipLaw,
     start: Start,
-    parameters: Smalse,
+    parameters: FaceNewton,
     *,
-    reduction: float,
     budget: int,
+    further: bool = False,
     reason: str,
     history: list[SolverStep],
-) -> tuple[Iterate, SmalseMemory]:
-    """Improve an iterate by SMALSE with its slip bound held. Collective.
+) -> tuple[Iterate, SmalseMemory | None]:
+    """Improve an iterate that Newton's method cannot, with its slip bound held for a while. Collective.
+
+    By proximal points where a preconditioner makes faces cheap; by SMALSE, which solves no face, elsewhere.
 
     Args:
         problem: The dual problem.
-        law: Where the slip bound comes from; it is frozen at the start.
+        law: Where the slip bound comes from.
         start: The iterate that Newton could not improve.
-        parameters: SMALSE's.
-        reduction: Stop when the residual has fallen by this factor.
+        parameters: Those of Newton's method.
         budget: Largest number of products to spend.
+        further: Whether an earlier rescue from the same iterate was of no use.
         reason: Why Newton's method needs it, in words.
         history: Gets one record.
 
     Returns:
-        The improved iterate, its residuals recomputed for ``law``, and what SMALSE learned.
+        The improved iterate with its residuals for ``law``, and what SMALSE learned.
     """
+    limit = start.operator.products + budget
+    memory: SmalseMemory | None = start.memory
+    if problem.preconditioner is None:
+        found, line, memory = _by_smalse(problem, law, start, parameters, limit)
+    else:
+        found, line = _by_proximal_points(problem, law, start, parameters, limit, further)
+    before = start.iterate.residuals
+    reached = "met its target" if _improved(found.residuals, before, further) else "used its budget"
+    note = f"rescue from {before.worst:.1e} because {reason}: {reached}"
+    products = start.operator.products
+    history.append(
+        replace(line, iteration=len(history), products=products, residuals=found.residuals, note=note)
+    )
+    return found, memory
+
+
+def _improved(after: Residuals, before: Residuals, further: bool) -> bool:
+    better = after.worst_beside(before) <= REDUCTION * before.worst_beside(after)
+    # From a very bad iterate any other is better by far, but not always one from which Newton gets anywhere.
+    return better and (not further or after.worst <= REDUCTION)
+
+
+def _by_proximal_points(
+    problem: DualProblem, law: SlipLaw, start: Start, parameters: FaceNewton, limit: int, further: bool
+) -> tuple[Iterate, SolverStep]:
+    """Take Newton steps with springs, and move their centre whenever they come to rest. Collective."""
+    point = ProximalPoint.build(problem, law, start.operator, SPRINGS).centred(start.iterate.multiplier)
+    careful = replace(
+        parameters, forcing=min(parameters.forcing, FORCING), loosest=min(parameters.loosest, LOOSEST)
+    )
+    steps = NewtonSteps(point.problem, point.frozen, point.operator, careful, springs=True)
+    current = steps.settled(point.enter(start.iterate))
+    for number in range(PROXIMAL_STEPS):
+        current, line = steps.step(current, number)
+        found = point.leave(current)
+        if not found.residuals.worst < DIVERGED:
+            found = start.iterate
+            break
+        if _improved(found.residuals, start.iterate.residuals, further) or start.operator.products >= limit:
+            break
+        if found.residuals.within(parameters.tolerance):
+            break
+        if current.residuals.worst < max(CENTRED, AHEAD * found.residuals.worst):
+            point = point.centred(point.force(current))
+            steps.move(point.problem, point.frozen)
+            current = point.enter(found)
+    return found, replace(line, method="proximal rescue")
+
+
+def _by_smalse(
+    problem: DualProblem, law: SlipLaw, start: Start, parameters: FaceNewton, limit: int
+) -> tuple[Iterate, SolverStep, SmalseMemory]:
+    """Take SMALSE steps. Collective."""
     frozen = Tresca(problem.layout, law.bound(start.iterate.multiplier))
     feasible = frozen.feasible(start.iterate.multiplier)
-    limit = start.operator.products + budget
-    target = reduction * start.iterate.residuals.worst
-    settings = replace(parameters, tolerance=target, max_products=limit)
+    target = REDUCTION * start.iterate.residuals.worst
+    settings = replace(parameters.rescue, tolerance=target, max_products=limit)
     for state in outer_iterations(problem, feasible, start, settings):
         if state.residuals.within(target) or start.operator.products >= limit:
             break
     improved = certify(problem, start.operator, law, state.multiplier, state.residual).iterate
-    line = state.record(len(history), problem, start.operator.products)
-    reached = "met its target" if state.residuals.within(target) else "used its budget"
-    note = f"rescue from {start.iterate.residuals.worst:.1e} because {reason}: {reached}"
-    history.append(replace(line, method="SMALSE rescue", residuals=improved.residuals, note=note))
-    return improved, state.memory
+    line = state.record(0, problem, start.operator.products)
+    return improved, replace(line, method="SMALSE rescue"), state.memory

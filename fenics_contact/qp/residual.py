@@ -12,6 +12,8 @@ from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 
 FORCE_FLOOR = 1e-10
+#: Errors of contact forces below this fraction of the largest of all forces are rounding, and count as none.
+ROUNDING = 1e-14
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,16 @@ class Residuals:
     def size(self) -> float:
         """√(natural² + gluing²), the number that the solution of a face predicts."""
         return float(np.hypot(self.natural, self.gluing))
+
+    def worst_beside(self, other: Residuals) -> float:
+        """The worst residual in the smaller scales of two: only such numbers tell which iterate is better.
+
+        A huge wrong force divided by itself is 1, and so is the missing part of one that is nearly right.
+        """
+        force = min(self.force_scale, other.force_scale) or max(self.force_scale, other.force_scale)
+        gluing = min(self.gluing_scale, other.gluing_scale) or max(self.gluing_scale, other.gluing_scale)
+        natural = _ratio(self.natural * self.force_scale, force)
+        return max(natural, _ratio(self.gluing * self.gluing_scale, gluing), self.coarse)
 
     def within(self, tolerance: float) -> bool:
         """Tell whether every residual is at most ``tolerance``; NaN is not."""
@@ -95,11 +107,13 @@ def measure(
         force_scale = max(force, force_mapped)
     force_scale = max(force_scale, FORCE_FLOOR * max(everything, closing))
     gluing_scale = max(cancelled, load) or rhs
+    rounding = ROUNDING * max(everything, closing)
+    violation = global_max(problem.comm, feasible.violation(multiplier))
     return Residuals(
-        natural=_ratio(distance, force_scale),
+        natural=_ratio(distance if distance > rounding else 0.0, force_scale),
         gluing=_ratio(jump, gluing_scale),
         coarse=_ratio(unbalanced, max(everything, problem.coarse.norm(problem.coarse.load))),
-        violation=_ratio(global_max(problem.comm, feasible.violation(multiplier)), force_scale),
+        violation=_ratio(violation if violation > rounding else 0.0, force_scale),
         force_scale=force_scale,
         gluing_scale=gluing_scale,
     )

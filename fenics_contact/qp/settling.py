@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,6 +50,12 @@ class Settling:
         self._problem, self._law = problem, law
         self.motions = _floating_motions(problem)
         self._rows = np.asarray(problem.coarse.matrix.T @ self.motions)
+
+    def with_law(self, law: SlipLaw) -> Settling:
+        """Return the same bodies under another law."""
+        other = copy(self)
+        other._law = law
+        return other
 
     def __call__(self, multiplier: Vector, residual: Vector, step: Vector) -> Vector:
         """Return δα = N β, shape (m,), replicated. Collective.

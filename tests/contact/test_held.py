@@ -12,8 +12,29 @@ from mpi4py import MPI
 from fenics_contact.contact import Status, check_held, solve_scene
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.feti import build_torn_system, decompose
-from fenics_contact.scene import Coulomb, Scene, Support, TotalForce, Tresca
-from tests.contact.gallery import block_on_plane, guided, partitions, pressed_block, stack, two_blocks
+from fenics_contact.geometry import block
+from fenics_contact.qp import FaceNewton
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    Coulomb,
+    IsotropicElasticity,
+    Scene,
+    Support,
+    Surface,
+    TotalForce,
+    Tresca,
+)
+from tests.contact.gallery import (
+    FLOOR,
+    SOFT,
+    block_on_plane,
+    guided,
+    partitions,
+    pressed_block,
+    stack,
+    two_blocks,
+)
 
 DOWN, ALONG = -4.0, 2.0  # the load of the block on the plane, with its push of 1
 NUMBERS = r"\(([^)]*)\)"
@@ -65,6 +86,31 @@ def test_friction_holds_just_as_much_as_it_can(friction: Coulomb | Tresca) -> No
     refused(pulled(scene, "block", (1.002 * limit, 0.0, -1.0)))
 
 
+@pytest.mark.parametrize("friction", [Coulomb(0.3), Tresca(0.15)])
+@pytest.mark.parametrize("part", [0.9999, 0.99999, 1.00001, 1.0001])
+def test_the_limit_of_friction_is_sharp(friction: Coulomb | Tresca, part: float) -> None:
+    flat = block_on_plane(friction)
+    mesh = block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (6, 3, 3))
+    flat = replace(flat, bodies={"block": replace(flat.bodies["block"], mesh=mesh)})
+    scene = pulled(flat, "block", (0.3 * part, 0.0, -1.0))
+    if part < 1:
+        check(scene)
+    else:
+        assert refused(scene)[0] == "block"
+
+
+def test_a_body_at_the_very_limit_of_friction_is_refused_as_any_slide_is_an_answer() -> None:
+    scene = pulled(block_on_plane(Coulomb(0.3)), "block", (0.3, 0.0, -1.0))
+    with pytest.raises(InfeasibleError, match="'block' is held only just: the load uses up all friction"):
+        check(scene)
+
+
+def test_the_body_that_is_pushed_is_named_and_not_those_it_takes_along() -> None:
+    scene = stack(Coulomb(0.5), Coulomb(0.3))
+    loads = [TotalForce("upper", "z1", (0.0, 0.0, -1.0)), TotalForce("lower", "x0", (0.4, 0.0, 0.0))]
+    assert refused(replace(scene, loads=loads))[0] == "lower"
+
+
 def test_a_body_without_friction_slides_at_the_slightest_push() -> None:
     check(pulled(block_on_plane(None), "block", (0.0, 0.0, -1.0)))
     body, translation, _ = refused(pulled(block_on_plane(None), "block", (0.001, 0.0, -1.0)))
@@ -102,6 +148,31 @@ def test_supports_hold_what_contact_does_not() -> None:
     lifted = pulled(guided(block_on_plane(None), "block"), "block", (0.0, 0.0, 1.0))
     assert refused(lifted)[1] == pytest.approx([0, 0, 1], abs=1e-2)
     check(replace(lifted, supports=[*lifted.supports, Support("block", "z1", (None, None, 0.0))]))
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("thickness", [1e-2, 1e-3, 1e-4])
+def test_a_thin_plate_clamped_at_one_edge_is_held_in_all_units(thickness: float, unit: float) -> None:
+    mesh = block((0.0, 0.0, 0.0), (8.0, 4.0, thickness), (8, 4, 1))
+    plate = Body(mesh.moved(unit * mesh.points), SOFT)
+    pair = ContactPair(Surface("block", "z0"), FLOOR, None)
+    scene = Scene({"block": plate}, [Support("block", "x0")], contacts=[pair])
+    check(pulled(scene, "block", (0.0, 0.0, 1.0)))
+    hinged = replace(scene, supports=[Support("block", "x0", (0.0, 0.0, None))])
+    assert refused(pulled(hinged, "block", (0.0, 0.0, 1.0)))[0] == "block"
+
+
+def test_a_thin_plate_lifted_at_its_clamped_edge_is_solved() -> None:
+    """Its clamp must bear thousands of times the load: levers are as long as the plate, arms as short."""
+    mesh = block((0.0, 0.0, 0.01), (8.0, 4.0, 0.011), (8, 4, 1))
+    pair = ContactPair(Surface("block", "z0"), FLOOR, None)
+    scene = Scene(
+        {"block": Body(mesh, IsotropicElasticity(1e9, 0.3))}, [Support("block", "x0")], contacts=[pair]
+    )
+    scene = pulled(scene, "block", (0.0, 0.0, 1e-3))
+    state = solve_scene(scene, partitions(scene, (1, 1, 1)), MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-6))
+    assert state.contact.count(Status.OPEN) == state.contact.points.count
+    assert state.gather_displacement("block")[:, 2].max() > 0.0
 
 
 def test_a_scene_that_is_moved_without_any_load_needs_no_holding() -> None:

@@ -93,6 +93,19 @@ def test_stiffening_is_the_schur_complement(cell: str, kind: type, rounding: flo
 
 
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("size", [1e-60, 1e60])
+def test_stiffening_has_room_for_displacements_of_any_size(kind: type, size: float) -> None:
+    subdomain = piece("hexahedron")
+    b = np.flatnonzero(surface(subdomain))
+    operator, way = keep(kind, subdomain, b), np.linspace(-1.0, 2.0, len(b))
+    operator.stiffen(way, force := np.empty(len(b)))
+    operator.stiffen(size * way, other := np.empty(len(b)))
+    np.testing.assert_allclose(other / size, force, rtol=1e-5, atol=1e-5 * abs(force).max())
+    operator.stiffen(0.0 * way, other)
+    assert not other.any()
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_an_interface_that_is_everything_leaves_no_inside(kind: type) -> None:
     subdomain = piece("hexahedron", cells=1)
     operator = keep(kind, subdomain, np.arange(subdomain.mesh.size))

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from fenics_contact.qp import FaceNewton, Tresca, solve
 from fenics_contact.qp.iterate import Iterate, iterate_at
-from fenics_contact.qp.line_search import damp
+from fenics_contact.qp.line_search import damp, descend
+from fenics_contact.qp.problem import CountedOperator
+from fenics_contact.qp.proximal import ProximalPoint
 from tests.qp.published_friction import CYCLING, published
 from tests.qp.random_problems import DenseProblem, random_problem
 
@@ -45,6 +48,43 @@ def test_step_that_improves_is_kept_whole():
     damped = damp(problem.dual, law, worse, better)
     assert damped.fraction == 1.0
     assert damped.iterate is better
+
+
+def test_a_huge_wrong_force_is_worse_than_one_that_is_nearly_right():
+    """Relative to itself each is wrong by about one: only a common scale tells them apart."""
+    problem = random_problem(3)
+    law = Tresca(problem.layout, problem.slip_bound)
+    solution = solve(problem.dual, problem.slip_bound, FaceNewton(tolerance=1e-10))
+    huge = iterate(problem, -1e4 * np.abs(solution.multiplier), solution.alpha)
+    small = iterate(problem, np.zeros_like(solution.multiplier), solution.alpha)
+    assert small.residuals.worst > 0.5 * huge.residuals.worst
+    assert huge.residuals.worst_beside(small.residuals) > 100 * small.residuals.worst_beside(huge.residuals)
+    assert damp(problem.dual, law, huge, small).iterate is small
+
+
+def test_a_step_may_be_worse_than_the_last_iterate_if_it_is_better_than_the_one_before():
+    problem = random_problem(3)
+    law = Tresca(problem.layout, problem.slip_bound)
+    solution = solve(problem.dual, problem.slip_bound, FaceNewton(tolerance=1e-10))
+    good, fair, bad = (
+        iterate(problem, part * solution.multiplier, solution.alpha) for part in (1.01, 1.1, 2.0)
+    )
+    assert damp(problem.dual, law, good, fair).iterate is not fair
+    assert damp(problem.dual, law, good, fair, bad.residuals).iterate is fair
+
+
+def test_the_minimum_of_the_potential_on_a_segment_is_found():
+    problem = random_problem(3)
+    dual, law = problem.dual, Tresca(problem.layout, problem.slip_bound)
+    solution = solve(dual, problem.slip_bound, FaceNewton(tolerance=1e-11))
+    point = ProximalPoint.build(dual, law, CountedOperator(dual.operator), 10.0).centred(solution.multiplier)
+    begin = point.enter(iterate(problem, solution.multiplier, solution.alpha))
+    offset = np.random.default_rng(0).standard_normal(len(solution.alpha))
+    ends = [iterate(problem, solution.multiplier, solution.alpha + part * offset) for part in (-1e-3, 4e-3)]
+    found = descend(point.problem, point.frozen, *(point.enter(end) for end in ends))
+    assert found.fraction == pytest.approx(0.2, abs=0.03)
+    assert found.iterate.residuals.natural < 0.2 * point.enter(ends[0]).residuals.natural
+    assert descend(point.problem, point.frozen, point.enter(ends[0]), begin).fraction == 1.0
 
 
 def test_a_step_that_was_cut_is_told():

@@ -1,0 +1,202 @@
+"""Newton steps on faces: classify, solve the linear face, settle floating bodies, go as far as it pays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fenics_contact.qp.coupled import CoupledFace, couple
+from fenics_contact.qp.face import Face, classify
+from fenics_contact.qp.face_system import FaceSystem, FaceSystems
+from fenics_contact.qp.gmres import projected_gmres
+from fenics_contact.qp.iterate import Iterate, apply_unless_zero, iterate_at
+from fenics_contact.qp.line_search import Damped, damp, descend
+from fenics_contact.qp.pcg import FaceStep, Stop, projected_cg
+from fenics_contact.qp.problem import CountedOperator, DualProblem, ShiftedOperator
+from fenics_contact.qp.reductions import Vector, global_sum
+from fenics_contact.qp.residual import Residuals, contact_step
+from fenics_contact.qp.settling import Settling, keep_unheld
+from fenics_contact.qp.slip_law import SlipLaw
+from fenics_contact.qp.solution import SolverStep
+
+if TYPE_CHECKING:
+    from fenics_contact.qp.face_newton import FaceNewton
+
+#: The longest cycle of active sets that is recognised.
+LONGEST_CYCLE = 6
+
+
+class NewtonSteps:
+    """Takes Newton steps of one solve and remembers the last faces, residuals and each disc's ρ."""
+
+    def __init__(
+        self,
+        problem: DualProblem,
+        law: SlipLaw,
+        operator: CountedOperator | ShiftedOperator,
+        parameters: FaceNewton,
+        *,
+        springs: bool = False,
+    ) -> None:
+        """Prepare the coarse spaces of all faces. Collective.
+
+        Args:
+            problem: The dual problem, or that of a proximal point.
+            law: Where the slip bound comes from.
+            operator: Its operator, counted.
+            parameters: Forcing terms and limits.
+            springs: The problem is that of a proximal point: ρ is given, a potential says how far to go.
+        """
+        self._problem, self._law, self._parameters = problem, law, parameters
+        self._operator, self._springs = operator, springs
+        self._systems = FaceSystems(problem, operator)
+        self._natural_step = contact_step(problem.layout, problem.diagonal)
+        self._rho = self._natural_step.copy()
+        self._face: Face | None = None
+        self._earlier: list[Face] = []
+        self._mismatch = 1.0
+        self._settling = Settling(problem, law)
+        self._before: Residuals | None = None
+
+    def move(self, problem: DualProblem, law: SlipLaw) -> None:
+        """Go on with another right side and another law."""
+        self._problem, self._law = problem, law
+        self._settling = self._settling.with_law(law)
+
+    def settled(self, iterate: Iterate) -> Iterate:
+        """Return an iterate of another load or position with its floating bodies at rest. Collective."""
+        problem = self._problem
+        alpha = problem.coarse.coefficients(iterate.product - problem.rhs - iterate.residual)
+        alpha = alpha + self._settling(iterate.multiplier, iterate.residual, self._rho)
+        return iterate_at(problem, self._law, iterate.multiplier, iterate.product, alpha)
+
+    def step(self, iterate: Iterate, number: int) -> tuple[Iterate, SolverStep]:
+        """Classify, solve the face, and return the new iterate with its line of history. Collective."""
+        face = self._next_face(iterate)
+        self._earlier = [self._face, *self._earlier[: LONGEST_CYCLE - 1]] if self._face else []
+        changes = 0 if self._face is None else face.changes(self._face)
+        self._face = face
+        system = self._systems.build(face)
+        coupled = couple(system, self._problem.coarse, self._law.growth, iterate.multiplier)
+        linear = coupled or system
+        entered = linear.enter(iterate.multiplier)
+        moved = apply_unless_zero(self._problem, self._operator, entered - iterate.multiplier)
+        product = iterate.product + moved
+        solved = self._solve(system, coupled, entered, product, iterate.residuals, changes)
+        multiplier, product = entered + linear.advance(solved.step), product + solved.product
+        alpha = self._motions(system, linear, iterate, multiplier, product)
+        after = iterate_at(self._problem, self._law, multiplier, product, alpha)
+        self._mismatch = abs(after.residuals.size - solved.measure) / (iterate.residuals.size or 1.0)
+        if self._springs:
+            damped = descend(self._problem, self._law, iterate, after)
+        else:
+            damped = damp(self._problem, self._law, iterate, after, self._before)
+        self._before = iterate.residuals
+        return damped.iterate, self._record(number, damped, system, solved, changes)
+
+    def stall(self) -> str:
+        """Say why the last steps led nowhere: whether the active set cycles or stands still. Collective."""
+        if self._face is None or not self._earlier:
+            return "the residual stands still"
+        changes = [self._face.changes(face) for face in self._earlier]
+        changed = global_sum(self._problem.comm, *changes)
+        flickering = f"{round(float(changed[0]))} statuses changed in the last step"
+        if changed[0] == 0.0:
+            return "the residual stands still on one face"
+        if not np.all(changed):
+            return f"the active set cycles with period {int(np.argmin(changed)) + 1}, {flickering}"
+        return f"the active set does not settle, {flickering}"
+
+    def _next_face(self, iterate: Iterate) -> Face:
+        """Classify, with a smaller ρ for discs whose force would otherwise turn back."""
+        layout, slip_bound = self._problem.layout, self._law.bound(iterate.multiplier)
+        face = classify(layout, slip_bound, iterate.multiplier, iterate.residual, self._rho)
+        if self._face is None or self._springs:
+            return face
+        turned = np.einsum("ia,ia->i", face.direction, self._face.direction) < 0.0
+        self._rho[layout.tangential[turned]] *= 0.3
+        return classify(layout, slip_bound, iterate.multiplier, iterate.residual, self._rho)
+
+    def _motions(
+        self,
+        system: FaceSystem,
+        linear: FaceSystem | CoupledFace,
+        before: Iterate,
+        multiplier: Vector,
+        product: Vector,
+    ) -> Vector:
+        """Return α after a step: from the rows of the face, then settled. Collective."""
+        problem, coarse = self._problem, self._problem.coarse
+        earlier = coarse.coefficients(before.product - problem.rhs - before.residual)
+        alpha = linear.motions(system.gradient(multiplier, product - problem.rhs))
+        alpha = keep_unheld(system.coarse, earlier, alpha)
+        if self._springs and system.coarse.gram.rank == coarse.m:
+            # The face moves the bodies already; moving them in turns with the rest would creep.
+            return alpha
+        residual = product - problem.rhs - coarse.transpose(alpha)
+        return np.asarray(alpha + self._settling(multiplier, residual, self._rho), dtype=np.float64)
+
+    def _solve(
+        self,
+        system: FaceSystem,
+        coupled: CoupledFace | None,
+        multiplier: Vector,
+        product: Vector,
+        residuals: Residuals,
+        changes: int,
+    ) -> FaceStep:
+        changed = global_sum(self._problem.comm, changes)[0] > 0.0
+        forcing = self._parameters.forcing if changed else min(self._parameters.forcing, self._mismatch)
+        wanted = min(self._parameters.loosest, forcing * residuals.worst)
+        tolerance = max(wanted, 0.3 * self._parameters.tolerance)
+        gradient = system.gradient(multiplier, product - self._problem.rhs)
+        weights = residual_weights(system.face, residuals, self._natural_step)
+        limit = max(self._parameters.max_products - self._operator.products, 1)
+        if coupled is None:
+            return projected_cg(system, gradient, weights, tolerance, limit)
+        return projected_gmres(coupled.coupled, gradient, weights, tolerance, limit)
+
+    def _record(
+        self, number: int, damped: Damped, system: FaceSystem, solved: FaceStep, changes: int
+    ) -> SolverStep:
+        face, coarse = system.face, system.coarse
+        counts = global_sum(
+            self._problem.comm,
+            np.count_nonzero(face.closed),
+            np.count_nonzero(face.stick),
+            np.count_nonzero(face.slip),
+            changes,
+        )
+        closed, stick, slip, changed = (round(float(count)) for count in counts)
+        note = f"{solved.iterations} CG steps, {changed} status changes"
+        if damped.fraction < 1.0:
+            note += f", cut to {damped.fraction:g} of the step"
+        if solved.stop is not Stop.CONVERGED:
+            note += f", {solved.stop.value}"
+        if coarse.gram.rank < coarse.m:
+            note += f", {coarse.m - coarse.gram.rank} rigid motions not held by the face"
+        return SolverStep(
+            "face Newton",
+            number,
+            self._operator.products,
+            damped.iterate.residuals,
+            closed,
+            stick,
+            slip,
+            note,
+        )
+
+
+def residual_weights(face: Face, residuals: Residuals, step: Vector) -> Vector:
+    """Return the weights that turn a residual on a face into the natural and the gluing residual.
+
+    Args:
+        face: The face.
+        residuals: The last residuals, for their scales.
+        step: ρ of the natural map, 0 on equality rows, owned.
+    """
+    gluing = residuals.gluing_scale or 1.0
+    weights = np.sqrt(face.restriction.power(2).T @ step**2) * face.damping**2
+    weights /= residuals.force_scale or np.inf
+    return np.where(weights > 0.0, weights, 1.0 / gluing)

@@ -1,0 +1,94 @@
+"""Where Newton's method fails it is rescued, and where nothing helps the error says why."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fenics_contact.errors import ConvergenceError
+from fenics_contact.qp import FaceNewton, Tresca, contact_step, measure, solve
+from fenics_contact.qp.iterate import Start, iterate_at
+from fenics_contact.qp.problem import CountedOperator
+from fenics_contact.qp.proximal import ProximalPoint
+from fenics_contact.qp.rescue import rescue
+from fenics_contact.qp.slip_law import Coulomb
+from tests.qp.test_coulomb import coulomb_violations
+from tests.qp.torn_bricks import Bricks, torn_problem
+
+
+@pytest.mark.parametrize("load", [1e-2, 1e-4, 1e-6, 1e-8])
+def test_an_almost_unloaded_brick_on_a_round_one_is_solved(load: float) -> None:
+    dual, _ = torn_problem(Bricks(n=4, crown=2.0, press=load, shear=0.1 * load, tilt=0.3))
+    mu_f = np.full(dual.layout.n_friction, 0.3)
+    found = solve(dual, None, FaceNewton(), friction_coefficient=mu_f)
+    assert 0 < found.history[-1].closed < dual.layout.n_contact / 2
+    violations = coulomb_violations(dual.layout, found.multiplier / load, found.residual, mu_f)
+    assert max(violations.values()) < 1e-4
+    assert found.products < 500  # more than 20 000 where iterates were compared in scales of their own
+
+
+@pytest.mark.parametrize("preconditioned", [True, False])
+def test_a_rescue_comes_nearer_from_anywhere(preconditioned: bool) -> None:
+    dual, _ = torn_problem(Bricks(crown=0.1, tilt=0.5, preconditioned=preconditioned))
+    law, operator = Coulomb(dual.layout, np.full(dual.layout.n_friction, 0.3)), CountedOperator(dual.operator)
+    far = dual.coarse.particular()
+    begin = iterate_at(dual, law, far, dual.operator(far), np.zeros(dual.coarse.m))
+    history = []
+    start = Start(begin, operator, None, cold=False)
+    found, memory = rescue(dual, law, start, FaceNewton(), budget=400, reason="of a test", history=history)
+    assert found.residuals.worst_beside(begin.residuals) < 0.3 * begin.residuals.worst_beside(found.residuals)
+    assert [step.method for step in history] == ["proximal rescue" if preconditioned else "SMALSE rescue"]
+    assert "because of a test" in history[0].note
+    assert history[0].products == operator.products < 400
+    assert (memory is None) == preconditioned
+
+
+def test_at_the_solution_springs_at_rest_change_nothing() -> None:
+    dual, _ = torn_problem(Bricks(crown=0.1, tilt=0.5))
+    bound = np.full(dual.layout.n_friction, 1e-3)
+    solution = solve(dual, bound, FaceNewton(tolerance=1e-10))
+    law, operator = Tresca(dual.layout, bound), CountedOperator(dual.operator)
+    point = ProximalPoint.build(dual, law, operator, 10.0).centred(solution.multiplier)
+    there = iterate_at(dual, law, solution.multiplier, solution.product, solution.alpha)
+    inside = point.enter(there)
+    assert inside.residuals.worst < 1e-8
+    np.testing.assert_allclose(
+        point.force(inside)[dual.layout.contact], there.multiplier[dual.layout.contact], atol=1e-10
+    )
+    np.testing.assert_allclose(point.leave(inside).residual, there.residual, atol=1e-14)
+    away = point.centred(2.0 * solution.multiplier).enter(there)
+    assert away.residuals.natural > 0.1
+    assert operator.products == 0
+    np.testing.assert_allclose(
+        contact_step(dual.layout, point.problem.diagonal), 10 * contact_step(dual.layout, dual.diagonal)
+    )
+
+
+def test_forces_that_are_rounding_are_none() -> None:
+    dual, _ = torn_problem(Bricks(crown=0.1))
+    law = Tresca(dual.layout, np.full(dual.layout.n_friction, 1e-3))
+    rng, size = np.random.default_rng(0), dual.layout.size
+    multiplier = np.where(np.isin(np.arange(size), dual.layout.equality), 1.0, 0.0)
+    noise = np.zeros(size)
+    noise[dual.layout.contact] = rng.standard_normal(len(dual.layout.contact))
+    zero = np.zeros(size)
+    for scale, counts in ((1e-17, False), (1e-8, True)):
+        found = measure(dual, law.feasible(zero), multiplier + scale * noise, zero, zero)
+        assert (found.natural > 0.0) == counts
+        assert (found.violation > 0.0) == counts
+
+
+def test_a_failure_says_what_was_reached_and_what_to_try() -> None:
+    dual, _ = torn_problem(Bricks(n=4, cubes=(3, 2), crown=2.0, shear=0.0, tilt=0.5))
+    mu_f = np.full(dual.layout.n_friction, 0.01)
+    slipping = r"all \d+ discs slip, and friction may not suffice for any equilibrium; raise the friction, "
+    with pytest.raises(
+        ConvergenceError, match=slipping + "lower the load, add a support, or raise max_steps"
+    ):
+        solve(dual, None, FaceNewton(max_steps=1), friction_coefficient=mu_f)
+    told = r"the best was .*, the .* and 0 rescues did not help: raise max_products, start from the solution"
+    with pytest.raises(ConvergenceError, match=told) as caught:
+        solve(dual, None, replace(FaceNewton(), max_products=30), friction_coefficient=40 * mu_f)
+    assert caught.value.history
