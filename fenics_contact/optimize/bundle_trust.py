@@ -9,12 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
 from fenics_contact.optimize.bundle import Bundle
-from fenics_contact.optimize.objective import Evaluation, evaluate
+from fenics_contact.optimize.objective import evaluate
 from fenics_contact.optimize.problem import Problem
+from fenics_contact.optimize.progress import Progress
 from fenics_contact.optimize.quadratic_program import SubproblemError
 from fenics_contact.optimize.result import Kind, NotConvergedError, Reason, Record, Result
+from fenics_contact.optimize.state import MethodState
 from fenics_contact.optimize.stopping import stopping_test
 from fenics_contact.optimize.subproblem import Step, solve_step
 from fenics_contact.optimize.trust import Trial, Trust
@@ -98,52 +101,52 @@ class BundleTrust:
         if not 0.0 <= self.locality < np.inf:
             raise InvalidInputError(f"locality must not be negative (0 for a convex J), got {self.locality}")
 
-    def minimize(self, problem: Problem, callback: Callback | None = None) -> Result:
+    def minimize(
+        self, problem: Problem, callback: Callback | None = None, checkpoint: Checkpoint | None = None
+    ) -> Result:
         """Run the method on a checked problem; `fenics_contact.optimize.minimize` is the usual way in.
 
         Args:
             problem: What `pose` returned.
             callback: Called with each record and a copy of the best point.
+            checkpoint: File to go on from and to write to.
 
         Returns:
             The best point, the reason for the stop and the history.
 
         Raises:
             NotConvergedError: If the stop is a failure and ``raise_on_failure`` is set.
+            InvalidInputError: If the checkpoint cannot be gone on from.
+            CheckpointError: If the checkpoint cannot be written.
         """
-        state = _start(self, problem)
+        progress = Progress(checkpoint, self, problem)
+        state = progress.recalled()
+        if state is None:
+            state = _start(self, problem)
+            progress.keep(state)
+            _tell(callback, state)
+        else:
+            _LOG.info("going on after %d evaluations", state.evaluations)
         reason: Reason | None = None
         while reason is None:
-            if callback is not None:
-                callback(state.history[-1], state.centre.x.copy())
             try:
                 state, reason = _iterated(self, problem, state)
             except SubproblemError as error:
                 _LOG.warning("%s", error)
                 reason = Reason.STEP_FAILED
+            if reason is None:
+                progress.keep(state)
+                _tell(callback, state)
+        progress.keep(state, last=True)
         return _finish(self, state, reason)
 
 
-@dataclass(frozen=True)
-class _State:
-    """Where the method stands between two evaluations."""
-
-    centre: Evaluation
-    bundle: Bundle
-    trust: Trust
-    first_t: float
-    history: tuple[Record, ...]
-
-    @property
-    def iterations(self) -> int:
-        return self.history[-1].iteration
-
-    @property
-    def evaluations(self) -> int:
-        return self.history[-1].evaluations
+def _tell(callback: Callback | None, state: MethodState) -> None:
+    if callback is not None:
+        callback(state.history[-1], state.centre.x.copy())
 
 
-def _start(method: BundleTrust, problem: Problem) -> _State:
+def _start(method: BundleTrust, problem: Problem) -> MethodState:
     try:
         centre = evaluate(problem.fun, problem.start, 1)
     except InvalidDesignError as error:
@@ -156,17 +159,17 @@ def _start(method: BundleTrust, problem: Problem) -> _State:
     radius = _RADIUS * problem.length
     trust = Trust(t, radius, _T_LEAST * t, _T_MOST * t, _RADIUS_LEAST * problem.length)
     record = Record(0, Kind.START, centre.value, centre.value, 0.0, t, 0.0, norm, 0.0, 1, 1)
-    return _State(centre, bundle, trust, t, (record,))
+    return MethodState(centre, bundle, trust, t, (record,))
 
 
-def _iterated(method: BundleTrust, problem: Problem, state: _State) -> tuple[_State, Reason | None]:
+def _iterated(method: BundleTrust, problem: Problem, state: MethodState) -> tuple[MethodState, Reason | None]:
     step, trust = _guarded_step(problem, state)
     state = replace(state, trust=trust)
     reason = _reason_to_stop(method, problem, state, step)
     return (_advanced(method, problem, state, step), None) if reason is None else (state, reason)
 
 
-def _guarded_step(problem: Problem, state: _State) -> tuple[Step, Trust]:
+def _guarded_step(problem: Problem, state: MethodState) -> tuple[Step, Trust]:
     """Solve the step's programme, with t small enough to stay in the trust region."""
     near = problem.allowed.around(state.centre.x, problem.scale)
     trust = state.trust
@@ -179,7 +182,7 @@ def _guarded_step(problem: Problem, state: _State) -> tuple[Step, Trust]:
     return step, trust
 
 
-def _reason_to_stop(method: BundleTrust, problem: Problem, state: _State, step: Step) -> Reason | None:
+def _reason_to_stop(method: BundleTrust, problem: Problem, state: MethodState, step: Step) -> Reason | None:
     """Return why the method must stop before trying the step, or None."""
     test = stopping_test(
         state.centre.value,
@@ -201,7 +204,7 @@ def _reason_to_stop(method: BundleTrust, problem: Problem, state: _State, step: 
     return Reason.EVALUATION_LIMIT if state.evaluations >= method.max_evaluations else None
 
 
-def _advanced(method: BundleTrust, problem: Problem, state: _State, step: Step) -> _State:
+def _advanced(method: BundleTrust, problem: Problem, state: MethodState, step: Step) -> MethodState:
     """Try the step and return the state after its null, serious or rejected trial."""
     x = problem.allowed.project(state.centre.x + problem.scale * step.move)
     step = replace(step, move=(x - state.centre.x) / problem.scale)
@@ -229,7 +232,7 @@ def _advanced(method: BundleTrust, problem: Problem, state: _State, step: Step) 
     )
 
 
-def _recorded(state: _State, step: Step, kind: Kind, value: float) -> tuple[Record, ...]:
+def _recorded(state: MethodState, step: Step, kind: Kind, value: float) -> tuple[Record, ...]:
     serious = kind is Kind.SERIOUS
     record = Record(
         iteration=state.iterations + serious,
@@ -248,7 +251,7 @@ def _recorded(state: _State, step: Step, kind: Kind, value: float) -> tuple[Reco
     return (*state.history, record)
 
 
-def _finish(method: BundleTrust, state: _State, reason: Reason) -> Result:
+def _finish(method: BundleTrust, state: MethodState, reason: Reason) -> Result:
     centre = state.centre
     result = Result(
         x=centre.x,
