@@ -211,4 +211,6 @@ assert record["volume_final"] > volume * (1 - 1e-4)
 #
 # - `Coulomb(0.1)`: most of the contact slips.
 # - Another objective, for example the largest contact force: see `fenics_contact.shape.ContactForces`.
+# - `checkpoint=Checkpoint(output / "run.npz")` in `minimize` (from `fenics_contact.optimize`): a run that is
+#   interrupted goes on from there when it is started again.
 # - A finer net, or `LinkShape(cell="tetrahedron")`.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import zipfile
@@ -41,7 +42,8 @@ def write_archive(path: Path, kind: str, fingerprint: Mapping[str, str], arrays:
         "_kind": kind,
         "_fingerprint": json.dumps(dict(fingerprint)),
     }
-    np.savez(buffer, **{name: np.asarray(value) for name, value in {**head, **arrays}.items()})
+    members = {name: np.asarray(value) for name, value in {**head, **arrays}.items()}
+    np.savez(buffer, **members, _digest=np.array(_digest(members)))
     write_whole(path, buffer.getvalue())
 
 
@@ -77,6 +79,15 @@ def read_archive(path: Path, kind: str, fingerprint: Mapping[str, str]) -> Array
     return arrays
 
 
+def _digest(members: Arrays) -> str:
+    """Return a hash of names and contents: the checksums of the format leave out the names."""
+    digest = hashlib.sha256()
+    for name in sorted(members):
+        digest.update(f"{name} {members[name].dtype.str} {members[name].shape} ".encode())
+        digest.update(np.ascontiguousarray(members[name]).tobytes())
+    return digest.hexdigest()
+
+
 def _loaded(path: Path) -> Arrays:
     try:
         content = path.read_bytes()
@@ -90,8 +101,11 @@ def _loaded(path: Path) -> Arrays:
             spoilt = archive.testzip()  # before anybody believes a length that stands in it
         if spoilt is None:
             with np.load(io.BytesIO(content), allow_pickle=False) as members:
-                return {name: members[name] for name in members.files}
-        reason = f"its part {spoilt!r} does not agree with its checksum"
+                found = {name: members[name] for name in members.files}
+            digest = str(found.pop("_digest", ""))
+            if "_format" not in found or digest == _digest(found):
+                return found
+        reason = "its checksums do not agree"
     except Exception as error:  # bytes of any other origin can make the libraries say anything
         reason = str(error) or type(error).__name__
     raise InvalidInputError(

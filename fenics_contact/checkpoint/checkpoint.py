@@ -14,7 +14,6 @@ if TYPE_CHECKING:  # the optimiser does without mpi4py
     from mpi4py import MPI
 
 
-
 @dataclass(frozen=True)
 class Checkpoint:
     """A file from which an interrupted run goes on.

@@ -6,7 +6,9 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from enum import Enum
+from functools import partial
 from pathlib import PurePath
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -19,7 +21,8 @@ def described(value: Any, name: str) -> dict[str, str]:
     """Describe a value by its parts: one entry for each number, text or array.
 
     Arrays are described by shape, type and a hash of their bits, dataclasses, mappings and sequences by what
-    they hold, functions and classes by their names; of any other object only the class is told.
+    they hold, functions by their names and the values that they carry along, classes by their names; of any
+    other object only the class is told.
 
     Args:
         value: What is to be recognised.
@@ -29,26 +32,9 @@ def described(value: Any, name: str) -> dict[str, str]:
         >>> described({"length": 2.0}, "beam")
         {"beam['length']": '2.0'}
     """
-    if isinstance(value, np.ndarray):
-        digest = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()[:16]
-        return {name: f"{value.dtype} array of shape {value.shape}, sha256 {digest}"}
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, Enum):
-        return {name: f"{type(value).__name__}.{value.name}"}
-    if value is None or isinstance(value, str | bytes | bool | int | float | complex | PurePath):
-        return {name: repr(value)}
-    if is_dataclass(value) and not isinstance(value, type):
-        parts = [(f"{name}.{field.name}", getattr(value, field.name)) for field in fields(value)]
-        return _joined({name: _class(value)}, parts)
-    if isinstance(value, Mapping):
-        return _joined({}, [(f"{name}[{key!r}]", part) for key, part in value.items()])
-    if isinstance(value, Sequence):
-        parts = [(f"{name}[{index}]", part) for index, part in enumerate(value)]
-        return _joined({f"len({name})": str(len(value))}, parts)
-    if hasattr(value, "__qualname__"):
-        return {name: f"{value.__module__}.{value.__qualname__}"}
-    return {name: _class(value)}
+    found: dict[str, str] = {}
+    _describe(value, name, found, ())
+    return found
 
 
 def differences(there: Mapping[str, str], here: Mapping[str, str]) -> list[str]:
@@ -66,11 +52,58 @@ def differences(there: Mapping[str, str], here: Mapping[str, str]) -> list[str]:
     return [*named, f"{more} more"] if more > 0 else named
 
 
-def _joined(first: dict[str, str], parts: list[tuple[str, Any]]) -> dict[str, str]:
-    found = dict(first)
-    for name, part in parts:
-        found.update(described(part, name))
-    return found
+def _describe(value: Any, name: str, found: dict[str, str], around: tuple[int, ...]) -> None:
+    """Add the parts of a value, which lies inside the objects of these identities."""
+    known = _leaf(value)
+    if known is not None:
+        found[name] = known
+        return
+    found[name], parts = _branches(value, name)
+    if id(value) not in around:
+        for part, inner in parts:
+            _describe(inner, part, found, (*around, id(value)))
+
+
+def _leaf(value: Any) -> str | None:
+    if isinstance(value, np.ndarray):
+        digest = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()[:16]
+        return f"{value.dtype} array of shape {value.shape}, sha256 {digest}"
+    if isinstance(value, Enum):
+        return f"{type(value).__name__}.{value.name}"
+    if isinstance(value, np.generic):
+        return repr(value.item())
+    if value is None or isinstance(value, str | bytes | bool | int | float | complex | PurePath):
+        return repr(value)
+    return None
+
+
+def _branches(value: Any, name: str) -> tuple[str, list[tuple[str, Any]]]:
+    """Return what an object is and its parts by name."""
+    if isinstance(value, Mapping):
+        return f"{len(value)} entries", [(f"{name}[{key!r}]", part) for key, part in value.items()]
+    if isinstance(value, Sequence):
+        return f"{len(value)} entries", [(f"{name}[{index}]", part) for index, part in enumerate(value)]
+    if is_dataclass(value) and not isinstance(value, type):
+        return _class(value), [(f"{name}.{part.name}", getattr(value, part.name)) for part in fields(value)]
+    if isinstance(value, partial):
+        return "partial", [(f"{name}.{part}", getattr(value, part)) for part in ("func", "args", "keywords")]
+    if isinstance(value, FunctionType):
+        cells = zip(value.__code__.co_freevars, value.__closure__ or (), strict=True)
+        carried = [(f"{name}.{variable}", cell.cell_contents) for variable, cell in cells if _filled(cell)]
+        given = [] if value.__defaults__ is None else [(f"{name}.defaults", value.__defaults__)]
+        return f"{value.__module__}.{value.__qualname__}", [*carried, *given]
+    if hasattr(value, "__qualname__"):
+        return f"{value.__module__}.{value.__qualname__}", []
+    return _class(value), []
+
+
+def _filled(cell: Any) -> bool:
+    """Tell whether a variable of an enclosing function has a value yet."""
+    try:
+        cell.cell_contents
+    except ValueError:
+        return False
+    return True
 
 
 def _class(value: Any) -> str:

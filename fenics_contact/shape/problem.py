@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
+from fenics_contact.checkpoint import described
 from fenics_contact.contact import State, find_state
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
 from fenics_contact.feti import decompose
@@ -18,7 +19,8 @@ from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
 from fenics_contact.shape.contact_derivative import bound_sensitivity, contact_by_shape
 from fenics_contact.shape.design import SurfaceDesign
 from fenics_contact.shape.forms import ShapeForms, work_by_shape
-from fenics_contact.shape.linearised_face import WeakChoice, WeakPoints, linearise_face
+from fenics_contact.shape.linearised_face import WeakChoice, linearise_face
+from fenics_contact.shape.memory import DesignMemory, DesignPoint
 from fenics_contact.shape.motion import HarmonicExtension
 from fenics_contact.shape.objective import Objective
 from fenics_contact.shape.pairs import check_pairs
@@ -31,27 +33,6 @@ ADJOINT_SHARE, ADJOINT_FLOOR = 1e-1, 1e-11
 logger = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, eq=False)
-class DesignPoint:
-    """A design that was evaluated.
-
-    Attributes:
-        alpha: Design variables, shape (size,).
-        value: Objective.
-        gradient: Clarke subgradient, shape (size,); the gradient where no point is weakly active.
-        state: Equilibrium.
-        weak: Weakly active points and the branch they were given.
-        adjoint_iterations: F-products of the adjoint.
-    """
-
-    alpha: np.ndarray
-    value: float
-    gradient: np.ndarray
-    state: State
-    weak: WeakPoints
-    adjoint_iterations: int
-
-
 class ShapeProblem:
     """J(α) with a Clarke subgradient, for one or more moving surfaces of a scene.
 
@@ -60,8 +41,9 @@ class ShapeProblem:
 
     Attributes:
         designs: The moving surfaces; α is their variables one after the other.
-        first: The design evaluated first.
-        best: The design with the smallest objective so far.
+        first: The design evaluated first; after a run was resumed, built again when it is first asked for, by
+            all ranks together.
+        best: The design with the smallest objective so far, likewise.
         last: The design evaluated last.
         seconds: Wall time of this rank by phase, over all evaluations.
         products: F-products of states and adjoints so far.
@@ -97,10 +79,8 @@ class ShapeProblem:
         self._adjoint_tolerance = max(ADJOINT_SHARE * self.solver.tolerance, ADJOINT_FLOOR)
         self._timer = PhaseTimer()
         self.evaluations, self.products = 0, 0
-        self.first: DesignPoint | None = None
-        self.best: DesignPoint | None = None
-        self.last: DesignPoint | None = None
-        self._previous: State | None = None
+        self._partitions = partitions
+        self._memory = DesignMemory(self)
         self._forms: ShapeForms | None = None
         if scene.dim != 3:
             raise InvalidInputError(
@@ -117,6 +97,49 @@ class ShapeProblem:
     def size(self) -> int:
         """Number of design variables."""
         return sum(design.size for design in self.designs)
+
+    @property
+    def comm(self) -> MPI.Comm:
+        """Communicator over which the subdomains are spread."""
+        return self.decomposition.comm
+
+    @property
+    def first(self) -> DesignPoint | None:
+        """The design evaluated first. Collective after a run was resumed."""
+        return self._memory.point("first")
+
+    @property
+    def best(self) -> DesignPoint | None:
+        """The design with the smallest objective so far. Collective after a run was resumed."""
+        return self._memory.point("best")
+
+    @property
+    def last(self) -> DesignPoint | None:
+        """The design evaluated last. Collective after a run was resumed."""
+        return self._memory.point("last")
+
+    def fingerprint(self) -> dict[str, str]:
+        """Say which problem it is, for a checkpoint."""
+        parts: dict[str, Any] = {
+            "scene": self.scene,
+            "partitions": self._partitions,
+            "designs": self.designs,
+            "objective": self.objective,
+            "solver": self.solver,
+            "choice": self.choice,
+        }
+        return {key: text for name, part in parts.items() for key, text in described(part, name).items()}
+
+    def memory(self) -> dict[str, np.ndarray]:
+        """Return what the next state depends on, and the designs that are kept. Collective."""
+        counts = np.array([self.evaluations, self.products])
+        return {"counts": counts, **self._memory.stored()}
+
+    def recall(self, memory: Mapping[str, np.ndarray]) -> None:
+        """Go on from what `memory` returned, also on another number of ranks. Collective."""
+        stored = dict(memory)
+        self.evaluations, self.products = (int(count) for count in stored.pop("counts"))
+        self._memory.recall(stored)
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -164,11 +187,12 @@ class ShapeProblem:
         """Return the equilibrium of a design, started from the one before. Collective."""
         with self._timer.phase("mesh motion"):
             scene = self.scene_of(alpha)
+        previous = self._memory.state
         state = find_state(
-            scene, self.decomposition, solver=self.solver, previous=self._previous,
-            start_geometry=self._previous is None, sensitivity=True, timer=self._timer,
+            scene, self.decomposition, solver=self.solver, previous=previous,
+            start_geometry=previous is None, sensitivity=True, timer=self._timer,
         )  # fmt: skip
-        self._previous = state
+        self._memory.passed(alpha, state)
         return state
 
     def value_of(self, alpha: np.ndarray) -> float:
@@ -204,9 +228,7 @@ class ShapeProblem:
             state.dual.products - before,
         )
         logger.info("design %d: J = %.9g, %d products", self.evaluations, value, state.dual.products)
-        self.last = point
-        self.first = self.first or point
-        self.best = point if self.best is None or value < self.best.value else self.best
+        self._memory.judged(point)
         return point
 
     def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
