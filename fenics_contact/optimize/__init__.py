@@ -7,6 +7,7 @@ from fenics_contact.errors import InvalidDesignError
 from fenics_contact.optimize.bundle_trust import BundleTrust
 from fenics_contact.optimize.constraints import Bounds, LinearConstraints, nearest_feasible
 from fenics_contact.optimize.minimization import minimize
+from fenics_contact.optimize.objective import Inexact
 from fenics_contact.optimize.problem import Problem, pose
 from fenics_contact.optimize.progress import Resumable
 from fenics_contact.optimize.quadratic_program import SubproblemError
@@ -17,6 +18,7 @@ __all__ = [
     "BundleTrust",
     "Checkpoint",
     "CheckpointError",
+    "Inexact",
     "InvalidDesignError",
     "Kind",
     "LinearConstraints",

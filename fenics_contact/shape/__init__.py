@@ -7,8 +7,10 @@ from fenics_contact.shape.memory import DesignPoint
 from fenics_contact.shape.motion import HarmonicExtension
 from fenics_contact.shape.objective import ContactForces, Objective, Partials, TotalPotential, VolumeIntegral
 from fenics_contact.shape.problem import ShapeProblem
+from fenics_contact.shape.tolerance import AdaptiveTolerance
 
 __all__ = [
+    "AdaptiveTolerance",
     "Adjoint",
     "ContactForces",
     "DesignPoint",

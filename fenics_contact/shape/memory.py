@@ -32,6 +32,11 @@ class DesignPoint:
         state: Equilibrium.
         weak: Weakly active points and the branch they were given.
         adjoint_iterations: F-products of the adjoint.
+        tolerance: Relative residual that the state was solved to.
+        error: Estimated error of the value, units of the objective: what the residuals of the state change in
+            it, to first order. With an adaptive tolerance the value is corrected by that and the error is a
+            safe estimate of what is left.
+        adjoint_multiplier: ζ of the adjoint, owned.
     """
 
     alpha: np.ndarray
@@ -40,6 +45,9 @@ class DesignPoint:
     state: State
     weak: WeakPoints
     adjoint_iterations: int
+    tolerance: float
+    error: float
+    adjoint_multiplier: np.ndarray
 
 
 class DesignMemory:
@@ -47,6 +55,7 @@ class DesignMemory:
 
     Attributes:
         state: State from which the next one starts, None before the first.
+        error_by_tolerance: Error of the last value divided by the tolerance of its state, 0 before the first.
     """
 
     def __init__(self, problem: ShapeProblem) -> None:
@@ -55,6 +64,7 @@ class DesignMemory:
         self._points: dict[str, DesignPoint | Stored] = {}
         self._alpha = np.zeros(0)
         self.state: State | None = None
+        self.error_by_tolerance = 0.0
 
     def passed(self, alpha: np.ndarray, state: State) -> None:
         """Remember the state found last."""
@@ -62,11 +72,20 @@ class DesignMemory:
 
     def judged(self, point: DesignPoint) -> None:
         """Remember a design that was evaluated."""
-        self._points.setdefault("first", point)
-        best = self._points.get("best")
-        if best is None or point.value < _value(best):
+        first, best = self._points.get("first"), self._points.get("best")
+        if first is None or np.array_equal(point.alpha, _alpha(first)):
+            self._points["first"] = point
+        if best is None or point.value < _value(best) or np.array_equal(point.alpha, _alpha(best)):
             self._points["best"] = point
         self._points["last"] = point
+        self.error_by_tolerance = point.error / point.tolerance
+
+    def of_design(self, alpha: np.ndarray) -> DesignPoint | None:
+        """Return what is known of this very design. Collective after a run was resumed."""
+        for name in ("last", "best", "first"):
+            if name in self._points and np.array_equal(_alpha(self._points[name]), alpha):
+                return self.point(name)
+        return None
 
     def point(self, name: str) -> DesignPoint | None:
         """Return a design by its name; one of an earlier run is built again first. Collective then."""
@@ -90,6 +109,7 @@ class DesignMemory:
             arrays.update({f"{name}.{part}": values for part, values in parts.items()})
         if self.state is not None:
             arrays[f"{_START}.alpha"] = self._alpha
+            arrays[f"{_START}.error"] = np.array(self.error_by_tolerance)
             arrays.update({f"{_START}.{part}": values for part, values in stored_state(self.state).items()})
         return arrays
 
@@ -104,21 +124,24 @@ class DesignMemory:
         points |= {name: points[str(stored[_SAME])] for name, stored in parts.items() if _SAME in stored}
         self._points = dict(points)
         if start is not None:
-            alpha = start.pop("alpha")
+            alpha, self.error_by_tolerance = start.pop("alpha"), float(start.pop("error"))
             self.passed(alpha, self._state(alpha, start))
 
     def _built(self, stored: Stored) -> DesignPoint:
         parts = {part.removeprefix(_STATE): stored[part] for part in stored if part.startswith(_STATE)}
         contacts, discs, edges = (int(count) for count in stored["weak"])
         weak = WeakPoints(contacts, discs, edges, WeakChoice[str(stored["choice"])])
-        alpha = stored["alpha"]
+        state = self._state(stored["alpha"], parts)
         return DesignPoint(
-            alpha=alpha,
+            alpha=stored["alpha"],
             value=_value(stored),
             gradient=stored["gradient"],
-            state=self._state(alpha, parts),
+            state=state,
             weak=weak,
             adjoint_iterations=int(stored["adjoint_iterations"]),
+            tolerance=float(stored["tolerance"]),
+            error=float(stored["error"]),
+            adjoint_multiplier=stored["adjoint"][state.torn.numbering.owned],
         )
 
     def _state(self, alpha: np.ndarray, parts: Stored) -> State:
@@ -131,7 +154,7 @@ class DesignMemory:
 
 
 def _stored_point(point: DesignPoint) -> Stored:
-    weak = point.weak
+    weak, numbering = point.weak, point.state.torn.numbering
     return {
         "alpha": point.alpha,
         "value": np.array(point.value),
@@ -139,9 +162,16 @@ def _stored_point(point: DesignPoint) -> Stored:
         "weak": np.array([weak.contacts, weak.discs, weak.edges]),
         "choice": np.array(weak.choice.name),
         "adjoint_iterations": np.array(point.adjoint_iterations),
+        "tolerance": np.array(point.tolerance),
+        "error": np.array(point.error),
+        "adjoint": numbering.gather(point.adjoint_multiplier, np.arange(numbering.total)),
         **{f"{_STATE}{part}": values for part, values in stored_state(point.state).items()},
     }
 
 
 def _value(point: DesignPoint | Stored) -> float:
     return point.value if isinstance(point, DesignPoint) else float(point["value"])
+
+
+def _alpha(point: DesignPoint | Stored) -> np.ndarray:
+    return point.alpha if isinstance(point, DesignPoint) else point["alpha"]
