@@ -18,7 +18,7 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demos test test-slow benchmark lint setup
+.PHONY: help demo demos test test-slow test-hard benchmark lint setup
 
 help: ## Show this list
 	@echo "Targets:"
@@ -37,10 +37,13 @@ demos: $(prepare) ## Run every demo
 	for demo in demos/demo_*.py; do $(launch) $(NP) $(python) $$demo || exit 1; done
 
 test: lint ## Check style and types, run the quick tests
-	$(launch) 1 $(python) -m pytest -m "not slow"
+	$(launch) 1 $(python) -m pytest -m "not slow and not hard"
 
 test-slow: $(prepare) ## Run the tests that take long
 	$(launch) 1 $(python) -m pytest -m slow
+
+test-hard: $(prepare) ## Run the hard cases; writes docs/hard_cases.md
+	$(launch) 1 $(python) -m pytest tests/hard -m hard --hard-table docs/hard_cases.md
 
 benchmark: $(prepare) ## Measure time, memory and products; results in benchmarks/
 	$(python) -m benchmarks $(if $(filter quick,$(BENCH)),--quick)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -11,22 +14,35 @@ from fenics_contact.feti.dual import BALANCED
 from fenics_contact.scene import rigid_body_modes
 from fenics_contact.scene.held import resisted_motions
 
+#: A load that needs more of the friction than all but this part is at its limit: how far the body slides is
+#: left to rounding.
+MARGIN = 1e-6
+#: Loads count as balanced when less than this part of them is left; the conic solver is asked for a tenth.
+LEFT = 1e-8
+#: Weight of the normal forces beside what is left of the loads: it keeps the forces of bodies that grip each
+#: other finite, and leaves nothing unbalanced where less than its inverse times the load is needed.
+SMALL = 1e-9
+
 
 def check_held(torn: TornSystem) -> None:
     """Refuse a scene in which some body can move away under the load. Collective.
 
     Asks whether support reactions and admissible contact forces (pressing, inside the friction cone or
     disc) exist that balance the load on every body. If not, the dual problem is infeasible: there is a
-    rigid motion that nothing resists and along which the load does work.
+    rigid motion that nothing resists and along which the load does work. If friction must be used up for it
+    to the last part of `MARGIN`, forces exist, but any slide along that motion is an answer.
 
     Args:
         torn: Gives scene, contact points and loads; its matrices are not used.
 
     Raises:
-        InfeasibleError: Names the body and the motion.
+        InfeasibleError: Names the body and the motion, and says so if it is held only just.
     """
     comm = torn.numbering.comm
-    bodies = [_RigidBody(torn, index) for index in range(len(torn.scene.bodies))]
+    meshes = [body.mesh.points for body in torn.scene.bodies.values()]
+    low, high = (getattr(np.concatenate(meshes), side)(axis=0) for side in ("min", "max"))
+    frame = _Frame(0.5 * (low + high), float(np.max(high - low)))
+    bodies = [_RigidBody(torn, index, frame) for index in range(len(meshes))]
     loads = comm.allreduce(np.array([body.load_wrench(torn) for body in bodies]))
     loads[np.abs(loads) <= BALANCED * comm.allreduce(np.abs(torn.load).sum())] = 0.0
     with together(comm):
@@ -41,20 +57,44 @@ def _check_balance(torn: TornSystem, bodies: list[_RigidBody], loads: np.ndarray
         return
     support = sp.block_diag([body.support for body in bodies])
     tied = sp.vstack([body.tie_wrenches(torn) for body in bodies])
+    reactions, right = sp.hstack([support, tied]), -loads.ravel() / scale
     contact = sp.vstack([body.contact_wrenches(torn) for body in bodies])
-    ray = _infeasibility_ray(sp.hstack([support, tied]), contact, -loads.ravel() / scale, torn)
-    if ray is not None:
-        raise InfeasibleError(_describe(ray.reshape(len(bodies), -1), bodies, torn.dim))
+    ray = _unresisted_motion(reactions, contact, right, torn, 1.0 - MARGIN)
+    if ray is None:
+        return
+    without_margin = _unresisted_motion(reactions, contact, right, torn, 1.0)
+    motion = (ray if without_margin is None else without_margin).reshape(len(bodies), -1)
+    raise InfeasibleError(_describe(motion, bodies, loads, torn.dim, only_just=without_margin is None))
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Where moments are taken about, and the arm that makes them comparable with forces.
+
+    Attributes:
+        centre: Of all bodies, shape (dim,), [length].
+        size: Of all bodies, [length].
+    """
+
+    centre: np.ndarray
+    size: float
+
+    def modes(self, points: np.ndarray) -> np.ndarray:
+        """Return rigid motions, rotations over the size, shape (n_nodes, dim, n_modes)."""
+        modes = rigid_body_modes(points - self.centre)
+        modes[..., points.shape[1] :] /= self.size
+        return modes
 
 
 class _RigidBody:
     """A body seen as rigid: its modes, and the wrenches of supports, ties, contacts and loads on it."""
 
-    def __init__(self, torn: TornSystem, index: int) -> None:
+    def __init__(self, torn: TornSystem, index: int, frame: _Frame) -> None:
         tearing = torn.decomposition.tearing
         self.name = tearing.body_names[index]
         self._nodes = slice(int(tearing.node_offset[index]), int(tearing.node_offset[index + 1]))
-        self._modes = rigid_body_modes(torn.scene.bodies[self.name].mesh.points)
+        self._modes = frame.modes(torn.scene.bodies[self.name].mesh.points)
+        self.size = frame.size
         #: Wrenches that supports can exert in both directions, shape (n_modes, n), orthonormal columns.
         self.support = resisted_motions(self._modes, torn.decomposition.fixed[self._nodes])
 
@@ -95,66 +135,99 @@ class _RigidBody:
         return np.asarray(moved).reshape(points.count, *self._modes.shape[1:])
 
 
-def _infeasibility_ray(
-    support: sp.spmatrix, contact: sp.spmatrix, right: np.ndarray, torn: TornSystem
+def _unresisted_motion(
+    support: sp.spmatrix, contact: sp.spmatrix, right: np.ndarray, torn: TornSystem, friction: float
 ) -> np.ndarray | None:
-    """Find the shortest x = (reactions, λ_N, τ) in its cones with [support contact] x = right.
+    """Find x = (reactions, λ_N, τ) in its cones with the smallest ‖[support contact] x − right‖.
+
+    The smallest distance, unlike feasibility, is found just as well where forces only just suffice.
+
+    Args:
+        support: Wrenches that act in both directions, shape (n_wrenches, n).
+        contact: Wrenches of unit contact forces, shape (n_wrenches, n_contact + (dim - 1) n_friction).
+        right: The wrench to balance, shape (n_wrenches,).
+        torn: Gives friction coefficients and bounds.
+        friction: The part of the friction that may be used.
 
     Returns:
-        None if there is one, else the rigid motion that certifies that there is none.
+        None if nothing is left, else the rigid motion that nothing resists, shape (n_wrenches,).
     """
     import clarabel  # not before some loaded body floats
 
-    balance = sp.hstack([support, contact])
-    n_normal, discs = torn.points.count, len(torn.frictional)
-    first = support.shape[1]
-    coulomb = torn.tresca_bound == 0.0
-    # Rows −(Ψ, τ) of each disc, with Ψ = μ λ_N or a given bound; b − A x must lie in the cone.
-    width = torn.dim
-    disc = width * np.arange(discs)
-    tau = first + n_normal + np.arange((width - 1) * discs).reshape(-1, width - 1)
-    rows = np.concatenate([disc[coulomb], (disc[:, None] + 1 + np.arange(width - 1)).ravel()])
-    columns = np.concatenate([first + torn.frictional[coulomb], tau.ravel()])
-    values = np.concatenate([-torn.friction_coefficient[coulomb], -np.ones(tau.size)])
-    cone = sp.csr_matrix((values, (rows, columns)), shape=(width * discs, balance.shape[1]))
-    bound = np.zeros((discs, width))
-    bound[:, 0] = torn.tresca_bound
-    press = -sp.identity(balance.shape[1], format="csr")[first : first + n_normal]
-    cones = [clarabel.ZeroConeT(len(right)), clarabel.NonnegativeConeT(n_normal)]
-    cones += [clarabel.SecondOrderConeT(width)] * discs
+    forces, admissible, limit, cones = _admissible(support.shape[1], torn, friction)
+    # Unknowns x, the distance t and what is left y; ‖y‖ ≤ t.
+    size, left = forces.size, np.arange(len(right))
+    balance = sp.hstack([support, contact, sp.csr_matrix((len(left), 1)), sp.identity(len(left))])
+    distance = sp.hstack([sp.csr_matrix((1 + len(left), size)), -sp.identity(1 + len(left))])
+    admissible = sp.hstack([admissible, sp.csr_matrix((admissible.shape[0], 1 + len(left)))])
     settings = clarabel.DefaultSettings()
     settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 0.1 * LEFT
     solution = clarabel.DefaultSolver(
-        sp.identity(balance.shape[1], format="csc"),
-        np.zeros(balance.shape[1]),
-        sp.vstack([balance, press, cone], format="csc"),
-        np.concatenate([right, np.zeros(n_normal), bound.ravel()]),
-        cones,
+        sp.csc_matrix((balance.shape[1],) * 2),
+        np.concatenate([SMALL * forces, [1.0], np.zeros(len(left))]),
+        sp.vstack([balance, admissible, distance], format="csc"),
+        np.concatenate([right, limit, np.zeros(1 + len(left))]),
+        [clarabel.ZeroConeT(len(left)), *cones, clarabel.SecondOrderConeT(1 + len(left))],
         settings,
     ).solve()
-    status = clarabel.SolverStatus
-    if solution.status in (status.PrimalInfeasible, status.AlmostPrimalInfeasible):
-        return np.array(solution.z[: len(right)])
-    if solution.status not in (status.Solved, status.AlmostSolved):
+    if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
         raise ConvergenceError(
             "the check whether every body is held needs an answer, the conic solver ended with "
             f"{solution.status}: look at the scale of loads and lengths"
         )
-    return None
+    return None if solution.x[size] <= LEFT else np.array(solution.z[: len(left)])
 
 
-def _describe(motion: np.ndarray, bodies: list[_RigidBody], dim: int) -> str:
-    worst = int(np.argmax(np.linalg.norm(motion, axis=1)))
-    # The certificate points against the right side, which is minus the load.
-    free = np.round(motion[worst] / np.abs(motion[worst]).max(), 3) + 0.0  # no -0
+def _admissible(
+    reactions: int, torn: TornSystem, friction: float
+) -> tuple[np.ndarray, sp.csr_matrix, np.ndarray, list[Any]]:
+    """Return which unknowns are normal forces, and A, b and cones with b − A x in the cones."""
+    import clarabel
+
+    n_normal, discs, width = torn.points.count, len(torn.frictional), torn.dim
+    size = reactions + n_normal + (width - 1) * discs
+    coulomb = torn.tresca_bound == 0.0
+    # Rows −(Ψ, τ) of each disc, with Ψ = μ λ_N or a given bound.
+    disc = width * np.arange(discs)
+    tau = reactions + n_normal + np.arange((width - 1) * discs).reshape(-1, width - 1)
+    rows = np.concatenate([disc[coulomb], (disc[:, None] + 1 + np.arange(width - 1)).ravel()])
+    columns = np.concatenate([reactions + torn.frictional[coulomb], tau.ravel()])
+    values = np.concatenate([-friction * torn.friction_coefficient[coulomb], -np.ones(tau.size)])
+    cone = sp.csr_matrix((values, (rows, columns)), shape=(width * discs, size))
+    bound = np.zeros((discs, width))
+    bound[:, 0] = friction * torn.tresca_bound
+    normal = np.zeros(size)
+    normal[reactions : reactions + n_normal] = 1.0
+    press = -sp.identity(size, format="csr")[normal > 0]
+    limit = np.concatenate([np.zeros(n_normal), bound.ravel()])
+    cones = [clarabel.NonnegativeConeT(n_normal), *[clarabel.SecondOrderConeT(width)] * discs]
+    return normal, sp.vstack([press, cone], format="csr"), limit, cones
+
+
+def _describe(
+    motion: np.ndarray, bodies: list[_RigidBody], loads: np.ndarray, dim: int, *, only_just: bool
+) -> str:
+    # The certificate points against the right side, which is minus the load. Bodies may be taken along by the
+    # one that is pushed: the load works most on that one.
+    pushed = int(np.argmax(np.einsum("bm,bm->b", motion, loads)))
+    free = motion[pushed] / np.where(np.arange(motion.shape[1]) < dim, 1.0, bodies[pushed].size)
+    free = np.round(free / np.abs(free).max(), 3) + 0.0  # no -0
     parts = [("translation", free[:dim]), ("rotation", free[dim:])]
     words = " with ".join(
         f"{kind} ({', '.join(f'{component:.2g}' for component in part)})"
         for kind, part in parts
         if np.any(part)
     )
+    name = repr(bodies[pushed].name)
+    if only_just:
+        return (
+            f"every body must be held by supports, contact or friction, but body {name} is held only just: "
+            f"the load uses up all friction against {words}, and how far it slides is not determined. "
+            "Support it, or raise the friction coefficient"
+        )
     return (
-        f"every body must be held by supports, contact or friction, but body {bodies[worst].name!r} can move "
+        f"every body must be held by supports, contact or friction, but body {name} can move "
         f"away under the load: {words} meets no resistance. Support it, let it touch something in the "
         "direction of the load, or raise the friction coefficient"
     )

@@ -38,11 +38,12 @@ def residuals(state: State) -> dict[str, float]:
     length = np.linalg.norm(mapped_tau, axis=1)
     mapped_tau[length > bound] *= (bound / np.where(length > 0, length, 1.0))[length > bound, None]
     excess = np.linalg.norm(tau, axis=1) - bound
+    way = np.abs(state.torn_displacement).max() or 1.0
     return {
-        "equilibrium": float(np.abs(G @ multiplier - problem.coarse.load).max() / forces.max()),
+        "equilibrium": float(np.abs(G @ multiplier - problem.coarse.load).max() / (forces.max() or 1.0)),
         "cone": max(float(-normal.min(initial=0.0)), float(excess.max(initial=0.0))) / size,
         "natural": float(np.hypot(_norm(normal - mapped_normal), _norm(tau - mapped_tau)) / size),
-        "gluing": float(np.abs(r[layout.equality]).max(initial=0.0) / np.abs(state.torn_displacement).max()),
+        "gluing": float(np.abs(r[layout.equality]).max(initial=0.0) / way),
     }
 
 

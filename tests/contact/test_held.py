@@ -12,6 +12,7 @@ from mpi4py import MPI
 from fenics_contact.contact import Status, check_held, solve_scene
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.feti import build_torn_system, decompose
+from fenics_contact.geometry import block
 from fenics_contact.scene import Coulomb, Scene, Support, TotalForce, Tresca
 from tests.contact.gallery import block_on_plane, guided, partitions, pressed_block, stack, two_blocks
 
@@ -63,6 +64,31 @@ def test_friction_holds_just_as_much_as_it_can(friction: Coulomb | Tresca) -> No
     scene = block_on_plane(friction)
     check(pulled(scene, "block", (0.998 * limit, 0.0, -1.0)))
     refused(pulled(scene, "block", (1.002 * limit, 0.0, -1.0)))
+
+
+@pytest.mark.parametrize("friction", [Coulomb(0.3), Tresca(0.15)])
+@pytest.mark.parametrize("part", [0.9999, 0.99999, 1.00001, 1.0001])
+def test_the_limit_of_friction_is_sharp(friction: Coulomb | Tresca, part: float) -> None:
+    flat = block_on_plane(friction)
+    mesh = block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (6, 3, 3))
+    flat = replace(flat, bodies={"block": replace(flat.bodies["block"], mesh=mesh)})
+    scene = pulled(flat, "block", (0.3 * part, 0.0, -1.0))
+    if part < 1:
+        check(scene)
+    else:
+        assert refused(scene)[0] == "block"
+
+
+def test_a_body_at_the_very_limit_of_friction_is_refused_as_any_slide_is_an_answer() -> None:
+    scene = pulled(block_on_plane(Coulomb(0.3)), "block", (0.3, 0.0, -1.0))
+    with pytest.raises(InfeasibleError, match="'block' is held only just: the load uses up all friction"):
+        check(scene)
+
+
+def test_the_body_that_is_pushed_is_named_and_not_those_it_takes_along() -> None:
+    scene = stack(Coulomb(0.5), Coulomb(0.3))
+    loads = [TotalForce("upper", "z1", (0.0, 0.0, -1.0)), TotalForce("lower", "x0", (0.4, 0.0, 0.0))]
+    assert refused(replace(scene, loads=loads))[0] == "lower"
 
 
 def test_a_body_without_friction_slides_at_the_slightest_push() -> None:

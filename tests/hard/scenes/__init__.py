@@ -1,0 +1,6 @@
+"""All scenes of the hard cases; importing this fills `TRIALS`."""
+
+from tests.hard.scenes import floating, friction, touching
+from tests.hard.trial import TRIALS
+
+__all__ = ["TRIALS", "floating", "friction", "touching"]

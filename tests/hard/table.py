@@ -1,0 +1,173 @@
+"""The table of hard cases: one row a case under the headings of groups, written as a page of Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fenics_contact.io.replacing import replacing
+
+INTRODUCTION = """\
+# Hard cases
+
+What makes contact problems fail, one case a row: what came out, how exact it is and what it cost. Every case is
+a test of `tests/hard/`; `make test-hard` runs them all and writes this page from their records, only if all of
+them ran and none failed. Where the outcome is a refusal or a failure, the test requires that very error: no case
+ends in a wrong answer.
+
+Of every solved case is checked, recomputed on the bodies in one piece from displacements and contact forces, with
+no figure of the solver's:
+
+- *natural*: ‖λ − P(λ − r/diag F)‖ relative to the normal forces, with a fresh product, at most the tolerance;
+- *balance*: resultant and moment of load and contact forces along every motion that no support of the body
+  resists, and the balance of every single node, relative to the forces that cancel there (the larger one);
+- *cone*: the largest tension or excess of friction over its bound, relative to the largest normal force;
+- *contact law*: the largest of penetration, normal force × gap, and what friction does not oppose of the slip,
+  bound × ‖slip‖ + friction · slip, relative to the largest force and displacement;
+- *same*: the largest relative difference of contact forces and displacements when the scene is given in other
+  units of length and force, when its bodies are cut otherwise, and when it is solved on two (some on four) ranks.
+
+"Unknowns" are torn displacements; products are those with the dual operator F. A *rescue* is a call of SMALSE
+where the active set cycled or the residual stood still; a *cut* is a Newton step that was shortened.
+"""
+
+#: Groups in the order of the page: key to heading and advice.
+GROUPS: dict[str, tuple[str, str]] = {
+    "floating": (
+        "Bodies that only contact and friction hold",
+        "A body that nothing holds is refused before anything is factored, and the message names body and motion: "
+        "support that motion, or give the pair friction. What rigid bodies could hold and elastic ones cannot, only "
+        "the solver finds out, and says that it did not converge.",
+    ),
+    "touching": (
+        "Contact that is nowhere, everywhere, or only just",
+        "Gaps of any size do no harm. A body that rolls by far more than it deforms is the hardest of these: give "
+        "it a support that keeps it from rolling, or shape and mesh that touch at more than one row of nodes.",
+    ),
+    "friction": (
+        "Friction from none to ten",
+        "Coefficients may be as large as one likes. A floating body exactly at the limit of its friction has no "
+        "unique slide and is refused; one that is dragged by a support has, and is solved.",
+    ),
+    "stiffness": (
+        "Stiff beside soft, thin, nearly incompressible",
+        "",
+    ),
+    "units": (
+        "Units",
+        "Any consistent units serve; every case above and below is solved in two.",
+    ),
+    "partition": (
+        "Partitions, supports and shared nodes",
+        "",
+    ),
+    "meshes": ("Meshes turned, mirrored, renumbered, distorted", ""),
+    "published": ("Published friction problems", ""),
+    "optimisation": ("Shape optimisation", ""),
+    "interrupted": ("Interrupted runs", ""),
+}
+
+COLUMNS = {
+    "case": "case",
+    "scene": "unknowns / subdomains / contacts",
+    "tolerance": "tolerance",
+    "work": "products (steps)",
+    "natural": "natural",
+    "balance": "balance",
+    "cone": "cone",
+    "law": "contact law",
+    "same": "same",
+    "status": "open / stick / slip",
+    "fallbacks": "fallbacks",
+    "outcome": "outcome",
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One case. Figures that a case does not have stay None or empty.
+
+    Attributes:
+        group: Key of `GROUPS`.
+        case: The case in words.
+        outcome: "solved", "refused: message" or "fails: cause".
+        scene: Its size.
+        tolerance: Relative residual asked for.
+        products: Products with F.
+        steps: Steps of the solver.
+        natural: Recomputed natural residual.
+        balance: Largest relative imbalance.
+        cone: Largest relative violation of a bound.
+        law: Largest relative violation of contact and friction law.
+        same: Largest relative difference between answers that should be one.
+        status: Counts of open, sticking and slipping points.
+        fallbacks: What had to help, in words; empty if nothing.
+    """
+
+    group: str
+    case: str
+    outcome: str = "solved"
+    scene: str = ""
+    tolerance: float | None = None
+    products: int | None = None
+    steps: int | None = None
+    natural: float | None = None
+    balance: float | None = None
+    cone: float | None = None
+    law: float | None = None
+    same: float | None = None
+    status: str = ""
+    fallbacks: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse a group that is not on the page."""
+        if self.group not in GROUPS:
+            raise ValueError(f"group must be one of {list(GROUPS)}, got {self.group!r}")
+
+    @property
+    def work(self) -> str:
+        """Products and steps."""
+        if self.products is None:
+            return ""
+        return f"{self.products}" if self.steps is None else f"{self.products} ({self.steps})"
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, float):
+        return "0" if value == 0.0 else f"{value:.0e}"
+    return str(value).replace("|", "\\|").replace("\n", " ")
+
+
+def page(rows: Sequence[Row]) -> str:
+    """Return the page of Markdown."""
+    parts = [INTRODUCTION]
+    refused = sum(row.outcome.startswith("refused") for row in rows)
+    failed = sum(row.outcome.startswith("fails") for row in rows)
+    parts.append(
+        f"{len(rows)} cases: {len(rows) - refused - failed} solved, {refused} refused with their reason, "
+        f"{failed} that fail.\n"
+    )
+    for key, (heading, advice) in GROUPS.items():
+        own = [row for row in rows if row.group == key]
+        if own:
+            parts.append(
+                "\n".join([f"## {heading}", "", *([advice, ""] if advice else []), *_table(own)]) + "\n"
+            )
+    return "\n".join(parts)
+
+
+def _table(rows: Sequence[Row]) -> list[str]:
+    """Return the lines of one table, without columns that are empty in all rows."""
+    shown = {name: title for name, title in COLUMNS.items() if any(_cell(getattr(row, name)) for row in rows)}
+    lines = ["| " + " | ".join(shown.values()) + " |", "|---" * len(shown) + "|"]
+    lines += ["| " + " | ".join(_cell(getattr(row, name)) for name in shown) + " |" for row in rows]
+    return lines
+
+
+def write(path: Path, rows: Sequence[Row]) -> None:
+    """Write the page; it appears whole."""
+    with replacing(path) as (hidden,):
+        hidden.write_text(page(rows), encoding="utf-8")

@@ -1,0 +1,121 @@
+"""Every hard scene: solved with all that must hold, the same however given, or refused with the reason."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.contact import State
+from fenics_contact.errors import ConvergenceError
+from tests.conftest import run_on_ranks
+from tests.hard.conftest import Record
+from tests.hard.invariants import Violations, violations
+from tests.hard.scenes import TRIALS
+from tests.hard.trial import OTHER_UNITS, Answer, Trial, fallbacks, scene_size, statuses
+
+#: The largest number of ranks of any case, and the seconds that all of them may take there.
+TIMEOUT = 1500.0
+OnRanks = Callable[[str, int], dict[str, Any]]
+
+
+@pytest.fixture(scope="module")
+def on_ranks(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> OnRanks:
+    """Return ``on_ranks(sentence, n)``; one mpirun for all sentences that are tested."""
+    selected = [
+        item.callspec.params.get("sentence") for item in request.session.items if hasattr(item, "callspec")
+    ]
+    found: dict[int, dict[str, Any]] = {}
+
+    def answer(sentence: str, ranks: int) -> dict[str, Any]:
+        if ranks not in found:
+            wanted = [name for name in TRIALS if name in selected and ranks in TRIALS[name].build().ranks]
+            names = tmp_path_factory.mktemp("ranks") / f"{ranks}.json"
+            names.write_text(json.dumps(wanted))
+            script = Path(__file__).with_name("on_ranks.py")
+            found[ranks] = json.loads(run_on_ranks(script, ranks, names, timeout=TIMEOUT))
+        return found[ranks][sentence]
+
+    return answer
+
+
+def assert_holds(found: Violations, tolerance: float) -> None:
+    """Require every violation to be as small as the tolerance lets it be."""
+    assert found.natural <= 1.01 * tolerance, found
+    assert found.cone <= tolerance, found
+    assert found.gluing <= 10 * tolerance, found
+    for value in (found.balance, found.nodal, found.penetration, found.complementarity, found.friction):
+        assert value <= 10 * tolerance, found
+
+
+def other_answers(case: Trial, sentence: str, on_ranks: OnRanks) -> dict[str, Answer]:
+    """Return the answers that should be the same one, each in the units of the trial."""
+    length, force = OTHER_UNITS
+    scaled = Answer.of(case.in_units(length, force).solve())
+    answers = {"units": scaled.in_units(1 / length, 1 / force)}
+    if case.other is not None:
+        answers["partition"] = Answer.of(case.solve(cut=case.other))
+    for ranks in case.ranks:
+        told = on_ranks(sentence, ranks)
+        assert "answer" in told, told
+        answers[f"{ranks} ranks"] = Answer.read(told["answer"])
+    return answers
+
+
+@pytest.mark.parametrize("sentence", TRIALS)
+def test_hard_scene(sentence: str, record: Record, on_ranks: OnRanks) -> None:
+    entry = TRIALS[sentence]
+    case = entry.build()
+    if case.error is not None:
+        refuse(case, entry.group, sentence, record, on_ranks)
+        return
+    state = case.solve()
+    found = violations(state)
+    assert_holds(found, case.solver.tolerance)
+    if case.checks is not None:
+        case.checks(state)
+    answer = Answer.of(state)
+    differences = {
+        name: answer.difference(other, case)
+        for name, other in other_answers(case, sentence, on_ranks).items()
+    }
+    assert max(differences.values()) <= case.agreement, differences
+    record(
+        entry.group, sentence, tolerance=case.solver.tolerance, balance=max(found.balance, found.nodal),
+        natural=found.natural, cone=found.cone, law=found.law, same=max(differences.values()),
+        **work(state),
+    )  # fmt: skip
+
+
+def work(state: State) -> dict[str, Any]:
+    """Return the columns of the table that tell what a state cost."""
+    return {
+        "scene": scene_size(state),
+        "products": state.counts["f_products"],
+        "steps": state.counts["solver_steps"],
+        "status": statuses(state),
+        "fallbacks": fallbacks(getattr(state.solution, "history", ())),
+    }
+
+
+def refuse(case: Trial, group: str, sentence: str, record: Record, on_ranks: OnRanks) -> None:
+    """Require the expected error on every number of ranks, and note it."""
+    assert case.error is not None
+    with pytest.raises(case.error, match=case.match) as caught:
+        case.solve(MPI.COMM_SELF)
+    for ranks in case.ranks:
+        told = on_ranks(sentence, ranks)
+        assert told.get("alike"), told
+        assert told["error"].startswith(case.error.__name__), told
+    history: Sequence[Any] = caught.value.history if isinstance(caught.value, ConvergenceError) else ()
+    message = str(caught.value)
+    record(
+        group, sentence, tolerance=case.solver.tolerance,
+        products=history[-1].products if history else None, steps=len(history) or None,
+        fallbacks=fallbacks(history),
+        outcome=f"fails: {case.cause}" if case.cause else f"refused: {message}",
+    )  # fmt: skip
