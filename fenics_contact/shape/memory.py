@@ -33,9 +33,9 @@ class DesignPoint:
         weak: Weakly active points and the branch they were given.
         adjoint_iterations: F-products of the adjoint.
         tolerance: Relative residual that the state was solved to.
-        error: Estimated error of the value, units of the objective: what the residuals of the state change in
-            it, to first order. With an adaptive tolerance the value is corrected by that and the error is a
-            safe estimate of what is left.
+        correction: What the residuals of the state change in the objective, to first order, see
+            `state_error`. With an adaptive tolerance the value has been corrected by it.
+        error: Safe estimate of the error of the value, units of the objective, corrected or not.
         adjoint_multiplier: ζ of the adjoint, owned.
     """
 
@@ -46,6 +46,7 @@ class DesignPoint:
     weak: WeakPoints
     adjoint_iterations: int
     tolerance: float
+    correction: float
     error: float
     adjoint_multiplier: np.ndarray
 
@@ -140,6 +141,7 @@ class DesignMemory:
             weak=weak,
             adjoint_iterations=int(stored["adjoint_iterations"]),
             tolerance=float(stored["tolerance"]),
+            correction=float(stored["correction"]),
             error=float(stored["error"]),
             adjoint_multiplier=stored["adjoint"][state.torn.numbering.owned],
         )
@@ -163,6 +165,7 @@ def _stored_point(point: DesignPoint) -> Stored:
         "choice": np.array(weak.choice.name),
         "adjoint_iterations": np.array(point.adjoint_iterations),
         "tolerance": np.array(point.tolerance),
+        "correction": np.array(point.correction),
         "error": np.array(point.error),
         "adjoint": numbering.gather(point.adjoint_multiplier, np.arange(numbering.total)),
         **{f"{_STATE}{part}": values for part, values in stored_state(point.state).items()},

@@ -215,7 +215,7 @@ class ShapeProblem:
         """
         known = self._memory.of_design(alpha) if self.inexact else None
         state = self._solved(alpha, self._tightest, known) if self.inexact else self.state_of(alpha)
-        point = self._judged(alpha, state, self._tightest, known)
+        point = self._point_at(alpha, state, self._tightest, known)
         self.evaluations += 1
         self._memory.judged(point)
         return point
@@ -242,10 +242,10 @@ class ShapeProblem:
             return point.value, point.gradient, 0.0
         known = self._memory.of_design(alpha)
         tolerance = policy.first(value, subgradient, self._memory.error_by_tolerance)
-        point = self._judged(alpha, self._solved(alpha, tolerance, known), tolerance, known)
+        point = self._point_at(alpha, self._solved(alpha, tolerance, known), tolerance, known)
         while point.error > value and tolerance > policy.tightest:
             tolerance = policy.next(tolerance, point.error, value)
-            point = self._judged(alpha, self._solved(alpha, tolerance, point), tolerance, point)
+            point = self._point_at(alpha, self._solved(alpha, tolerance, point), tolerance, point)
         self.evaluations += 1
         self._memory.judged(point)
         return point.value, point.gradient, point.error
@@ -277,7 +277,7 @@ class ShapeProblem:
         except (ConvergenceError, InfeasibleError) as error:
             raise InvalidDesignError(f"no equilibrium of the design was found: {error}") from error
 
-    def _judged(
+    def _point_at(
         self, alpha: np.ndarray, state: State, tolerance: float, known: DesignPoint | None
     ) -> DesignPoint:
         """Return objective, subgradient and their errors at a state. Collective."""
@@ -300,8 +300,8 @@ class ShapeProblem:
         self.products += state.dual.products
         value = partials.value + (error.correction if self.inexact else 0.0)
         # Ranks must take the same decisions: rounding in sums over ranks may not tell them apart.
-        value, gradient, size = self.comm.bcast((value, gradient, error.size))
-        logger.info("J = %.9g ± %.1e, %d products", value, size, state.dual.products)
+        value, gradient, error = self.comm.bcast((value, gradient, error))
+        logger.info("J = %.9g ± %.1e, %d products", value, error.size, state.dual.products)
         return DesignPoint(
             alpha=np.array(alpha, dtype=float),
             value=value,
@@ -310,7 +310,8 @@ class ShapeProblem:
             weak=linearised.weak,
             adjoint_iterations=state.dual.products - before,
             tolerance=tolerance,
-            error=size,
+            correction=error.correction,
+            error=error.size,
             adjoint_multiplier=adjoint.multiplier,
         )
 
