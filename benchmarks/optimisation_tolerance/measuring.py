@@ -17,6 +17,8 @@ TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 FIXED = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10)
 ADAPTIVE = {"adaptive": AdaptiveTolerance(), "adaptive from 1e-2": AdaptiveTolerance(loosest=1e-2)}
 STOPPING = (1e-4, 1e-6)
+#: What is left of that where an evaluation takes long.
+FEW_FIXED, FEW_ADAPTIVE, FEW_STOPPING = (1e-3, 1e-6, 1e-8), ("adaptive",), (1e-4,)
 
 
 def designs(chain: Chain, best: np.ndarray, count: int) -> dict[str, np.ndarray]:
@@ -77,10 +79,12 @@ def optimum(chain: Chain, name: str, stopping: float) -> dict[str, Any]:
     }
 
 
-def study(size: str, random_designs: int) -> dict[str, Any]:
-    """Return all measurements of one size."""
+def study(size: str, random_designs: int, *, few: bool) -> dict[str, Any]:
+    """Return all measurements of one size, or few of them."""
     chain = Chain(size)
-    names = [*(f"{tolerance:.0e}" for tolerance in FIXED), *ADAPTIVE]
-    optima = [optimum(chain, name, stopping) for stopping in STOPPING for name in names]
+    fixed, adaptive = (FEW_FIXED, FEW_ADAPTIVE) if few else (FIXED, tuple(ADAPTIVE))
+    names = [*(f"{tolerance:.0e}" for tolerance in fixed), *adaptive]
+    stopping = FEW_STOPPING if few else STOPPING
+    optima = [optimum(chain, name, limit) for limit in stopping for name in names]
     best = min(optima, key=lambda run: run["value"])["design"]
     return {"size": size, "optima": optima, "errors": errors(chain, best, random_designs)}

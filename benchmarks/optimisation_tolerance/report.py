@@ -142,7 +142,8 @@ def _plot_errors(axes: Any, rows: list[dict[str, Any]]) -> None:
 def _plot_products(axes: Any, optima: list[dict[str, Any]]) -> None:
     names = list(dict.fromkeys(run["states"] for run in optima))
     place = np.arange(len(names))
-    for shift, (stopping, shade) in enumerate(((1e-4, 1.0), (1e-6, 0.5))):
+    limits = sorted({run["stopping"] for run in optima}, reverse=True)
+    for shift, (stopping, shade) in enumerate(zip(limits, (1.0, 0.5), strict=False)):
         runs = {run["states"]: run for run in optima if run["stopping"] == stopping}
         colours = [GREEN if "adaptive" in name else BLUE for name in names]
         heights = [runs[name]["products"] for name in names]

@@ -29,7 +29,9 @@ from tests.shape.test_weak_points import SWITCHES
 Array = np.ndarray
 
 
-def on_a_ramp(aim: float, tolerance: float | AdaptiveTolerance = 1e-8) -> ShapeProblem:
+def on_a_ramp(
+    aim: float, tolerance: float | AdaptiveTolerance = 1e-8, *, friction: float = 0.3
+) -> ShapeProblem:
     """A block that nothing but friction holds on another one, whose top may be tilted along x.
 
     The objective is zero where the sum of the squared friction forces is what ``aim`` of the weight makes
@@ -41,14 +43,14 @@ def on_a_ramp(aim: float, tolerance: float | AdaptiveTolerance = 1e-8) -> ShapeP
         {"lower": Body(lower, PLASTIC), "upper": Body(upper, RUBBER)},
         [Support("lower", "z0")],
         [BodyForce("upper", (0.0, 0.0, -1.0))],
-        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), Coulomb(0.3))],
+        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), Coulomb(friction))],
     )
     wanted = (aim * 1.74 * 1.02 * 0.8) ** 2 / 10.0
 
     def misfit(contact: ContactResult) -> tuple[float, Array, Array]:
-        friction = contact.friction_force
-        miss = float((friction**2).sum()) / wanted - 1.0
-        return miss**2, np.zeros(len(friction)), 4.0 * miss * friction / wanted
+        tau = contact.friction_force
+        miss = float((tau**2).sum()) / wanted - 1.0
+        return miss**2, np.zeros(len(tau)), 4.0 * miss * tau / wanted
 
     design = SurfaceDesign("lower", side(lower, "z1"), (2, 1))
     # Near the limit of friction a state can cost any number of products: such designs are given up soon.
