@@ -10,9 +10,9 @@ from mpi4py import MPI
 
 from fenics_contact import _dolfinx
 from fenics_contact.feti.composition import Composition, integrate, possible
+from fenics_contact.feti.facet_areas import quadrature_areas
 from fenics_contact.feti.load_forms import Symbol, fields_of, load_key, load_name, load_parameters, load_work
 from fenics_contact.feti.model_checks import check_model, unit_cell_stiffness
-from fenics_contact.feti.surface import quadrature_areas
 from fenics_contact.feti.templates import (
     LOADED,
     QUADRATURE_DEGREE,
@@ -23,7 +23,7 @@ from fenics_contact.feti.templates import (
     surface_measure,
     volume_measure,
 )
-from fenics_contact.scene import Load, Material, Scene, Surface, ThermalStrain, TotalForce, Traction
+from fenics_contact.scene import Load, Material, Scene, ThermalStrain, TotalForce, Traction
 
 __all__ = [
     "LOADED",
@@ -50,6 +50,11 @@ class FormLibrary:
     def compiled(self) -> tuple[tuple[Any, ...], ...]:
         """Names of the forms compiled so far."""
         return self._templates.names
+
+    @property
+    def templates(self) -> Templates:
+        """The compiled forms; what floors above write joins them, when it is asked for."""
+        return self._templates
 
     def prepare(self, scene: Scene) -> None:
         """Compile what the scene calls for and is not there yet. Collective on the library's communicator.
@@ -98,6 +103,10 @@ class FormLibrary:
         functions = fields_of(load, space, points)
         return template.bind([space], load_parameters(load, parts), functions, facets, cells=cells)
 
+    def varies(self, material: Material, cell_type: str) -> bool:
+        """Return whether the stiffness of a material mentions the place that it is at."""
+        return self._templates["stiffness", (material,), cell_type].mentions(ufl.geometry.SpatialCoordinate)
+
     def typical_modulus(self, material: Material, cell_type: str) -> float:
         """Return the mean diagonal entry of the stiffness of a cell of edge length one.
 
@@ -145,6 +154,6 @@ def as_tractions(scene: Scene) -> tuple[Load, ...]:
 
 
 def _spread(scene: Scene, load: TotalForce) -> Traction:
-    facets = scene.facets(Surface(load.body, load.surface))
-    area = float(quadrature_areas(scene.bodies[load.body].mesh.points, facets).sum())
+    mesh = scene.bodies[load.body].mesh
+    area = float(quadrature_areas(mesh.points, mesh.surfaces[load.surface]).sum())
     return Traction(load.body, load.surface, tuple(component / area for component in load.value))

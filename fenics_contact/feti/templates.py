@@ -8,12 +8,21 @@ from typing import Any
 import numpy as np
 import ufl
 from mpi4py import MPI
+from ufl.algorithms.analysis import extract_type
 
 from fenics_contact import _dolfinx
 
 #: Gauss rule of the volume: two points a direction on tensor-product cells, one on simplices suit linear
-#: elasticity.
-QUADRATURE_DEGREE = {"hexahedron": 2, "tetrahedron": 1, "quadrilateral": 2, "triangle": 1}
+#: elasticity, three a direction and one on each edge the quadratic cells.
+QUADRATURE_DEGREE = {
+    "hexahedron": 2,
+    "tetrahedron": 1,
+    "quadrilateral": 2,
+    "triangle": 1,
+    "hexahedron27": 4,
+    "quadrilateral9": 4,
+    "triangle6": 2,
+}
 #: Tag that every loaded surface gets inside a load form.
 LOADED = 1
 
@@ -29,7 +38,12 @@ class Template:
     ) -> None:
         """Compile ``form``. Collective on ``comm``."""
         self._form = _dolfinx.CompiledForm(comm, form)
+        self._written = form
         self._constants, self._coefficients = tuple(constants), tuple(coefficients)
+
+    def mentions(self, kind: type) -> bool:
+        """Return whether the form was written with a symbol of UFL of some kind."""
+        return bool(extract_type(self._written, kind))
 
     def bind(
         self,
@@ -120,11 +134,15 @@ def scalar_constants(cell_type: str, count: int) -> tuple[Any, ...]:
 
 
 def volume_measure(cell_type: str, degree: int | None = None) -> Any:
-    """Return dx on the template with the package's quadrature degree, or the given one."""
-    degree = QUADRATURE_DEGREE[cell_type] if degree is None else degree
+    """Return dx on the template with the package's quadrature degree, or the given one.
+
+    The given one is for linear cells; quadratic ones get twice that.
+    """
+    degree = QUADRATURE_DEGREE[cell_type] if degree is None else degree * _dolfinx.degree(cell_type)
     return ufl.dx(domain=_dolfinx.template(cell_type), metadata={"quadrature_degree": degree})
 
 
 def surface_measure(cell_type: str) -> Any:
     """Return ds of the loaded surface on the template."""
-    return ufl.ds(domain=_dolfinx.template(cell_type), metadata={"quadrature_degree": 2})(LOADED)
+    degree = 2 * _dolfinx.degree(cell_type)
+    return ufl.ds(domain=_dolfinx.template(cell_type), metadata={"quadrature_degree": degree})(LOADED)
