@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -39,10 +38,7 @@ def check_held(torn: TornSystem) -> None:
         InfeasibleError: Names the body and the motion, and says so if it is held only just.
     """
     comm = torn.numbering.comm
-    meshes = [body.mesh.points for body in torn.scene.bodies.values()]
-    low, high = (getattr(np.concatenate(meshes), side)(axis=0) for side in ("min", "max"))
-    frame = _Frame(0.5 * (low + high), float(np.max(high - low)))
-    bodies = [_RigidBody(torn, index, frame) for index in range(len(meshes))]
+    bodies = [_RigidBody(torn, index) for index in range(len(torn.scene.bodies))]
     loads = comm.allreduce(np.array([body.load_wrench(torn) for body in bodies]))
     loads[np.abs(loads) <= BALANCED * comm.allreduce(np.abs(torn.load).sum())] = 0.0
     with together(comm):
@@ -67,34 +63,14 @@ def _check_balance(torn: TornSystem, bodies: list[_RigidBody], loads: np.ndarray
     raise InfeasibleError(_describe(motion, bodies, loads, torn.dim, only_just=without_margin is None))
 
 
-@dataclass(frozen=True)
-class _Frame:
-    """Where moments are taken about, and the arm that makes them comparable with forces.
-
-    Attributes:
-        centre: Of all bodies, shape (dim,), [length].
-        size: Of all bodies, [length].
-    """
-
-    centre: np.ndarray
-    size: float
-
-    def modes(self, points: np.ndarray) -> np.ndarray:
-        """Return rigid motions, rotations over the size, shape (n_nodes, dim, n_modes)."""
-        modes = rigid_body_modes(points - self.centre)
-        modes[..., points.shape[1] :] /= self.size
-        return modes
-
-
 class _RigidBody:
     """A body seen as rigid: its modes, and the wrenches of supports, ties, contacts and loads on it."""
 
-    def __init__(self, torn: TornSystem, index: int, frame: _Frame) -> None:
+    def __init__(self, torn: TornSystem, index: int) -> None:
         tearing = torn.decomposition.tearing
         self.name = tearing.body_names[index]
         self._nodes = slice(int(tearing.node_offset[index]), int(tearing.node_offset[index + 1]))
-        self._modes = frame.modes(torn.scene.bodies[self.name].mesh.points)
-        self.size = frame.size
+        self._modes = rigid_body_modes(torn.scene.bodies[self.name].mesh.points)
         #: Wrenches that supports can exert in both directions, shape (n_modes, n), orthonormal columns.
         self.support = resisted_motions(self._modes, torn.decomposition.fixed[self._nodes])
 
@@ -211,8 +187,7 @@ def _describe(
     # The certificate points against the right side, which is minus the load. Bodies may be taken along by the
     # one that is pushed: the load works most on that one.
     pushed = int(np.argmax(np.einsum("bm,bm->b", motion, loads)))
-    free = motion[pushed] / np.where(np.arange(motion.shape[1]) < dim, 1.0, bodies[pushed].size)
-    free = np.round(free / np.abs(free).max(), 3) + 0.0  # no -0
+    free = np.round(motion[pushed] / np.abs(motion[pushed]).max(), 3) + 0.0  # no -0
     parts = [("translation", free[:dim]), ("rotation", free[dim:])]
     words = " with ".join(
         f"{kind} ({', '.join(f'{component:.2g}' for component in part)})"

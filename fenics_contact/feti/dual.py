@@ -11,6 +11,7 @@ from mpi4py import MPI
 from fenics_contact.errors import together
 from fenics_contact.feti.dirichlet import DirichletPreconditioner
 from fenics_contact.feti.inverse import LocalKind, TornInverse, kernel_matrix
+from fenics_contact.feti.kernel_basis import whole_motions
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.linalg import sweep
 from fenics_contact.qp import CoarseSpace, ContactLayout, DualProblem
@@ -19,6 +20,8 @@ from fenics_contact.timing import PhaseTimer
 
 #: Flexibility of rows that have none, relative to the mean of all contact rows.
 STIFF = 1e-6
+#: Entries of G below this part of the largest are rounding: gluing rows do not feel the motion of a body.
+UNFELT = 1e-13
 #: A resultant below this fraction of the loads' sum is rounding: the loads balance each other.
 BALANCED = 1e-13
 
@@ -143,7 +146,8 @@ class DualSystem:
             counts[subdomain.mesh.number] = subdomain.kernel.shape[1]
         offset = np.concatenate([[0], np.cumsum(comm.allreduce(counts))])
         mine = offset[[subdomain.mesh.number for subdomain in self.torn.subdomains]]
-        return kernel_matrix(self.torn.subdomains, int(offset[-1]), mine)
+        own = kernel_matrix(self.torn.subdomains, int(offset[-1]), mine)
+        return (own @ whole_motions(self.torn, offset)).tocsr()
 
     def _resultants(self, comm: MPI.Comm) -> np.ndarray:
         """Return e = Rᵀ f, replicated; what is only rounding of balanced loads is set to zero."""
@@ -153,7 +157,10 @@ class DualSystem:
 
     def _coarse_columns(self) -> sp.csr_matrix:
         """Return this rank's owned columns of G = Rᵀ Bᵀ, shape (n_modes, n_owned)."""
-        return self.torn.numbering.sum_rows(self._B @ self.kernel).T.tocsr()
+        columns = self.torn.numbering.sum_rows(self._B @ self.kernel).T.tocsr()
+        columns.data[np.abs(columns.data) <= UNFELT * np.abs(columns.data).max(initial=0.0)] = 0.0
+        columns.eliminate_zeros()
+        return columns
 
     def _layout(self) -> ContactLayout:
         torn = self.torn

@@ -11,7 +11,8 @@ from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_sum
 from fenics_contact.qp.slip_law import SlipLaw
 
-LARGEST_FORCE = 1e4
+#: A thin plate clamped at one edge needs as large a force as its length is thicknesses.
+LARGEST_FORCE = 1e7
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +38,7 @@ def find_equilibrium(
 
     Minimises ½‖Q z − λ₀‖² over the admissible set by accelerated projected gradients, Q = I − P. At
     distance g = Q z − λ₀ with optimality error s = z − P_Λ(z − g), any equilibrium y obeys
-    ‖g‖² ≤ ‖s‖(‖y − z‖ + ‖g‖). Once that would take a force 10⁴ times the load's, none exists.
+    ‖g‖² ≤ ‖s‖(‖y − z‖ + ‖g‖). Once that would take a force 10⁷ times the load's, none exists.
 
     Args:
         problem: Coarse space and layout are used.

@@ -8,7 +8,7 @@ from scipy.linalg import lapack
 
 from fenics_contact.qp.reductions import Vector
 
-RANK_TOLERANCE = 1e-8
+RANK_TOLERANCE = 1e-12
 
 
 class GramInverse:

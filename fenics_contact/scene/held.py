@@ -11,7 +11,7 @@ from fenics_contact.scene.kernels import rigid_body_modes
 if TYPE_CHECKING:
     from fenics_contact.scene.scene import Scene
 
-#: Support reactions below this fraction of the largest count as none: the motion is not resisted.
+#: A motion counts as not resisted if it moves supported nodes by less than this part of what others do.
 RANK_TOLERANCE = 1e-9
 
 
@@ -25,9 +25,10 @@ def resisted_motions(modes: np.ndarray, fixed: np.ndarray) -> np.ndarray:
     Returns:
         Coefficients of the modes as columns, shape (n_modes, rank).
     """
-    held = modes[fixed]
-    left, size, _ = np.linalg.svd(held.T @ held)
-    return np.asarray(left[:, size > RANK_TOLERANCE * size[0]])
+    # The edge of a thin plate moves little when the plate turns about it: singular values show how much,
+    # their squares would drown in rounding.
+    _, size, motions = np.linalg.svd(modes[fixed], full_matrices=False)
+    return np.asarray(motions[size > RANK_TOLERANCE * size.max(initial=0.0)].T)
 
 
 def held_by_supports(scene: Scene, body: str) -> bool:

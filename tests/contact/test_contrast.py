@@ -154,6 +154,15 @@ def test_the_answer_at_the_largest_contrast_is_right(case: Case) -> None:
         assert contact.count(Status.STICK) + contact.count(Status.SLIP) > 10
 
 
+@pytest.mark.parametrize("slave", ["lower", "upper"])
+def test_a_stiff_body_on_one_a_million_times_softer_takes_no_more_work(slave: str) -> None:
+    """Contact with the soft one alone holds the stiff one: rows of so little stiffness still are rows."""
+    case = Blocks("lower", slave, FRICTION)
+    state = solved(case, 1e6)
+    assert_solved(state, 1e-6)
+    assert state.counts["f_products"] < 2.5 * solved(case, 1.0).counts["f_products"]
+
+
 def test_a_stiff_body_acts_on_a_soft_one_as_a_rigid_one() -> None:
     """The answer nears that on a rigid plane, and its distance falls as the contrast grows."""
     case = Blocks("upper", "upper", None)

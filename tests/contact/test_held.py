@@ -13,8 +13,28 @@ from fenics_contact.contact import Status, check_held, solve_scene
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.geometry import block
-from fenics_contact.scene import Coulomb, Scene, Support, TotalForce, Tresca
-from tests.contact.gallery import block_on_plane, guided, partitions, pressed_block, stack, two_blocks
+from fenics_contact.qp import FaceNewton
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    Coulomb,
+    IsotropicElasticity,
+    Scene,
+    Support,
+    Surface,
+    TotalForce,
+    Tresca,
+)
+from tests.contact.gallery import (
+    FLOOR,
+    SOFT,
+    block_on_plane,
+    guided,
+    partitions,
+    pressed_block,
+    stack,
+    two_blocks,
+)
 
 DOWN, ALONG = -4.0, 2.0  # the load of the block on the plane, with its push of 1
 NUMBERS = r"\(([^)]*)\)"
@@ -128,6 +148,31 @@ def test_supports_hold_what_contact_does_not() -> None:
     lifted = pulled(guided(block_on_plane(None), "block"), "block", (0.0, 0.0, 1.0))
     assert refused(lifted)[1] == pytest.approx([0, 0, 1], abs=1e-2)
     check(replace(lifted, supports=[*lifted.supports, Support("block", "z1", (None, None, 0.0))]))
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("thickness", [1e-2, 1e-3, 1e-4])
+def test_a_thin_plate_clamped_at_one_edge_is_held_in_all_units(thickness: float, unit: float) -> None:
+    mesh = block((0.0, 0.0, 0.0), (8.0, 4.0, thickness), (8, 4, 1))
+    plate = Body(mesh.moved(unit * mesh.points), SOFT)
+    pair = ContactPair(Surface("block", "z0"), FLOOR, None)
+    scene = Scene({"block": plate}, [Support("block", "x0")], contacts=[pair])
+    check(pulled(scene, "block", (0.0, 0.0, 1.0)))
+    hinged = replace(scene, supports=[Support("block", "x0", (0.0, 0.0, None))])
+    assert refused(pulled(hinged, "block", (0.0, 0.0, 1.0)))[0] == "block"
+
+
+def test_a_thin_plate_lifted_at_its_clamped_edge_is_solved() -> None:
+    """Its clamp must bear thousands of times the load: levers are as long as the plate, arms as short."""
+    mesh = block((0.0, 0.0, 0.01), (8.0, 4.0, 0.011), (8, 4, 1))
+    pair = ContactPair(Surface("block", "z0"), FLOOR, None)
+    scene = Scene(
+        {"block": Body(mesh, IsotropicElasticity(1e9, 0.3))}, [Support("block", "x0")], contacts=[pair]
+    )
+    scene = pulled(scene, "block", (0.0, 0.0, 1e-3))
+    state = solve_scene(scene, partitions(scene, (1, 1, 1)), MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-6))
+    assert state.contact.count(Status.OPEN) == state.contact.points.count
+    assert state.gather_displacement("block")[:, 2].max() > 0.0
 
 
 def test_a_scene_that_is_moved_without_any_load_needs_no_holding() -> None:

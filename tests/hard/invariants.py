@@ -136,9 +136,7 @@ def _balance(whole: Whole, body: str, applied: np.ndarray, on_nodes: np.ndarray)
     ties = whole.torn.ties
     if ties.count and np.any(ties.jump[:, own].nnz):
         return 0.0  # tie forces are no part of the answer
-    points = whole.torn.scene.bodies[body].mesh.points
-    modes = rigid_body_modes(points - points.mean(axis=0))
-    modes[..., points.shape[1] :] /= np.ptp(points, axis=0).max()  # a rotation moves by about one, too
+    modes = rigid_body_modes(whole.torn.scene.bodies[body].mesh.points)
     resisted = resisted_motions(modes, whole.fixed[own])
     wrench = np.einsum("ndm,nd->m", modes, applied[own])
     forces = np.abs(whole.load[own]) + np.abs(on_nodes[own])

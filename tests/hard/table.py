@@ -11,64 +11,87 @@ from fenics_contact.io.replacing import replacing
 INTRODUCTION = """\
 # Hard cases
 
-What makes contact problems fail, one case a row: what came out, how exact it is and what it cost. Every case is
-a test of `tests/hard/`; `make test-hard` runs them all and writes this page from their records, only if all of
-them ran and none failed. Where the outcome is a refusal or a failure, the test requires that very error: no case
-ends in a wrong answer.
+What makes contact problems fail, one case a row: what came out, how exact it is and what it cost. Every
+case is a test of `tests/hard/`; `make test-hard` runs them all and writes this page from their records,
+only if all of them ran and none failed. Where the outcome is a refusal or a failure, the test requires that
+very error: no case ends in a wrong answer.
 
-Of every solved case is checked, recomputed on the bodies in one piece from displacements and contact forces, with
-no figure of the solver's:
+Of every solved case is checked, recomputed on the bodies in one piece from displacements and contact
+forces, with no figure of the solver's:
 
-- *natural*: ‖λ − P(λ − r/diag F)‖ relative to the normal forces, with a fresh product, at most the tolerance;
+- *natural*: ‖λ − P(λ − r/diag F)‖ relative to the normal forces, with a fresh product, at most the
+  tolerance;
 - *balance*: resultant and moment of load and contact forces along every motion that no support of the body
   resists, and the balance of every single node, relative to the forces that cancel there (the larger one);
 - *cone*: the largest tension or excess of friction over its bound, relative to the largest normal force;
-- *contact law*: the largest of penetration, normal force × gap, and what friction does not oppose of the slip,
-  bound × ‖slip‖ + friction · slip, relative to the largest force and displacement;
-- *same*: the largest relative difference of contact forces and displacements when the scene is given in other
-  units of length and force, when its bodies are cut otherwise, and when it is solved on two (some on four) ranks.
+- *contact law*: the largest of penetration, normal force × gap, and what friction does not oppose of the
+  slip, bound × ‖slip‖ + friction · slip, relative to the largest force and displacement;
+- *same*: the largest relative difference of contact forces and displacements when the scene is given in
+  other units of length and force, when its bodies are cut otherwise, and when it is solved on two (some on
+  four) ranks.
 
-"Unknowns" are torn displacements; products are those with the dual operator F. A *rescue* is a call of SMALSE
-where the active set cycled or the residual stood still; a *cut* is a Newton step that was shortened.
+"Unknowns" are torn displacements; products are those with the dual operator F. A *rescue* is a call of
+SMALSE where the active set cycled or the residual stood still; a *cut* is a Newton step that was shortened.
 """
 
 #: Groups in the order of the page: key to heading and advice.
 GROUPS: dict[str, tuple[str, str]] = {
     "floating": (
         "Bodies that only contact and friction hold",
-        "A body that nothing holds is refused before anything is factored, and the message names body and motion: "
-        "support that motion, or give the pair friction. What rigid bodies could hold and elastic ones cannot, only "
-        "the solver finds out, and says that it did not converge.",
+        "A body that nothing holds is refused before anything is factored, and the message names body and "
+        "motion: support that motion, or give the pair friction. What rigid bodies could hold and elastic "
+        "ones cannot, only the solver finds out, and says that it did not converge.",
     ),
     "touching": (
         "Contact that is nowhere, everywhere, or only just",
-        "Gaps of any size do no harm. A body that rolls by far more than it deforms is the hardest of these: give "
-        "it a support that keeps it from rolling, or shape and mesh that touch at more than one row of nodes.",
+        "Gaps of any size do no harm. A body that rolls by far more than it deforms is the hardest of "
+        "these: give it a support that keeps it from rolling, or shape and mesh that touch at more than "
+        "one row of nodes.",
     ),
     "friction": (
         "Friction from none to ten",
-        "Coefficients may be as large as one likes. A floating body exactly at the limit of its friction has no "
-        "unique slide and is refused; one that is dragged by a support has, and is solved.",
+        "Coefficients may be as large as one likes. A floating body exactly at the limit of its friction "
+        "has no unique slide and is refused; one that is dragged by a support has, and is solved.",
     ),
     "stiffness": (
         "Stiff beside soft, thin, nearly incompressible",
-        "",
+        "Any contrast between bodies, or between layers, costs next to nothing. Soft and stiff side by "
+        "side in the same subdomains on a friction floor cost much: cut along the boundary of the "
+        "materials, or make bodies of them and tie them. Let the softer or the finer surface be the "
+        "slave. Linear cells lock as Poisson's ratio nears one half, the errors are in the outcomes: take "
+        "quadratic hexahedra, whose contact radius stays right while the pressures of single nodes "
+        "oscillate. Solid cells ten times as long as thick do no harm, a hundred times cost many "
+        "products, and a thousand times are beyond what the dual solvers manage; belts that slide round a "
+        "disc take some hundred.",
     ),
     "units": (
         "Units",
-        "Any consistent units serve; every case above and below is solved in two.",
+        "Any consistent units serve: forces of the same scene differ by rounding, and every case of this "
+        "page is solved in two systems.",
     ),
     "partition": (
         "Partitions, supports and shared nodes",
+        "Any partition gives the same answer. Subdomains may be jagged, tiny, or have no contact at all; "
+        "ones of a cell or two cost time, not products. Supports may overlap where they agree, and nodes "
+        "may belong to several pairs; forces at nodes with more multipliers than displacements are not "
+        "unique one by one, their sum is.",
+    ),
+    "meshes": (
+        "Meshes turned, mirrored, renumbered, distorted",
+        "The answer does not depend on how a mesh is turned or numbered, and cells that are nearly flat "
+        "do no harm to the solver. Cells that are flat or inverted are refused with their place when the "
+        "mesh is made.",
+    ),
+    "published": (
+        "Published friction problems",
         "",
     ),
-    "meshes": ("Meshes turned, mirrored, renumbered, distorted", ""),
-    "published": ("Published friction problems", ""),
     "optimisation": (
         "Shape optimisation",
-        "A trial design without mesh or equilibrium is rejected, the trust region shrinks, and the history says "
-        "why. Figures are those of the last design; products are those of all designs, steps are evaluations. "
-        "Near the limit of friction a state can cost any number of products: give the solver a `max_products`.",
+        "A trial design without mesh or equilibrium is rejected, the trust region shrinks, and the history "
+        "says why. Figures are those of the last design; products are those of all designs, steps are "
+        "evaluations. Near the limit of friction a state can cost any number of products: give the solver a "
+        "`max_products`.",
     ),
     "interrupted": (
         "Interrupted runs",

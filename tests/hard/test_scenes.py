@@ -19,7 +19,7 @@ from tests.hard.scenes import TRIALS
 from tests.hard.trial import OTHER_UNITS, Answer, Trial, fallbacks, scene_size, statuses
 
 #: The largest number of ranks of any case, and the seconds that all of them may take there.
-TIMEOUT = 1500.0
+TIMEOUT = 3000.0
 OnRanks = Callable[[str, int], dict[str, Any]]
 
 
@@ -43,22 +43,25 @@ def on_ranks(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     return answer
 
 
-def assert_holds(found: Violations, tolerance: float) -> None:
+def assert_holds(found: Violations, tolerance: float, amplification: float) -> None:
     """Require every violation to be as small as the tolerance lets it be."""
     assert found.natural <= 1.01 * tolerance, found
     assert found.cone <= tolerance, found
     assert found.gluing <= 10 * tolerance, found
-    for value in (found.balance, found.nodal, found.penetration, found.complementarity, found.friction):
-        assert value <= 10 * tolerance, found
+    assert found.balance <= 10 * tolerance, found
+    for value in (found.nodal, found.penetration, found.complementarity, found.friction):
+        assert value <= amplification * tolerance, found
 
 
 def other_answers(case: Trial, sentence: str, on_ranks: OnRanks) -> dict[str, Answer]:
     """Return the answers that should be the same one, each in the units of the trial."""
-    length, force = OTHER_UNITS
-    scaled = Answer.of(case.in_units(length, force).solve())
-    answers = {"units": scaled.in_units(1 / length, 1 / force)}
+    answers = {}
+    if case.units:
+        length, force = OTHER_UNITS
+        answers["units"] = Answer.of(case.in_units(length, force).solve()).in_units(1 / length, 1 / force)
     if case.other is not None:
         answers["partition"] = Answer.of(case.solve(cut=case.other))
+    answers |= {name: twin() for name, twin in case.twins.items()}
     for ranks in case.ranks:
         told = on_ranks(sentence, ranks)
         assert "answer" in told, told
@@ -75,9 +78,10 @@ def test_hard_scene(sentence: str, record: Record, on_ranks: OnRanks) -> None:
         return
     state = case.solve()
     found = violations(state)
-    assert_holds(found, case.solver.tolerance)
+    assert_holds(found, case.solver.tolerance, case.amplification)
     if case.checks is not None:
         case.checks(state)
+    remark = f"; {case.remark(state)}" if case.remark else ""
     answer = Answer.of(state)
     differences = {
         name: answer.difference(other, case)
@@ -87,7 +91,7 @@ def test_hard_scene(sentence: str, record: Record, on_ranks: OnRanks) -> None:
     record(
         entry.group, sentence, tolerance=case.solver.tolerance, balance=max(found.balance, found.nodal),
         natural=found.natural, cone=found.cone, law=found.law, same=max(differences.values()),
-        **work(state),
+        outcome=f"solved{remark}",         **work(state),
     )  # fmt: skip
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import State, Status, solve_scene, solve_steps
+from fenics_contact.errors import ConvergenceError
 from fenics_contact.geometry import bisection_partition, box_partition, graph_partition
 from fenics_contact.qp import DualSolver, FaceNewton, SolverStep
 from fenics_contact.scene import LoadStep, Scene
@@ -38,12 +39,16 @@ class Trial:
         other: Another partition, with another number of subdomains; None where the bodies have one cell.
         solver: Dual solver with its tolerance.
         steps: Load steps; the state after the last is judged.
+        units: Whether the answer is found in other units, too.
         ranks: Numbers of ranks on which the answer must be the same.
         forces: Whether the forces of single contact points are unique, else only their sum over all is.
         displacements: Whether displacements are unique, else only their differences of energy are.
+        amplification: What conditioning may make of the tolerance in the balance of nodes and in distances.
         agreement: Largest relative difference between answers that should be one.
         force_scale: The smallest force that contact forces are compared with, [force].
         checks: Asserts what is known of this very answer.
+        remark: Says something measured about it, for the table.
+        twins: Other scenes that must have the same answer, given in the coordinates and units of this one.
         error: Class of the error that is expected instead of an answer.
         match: Pattern of its message.
         cause: Why it fails; empty where the error is the right answer.
@@ -54,12 +59,16 @@ class Trial:
     other: Cut | None = None
     solver: DualSolver = SOLVER
     steps: tuple[LoadStep, ...] = ()
+    units: bool = True
     ranks: tuple[int, ...] = (2,)
     forces: bool = True
     displacements: bool = True
+    amplification: float = 10.0
     agreement: float = 1e-6
     force_scale: float = 0.0
     checks: Callable[[State], None] | None = None
+    remark: Callable[[State], str] | None = None
+    twins: Mapping[str, Callable[[], Answer]] = field(default_factory=dict)
     error: type[Exception] | None = None
     match: str = ""
     cause: str = ""
@@ -128,6 +137,12 @@ def ragged(scene: Scene, parts: int) -> Cut:
         name: graph_partition(body.mesh, min(parts, body.mesh.n_cells), name)
         for name, body in scene.bodies.items()
     }
+
+
+def failing_trial(scene: Scene, cause: str, **options: Any) -> Trial:
+    """Return a trial that the solver is known not to manage; it must say so."""
+    expected = {"error": ConvergenceError, "match": STANDS_STILL, "solver": HASTY, "ranks": (), **options}
+    return cut_trial(scene, cause=cause, **expected)
 
 
 def cut_trial(scene: Scene, **options: Any) -> Trial:

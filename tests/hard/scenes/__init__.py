@@ -1,6 +1,6 @@
 """All scenes of the hard cases; importing this fills `TRIALS`."""
 
-from tests.hard.scenes import floating, friction, touching
+from tests.hard.scenes import floating, friction, meshes, partition, stiffness, touching, units
 from tests.hard.trial import TRIALS
 
-__all__ = ["TRIALS", "floating", "friction", "touching"]
+__all__ = ["TRIALS", "floating", "friction", "meshes", "partition", "stiffness", "touching", "units"]

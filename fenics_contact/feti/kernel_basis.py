@@ -1,0 +1,64 @@
+"""A basis of all rigid motions in which those of whole bodies stand apart.
+
+The motion of a body is the sum of those of its subdomains, and gluing rows do not feel it: in G it would be a
+difference of large numbers, and what holds the body a small rest of them where the body is stiff and what
+it lies on is soft. As a basis vector of its own it keeps all its digits.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact.feti.subdomain import Subdomain
+from fenics_contact.feti.torn import TornSystem
+
+#: Modes of a subdomain must give those of its body up to this, or the body keeps the subdomains' own.
+SPANNED = 1e-10
+
+
+def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:
+    """Return T that takes the first subdomain's modes of every cut body for those of the body. Collective.
+
+    Args:
+        torn: The torn system.
+        offset: First mode of each subdomain and the total, replicated, shape (n_subdomains + 1,).
+
+    Returns:
+        Coefficients of the new basis vectors in the old ones as columns, (n_modes, n_modes), replicated.
+    """
+    mine = {part.mesh.number: _coefficients(torn, part) for part in torn.subdomains}
+    parts = {
+        number: found for share in torn.numbering.comm.allgather(mine) for number, found in share.items()
+    }
+    total, first = int(offset[-1]), torn.decomposition.tearing.subdomain_offset
+    kept, rows, columns, values = np.ones(total), [], [], []
+    for start, end in pairwise(first):
+        place = np.arange(offset[start], offset[start + 1])
+        found = [parts[number] for number in range(start, end)]
+        whole = [part for part in found if part is not None and part.shape[1] == len(place)]
+        if len(found) == 1 or len(whole) < len(found):
+            continue
+        kept[place] = 0.0
+        block = np.vstack(whole)
+        row, column = np.indices(block.shape)
+        rows.append(offset[start] + row.ravel())
+        columns.append(offset[start] + column.ravel())
+        values.append(block.ravel())
+    nowhere = np.zeros(0, dtype=np.int64)
+    entries = (np.concatenate([nowhere, *rows]), np.concatenate([nowhere, *columns]))
+    motions = sp.csr_matrix((np.concatenate([np.zeros(0), *values]), entries), shape=(total, total))
+    return (motions + sp.diags(kept)).tocsr()
+
+
+def _coefficients(torn: TornSystem, subdomain: Subdomain) -> np.ndarray | None:
+    """Return the body's modes in those of a subdomain, a mode a column; None if it has others."""
+    body = torn.scene.bodies[subdomain.mesh.body]
+    kernels = [np.asarray(material.kernel(body.mesh.points)) for material in body.materials]
+    kernel = min(kernels, key=lambda modes: modes.shape[-1])
+    wanted = kernel[subdomain.mesh.nodes].reshape(-1, kernel.shape[-1])
+    found = np.linalg.lstsq(subdomain.kernel, wanted, rcond=None)[0]
+    error = np.abs(subdomain.kernel @ found - wanted).max(initial=0.0)
+    return found if error <= SPANNED * np.abs(wanted).max(initial=0.0) else None
