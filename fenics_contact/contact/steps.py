@@ -11,6 +11,7 @@ from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.contact.equilibrium import decomposed, find_state
 from fenics_contact.contact.state import State
 from fenics_contact.contact.steps_done import StepsDone
+from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.feti import Decomposition
 from fenics_contact.qp import DualSolver
 from fenics_contact.scene import LoadStep, Scene
@@ -40,6 +41,7 @@ class LoadSequence:
         comm: MPI.Comm,
         *,
         solver: DualSolver | None = None,
+        tolerance: Tolerance = None,
         checkpoint: Checkpoint | None = None,
     ) -> None:
         """Start unloaded; arguments as for `solve_scene`.
@@ -49,6 +51,7 @@ class LoadSequence:
             partitions: As for `solve_scene`; give them if a run may go on with another number of ranks.
             comm: Communicator over which the subdomains are spread.
             solver: As for `solve_scene`.
+            tolerance: As for `solve_scene`, for every step.
             checkpoint: File that is written after the steps and that an interrupted history goes on from.
 
         Raises:
@@ -57,8 +60,10 @@ class LoadSequence:
         self.scene, self.state = scene, None
         if checkpoint is not None and partitions is None:
             partitions = scene.partition(comm.size)
-        self._done = StepsDone(checkpoint, {"scene": scene, "partitions": partitions, "solver": solver}, comm)
-        self._partitions, self._comm, self._solver = partitions, comm, solver
+        problem = {"scene": scene, "partitions": partitions, "solver": solver, "tolerance": tolerance}
+        self._done = StepsDone(checkpoint, problem, comm)
+        self._partitions, self._comm = partitions, comm
+        self._solver, self._tolerance = solver, tolerance
         self._decomposition: Decomposition | None = None
         self._timer = PhaseTimer()
 
@@ -79,8 +84,8 @@ class LoadSequence:
         state = self._done.recalled(step, scene, self._decomposition, self.state, self._timer)
         if state is None:
             state = find_state(
-                scene, self._decomposition, solver=self._solver, previous=self.state,
-                slip_from=self.state, timer=self._timer,
+                scene, self._decomposition, solver=self._solver, tolerance=self._tolerance,
+                previous=self.state, slip_from=self.state, timer=self._timer,
             )  # fmt: skip
             self._done.keep(step, state)
         self.scene, self.state = scene, state
@@ -98,6 +103,7 @@ def solve_steps(
     comm: MPI.Comm,
     *,
     solver: DualSolver | None = None,
+    tolerance: Tolerance = None,
     checkpoint: Checkpoint | None = None,
 ) -> tuple[State, ...]:
     """Find the states at the end of every load step, see `LoadSequence`. Collective on ``comm``.
@@ -108,13 +114,16 @@ def solve_steps(
         partitions: As for `solve_scene`.
         comm: Communicator over which the subdomains are spread.
         solver: As for `solve_scene`.
+        tolerance: As for `solve_scene`, for every step.
         checkpoint: As for `LoadSequence`.
 
     Example:
         >>> push = [LoadStep(f"push {s}", loads=[weight, pull(s)]) for s in (0.5, 1.0, 0.0)]  # doctest: +SKIP
         >>> states = solve_steps(scene, push, partitions, comm)  # doctest: +SKIP
     """
-    sequence = LoadSequence(scene, partitions, comm, solver=solver, checkpoint=checkpoint)
+    sequence = LoadSequence(
+        scene, partitions, comm, solver=solver, tolerance=tolerance, checkpoint=checkpoint
+    )
     states = tuple(sequence.advance(step) for step in steps)
     sequence.finish()
     return states

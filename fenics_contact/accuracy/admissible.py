@@ -1,0 +1,170 @@
+"""An admissible multiplier near a computed one: within its cone and in equilibrium."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact.qp import CoarseSpace, ContactLayout, DualProblem, FeasibleSet, contact_step
+from fenics_contact.qp.face import Marks
+from fenics_contact.qp.reductions import Vector
+
+#: Forces out of balance below this share of all forces are rounding.
+ROUNDING = 1e-13
+#: Rounds of projections on the cone and on equilibrium, one after the other.
+ROUNDS = 100
+#: A round that leaves more than this share of what was out of balance leads nowhere.
+PROGRESS = 0.9
+#: A slip bound beyond every force.
+ENDLESS = 1e300
+
+
+@dataclass(frozen=True, eq=False)
+class Statuses:
+    """What contact does at a multiplier, and which rows are free for it.
+
+    Attributes:
+        problem: The dual problem.
+        closed: Contacts that press, shape (n_contact,), owned.
+        stick: Discs that stick, shape (n_friction,), owned.
+        slip: Discs on the circle, shape (n_friction,), owned; the others are pinned (Ψ = 0).
+        directions: Multiplier that gives the directions of friction forces, owned.
+    """
+
+    problem: DualProblem
+    closed: Marks
+    stick: Marks
+    slip: Marks
+    directions: Vector
+
+    @cached_property
+    def free(self) -> sp.csr_matrix:
+        """Basis of the rows whose multipliers are free and in which r should vanish, shape (size, n_face)."""
+        return basis(self.problem.layout, self.closed, self.stick, self.slip, self.directions)
+
+    @cached_property
+    def coarse(self) -> CoarseSpace:
+        """Equilibrium by the free rows alone, in evened multipliers. Collective on first use."""
+        return self.problem.evened.coarse.restricted(self.free)
+
+    def settled(self, residual: Vector) -> Vector:
+        """Return r without the rigid motions that fit it best on the free rows. Collective."""
+        evened = self.free.T @ (evening(self.problem) * residual)
+        return residual - self.problem.coarse.transpose(self.coarse.coefficients(evened))
+
+
+@dataclass(frozen=True, eq=False)
+class Admissible:
+    """A multiplier that a Tresca problem admits.
+
+    Attributes:
+        multiplier: λ with λ_N ≥ 0, ‖τ‖ ≤ Ψ and G λ = e, owned.
+        statuses: What contact does.
+        slip_bound: Ψ of the Tresca problem, shape (n_friction,), owned. It is the given one except where no
+            multiplier within it balances the load: at a load that all friction just resists the solver's
+            tolerance decides about that. It then is raised to the forces that were found.
+        unbalanced: What is left of G λ − e, measured in multipliers, relative to ‖λ‖.
+    """
+
+    multiplier: Vector
+    statuses: Statuses
+    slip_bound: Vector
+    unbalanced: float
+
+
+def admissible(problem: DualProblem, slip_bound: Vector, multiplier: Vector, residual: Vector) -> Admissible:
+    """Find an admissible multiplier near a computed one. Collective; no product.
+
+    Where the map w = λ − ρ r of the solver says open, the normal force is set to zero, where it says slip,
+    friction is set on its circle: what is missing there costs energy of first order, as gap and slip are not
+    small. Elsewhere λ is projected on the cone.
+
+    Args:
+        problem: The dual problem.
+        slip_bound: Ψ, shape (n_friction,), owned.
+        multiplier: λ, owned.
+        residual: r = F λ − d − Gᵀα, owned.
+    """
+    layout = problem.layout
+    trial = multiplier - contact_step(layout, problem.diagonal) * residual
+    wanted = trial[layout.tangential]
+    length = np.linalg.norm(wanted, axis=1)
+    slip = (slip_bound > 0.0) & (length >= slip_bound)
+    start = np.array(multiplier)
+    start[layout.normal[trial[layout.normal] <= 0.0]] = 0.0
+    start[layout.tangential[slip]] = (slip_bound[slip] / length[slip])[:, None] * wanted[slip]
+    stick = (slip_bound > 0.0) & ~slip
+    statuses = Statuses(problem, trial[layout.normal] > 0.0, stick, slip, start)
+    found, left = _balanced(statuses, FeasibleSet(layout, slip_bound), start)
+    if left > ROUNDING:
+        endless = FeasibleSet(layout, np.full_like(slip_bound, ENDLESS))
+        found, left = _balanced(statuses, endless, start)
+        slip_bound = np.maximum(slip_bound, np.linalg.norm(found[layout.tangential], axis=1))
+    return Admissible(found, statuses, slip_bound, left)
+
+
+def _balanced(statuses: Statuses, feasible: FeasibleSet, start: Vector) -> tuple[Vector, float]:
+    """Return a multiplier of the cone in equilibrium, and how much is left of G λ − e. Collective.
+
+    The shortest change of the free multipliers balances, or where these do not suffice, of all; what then
+    leaves the cone is projected again. Contact forces next to those that were moved take part: gluing forces
+    alone would carry the difference through the bodies, which bends thin ones.
+    """
+    problem, found = statuses.problem, feasible.project(start)
+    left = _unbalanced(problem, found)
+    every = sp.identity(problem.layout.size, format="csr")
+    for rows, coarse in ((statuses.free, statuses.coarse), (every, problem.evened.coarse)):
+        for _ in range(ROUNDS):
+            if left <= ROUNDING:
+                return found, left
+            lacking = rows @ coarse.transpose(coarse.solve(problem.coarse.residual(found)))
+            found = feasible.project(found - evening(problem) * lacking)
+            before, left = left, _unbalanced(problem, found)
+            if left > PROGRESS * before:
+                break
+    return found, left
+
+
+def evening(problem: DualProblem) -> Vector:
+    """Return the factors of the evened multipliers, one where stiffness is even, owned."""
+    return np.ones(problem.layout.size) if problem.scaling is None else problem.scaling.factor
+
+
+def rows_of(size: int, rows: np.ndarray) -> sp.csr_matrix:
+    """Return the restriction Z to some owned rows, shape (size, n_rows)."""
+    count = len(rows)
+    return sp.csr_matrix((np.ones(count), (rows, np.arange(count))), shape=(size, count))
+
+
+def basis(
+    layout: ContactLayout, closed: Marks, stick: Marks, turning: Marks, multiplier: Vector
+) -> sp.csr_matrix:
+    """Return Z of the gluing rows and some contact rows, orthonormal, shape (size, n_face), owned.
+
+    Args:
+        layout: Positions of the multipliers.
+        closed: Contacts whose normal row is in it, shape (n_contact,).
+        stick: Discs of which both rows are in it, shape (n_friction,).
+        turning: Discs of which the direction across the friction force is in it, shape (n_friction,).
+        multiplier: Gives the friction forces, owned.
+    """
+    rows = [layout.equality, layout.normal[closed], layout.tangential[stick].ravel()]
+    single = rows_of(layout.size, np.concatenate(rows))
+    if layout.tangential.shape[1] == 1:
+        return single
+    pairs = layout.tangential[turning]
+    tau = multiplier[pairs] / np.linalg.norm(multiplier[pairs], axis=1, keepdims=True)
+    values = np.stack([-tau[:, 1], tau[:, 0]], axis=1)
+    columns = np.repeat(np.arange(len(pairs)), 2)
+    turned = sp.csr_matrix((values.ravel(), (pairs.ravel(), columns)), shape=(layout.size, len(pairs)))
+    return sp.hstack([single, turned], format="csr")
+
+
+def _unbalanced(problem: DualProblem, multiplier: Vector) -> float:
+    coarse = problem.coarse
+    size = max(problem.norm(multiplier), coarse.norm(coarse.load))
+    left = coarse.norm(coarse.residual(multiplier))
+    return left / size if size > 0.0 else 0.0
