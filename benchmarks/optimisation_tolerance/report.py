@@ -31,6 +31,17 @@ Errors are relative and against states of tolerance 1e-11. Written by
 - *wrong status*: points whose open, stick or slip differs from the accurate state, over all designs.
 - *above the best*: J of the design that was found, evaluated accurately, over the best of all runs, in units
   of ε (1 + |J|), where ε is the stopping tolerance of the optimiser.
+
+How to read it: subgradient and value are about a tenth as wrong as the state is allowed to be, or less; the
+adjoint knows that error of the value, so that the corrected one is better by two digits. A fixed tolerance
+that is too loose for ε is not noticed by the optimiser: it may stop above the optimum and say that it
+converged. The adaptive one asks for what each step needs and confirms the last design before it stops.
+
+A loose state may take a point that is about to close or to slip for one that does so already. Beside such a
+switch the subgradient is then off by the kink, not by the tolerance, but it is that of the other side or
+between both: an inexact Clarke subgradient, which is all that the bundle method needs
+(`tests/shape/test_inexact_states.py`). Weakly active points are told as such only by states of 1e-7 or
+better.
 """
 
 
@@ -70,7 +81,7 @@ def _wrong(study: dict[str, Any]) -> str:
         wrong = [row["subgradient_error"] for row in mine if row["wrong_status"]]
         right = [row["subgradient_error"] for row in mine if not row["wrong_status"]]
         words = [
-            f"{len(errors)} designs with {kind} face, subgradient wrong by {np.median(errors):.1e} "
+            f"{len(errors)} design{'s' if len(errors) > 1 else ''} with {kind} face, subgradient wrong by {np.median(errors):.1e} "
             f"(median), {max(errors):.1e} (largest)"
             for kind, errors in (("the right", right), ("a wrong", wrong))
             if errors
@@ -149,7 +160,7 @@ def _plot_products(axes: Any, optima: list[dict[str, Any]]) -> None:
         heights = [runs[name]["products"] for name in names]
         bars = axes.bar(place + 0.4 * shift - 0.2, heights, 0.38, color=colours, alpha=shade)
         axes.bar_label(bars, fontsize="small")
-    axes.set_xticks(place, [name.replace(" from", "\nfrom") for name in names])
+    axes.set_xticks(place, [name.replace(" from", "\nfrom") for name in names], fontsize="small")
     axes.set_xlabel("tolerance of the states")
     axes.set_ylabel("products of the minimisation")
     axes.set_title("stopping tolerance 1e-4 (full) and 1e-6 (pale)", fontsize="medium")

@@ -321,9 +321,11 @@ def _finish(method: BundleTrust, state: MethodState, reason: Reason) -> Result:
     )
     if reason.success or not method.raise_on_failure:
         return result
+    refusals = [record.note for record in state.history if record.kind is Kind.REJECTED]
+    last = f"; the last trial: {refusals[-1]}" if reason is Reason.INVALID_DESIGNS else ""
     raise NotConvergedError(
         f"{reason.value} (after {result.iterations} serious steps and {result.evaluations} evaluations, "
-        f"best value {result.value:.9g})",
+        f"best value {result.value:.9g}{last})",
         result.history,
         result,
     )

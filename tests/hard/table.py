@@ -95,8 +95,8 @@ GROUPS: dict[str, tuple[str, str]] = {
     ),
     "interrupted": (
         "Interrupted runs",
-        "A checkpoint is replaced at once or not at all. What cannot be read or belongs to another problem is "
-        "refused; nothing starts anew where a checkpoint was expected.",
+        "A checkpoint is replaced at once or not at all. What cannot be read or belongs to another problem "
+        "is refused; nothing starts anew where a checkpoint was expected.",
     ),
 }
 

@@ -15,7 +15,7 @@ from tests.optimize.cases import BY_NAME, Case
 from tests.optimize.functions import Array
 
 #: Convex and constrained, with and without kinks at the minimum.
-NAMES = ("CB2", "QL", "Shor", "Maxquad", "Maxl", "MXHILB", "MAD4", "HS86")
+NAMES = ("CB2", "QL", "Shor", "Maxquad", "Maxl", "MAD4", "HS86")
 #: Relative errors above which a solver is not called one.
 ROUGHEST = (0.3, 0.1)
 
