@@ -32,7 +32,7 @@ Errors are relative and against states of tolerance 1e-11. Written by
 - *above the best*: J of the design that was found, evaluated accurately, over the best of all runs, in units
   of ε (1 + |J|), where ε is the stopping tolerance of the optimiser.
 
-How to read it: subgradient and value are about a tenth as wrong as the state is allowed to be, or less; the
+How to read it: subgradient and value are at most a quarter as wrong as the state is allowed to be; the
 adjoint knows that error of the value, so that the corrected one is better by two digits. A fixed tolerance
 that is too loose for ε is not noticed by the optimiser: it may stop above the optimum and say that it
 converged. The adaptive one asks for what each step needs and confirms the last design before it stops.
@@ -81,7 +81,8 @@ def _wrong(study: dict[str, Any]) -> str:
         wrong = [row["subgradient_error"] for row in mine if row["wrong_status"]]
         right = [row["subgradient_error"] for row in mine if not row["wrong_status"]]
         words = [
-            f"{len(errors)} design{'s' if len(errors) > 1 else ''} with {kind} face, subgradient wrong by {np.median(errors):.1e} "
+            f"{len(errors)} design{'s' if len(errors) > 1 else ''} with {kind} face, subgradient wrong by "
+            f"{np.median(errors):.1e} "
             f"(median), {max(errors):.1e} (largest)"
             for kind, errors in (("the right", right), ("a wrong", wrong))
             if errors
