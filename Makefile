@@ -19,7 +19,7 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demos test test-slow test-hard benchmark lint setup
+.PHONY: help demo demos test test-slow test-hard study-optimisation benchmark lint setup
 
 help: ## Show this list
 	@echo "Targets:"
@@ -46,6 +46,9 @@ test-slow: $(prepare) ## Run the tests that take long
 
 test-hard: $(prepare) ## Run the hard cases; writes docs/hard_cases.md
 	$(launch) 1 $(python) -m pytest tests/hard -m hard --hard-table docs/hard_cases.md
+
+study-optimisation: $(prepare) ## Measure what state tolerances do to an optimisation; docs/studies/
+	$(python) -m benchmarks.optimisation_tolerance $(if $(filter quick,$(BENCH)),--quick)
 
 benchmark: $(prepare) ## Measure time, memory and products; results in benchmarks/
 	$(python) -m benchmarks $(if $(filter quick,$(BENCH)),--quick)

@@ -2,6 +2,7 @@
 
 The floors of the package, from the ground up; each imports only those before it:
 
+* `fenics_contact.checkpoint`: files from which interrupted runs go on,
 * `fenics_contact.geometry`: chain links, blocks, Hertz bodies, partitions,
 * `fenics_contact.scene`: bodies, materials, supports, loads, contact pairs,
 * `fenics_contact.qp`: dual solvers for bounds and friction discs,

@@ -8,6 +8,7 @@ from fenics_contact.contact.result import ContactResult, Status
 from fenics_contact.contact.slip_bounds import Damping
 from fenics_contact.contact.state import State
 from fenics_contact.contact.steps import LoadSequence, solve_steps
+from fenics_contact.contact.stored import restored_state, stored_state
 
 __all__ = [
     "ContactResult",
@@ -19,6 +20,8 @@ __all__ = [
     "Status",
     "check_held",
     "find_state",
+    "restored_state",
     "solve_scene",
     "solve_steps",
+    "stored_state",
 ]

@@ -120,7 +120,8 @@ def find_state(
         )
         if slip_from is not None:
             torn = torn.with_slip_from(slip_from.torn.relative(slip_from.torn_displacement))
-        if previous is None or torn.scene.loads != previous.scene.loads:
+        same = previous is not None and torn.points is previous.torn.points
+        if previous is None or not same or torn.scene.loads != previous.scene.loads:
             check_held(torn)
     kind = choose_solver(scene, decomposition.tearing.n_subdomains, sensitivity=sensitivity)
     if solver is None and kind is SolverKind.DIRECT:

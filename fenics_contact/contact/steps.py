@@ -7,8 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from mpi4py import MPI
 
+from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.contact.equilibrium import decomposed, find_state
 from fenics_contact.contact.state import State
+from fenics_contact.contact.steps_done import StepsDone
 from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.feti import Decomposition
 from fenics_contact.qp import DualSolver
@@ -21,6 +23,8 @@ class LoadSequence:
 
     Slip is measured from the last step: u_T(t) − u_T(t − 1) is what friction opposes. So a block that was
     pushed and let go keeps the shear that its floor holds, and reversed sliding dissipates again.
+
+    With a checkpoint, steps that a run before this one has done are read instead of solved: one product each.
 
     Attributes:
         scene: The scene with the loads of the last step.
@@ -38,9 +42,26 @@ class LoadSequence:
         *,
         solver: DualSolver | None = None,
         tolerance: Tolerance = None,
+        checkpoint: Checkpoint | None = None,
     ) -> None:
-        """Start unloaded; arguments as for `solve_scene`."""
+        """Start unloaded; arguments as for `solve_scene`.
+
+        Args:
+            scene: Bodies, contact pairs, and the supports and loads that the steps do not give.
+            partitions: As for `solve_scene`; give them if a run may go on with another number of ranks.
+            comm: Communicator over which the subdomains are spread.
+            solver: As for `solve_scene`.
+            tolerance: As for `solve_scene`, for every step.
+            checkpoint: File that is written after the steps and that an interrupted history goes on from.
+
+        Raises:
+            InvalidInputError: If the checkpoint cannot be read or is one of another scene.
+        """
         self.scene, self.state = scene, None
+        if checkpoint is not None and partitions is None:
+            partitions = scene.partition(comm.size)
+        problem = {"scene": scene, "partitions": partitions, "solver": solver, "tolerance": tolerance}
+        self._done = StepsDone(checkpoint, problem, comm)
         self._partitions, self._comm = partitions, comm
         self._solver, self._tolerance = solver, tolerance
         self._decomposition: Decomposition | None = None
@@ -55,16 +76,24 @@ class LoadSequence:
             InvalidInputError: If the step's supports hold other components than before.
             InfeasibleError: If nothing holds some body against the new load.
             ConvergenceError: If the solver does not reach its tolerance.
+            CheckpointError: If the checkpoint cannot be written.
         """
         scene = step.applied_to(self.scene)
         if self._decomposition is None:
             self._decomposition, self._timer = decomposed(scene, self._partitions, self._comm)
-        state = find_state(
-            scene, self._decomposition, solver=self._solver, tolerance=self._tolerance, previous=self.state,
-            slip_from=self.state, timer=self._timer,
-        )  # fmt: skip
+        state = self._done.recalled(step, scene, self._decomposition, self.state, self._timer)
+        if state is None:
+            state = find_state(
+                scene, self._decomposition, solver=self._solver, tolerance=self._tolerance,
+                previous=self.state, slip_from=self.state, timer=self._timer,
+            )  # fmt: skip
+            self._done.keep(step, state)
         self.scene, self.state = scene, state
         return state
+
+    def finish(self) -> None:
+        """Write the steps that the checkpoint does not hold yet, if it is written less often. Collective."""
+        self._done.write()
 
 
 def solve_steps(
@@ -75,6 +104,7 @@ def solve_steps(
     *,
     solver: DualSolver | None = None,
     tolerance: Tolerance = None,
+    checkpoint: Checkpoint | None = None,
 ) -> tuple[State, ...]:
     """Find the states at the end of every load step, see `LoadSequence`. Collective on ``comm``.
 
@@ -85,10 +115,15 @@ def solve_steps(
         comm: Communicator over which the subdomains are spread.
         solver: As for `solve_scene`.
         tolerance: As for `solve_scene`, for every step.
+        checkpoint: As for `LoadSequence`.
 
     Example:
         >>> push = [LoadStep(f"push {s}", loads=[weight, pull(s)]) for s in (0.5, 1.0, 0.0)]  # doctest: +SKIP
         >>> states = solve_steps(scene, push, partitions, comm)  # doctest: +SKIP
     """
-    sequence = LoadSequence(scene, partitions, comm, solver=solver, tolerance=tolerance)
-    return tuple(sequence.advance(step) for step in steps)
+    sequence = LoadSequence(
+        scene, partitions, comm, solver=solver, tolerance=tolerance, checkpoint=checkpoint
+    )
+    states = tuple(sequence.advance(step) for step in steps)
+    sequence.finish()
+    return states

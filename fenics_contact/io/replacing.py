@@ -9,6 +9,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from fenics_contact.checkpoint.whole_file import synchronise
+
 
 @contextmanager
 def replacing(*targets: Path) -> Iterator[tuple[Path, ...]]:
@@ -41,12 +43,3 @@ def replace_all(written: Sequence[Path], folder: Path) -> None:
     for path in written:
         os.replace(path, folder / path.name)
     synchronise(folder)
-
-
-def synchronise(path: Path) -> None:
-    """Wait until a file or folder is on the disk."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

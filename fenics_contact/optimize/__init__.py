@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from fenics_contact.checkpoint import Checkpoint, CheckpointError
 from fenics_contact.errors import InvalidDesignError
 from fenics_contact.optimize.bundle_trust import BundleTrust
 from fenics_contact.optimize.constraints import Bounds, LinearConstraints, nearest_feasible
 from fenics_contact.optimize.minimization import minimize
+from fenics_contact.optimize.objective import Inexact
 from fenics_contact.optimize.problem import Problem, pose
+from fenics_contact.optimize.progress import Resumable
 from fenics_contact.optimize.quadratic_program import SubproblemError
 from fenics_contact.optimize.result import Kind, NotConvergedError, Reason, Record, Result
 
 __all__ = [
     "Bounds",
     "BundleTrust",
+    "Checkpoint",
+    "CheckpointError",
+    "Inexact",
     "InvalidDesignError",
     "Kind",
     "LinearConstraints",
@@ -21,6 +27,7 @@ __all__ = [
     "Reason",
     "Record",
     "Result",
+    "Resumable",
     "SubproblemError",
     "minimize",
     "nearest_feasible",

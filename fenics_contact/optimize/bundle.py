@@ -27,6 +27,9 @@ class Bundle:
         errors: α_i, shape (m,), units of J.
         distances: s_i in scaled variables, shape (m,).
         locality: c, units of J; 0 for a convex objective.
+        noise: Error e_i of the value that plane i was found with, shape (m,), units of J. A plane may lie too
+            high by e_i, seen from a centre whose value is too low by e_0, and is pushed down by both: an
+            inexact plane promises no less decrease than there may be.
 
     References:
         K. C. Kiwiel, Methods of Descent for Nondifferentiable Optimization, Lecture Notes in
@@ -38,6 +41,13 @@ class Bundle:
     errors: Array
     distances: Array
     locality: float
+    noise: Array
+
+    @classmethod
+    def of_centre(cls, gradient: Array, locality: float, noise: float = 0.0) -> Bundle:
+        """Return the bundle that holds the centre's own plane alone."""
+        zero = np.zeros(1)
+        return cls(gradient[None], zero, zero, locality, np.array([noise]))
 
     @property
     def size(self) -> int:
@@ -47,20 +57,35 @@ class Bundle:
     @property
     def measures(self) -> Array:
         """Subgradient locality measures β_i, shape (m,), not negative."""
-        return np.maximum(np.abs(self.errors), self.locality * self.distances**2)
+        away = self.noise + self.noise[0]
+        away[0] = 0.0
+        return np.maximum(np.abs(self.errors), self.locality * self.distances**2) + away
 
     def model(self, step: Array) -> float:
         """Return the predicted change of J, max_i (g_i·y - β_i), for a step y of shape (n,)."""
         return float(np.max(self.gradients @ step - self.measures))
 
-    def with_cut(self, gradient: Array, error: float, distance: float) -> Bundle:
+    def with_cut(self, gradient: Array, error: float, distance: float, noise: float = 0.0) -> Bundle:
         """Return the bundle with one more plane at the end."""
         return Bundle(
             np.vstack([self.gradients, gradient]),
             np.append(self.errors, error),
             np.append(self.distances, distance),
             self.locality,
+            np.append(self.noise, noise),
         )
+
+    def refined(self, gradient: Array, change: float, noise: float) -> Bundle:
+        """Return the bundle after its centre was evaluated again.
+
+        Args:
+            gradient: The centre's subgradient, shape (n,), scaled variables.
+            change: Change of the centre's value.
+            noise: Its error now.
+        """
+        gradients, errors, noises = self.gradients.copy(), self.errors + change, self.noise.copy()
+        gradients[0], errors[0], noises[0] = gradient, 0.0, noise
+        return Bundle(gradients, errors, self.distances, self.locality, noises)
 
     def moved(self, step: Array, change: float, locality: float) -> Bundle:
         """Return the bundle seen from a new centre, whose own plane is the last one.
@@ -77,7 +102,7 @@ class Bundle:
         distances = self.distances + np.linalg.norm(step)
         errors[-1] = distances[-1] = 0.0
         order = np.roll(np.arange(self.size), 1)
-        return Bundle(self.gradients[order], errors[order], distances[order], locality)
+        return Bundle(self.gradients[order], errors[order], distances[order], locality, self.noise[order])
 
     def reduced(self, weights: Array, room: int) -> Bundle:
         """Return a bundle with at most ``room`` planes that has the same solution of the step's programme.
@@ -103,9 +128,14 @@ class Bundle:
         kept = self.chosen(np.concatenate([[0], np.sort(order[: room - 2])]))
         share = weights / weights.sum()
         return kept.with_cut(
-            share @ self.gradients, float(share @ self.errors), float(share @ self.distances)
+            share @ self.gradients,
+            float(share @ self.errors),
+            float(share @ self.distances),
+            float(share @ self.noise),
         )
 
     def chosen(self, rows: NDArray[np.intp]) -> Bundle:
         """Return the bundle of some planes, given by their numbers."""
-        return Bundle(self.gradients[rows], self.errors[rows], self.distances[rows], self.locality)
+        return Bundle(
+            self.gradients[rows], self.errors[rows], self.distances[rows], self.locality, self.noise[rows]
+        )

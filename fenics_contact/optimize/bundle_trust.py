@@ -9,13 +9,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
 from fenics_contact.optimize.bundle import Bundle
-from fenics_contact.optimize.objective import Evaluation, evaluate
+from fenics_contact.optimize.inexactness import Demand, again, demand
+from fenics_contact.optimize.objective import Accuracy, Evaluation, can_be_inexact, evaluate
 from fenics_contact.optimize.problem import Problem
+from fenics_contact.optimize.progress import Progress
 from fenics_contact.optimize.quadratic_program import SubproblemError
 from fenics_contact.optimize.result import Kind, NotConvergedError, Reason, Record, Result
-from fenics_contact.optimize.stopping import stopping_test
+from fenics_contact.optimize.state import MethodState
+from fenics_contact.optimize.stopping import StoppingTest, stopping_test
 from fenics_contact.optimize.subproblem import Step, solve_step
 from fenics_contact.optimize.trust import Trial, Trust
 
@@ -27,6 +31,8 @@ _LOG = logging.getLogger(__name__)
 _RADIUS = 3.0  # first trust radius, in lengths of the problem
 _RADIUS_LEAST = 1e-8  # least one, in lengths of the problem
 _T_LEAST, _T_MOST = 1e-10, 1e4  # range of t, in units of the first t
+_FIRST_SUBGRADIENT = 0.01  # relative error that the first subgradient of an inexact function may have
+_SLOPE_SHARE = 0.1  # part of the predicted decrease by which an inexact subgradient may be wrong along a step
 
 
 @dataclass(frozen=True)
@@ -55,6 +61,10 @@ class BundleTrust:
     that is longer. On the published convex test functions the error of J at the stop is below ε (s + \|J\|);
     for a nonconvex one the test asks for stationarity only.
 
+    A function that can be evaluated inexactly (`Inexact`) is asked for no more accuracy than the predicted
+    decrease needs. The centre is evaluated again where that has fallen so far that its error counts, and once
+    more before the method stops: at the end value and subgradient are as good as ε asks.
+
     Attributes:
         tolerance: ε, relative stopping tolerance.
         max_iterations: Most serious steps.
@@ -65,6 +75,8 @@ class BundleTrust:
         locality: Weight of the distance in β_i = max(\|α_i\|, c s_i²), c = locality·‖g‖/length: how fast old
             planes of a nonconvex J are distrusted. 0 is right, and faster, for a convex J.
         descent: Part of the predicted decrease that makes a step serious, in (0, 1).
+        inexactness: Errors of J that are asked of an inexact function, as a part of the predicted decrease,
+            less than half of ``descent``.
         value_scale: Absolute part of the stopping test, for an objective whose least value is about 0.
         raise_on_failure: Whether a stop for any other reason than CONVERGED or STATIONARY raises.
 
@@ -82,6 +94,7 @@ class BundleTrust:
     first_step: float = 0.3
     locality: float = 0.1
     descent: float = 0.05
+    inexactness: float = 0.02
     value_scale: float = 1.0
     raise_on_failure: bool = True
 
@@ -95,78 +108,94 @@ class BundleTrust:
                 raise InvalidInputError(f"{name} must be at least {least}, got {getattr(self, name)}")
         if not 0.0 < self.descent < 1.0:
             raise InvalidInputError(f"descent must lie in (0, 1), got {self.descent}")
+        if not 0.0 < self.inexactness < 0.5 * self.descent:
+            raise InvalidInputError(
+                f"inexactness must lie between 0 and half of descent, {0.5 * self.descent}, got "
+                f"{self.inexactness}: else the error could pass for a descent"
+            )
         if not 0.0 <= self.locality < np.inf:
             raise InvalidInputError(f"locality must not be negative (0 for a convex J), got {self.locality}")
 
-    def minimize(self, problem: Problem, callback: Callback | None = None) -> Result:
+    def minimize(
+        self, problem: Problem, callback: Callback | None = None, checkpoint: Checkpoint | None = None
+    ) -> Result:
         """Run the method on a checked problem; `fenics_contact.optimize.minimize` is the usual way in.
 
         Args:
             problem: What `pose` returned.
             callback: Called with each record and a copy of the best point.
+            checkpoint: File to go on from and to write to.
 
         Returns:
             The best point, the reason for the stop and the history.
 
         Raises:
             NotConvergedError: If the stop is a failure and ``raise_on_failure`` is set.
+            InvalidInputError: If the checkpoint cannot be gone on from.
+            CheckpointError: If the checkpoint cannot be written.
         """
-        state = _start(self, problem)
+        progress = Progress(checkpoint, self, problem)
+        state = progress.recalled()
+        if state is None:
+            state = _start(self, problem)
+            progress.keep(state)
+            _tell(callback, state)
+        else:
+            _LOG.info("going on after %d evaluations", state.evaluations)
         reason: Reason | None = None
         while reason is None:
-            if callback is not None:
-                callback(state.history[-1], state.centre.x.copy())
             try:
                 state, reason = _iterated(self, problem, state)
             except SubproblemError as error:
                 _LOG.warning("%s", error)
                 reason = Reason.STEP_FAILED
+            if reason is None:
+                progress.keep(state)
+                _tell(callback, state)
+        progress.keep(state, last=True)
         return _finish(self, state, reason)
 
 
-@dataclass(frozen=True)
-class _State:
-    """Where the method stands between two evaluations."""
-
-    centre: Evaluation
-    bundle: Bundle
-    trust: Trust
-    first_t: float
-    history: tuple[Record, ...]
-
-    @property
-    def iterations(self) -> int:
-        return self.history[-1].iteration
-
-    @property
-    def evaluations(self) -> int:
-        return self.history[-1].evaluations
+def _tell(callback: Callback | None, state: MethodState) -> None:
+    if callback is not None:
+        callback(state.history[-1], state.centre.x.copy())
 
 
-def _start(method: BundleTrust, problem: Problem) -> _State:
+def _start(method: BundleTrust, problem: Problem) -> MethodState:
     try:
-        centre = evaluate(problem.fun, problem.start, 1)
+        centre = evaluate(problem.fun, problem.start, 1, Accuracy(np.inf, _FIRST_SUBGRADIENT))
     except InvalidDesignError as error:
         raise InvalidDesignError(f"the starting design must be valid: {error}") from error
     gradient = centre.subgradient * problem.scale
     norm = float(np.linalg.norm(gradient))
     t = method.first_step * problem.length / (norm or 1.0)
-    zero = np.zeros(1)
-    bundle = Bundle(gradient[None], zero, zero, method.locality * norm / problem.length)
+    bundle = Bundle.of_centre(gradient, method.locality * norm / problem.length, centre.error)
     radius = _RADIUS * problem.length
     trust = Trust(t, radius, _T_LEAST * t, _T_MOST * t, _RADIUS_LEAST * problem.length)
-    record = Record(0, Kind.START, centre.value, centre.value, 0.0, t, 0.0, norm, 0.0, 1, 1)
-    return _State(centre, bundle, trust, t, (record,))
+    record = Record(0, Kind.START, centre.value, centre.value, 0.0, t, 0.0, norm, 0.0, 1, 1, centre.error)
+    return MethodState(centre, bundle, trust, t, (record,))
 
 
-def _iterated(method: BundleTrust, problem: Problem, state: _State) -> tuple[_State, Reason | None]:
+def _iterated(method: BundleTrust, problem: Problem, state: MethodState) -> tuple[MethodState, Reason | None]:
     step, trust = _guarded_step(problem, state)
     state = replace(state, trust=trust)
-    reason = _reason_to_stop(method, problem, state, step)
-    return (_advanced(method, problem, state, step), None) if reason is None else (state, reason)
+    test = stopping_test(
+        state.centre.value,
+        tolerance=method.tolerance,
+        value_scale=method.value_scale,
+        reach=method.first_step * problem.length,
+        first_t=state.first_t,
+    )
+    reason = _reason_to_stop(method, problem, state, step, test)
+    wanted = _wanted(method, problem, state, step, test, claim=reason is not None and reason.success)
+    if wanted is not None and state.evaluations < method.max_evaluations:
+        return _refined(problem, state, step, wanted), None
+    if reason is not None:
+        return state, reason
+    return _advanced(method, problem, state, step, _demand(method, state, step, test)), None
 
 
-def _guarded_step(problem: Problem, state: _State) -> tuple[Step, Trust]:
+def _guarded_step(problem: Problem, state: MethodState) -> tuple[Step, Trust]:
     """Solve the step's programme, with t small enough to stay in the trust region."""
     near = problem.allowed.around(state.centre.x, problem.scale)
     trust = state.trust
@@ -179,15 +208,39 @@ def _guarded_step(problem: Problem, state: _State) -> tuple[Step, Trust]:
     return step, trust
 
 
-def _reason_to_stop(method: BundleTrust, problem: Problem, state: _State, step: Step) -> Reason | None:
+def _demand(
+    method: BundleTrust, state: MethodState, step: Step, test: StoppingTest, reach: float = 0.0
+) -> Demand:
+    """Return what a trial of the step needs, or a claim about all points within ``reach``."""
+    norm = float(np.linalg.norm(state.bundle.gradients[0]))
+    worth = max(step.decrease, test.limit if reach else test.rounding)
+    return demand(worth, max(step.length, reach), norm, (method.inexactness, _SLOPE_SHARE))
+
+
+def _wanted(
+    method: BundleTrust, problem: Problem, state: MethodState, step: Step, test: StoppingTest, *, claim: bool
+) -> Accuracy | None:
+    """Return the accuracy with which the centre must be evaluated again, None where it is good enough."""
+    if not can_be_inexact(problem.fun):
+        return None
+    needed = _demand(method, state, step, test, test.reach if claim else 0.0)
+    if needed.missed_by(state.centre) or (claim and not needed.confirmed_by(state.centre)):
+        return needed.sharper_than(state.centre)
+    return None
+
+
+def _refined(problem: Problem, state: MethodState, step: Step, accuracy: Accuracy) -> MethodState:
+    """Evaluate the centre again, more accurately."""
+    centre = state.centre
+    found = again(centre, evaluate(problem.fun, centre.x, state.evaluations + 1, accuracy))
+    bundle = state.bundle.refined(found.subgradient * problem.scale, found.value - centre.value, found.error)
+    return replace(state, centre=found, bundle=bundle, history=_recorded(state, step, Kind.REFINED, found))
+
+
+def _reason_to_stop(
+    method: BundleTrust, problem: Problem, state: MethodState, step: Step, test: StoppingTest
+) -> Reason | None:
     """Return why the method must stop before trying the step, or None."""
-    test = stopping_test(
-        state.centre.value,
-        tolerance=method.tolerance,
-        value_scale=method.value_scale,
-        reach=method.first_step * problem.length,
-        first_t=state.first_t,
-    )
     near = problem.allowed.around(state.centre.x, problem.scale)
     solved = test.reason(step, lambda t: solve_step(state.bundle, near, t))
     if solved is not None:
@@ -201,23 +254,25 @@ def _reason_to_stop(method: BundleTrust, problem: Problem, state: _State, step: 
     return Reason.EVALUATION_LIMIT if state.evaluations >= method.max_evaluations else None
 
 
-def _advanced(method: BundleTrust, problem: Problem, state: _State, step: Step) -> _State:
+def _advanced(
+    method: BundleTrust, problem: Problem, state: MethodState, step: Step, needed: Demand
+) -> MethodState:
     """Try the step and return the state after its null, serious or rejected trial."""
     x = problem.allowed.project(state.centre.x + problem.scale * step.move)
     step = replace(step, move=(x - state.centre.x) / problem.scale)
     try:
-        found = evaluate(problem.fun, x, state.evaluations + 1)
+        found = evaluate(problem.fun, x, state.evaluations + 1, needed.asked)
     except InvalidDesignError as error:
         _LOG.info("trial design %d is invalid: %s", state.evaluations + 1, error)
         trust = state.trust.after_rejection(step.length)
-        return replace(state, trust=trust, history=_recorded(state, step, Kind.REJECTED, np.nan))
+        return replace(state, trust=trust, history=_recorded(state, step, Kind.REJECTED, None, str(error)))
     gradient = found.subgradient * problem.scale
     change, slope = found.value - state.centre.value, float(gradient @ step.move)
     bundle = state.bundle.reduced(step.weights, method.max_bundle - 1)
-    bundle = bundle.with_cut(gradient, slope - change, step.length)
+    bundle = bundle.with_cut(gradient, slope - change, step.length, found.error)
     trial = Trial(step, change, slope, float(bundle.measures[-1]))
     if change > -method.descent * step.decrease:
-        history = _recorded(state, step, Kind.NULL, found.value)
+        history = _recorded(state, step, Kind.NULL, found)
         return replace(state, bundle=bundle, trust=state.trust.after_null(trial), history=history)
     locality = method.locality * float(np.linalg.norm(gradient)) / problem.length
     return replace(
@@ -225,17 +280,19 @@ def _advanced(method: BundleTrust, problem: Problem, state: _State, step: Step) 
         centre=found,
         bundle=bundle.moved(step.move, change, locality),
         trust=state.trust.after_serious(trial),
-        history=_recorded(state, step, Kind.SERIOUS, found.value),
+        history=_recorded(state, step, Kind.SERIOUS, found),
     )
 
 
-def _recorded(state: _State, step: Step, kind: Kind, value: float) -> tuple[Record, ...]:
-    serious = kind is Kind.SERIOUS
+def _recorded(
+    state: MethodState, step: Step, kind: Kind, found: Evaluation | None, note: str = ""
+) -> tuple[Record, ...]:
+    value = np.nan if found is None else found.value
     record = Record(
-        iteration=state.iterations + serious,
+        iteration=state.iterations + (kind is Kind.SERIOUS),
         kind=kind,
         value=value,
-        best=value if serious else state.centre.value,
+        best=value if kind in (Kind.SERIOUS, Kind.REFINED) else state.centre.value,
         predicted_decrease=step.decrease,
         t=step.t,
         step_length=step.length,
@@ -243,12 +300,14 @@ def _recorded(state: _State, step: Step, kind: Kind, value: float) -> tuple[Reco
         aggregate_error=step.aggregate_error,
         bundle_size=state.bundle.size,
         evaluations=state.evaluations + 1,
+        error=0.0 if found is None else found.error,
+        note=note,
     )
     _LOG.info("%s", record)
     return (*state.history, record)
 
 
-def _finish(method: BundleTrust, state: _State, reason: Reason) -> Result:
+def _finish(method: BundleTrust, state: MethodState, reason: Reason) -> Result:
     centre = state.centre
     result = Result(
         x=centre.x,
@@ -258,12 +317,15 @@ def _finish(method: BundleTrust, state: _State, reason: Reason) -> Result:
         iterations=state.iterations,
         evaluations=state.evaluations,
         history=state.history,
+        error=centre.error,
     )
     if reason.success or not method.raise_on_failure:
         return result
+    refusals = [record.note for record in state.history if record.kind is Kind.REJECTED]
+    last = f"; the last trial: {refusals[-1]}" if reason is Reason.INVALID_DESIGNS else ""
     raise NotConvergedError(
         f"{reason.value} (after {result.iterations} serious steps and {result.evaluations} evaluations, "
-        f"best value {result.value:.9g})",
+        f"best value {result.value:.9g}{last})",
         result.history,
         result,
     )

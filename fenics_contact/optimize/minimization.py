@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.optimize.bundle_trust import BundleTrust, Callback
 from fenics_contact.optimize.constraints import Bounds, LinearConstraints
 from fenics_contact.optimize.objective import Fun
@@ -20,6 +21,7 @@ def minimize(
     constraints: LinearConstraints | None = None,
     scale: ArrayLike | None = None,
     callback: Callback | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> Result:
     """Minimise a locally Lipschitz function, convex or not, over a box and linear constraints.
 
@@ -37,12 +39,16 @@ def minimize(
         scale: Size of each variable, shape (n,) or a number. None takes the widths of the box where it is
             bounded on all sides, so choose bounds that mean something; else 1.
         callback: Called after every evaluation with its record and the best point so far.
+        checkpoint: File that is written after evaluations and from which an interrupted run goes on with the
+            iterates that it would have had; None keeps nothing. Limits and tolerance may be changed between.
 
     Returns:
         The best point, its value and subgradient, the reason for the stop and the history.
 
     Raises:
-        InvalidInputError: If a shape does not fit, x0 is infeasible, or ``fun`` returns nan or inf.
+        InvalidInputError: If a shape does not fit, x0 is infeasible, ``fun`` returns nan or inf, or the
+            checkpoint is unreadable or one of another problem.
+        CheckpointError: If the checkpoint cannot be written; the one before is as it was.
         InvalidDesignError: If J does not exist at x0.
         NotConvergedError: If the method stops before its tolerance is met, with the history and the best
             result so far; not if ``method.raise_on_failure`` is False.
@@ -57,4 +63,4 @@ def minimize(
         (1.0, 'STATIONARY')
     """
     problem = pose(fun, x0, bounds, constraints, scale)
-    return (method or BundleTrust()).minimize(problem, callback)
+    return (method or BundleTrust()).minimize(problem, callback, checkpoint)

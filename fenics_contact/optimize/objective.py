@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +15,40 @@ Array = NDArray[np.float64]
 Fun = Callable[[Array], tuple[float, ArrayLike]]
 
 
+@runtime_checkable
+class Inexact(Protocol):
+    """A function that is cheaper where it may be less accurate: a state solved by an iteration."""
+
+    def __call__(self, x: Array) -> tuple[float, ArrayLike]:
+        """Return value and subgradient as accurately as it can."""
+
+    @property
+    def inexact(self) -> bool:
+        """Whether `within` can save anything; else it is not called."""
+
+    def within(self, x: Array, value: float, subgradient: float) -> tuple[float, ArrayLike, float]:
+        """Return the value, a subgradient, and the estimated error of the value.
+
+        Args:
+            x: Point, shape (n,).
+            value: Largest error of the value, units of J; inf where anything will do.
+            subgradient: Largest error of the subgradient, relative to it.
+        """
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """What is asked of an evaluation: 0 the best that the function can do, inf anything.
+
+    Attributes:
+        value: Largest error of J.
+        subgradient: Largest relative error of the subgradient.
+    """
+
+    value: float = 0.0
+    subgradient: float = 0.0
+
+
 @dataclass(frozen=True)
 class Evaluation:
     """Value and subgradient at a point.
@@ -22,20 +57,35 @@ class Evaluation:
         x: Point, shape (n,).
         value: J(x).
         subgradient: One subgradient, shape (n,), in the caller's variables.
+        error: Estimated error of the value.
+        asked_value: Error of the value that was allowed, 0 for an exact function.
+        asked_subgradient: Relative error of the subgradient that was allowed.
+        turned: By how much the subgradient differs from that of a less accurate evaluation of the same point,
+            relative to it: 0 for an exact function, inf where there is nothing to compare with.
     """
 
     x: Array
     value: float
     subgradient: Array
+    error: float = 0.0
+    asked_value: float = 0.0
+    asked_subgradient: float = 0.0
+    turned: float = 0.0
 
 
-def evaluate(fun: Fun, x: Array, number: int) -> Evaluation:
+def can_be_inexact(fun: Fun) -> bool:
+    """Tell whether a function gains by being asked for no more accuracy than needed."""
+    return isinstance(fun, Inexact) and fun.inexact
+
+
+def evaluate(fun: Fun, x: Array, number: int, accuracy: Accuracy | None = None) -> Evaluation:
     """Call the function with a copy of x and check what it returns.
 
     Args:
         fun: Returns the value and one subgradient.
         x: Point, shape (n,).
         number: Count of this evaluation, for the message.
+        accuracy: What is asked of a function that can be inexact; None for the best it can do.
 
     Returns:
         Copies of all three.
@@ -44,7 +94,20 @@ def evaluate(fun: Fun, x: Array, number: int) -> Evaluation:
         InvalidInputError: If the answer is no pair of a finite number and n finite numbers.
         InvalidDesignError: If the function raises it.
     """
-    answer, where = fun(x.copy()), f"at evaluation {number}"
+    if accuracy is None or not (isinstance(fun, Inexact) and fun.inexact):
+        return _checked(fun(x.copy()), x, f"at evaluation {number}")
+    value, subgradient, error = fun.within(x.copy(), accuracy.value, accuracy.subgradient)
+    found = _checked((value, subgradient), x, f"at evaluation {number}")
+    return replace(
+        found,
+        error=float(error),
+        asked_value=accuracy.value,
+        asked_subgradient=accuracy.subgradient,
+        turned=float(np.inf),
+    )
+
+
+def _checked(answer: Any, x: Array, where: str) -> Evaluation:
     if not isinstance(answer, tuple) or len(answer) != 2:
         raise InvalidInputError(f"fun must return (value, subgradient), got {type(answer).__name__} {where}")
     value, subgradient = np.array(answer[0], dtype=float), np.array(answer[1], dtype=float)

@@ -48,12 +48,13 @@ class Reason(Enum):
 
 
 class Kind(Enum):
-    """What became of a trial point."""
+    """What became of a trial point; REFINED is the centre, evaluated again with a smaller error."""
 
     START = "start"
     SERIOUS = "serious"
     NULL = "null"
     REJECTED = "rejected"
+    REFINED = "refined"
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,8 @@ class Record:
         aggregate_error: Linearisation error of the aggregate subgradient.
         bundle_size: Cutting planes in the model that made the step.
         evaluations: Evaluations up to and with this one.
+        error: Estimated error of `value`; 0 for a function that is exact or does not tell.
+        note: Why a trial point was rejected; empty for any other.
     """
 
     iteration: int
@@ -85,6 +88,8 @@ class Record:
     aggregate_error: float
     bundle_size: int
     evaluations: int
+    error: float = 0.0
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -99,6 +104,7 @@ class Result:
         iterations: Serious steps.
         evaluations: Evaluations of the objective, failed ones included.
         history: One record for each evaluation, oldest first.
+        error: Estimated error of the value; 0 for a function that is exact or does not tell.
     """
 
     x: Array
@@ -108,6 +114,7 @@ class Result:
     iterations: int
     evaluations: int
     history: tuple[Record, ...]
+    error: float = 0.0
 
 
 class NotConvergedError(ConvergenceError):

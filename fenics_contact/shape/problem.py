@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
+from fenics_contact.checkpoint import described
 from fenics_contact.contact import State, find_state
-from fenics_contact.errors import InvalidDesignError, InvalidInputError
+from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidDesignError, InvalidInputError
 from fenics_contact.feti import decompose
 from fenics_contact.qp import DualSolver, FaceNewton
 from fenics_contact.scene import Scene, SurfaceLoad
@@ -18,38 +20,21 @@ from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
 from fenics_contact.shape.contact_derivative import bound_sensitivity, contact_by_shape
 from fenics_contact.shape.design import SurfaceDesign
 from fenics_contact.shape.forms import ShapeForms, work_by_shape
-from fenics_contact.shape.linearised_face import WeakChoice, WeakPoints, linearise_face
+from fenics_contact.shape.linearised_face import WeakChoice, linearise_face
+from fenics_contact.shape.memory import DesignMemory, DesignPoint
 from fenics_contact.shape.motion import HarmonicExtension
 from fenics_contact.shape.objective import Objective
 from fenics_contact.shape.pairs import check_pairs
+from fenics_contact.shape.state_error import state_error
+from fenics_contact.shape.tolerance import AdaptiveTolerance
 from fenics_contact.shape.volume import volume_by_points
 from fenics_contact.timing import PhaseTimer
 
-#: Tolerance of the adjoint relative to that of the state, and the smallest one asked for.
+#: Tolerance of the adjoint relative to that of the state, and the smallest one asked for: the subgradient may
+#: not be worse than the state it is taken at, down to what rounding allows.
 ADJOINT_SHARE, ADJOINT_FLOOR = 1e-1, 1e-11
 
 logger = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, eq=False)
-class DesignPoint:
-    """A design that was evaluated.
-
-    Attributes:
-        alpha: Design variables, shape (size,).
-        value: Objective.
-        gradient: Clarke subgradient, shape (size,); the gradient where no point is weakly active.
-        state: Equilibrium.
-        weak: Weakly active points and the branch they were given.
-        adjoint_iterations: F-products of the adjoint.
-    """
-
-    alpha: np.ndarray
-    value: float
-    gradient: np.ndarray
-    state: State
-    weak: WeakPoints
-    adjoint_iterations: int
 
 
 class ShapeProblem:
@@ -60,8 +45,9 @@ class ShapeProblem:
 
     Attributes:
         designs: The moving surfaces; α is their variables one after the other.
-        first: The design evaluated first.
-        best: The design with the smallest objective so far.
+        first: The design evaluated first; after a run was resumed, built again when it is first asked for, by
+            all ranks together.
+        best: The design with the smallest objective so far, likewise.
         last: The design evaluated last.
         seconds: Wall time of this rank by phase, over all evaluations.
         products: F-products of states and adjoints so far.
@@ -78,6 +64,7 @@ class ShapeProblem:
         *,
         solver: DualSolver | None = None,
         choice: WeakChoice = WeakChoice.RELEASED,
+        tolerance: float | AdaptiveTolerance | None = None,
     ) -> None:
         """Decompose the scene and prepare the mesh motion. Collective on ``comm``.
 
@@ -89,18 +76,21 @@ class ShapeProblem:
             comm: Communicator.
             solver: Dual solver of the states, `FaceNewton()` by default.
             choice: Branch for weakly active points.
+            tolerance: Relative residual of the states: a number for all of them, or `AdaptiveTolerance()`,
+                with which an optimiser asks for no more than it needs; None for that of the solver.
         """
         self.scene, self.objective, self.choice = scene, objective, choice
         self.designs = (designs,) if isinstance(designs, SurfaceDesign) else tuple(designs)
         self.solver = solver or FaceNewton()
-        # The subgradient may not be worse than the state it is taken at, down to what rounding allows.
-        self._adjoint_tolerance = max(ADJOINT_SHARE * self.solver.tolerance, ADJOINT_FLOOR)
+        self._adaptive = tolerance if isinstance(tolerance, AdaptiveTolerance) else None
+        if isinstance(tolerance, AdaptiveTolerance):
+            self._tightest = tolerance.tightest
+        else:
+            self._tightest = self.solver.tolerance if tolerance is None else float(tolerance)
         self._timer = PhaseTimer()
         self.evaluations, self.products = 0, 0
-        self.first: DesignPoint | None = None
-        self.best: DesignPoint | None = None
-        self.last: DesignPoint | None = None
-        self._previous: State | None = None
+        self._partitions = partitions
+        self._memory = DesignMemory(self)
         self._forms: ShapeForms | None = None
         if scene.dim != 3:
             raise InvalidInputError(
@@ -117,6 +107,50 @@ class ShapeProblem:
     def size(self) -> int:
         """Number of design variables."""
         return sum(design.size for design in self.designs)
+
+    @property
+    def comm(self) -> MPI.Comm:
+        """Communicator over which the subdomains are spread."""
+        return self.decomposition.comm
+
+    @property
+    def first(self) -> DesignPoint | None:
+        """The design evaluated first. Collective after a run was resumed."""
+        return self._memory.point("first")
+
+    @property
+    def best(self) -> DesignPoint | None:
+        """The design with the smallest objective so far. Collective after a run was resumed."""
+        return self._memory.point("best")
+
+    @property
+    def last(self) -> DesignPoint | None:
+        """The design evaluated last. Collective after a run was resumed."""
+        return self._memory.point("last")
+
+    def fingerprint(self) -> dict[str, str]:
+        """Say which problem it is, for a checkpoint."""
+        parts: dict[str, Any] = {
+            "scene": self.scene,
+            "partitions": self._partitions,
+            "designs": self.designs,
+            "objective": self.objective,
+            "solver": self.solver,
+            "tolerance": self._adaptive or self._tightest,
+            "choice": self.choice,
+        }
+        return {key: text for name, part in parts.items() for key, text in described(part, name).items()}
+
+    def memory(self) -> dict[str, np.ndarray]:
+        """Return what the next state depends on, and the designs that are kept. Collective."""
+        counts = np.array([self.evaluations, self.products])
+        return {"counts": counts, **self._memory.stored()}
+
+    def recall(self, memory: Mapping[str, np.ndarray]) -> None:
+        """Go on from what `memory` returned, also on another number of ranks. Collective."""
+        stored = dict(memory)
+        self.evaluations, self.products = (int(count) for count in stored.pop("counts"))
+        self._memory.recall(stored)
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -161,15 +195,12 @@ class ShapeProblem:
             raise InvalidDesignError(f"the design cannot be meshed: {error}") from error
 
     def state_of(self, alpha: np.ndarray) -> State:
-        """Return the equilibrium of a design, started from the one before. Collective."""
-        with self._timer.phase("mesh motion"):
-            scene = self.scene_of(alpha)
-        state = find_state(
-            scene, self.decomposition, solver=self.solver, previous=self._previous,
-            start_geometry=self._previous is None, sensitivity=True, timer=self._timer,
-        )  # fmt: skip
-        self._previous = state
-        return state
+        """Return the equilibrium of a design, started from the one before. Collective.
+
+        Raises:
+            InvalidDesignError: If the design inverts a cell, or no equilibrium is found for it.
+        """
+        return self._solved(alpha, self._tightest)
 
     def value_of(self, alpha: np.ndarray) -> float:
         """Return J(α) alone, without adjoint. Collective."""
@@ -177,37 +208,112 @@ class ShapeProblem:
         return self.objective.value(state, self._shape_forms(state))
 
     def evaluate(self, alpha: np.ndarray) -> DesignPoint:
-        """Solve the state and its adjoint and return value and subgradient. Collective."""
-        state = self.state_of(alpha)
+        """Solve the state and its adjoint and return value and subgradient. Collective.
+
+        Raises:
+            InvalidDesignError: If the design inverts a cell, or no equilibrium is found for it.
+        """
+        known = self._memory.of_design(alpha) if self.inexact else None
+        state = self._solved(alpha, self._tightest, known) if self.inexact else self.state_of(alpha)
+        point = self._point_at(alpha, state, self._tightest, known)
+        self.evaluations += 1
+        self._memory.judged(point)
+        return point
+
+    @property
+    def inexact(self) -> bool:
+        """Whether an optimiser may ask for less accuracy, see `within`."""
+        return self._adaptive is not None
+
+    def within(self, alpha: np.ndarray, value: float, subgradient: float) -> tuple[float, np.ndarray, float]:
+        """Return J(α), a subgradient and the estimated error of J, no more accurate than asked. Collective.
+
+        Args:
+            alpha: Design variables, shape (size,), [length].
+            value: Largest error of J.
+            subgradient: Largest relative error of the subgradient, which the tolerance of the state follows.
+
+        Raises:
+            InvalidDesignError: If the design inverts a cell, or no equilibrium is found for it.
+        """
+        policy = self._adaptive
+        if policy is None:
+            point = self.evaluate(alpha)
+            return point.value, point.gradient, 0.0
+        known = self._memory.of_design(alpha)
+        tolerance = policy.first(value, subgradient, self._memory.error_by_tolerance)
+        point = self._point_at(alpha, self._solved(alpha, tolerance, known), tolerance, known)
+        while point.error > value and tolerance > policy.tightest:
+            tolerance = policy.next(tolerance, point.error, value)
+            point = self._point_at(alpha, self._solved(alpha, tolerance, point), tolerance, point)
+        self.evaluations += 1
+        self._memory.judged(point)
+        return point.value, point.gradient, point.error
+
+    def _solved(self, alpha: np.ndarray, tolerance: float, known: DesignPoint | None = None) -> State:
+        """Find an equilibrium, from a less accurate one of the same design where it is known. Collective."""
+        previous = self._memory.state if known is None else known.state
+        with self._timer.phase("mesh motion"):
+            scene = self.scene_of(alpha) if known is None else known.state.scene
+        solver = self.solver.with_tolerance(tolerance)
+        find = partial(
+            find_state, scene, self.decomposition, solver=solver, sensitivity=True, timer=self._timer
+        )
+        try:
+            state = find(previous=previous, start_geometry=previous is None)
+        except InfeasibleError as error:
+            raise InvalidDesignError(f"the design has no equilibrium: {error}") from error
+        except ConvergenceError as error:
+            if previous is None:
+                raise
+            logger.warning("a warm start led nowhere, a cold one follows: %s", error)
+            state = self._solved_cold(find)
+        self._memory.passed(alpha, state)
+        return state
+
+    def _solved_cold(self, find: Callable[..., State]) -> State:
+        try:
+            return find(previous=None, start_geometry=False)
+        except (ConvergenceError, InfeasibleError) as error:
+            raise InvalidDesignError(f"no equilibrium of the design was found: {error}") from error
+
+    def _point_at(
+        self, alpha: np.ndarray, state: State, tolerance: float, known: DesignPoint | None
+    ) -> DesignPoint:
+        """Return objective, subgradient and their errors at a state. Collective."""
         before = state.dual.products
         forms = self._shape_forms(state)
         with self._timer.phase("objective"):
             partials = self.objective.partials(state, forms)
         with self._timer.phase("adjoint"):
             linearised = linearise_face(state, self.choice)
-            adjoint = solve_adjoint(state, partials, linearised, tolerance=self._adjoint_tolerance)
+            adjoint = solve_adjoint(
+                state, partials, linearised,
+                tolerance=max(ADJOINT_SHARE * tolerance, ADJOINT_FLOOR),
+                start=None if known is None else known.adjoint_multiplier,
+            )  # fmt: skip
+            error = state_error(state, partials, linearised, adjoint)
         with self._timer.phase("gradient"):
             by_bound = bound_sensitivity(state, adjoint, partials, linearised)
             by_points = self._by_points(state, adjoint, partials.by_shape, by_bound)
             gradient = self._by_design(by_points)
-        self.evaluations += 1
         self.products += state.dual.products
-        comm = self.decomposition.comm
+        value = partials.value + (error.correction if self.inexact else 0.0)
         # Ranks must take the same decisions: rounding in sums over ranks may not tell them apart.
-        value, gradient = comm.bcast((partials.value, gradient))
-        point = DesignPoint(
-            np.array(alpha, dtype=float),
-            value,
-            gradient,
-            state,
-            linearised.weak,
-            state.dual.products - before,
+        value, gradient, error = self.comm.bcast((value, gradient, error))
+        logger.info("J = %.9g ± %.1e, %d products", value, error.size, state.dual.products)
+        return DesignPoint(
+            alpha=np.array(alpha, dtype=float),
+            value=value,
+            gradient=gradient,
+            state=state,
+            weak=linearised.weak,
+            adjoint_iterations=state.dual.products - before,
+            tolerance=tolerance,
+            correction=error.correction,
+            error=error.size,
+            adjoint_multiplier=adjoint.multiplier,
         )
-        logger.info("design %d: J = %.9g, %d products", self.evaluations, value, state.dual.products)
-        self.last = point
-        self.first = self.first or point
-        self.best = point if self.best is None or value < self.best.value else self.best
-        return point
 
     def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the volume of the designed bodies and its gradient, [length³]. Collective."""

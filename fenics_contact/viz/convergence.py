@@ -17,7 +17,7 @@ from fenics_contact.viz.words import headline, written
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-KINDS = ("start", "serious", "null", "rejected")
+KINDS = ("start", "serious", "null", "rejected", "refined")
 
 
 def plot_convergence(
@@ -34,7 +34,7 @@ def plot_convergence(
 
     Args:
         values: Objective of each trial point in the order of evaluation, (n,); NaN where it was rejected.
-        kinds: What became of each: "start", "serious", "null" or "rejected".
+        kinds: What became of each: "start", "serious", "null", "rejected" or "refined".
         path: PNG file to write.
         label: Name of the objective, with its unit.
         title: What comes before the facts in the title.
@@ -80,7 +80,7 @@ def _checked(values: Sequence[float] | np.ndarray, kinds: Sequence[str]) -> tupl
 def _draw(values: np.ndarray, kind: np.ndarray, target: Path, words: tuple[str, str], width: int) -> None:
     label, title = words
     number = np.arange(len(values))
-    centre = (kind == "start") | (kind == "serious")
+    centre = np.isin(kind, ("start", "serious", "refined"))
     first, last = values[centre][0], values[centre][-1]
     facts = f"{written(first, 6)} → {written(last, 6)}"
     if first != 0:

@@ -96,11 +96,15 @@ GROUPS: dict[str, tuple[str, str]] = {
     ),
     "optimisation": (
         "Shape optimisation",
-        "",
+        "A trial design without mesh or equilibrium is rejected, the trust region shrinks, and the history "
+        "says why. Figures are those of the last design; products are those of all designs, steps are "
+        "evaluations. Near the limit of friction a state can cost any number of products: give the solver a "
+        "`max_products`.",
     ),
     "interrupted": (
         "Interrupted runs",
-        "",
+        "A checkpoint is replaced at once or not at all. What cannot be read or belongs to another problem "
+        "is refused; nothing starts anew where a checkpoint was expected.",
     ),
 }
 

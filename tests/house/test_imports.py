@@ -12,7 +12,7 @@ from tests.house.source import PACKAGE, Module, modules, room_of
 #: From the ground up; rooms on one floor do not know each other.
 FLOORS = [
     {"errors"},
-    {"_requirements", "timing"},
+    {"_requirements", "timing", "checkpoint"},
     {"_dolfinx"},
     {"geometry", "linalg"},
     {"scene", "qp"},

@@ -14,7 +14,7 @@ from tests.optimize.functions import Array, crescent, maxquad
 def bundle_of(fun, points: Array, locality: float = 0.0) -> Bundle:  # type: ignore[no-untyped-def]
     centre = points[0]
     value, gradient = fun(centre)
-    bundle = Bundle(gradient[None], np.zeros(1), np.zeros(1), locality)
+    bundle = Bundle.of_centre(gradient, locality)
     for point in points[1:]:
         other, slope = fun(point)
         error = value - other - slope @ (centre - point)

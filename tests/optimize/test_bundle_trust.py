@@ -148,7 +148,9 @@ def test_method_stops_with_the_reason_when_a_minimum_lies_in_the_invalid_region(
             raise InvalidDesignError("a cell is inverted")
         return float(x[0]), np.array([1.0])
 
-    with pytest.raises(NotConvergedError, match=r"every trial.*bound the design away") as caught:
+    with pytest.raises(
+        NotConvergedError, match=r"every trial.*bound the.* last trial: a cell is inverted"
+    ) as caught:
         minimize(fun, [1.5])
     best = caught.value.best
     assert best is not None

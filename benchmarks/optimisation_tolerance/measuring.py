@@ -1,0 +1,90 @@
+"""Measure values, subgradients and optima with states of different tolerances."""
+
+from __future__ import annotations
+
+from collections import Counter
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from benchmarks.optimisation_tolerance.chain import BOUND, Chain
+from fenics_contact.shape import AdaptiveTolerance, DesignPoint
+
+#: What everything is compared with.
+REFERENCE = 1e-11
+TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
+FIXED = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10)
+ADAPTIVE = {"adaptive": AdaptiveTolerance(), "adaptive from 1e-2": AdaptiveTolerance(loosest=1e-2)}
+STOPPING = (1e-4, 1e-6)
+#: What is left of that where an evaluation takes long.
+FEW_FIXED, FEW_ADAPTIVE, FEW_STOPPING = (1e-3, 1e-6, 1e-8), ("adaptive",), (1e-4,)
+
+
+def designs(chain: Chain, best: np.ndarray, count: int) -> dict[str, np.ndarray]:
+    """Return the start, a design on the way, the optimum, and random ones."""
+    rng = np.random.default_rng(1)
+    named = {"start": np.zeros_like(best), "half way": 0.5 * best, "optimum": best}
+    return named | {f"random {k}": 0.4 * BOUND * rng.standard_normal(best.size) for k in range(count)}
+
+
+def compared(point: DesignPoint, exact: DesignPoint) -> dict[str, Any]:
+    """Return the errors of a value with its correction and of the subgradient, all relative."""
+    size, miss = abs(exact.value), exact.value - (point.value - point.correction)
+    gradient = float(np.linalg.norm(point.gradient - exact.gradient) / np.linalg.norm(exact.gradient))
+    return {
+        "tolerance": point.tolerance,
+        "value_error": abs(miss) / size,
+        "corrected_error": abs(miss - point.correction) / size,
+        "estimate": abs(point.correction) / size,
+        "subgradient_error": gradient,
+        "wrong_status": int(np.count_nonzero(point.state.contact.status != exact.state.contact.status)),
+        "contact_points": point.state.contact.points.count,
+        "closed_points": int(np.count_nonzero(exact.state.contact.status)),
+        "products": point.state.solution.products + point.adjoint_iterations,
+    }
+
+
+def errors(chain: Chain, best: np.ndarray, count: int) -> list[dict[str, Any]]:
+    """Return the errors at some designs, each solved from a cold start."""
+    found = []
+    for name, alpha in designs(chain, best, count).items():
+        exact = chain.problem(REFERENCE).evaluate(alpha)
+        for tolerance in TOLERANCES:
+            problem = chain.problem(AdaptiveTolerance(loosest=tolerance, tightest=tolerance))
+            found.append({"design": name, **compared(problem.evaluate(alpha), exact)})
+        print(f"{chain.size}: errors at the design {name!r} are known", flush=True)
+    return found
+
+
+def optimum(chain: Chain, name: str, stopping: float) -> dict[str, Any]:
+    """Minimise once and evaluate the design that was found accurately."""
+    problem = chain.problem(ADAPTIVE[name] if name in ADAPTIVE else float(name))
+    began = perf_counter()
+    result = chain.minimised(problem, stopping)
+    seconds = perf_counter() - began
+    exact = chain.problem(REFERENCE).evaluate(result.x)
+    print(f"{chain.size}: minimised to {stopping:g} with {name}: {problem.products} products", flush=True)
+    return {
+        "states": name,
+        "stopping": stopping,
+        "design": result.x,
+        "value_claimed": result.value,
+        "value": exact.value,
+        "reason": result.reason.name,
+        "kinds": dict(Counter(record.kind.value for record in result.history)),
+        "products": problem.products,
+        "seconds": seconds,
+        "seconds_solving": problem.seconds["solve"] + problem.seconds["adjoint"],
+    }
+
+
+def study(size: str, random_designs: int, *, few: bool) -> dict[str, Any]:
+    """Return all measurements of one size, or few of them."""
+    chain = Chain(size)
+    fixed, adaptive = (FEW_FIXED, FEW_ADAPTIVE) if few else (FIXED, tuple(ADAPTIVE))
+    names = [*(f"{tolerance:.0e}" for tolerance in fixed), *adaptive]
+    stopping = FEW_STOPPING if few else STOPPING
+    optima = [optimum(chain, name, limit) for limit in stopping for name in names]
+    best = min(optima, key=lambda run: run["value"])["design"]
+    return {"size": size, "optima": optima, "errors": errors(chain, best, random_designs)}

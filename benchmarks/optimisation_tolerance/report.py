@@ -1,0 +1,168 @@
+"""The page and the picture of the study."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+
+from benchmarks.report import table
+
+ORANGE, BLUE, GREEN = "#f58518", "#4c78a8", "#54a24b"
+#: What the adaptive runs are compared with.
+USUAL = "1e-08"
+
+INTRODUCTION = """\
+# What a looser state tolerance does to the subgradient and to the optimum
+
+The chain of `demos/demo_chain_links.py`: total potential energy, 28 variables, friction coefficient 0.3.
+Errors are relative and against states of tolerance 1e-11. Written by
+`python -m benchmarks.optimisation_tolerance`.
+
+![Errors and products](optimisation_tolerance.png)
+
+- *value*: error of J as the state gives it; *corrected*: with the adjoint-weighted residual added, which an
+  adaptive tolerance does; *estimate*: that residual itself, median of estimate over error in brackets.
+- *wrong status*: points whose open, stick or slip differs from the accurate state, over all designs.
+- *above the best*: J of the design that was found, evaluated accurately, over the best of all runs, in units
+  of ε (1 + |J|), where ε is the stopping tolerance of the optimiser.
+
+How to read it: subgradient and value are at most a quarter as wrong as the state is allowed to be; the
+adjoint knows that error of the value, so that the corrected one is better by two digits. A fixed tolerance
+that is too loose for ε is not noticed by the optimiser: it may stop above the optimum and say that it
+converged. The adaptive one asks for what each step needs and confirms the last design before it stops.
+
+A loose state may take a point that is about to close or to slip for one that does so already. Beside such a
+switch the subgradient is then off by the kink, not by the tolerance, but it is that of the other side or
+between both: an inexact Clarke subgradient, which is all that the bundle method needs
+(`tests/shape/test_inexact_states.py`). Weakly active points are told as such only by states of 1e-7 or
+better.
+"""
+
+
+def page(studies: list[dict[str, Any]]) -> str:
+    """Return the page of Markdown."""
+    parts = [INTRODUCTION]
+    for study in studies:
+        parts += [f"## {study['size'].capitalize()} chain\n", _errors(study), _wrong(study), _optima(study)]
+    return "\n".join(parts)
+
+
+def _errors(study: dict[str, Any]) -> str:
+    rows = []
+    for tolerance in sorted({row["tolerance"] for row in study["errors"]}, reverse=True):
+        mine = [row for row in study["errors"] if row["tolerance"] == tolerance]
+
+        def largest(name: str, mine: list[dict[str, Any]] = mine) -> str:
+            return f"{max(row[name] for row in mine):.1e}"
+
+        ratio = np.median([row["estimate"] / row["value_error"] for row in mine])
+        wrong = sum(row["wrong_status"] for row in mine)
+        products = np.mean([row["products"] for row in mine])
+        rows.append(
+            (f"{tolerance:g}", largest("value_error"), f"{largest('estimate')} ({ratio:.2f})",
+             largest("corrected_error"), largest("subgradient_error"), str(wrong), f"{products:.0f}")
+        )  # fmt: skip
+    head = ("tolerance", "value", "estimate", "corrected", "subgradient", "wrong status", "products")
+    count = len({row["design"] for row in study["errors"]})
+    return f"Largest errors over {count} designs, each solved cold; mean products.\n\n{table(head, rows)}\n"
+
+
+def _wrong(study: dict[str, Any]) -> str:
+    """Say what a wrong face does to the subgradient."""
+    lines = []
+    for tolerance in (1e-1, 1e-2, 1e-3):
+        mine = [row for row in study["errors"] if row["tolerance"] == tolerance]
+        wrong = [row["subgradient_error"] for row in mine if row["wrong_status"]]
+        right = [row["subgradient_error"] for row in mine if not row["wrong_status"]]
+        words = [
+            f"{len(errors)} design{'s' if len(errors) > 1 else ''} with {kind} face, subgradient wrong by "
+            f"{np.median(errors):.1e} "
+            f"(median), {max(errors):.1e} (largest)"
+            for kind, errors in (("the right", right), ("a wrong", wrong))
+            if errors
+        ]
+        lines.append(f"- tolerance {tolerance:g}: {'; '.join(words)}.")
+    return "\n".join(lines) + "\n"
+
+
+def _optima(study: dict[str, Any]) -> str:
+    rows = []
+    best = min(run["value"] for run in study["optima"])
+    for run in study["optima"]:
+        usual = next(
+            other
+            for other in study["optima"]
+            if other["states"] == USUAL and other["stopping"] == run["stopping"]
+        )
+        above = (run["value"] - best) / (run["stopping"] * (1 + abs(best)))
+        claimed = abs(run["value_claimed"] - run["value"]) / abs(run["value"])
+        kinds = run["kinds"]
+        evaluations = f"{sum(kinds.values())} ({kinds.get('refined', 0)})"
+        rows.append(
+            (f"{run['stopping']:g}", run["states"], f"{run['value']:.4f}", f"{above:.3f}", f"{claimed:.0e}",
+             evaluations, str(run["products"]), f"{run['products'] / usual['products']:.2f}",
+             f"{run['seconds_solving'] / usual['seconds_solving']:.2f}", run["reason"].lower())
+        )  # fmt: skip
+    head = (
+        "ε", "states", "J of the optimum [N mm]", "above the best", "error of J claimed",
+        "evaluations (again)", "products", "ratio to 1e-08", "time solving", "stop",
+    )  # fmt: skip
+    return table(head, rows) + "\n"
+
+
+def plot(path: Path, study: dict[str, Any]) -> None:
+    """Draw the errors by tolerance, and what the optimum costs."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.6), layout="constrained")
+    _plot_errors(left, study["errors"])
+    _plot_products(right, study["optima"])
+    figure.suptitle(f"{study['size'].capitalize()} chain", fontsize="medium")
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
+
+
+def _plot_errors(axes: Any, rows: list[dict[str, Any]]) -> None:
+    tolerances = sorted({row["tolerance"] for row in rows})
+    for name, label, colour, marker in (
+        ("value_error", "value", BLUE, "o"),
+        ("corrected_error", "value, corrected by the adjoint", GREEN, "s"),
+        ("subgradient_error", "subgradient", ORANGE, "^"),
+    ):
+        errors = [[row[name] for row in rows if row["tolerance"] == t] for t in tolerances]
+        axes.loglog(tolerances, [max(each) for each in errors], marker=marker, color=colour, label=label)
+        axes.fill_between(
+            tolerances,
+            [min(each) for each in errors],
+            [max(each) for each in errors],
+            color=colour,
+            alpha=0.12,
+        )
+    axes.loglog(tolerances, tolerances, color="0.5", linestyle=":", label="tolerance itself")
+    axes.set_xlabel("tolerance of the state")
+    axes.set_ylabel("relative error (largest; band: all designs)")
+    axes.set_ylim(bottom=1e-15)
+    axes.grid(True, alpha=0.3)
+    axes.legend(frameon=False, fontsize="small")
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _plot_products(axes: Any, optima: list[dict[str, Any]]) -> None:
+    names = list(dict.fromkeys(run["states"] for run in optima))
+    place = np.arange(len(names))
+    limits = sorted({run["stopping"] for run in optima}, reverse=True)
+    for shift, (stopping, shade) in enumerate(zip(limits, (1.0, 0.5), strict=False)):
+        runs = {run["states"]: run for run in optima if run["stopping"] == stopping}
+        colours = [GREEN if "adaptive" in name else BLUE for name in names]
+        heights = [runs[name]["products"] for name in names]
+        bars = axes.bar(place + 0.4 * shift - 0.2, heights, 0.38, color=colours, alpha=shade)
+        axes.bar_label(bars, fontsize="small")
+    axes.set_xticks(place, [name.replace(" from", "\nfrom") for name in names], fontsize="small")
+    axes.set_xlabel("tolerance of the states")
+    axes.set_ylabel("products of the minimisation")
+    axes.set_title("stopping tolerance 1e-4 (full) and 1e-6 (pale)", fontsize="medium")
+    axes.spines[["top", "right"]].set_visible(False)

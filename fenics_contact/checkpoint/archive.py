@@ -1,0 +1,114 @@
+"""Arrays by name in a file of NumPy's .npz format, with what it holds and of which problem it is."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenics_contact.checkpoint.fingerprint import differences
+from fenics_contact.checkpoint.whole_file import write_whole
+from fenics_contact.errors import InvalidInputError
+
+FORMAT = "fenics_contact checkpoint"
+VERSION = 1
+
+Arrays = dict[str, NDArray[Any]]
+
+
+def write_archive(path: Path, kind: str, fingerprint: Mapping[str, str], arrays: Mapping[str, Any]) -> None:
+    """Write arrays with their kind and the problem's fingerprint, whole or not at all.
+
+    Args:
+        path: File to replace.
+        kind: What the arrays are.
+        fingerprint: Says what the problem is, see `described`.
+        arrays: Numbers and text by name; names must not start with an underscore.
+
+    Raises:
+        CheckpointError: If it cannot be written.
+    """
+    buffer = io.BytesIO()
+    head = {
+        "_format": FORMAT,
+        "_version": VERSION,
+        "_kind": kind,
+        "_fingerprint": json.dumps(dict(fingerprint)),
+    }
+    members = {name: np.asarray(value) for name, value in {**head, **arrays}.items()}
+    np.savez(buffer, **members, _digest=np.array(_digest(members)))
+    write_whole(path, buffer.getvalue())
+
+
+def read_archive(path: Path, kind: str, fingerprint: Mapping[str, str]) -> Arrays:
+    """Read the arrays of a problem.
+
+    Raises:
+        InvalidInputError: If the file is missing, cannot be read, is no whole checkpoint, or is one of
+            another version, kind or problem; says what differs.
+    """
+    arrays = _loaded(path)
+    if str(arrays.pop("_format", "")) != FORMAT:
+        raise InvalidInputError(
+            f"a checkpoint is needed, but {str(path)!r} is another file: give the path of a checkpoint, or a "
+            "new name to start anew"
+        )
+    version, found = int(arrays.pop("_version")), str(arrays.pop("_kind"))
+    if version != VERSION:
+        raise InvalidInputError(
+            f"a checkpoint of version {VERSION} is needed, {str(path)!r} is of version {version}: go on with "
+            "the version of fenics_contact that wrote it, or give a new name to start anew"
+        )
+    if found != kind:
+        raise InvalidInputError(
+            f"a checkpoint of a {kind} is needed, {str(path)!r} is one of a {found}: give another path"
+        )
+    unlike = differences(json.loads(str(arrays.pop("_fingerprint"))), fingerprint)
+    if unlike:
+        raise InvalidInputError(
+            f"the checkpoint {str(path)!r} is of another problem; there and here differ "
+            f"{'; '.join(unlike)}: give the same problem to go on, or a new name to start anew"
+        )
+    return arrays
+
+
+def _digest(members: Arrays) -> str:
+    """Return a hash of names and contents: the checksums of the format leave out the names."""
+    digest = hashlib.sha256()
+    for name in sorted(members):
+        digest.update(f"{name} {members[name].dtype.str} {members[name].shape} ".encode())
+        digest.update(np.ascontiguousarray(members[name]).tobytes())
+    return digest.hexdigest()
+
+
+def _loaded(path: Path) -> Arrays:
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InvalidInputError(
+            f"a checkpoint is needed at {str(path)!r}, which cannot be read: {error.strerror or error}; give "
+            "the path of one that can"
+        ) from error
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            spoilt = archive.testzip()  # before anybody believes a length that stands in it
+        if spoilt is None:
+            with np.load(io.BytesIO(content), allow_pickle=False) as members:
+                found = {name: members[name] for name in members.files}
+            digest = str(found.pop("_digest", ""))
+            if "_format" not in found or digest == _digest(found):
+                return found
+        reason = "its checksums do not agree"
+    except Exception as error:  # bytes of any other origin can make the libraries say anything
+        reason = str(error) or type(error).__name__
+    raise InvalidInputError(
+        f"a whole checkpoint is needed, {str(path)!r} with {len(content)} bytes is none ({reason}): bring "
+        "back a copy of it, or move it away to start anew"
+    )

@@ -1,0 +1,75 @@
+"""Where a run keeps its checkpoint, and what it does with one that is there already."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fenics_contact.checkpoint.archive import Arrays, read_archive, write_archive
+from fenics_contact.errors import InvalidInputError, together
+
+if TYPE_CHECKING:  # the optimiser does without mpi4py
+    from mpi4py import MPI
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A file from which an interrupted run goes on.
+
+    It is replaced at once: killed at any moment, a run leaves the last whole one. The same command run again
+    goes on from there, on any number of ranks.
+
+    Attributes:
+        path: The file, in NumPy's .npz format; its folder is created.
+        every: Evaluations or load steps between two writes; the end of the run is written in any case.
+        resume: None goes on from the file where there is one, True wants one, False starts anew and replaces
+            it.
+        comm: Communicator on which the run is replicated: rank 0 reads and writes. Only a function that does
+            not know its communicator needs it.
+    """
+
+    path: str | Path
+    every: int = 1
+    resume: bool | None = None
+    comm: MPI.Comm | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse intervals that are none."""
+        if self.every < 1:
+            raise InvalidInputError(
+                f"every must be at least 1, got {self.every}: how many evaluations lie between two writes"
+            )
+
+    def read(self, kind: str, fingerprint: Mapping[str, str], comm: MPI.Comm | None) -> Arrays | None:
+        """Return what is stored, None where the run starts anew. Collective on ``comm``.
+
+        Raises:
+            InvalidInputError: On all ranks, see `read_archive`.
+        """
+        path, found = Path(self.path), None
+        if self.resume is False:
+            return None
+        if comm is None:
+            return read_archive(path, kind, fingerprint) if self.resume or path.exists() else None
+        with together(comm):
+            if comm.rank == 0 and (self.resume or path.exists()):
+                found = read_archive(path, kind, fingerprint)
+        answer: Arrays | None = comm.bcast(found)
+        return answer
+
+    def write(
+        self, kind: str, fingerprint: Mapping[str, str], arrays: Mapping[str, Any], comm: MPI.Comm | None
+    ) -> None:
+        """Replace what is stored. Collective on ``comm``.
+
+        Raises:
+            CheckpointError: On all ranks; the file is then what it was.
+        """
+        if comm is None:
+            write_archive(Path(self.path), kind, fingerprint, arrays)
+            return
+        with together(comm):
+            if comm.rank == 0:
+                write_archive(Path(self.path), kind, fingerprint, arrays)

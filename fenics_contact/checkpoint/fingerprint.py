@@ -1,0 +1,110 @@
+"""What a problem is, in words that another run of the same script finds again."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import partial
+from pathlib import PurePath
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+
+#: How many differences a message lists.
+MOST_NAMED = 4
+
+
+def described(value: Any, name: str) -> dict[str, str]:
+    """Describe a value by its parts: one entry for each number, text or array.
+
+    Arrays are described by shape, type and a hash of their bits, dataclasses, mappings and sequences by what
+    they hold, functions by their names and the values that they carry along, classes by their names; of any
+    other object only the class is told.
+
+    Args:
+        value: What is to be recognised.
+        name: How it is called.
+
+    Example:
+        >>> described({"length": 2.0}, "beam")
+        {"beam['length']": '2.0'}
+    """
+    found: dict[str, str] = {}
+    _describe(value, name, found, ())
+    return found
+
+
+def differences(there: Mapping[str, str], here: Mapping[str, str]) -> list[str]:
+    """Name what differs between two descriptions, the first few in words.
+
+    Args:
+        there: The one that was stored.
+        here: The present one.
+    """
+    unlike = [name for name in {**there, **here} if there.get(name) != here.get(name)]
+    named = [
+        f"{name} ({there.get(name, 'absent')}, {here.get(name, 'absent')})" for name in unlike[:MOST_NAMED]
+    ]
+    more = len(unlike) - MOST_NAMED
+    return [*named, f"{more} more"] if more > 0 else named
+
+
+def _describe(value: Any, name: str, found: dict[str, str], around: tuple[int, ...]) -> None:
+    """Add the parts of a value, which lies inside the objects of these identities."""
+    known = _leaf(value)
+    if known is not None:
+        found[name] = known
+        return
+    found[name], parts = _branches(value, name)
+    if id(value) not in around:
+        for part, inner in parts:
+            _describe(inner, part, found, (*around, id(value)))
+
+
+def _leaf(value: Any) -> str | None:
+    if isinstance(value, np.ndarray):
+        digest = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()[:16]
+        return f"{value.dtype} array of shape {value.shape}, sha256 {digest}"
+    if isinstance(value, Enum):
+        return f"{type(value).__name__}.{value.name}"
+    if isinstance(value, np.generic):
+        return repr(value.item())
+    if value is None or isinstance(value, str | bytes | bool | int | float | complex | PurePath):
+        return repr(value)
+    return None
+
+
+def _branches(value: Any, name: str) -> tuple[str, list[tuple[str, Any]]]:
+    """Return what an object is and its parts by name."""
+    if isinstance(value, Mapping):
+        return f"{len(value)} entries", [(f"{name}[{key!r}]", part) for key, part in value.items()]
+    if isinstance(value, Sequence):
+        return f"{len(value)} entries", [(f"{name}[{index}]", part) for index, part in enumerate(value)]
+    if is_dataclass(value) and not isinstance(value, type):
+        return _class(value), [(f"{name}.{part.name}", getattr(value, part.name)) for part in fields(value)]
+    if isinstance(value, partial):
+        return "partial", [(f"{name}.{part}", getattr(value, part)) for part in ("func", "args", "keywords")]
+    if isinstance(value, FunctionType):
+        cells = zip(value.__code__.co_freevars, value.__closure__ or (), strict=True)
+        carried = [(f"{name}.{variable}", cell.cell_contents) for variable, cell in cells if _filled(cell)]
+        given = [] if value.__defaults__ is None else [(f"{name}.defaults", value.__defaults__)]
+        return f"{value.__module__}.{value.__qualname__}", [*carried, *given]
+    if hasattr(value, "__qualname__"):
+        return f"{value.__module__}.{value.__qualname__}", []
+    return _class(value), []
+
+
+def _filled(cell: Any) -> bool:
+    """Tell whether a variable of an enclosing function has a value yet."""
+    try:
+        cell.cell_contents
+    except ValueError:
+        return False
+    return True
+
+
+def _class(value: Any) -> str:
+    return f"{type(value).__module__}.{type(value).__qualname__}"

@@ -1,0 +1,107 @@
+"""The checkpoint of a load history: the states after the steps that are done."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_contact.checkpoint import Checkpoint, described, differences
+from fenics_contact.contact.state import State
+from fenics_contact.contact.stored import restored_state, stored_state
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti import Decomposition
+from fenics_contact.scene import LoadStep, Scene
+from fenics_contact.timing import PhaseTimer
+
+KIND = "load history"
+
+
+class StepsDone:
+    """Reads the states of steps that were done before, and writes new ones; nothing without a checkpoint."""
+
+    def __init__(self, checkpoint: Checkpoint | None, problem: Mapping[str, Any], comm: MPI.Comm) -> None:
+        """Read what there is. Collective.
+
+        Args:
+            checkpoint: The file, or None.
+            problem: What the history belongs to, by name.
+            comm: Communicator.
+
+        Raises:
+            InvalidInputError: If the file is no checkpoint of this problem; says what to do.
+        """
+        self._checkpoint, self._comm = checkpoint, comm
+        self._arrays: dict[str, np.ndarray] = {}
+        self._fingerprint: dict[str, str] = {}
+        self._here, self._stored, self._written = 0, 0, 0
+        if checkpoint is None:
+            return
+        for name, part in problem.items():
+            self._fingerprint.update(described(part, name))
+        found = checkpoint.read(KIND, self._fingerprint, comm)
+        if found is not None:
+            self._stored = self._written = int(found.pop("steps"))
+            self._arrays = found
+
+    def recalled(
+        self,
+        step: LoadStep,
+        scene: Scene,
+        decomposition: Decomposition,
+        previous: State | None,
+        timer: PhaseTimer,
+    ) -> State | None:
+        """Return the state after the next step if it is stored, else None. Collective.
+
+        Args:
+            step: The step.
+            scene: The scene with its loads and supports.
+            decomposition: Decomposition of the scene.
+            previous: State before the step.
+            timer: Collects the seconds.
+
+        Raises:
+            InvalidInputError: If another step was done there.
+        """
+        if self._here >= self._stored:
+            return None
+        names = [name for name in self._arrays if name.startswith(self._prefix)]
+        stored = {name.removeprefix(self._prefix): self._arrays[name] for name in names}
+        unlike = differences(json.loads(str(stored.pop("step"))), described(step, "step"))
+        if unlike:
+            raise InvalidInputError(
+                f"step {self._here} of the checkpoint is another one; there and here differ "
+                f"{'; '.join(unlike)}: give the same steps to go on, or a new name to start anew"
+            )
+        self._here += 1
+        return restored_state(scene, decomposition, stored, previous=previous, timer=timer)
+
+    def keep(self, step: LoadStep, state: State) -> None:
+        """Add the state after a step and write it where that is due. Collective.
+
+        Raises:
+            CheckpointError: If it cannot be written; the file is then what it was.
+        """
+        if self._checkpoint is None:
+            return
+        self._arrays[f"{self._prefix}step"] = np.array(json.dumps(described(step, "step")))
+        for name, values in stored_state(state).items():
+            self._arrays[f"{self._prefix}{name}"] = values
+        self._here += 1
+        if self._here >= self._written + self._checkpoint.every:
+            self.write()
+
+    def write(self) -> None:
+        """Write all steps unless the file holds them. Collective."""
+        if self._checkpoint is not None and self._here > self._written:
+            arrays = {"steps": np.array(self._here), **self._arrays}
+            self._checkpoint.write(KIND, self._fingerprint, arrays, self._comm)
+            self._written = self._here
+
+    @property
+    def _prefix(self) -> str:
+        return f"{self._here:06d}."

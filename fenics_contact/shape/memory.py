@@ -1,0 +1,180 @@
+"""Designs that a problem remembers: the state to start the next one from, and the first, best and last."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fenics_contact.contact import State, restored_state, stored_state
+from fenics_contact.shape.linearised_face import WeakChoice, WeakPoints
+
+if TYPE_CHECKING:
+    from fenics_contact.shape.problem import ShapeProblem
+
+Stored = dict[str, np.ndarray]
+
+_STATE = "state."
+_START = "start"
+_SAME = "same"
+
+
+@dataclass(frozen=True, eq=False)
+class DesignPoint:
+    """A design that was evaluated.
+
+    Attributes:
+        alpha: Design variables, shape (size,).
+        value: Objective.
+        gradient: Clarke subgradient, shape (size,); the gradient where no point is weakly active.
+        state: Equilibrium.
+        weak: Weakly active points and the branch they were given.
+        adjoint_iterations: F-products of the adjoint.
+        tolerance: Relative residual that the state was solved to.
+        correction: What the residuals of the state change in the objective, to first order, see
+            `state_error`. With an adaptive tolerance the value has been corrected by it.
+        error: Safe estimate of the error of the value, units of the objective, corrected or not.
+        adjoint_multiplier: ζ of the adjoint, owned.
+    """
+
+    alpha: np.ndarray
+    value: float
+    gradient: np.ndarray
+    state: State
+    weak: WeakPoints
+    adjoint_iterations: int
+    tolerance: float
+    correction: float
+    error: float
+    adjoint_multiplier: np.ndarray
+
+
+class DesignMemory:
+    """The state found last and the first, best and last design; those of an earlier run as arrays.
+
+    Attributes:
+        state: State from which the next one starts, None before the first.
+        error_by_tolerance: Error of the last value divided by the tolerance of its state, 0 before the first.
+    """
+
+    def __init__(self, problem: ShapeProblem) -> None:
+        """Remember nothing."""
+        self._problem = problem
+        self._points: dict[str, DesignPoint | Stored] = {}
+        self._alpha = np.zeros(0)
+        self.state: State | None = None
+        self.error_by_tolerance = 0.0
+
+    def passed(self, alpha: np.ndarray, state: State) -> None:
+        """Remember the state found last."""
+        self._alpha, self.state = np.array(alpha, dtype=float), state
+
+    def judged(self, point: DesignPoint) -> None:
+        """Remember a design that was evaluated."""
+        first, best = self._points.get("first"), self._points.get("best")
+        if first is None or np.array_equal(point.alpha, _alpha(first)):
+            self._points["first"] = point
+        if best is None or point.value < _value(best) or np.array_equal(point.alpha, _alpha(best)):
+            self._points["best"] = point
+        self._points["last"] = point
+        self.error_by_tolerance = point.error / point.tolerance
+
+    def of_design(self, alpha: np.ndarray) -> DesignPoint | None:
+        """Return what is known of this very design. Collective after a run was resumed."""
+        for name in ("last", "best", "first"):
+            if name in self._points and np.array_equal(_alpha(self._points[name]), alpha):
+                return self.point(name)
+        return None
+
+    def point(self, name: str) -> DesignPoint | None:
+        """Return a design by its name; one of an earlier run is built again first. Collective then."""
+        found = self._points.get(name)
+        if found is None or isinstance(found, DesignPoint):
+            return found
+        built = self._built(found)
+        self._points = {key: built if kept is found else kept for key, kept in self._points.items()}
+        return built
+
+    def stored(self) -> Stored:
+        """Return all as arrays. Collective."""
+        arrays: Stored = {}
+        names: dict[int, str] = {}
+        for name, kept in self._points.items():
+            if id(kept) in names:
+                arrays[f"{name}.{_SAME}"] = np.array(names[id(kept)])
+                continue
+            names[id(kept)] = name
+            parts = _stored_point(kept) if isinstance(kept, DesignPoint) else kept
+            arrays.update({f"{name}.{part}": values for part, values in parts.items()})
+        if self.state is not None:
+            arrays[f"{_START}.alpha"] = self._alpha
+            arrays[f"{_START}.error"] = np.array(self.error_by_tolerance)
+            arrays.update({f"{_START}.{part}": values for part, values in stored_state(self.state).items()})
+        return arrays
+
+    def recall(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Take up what `stored` returned; only the state to start from is built at once. Collective."""
+        parts: dict[str, Stored] = {}
+        for key, values in arrays.items():
+            name, _, part = key.partition(".")
+            parts.setdefault(name, {})[part] = values
+        start = parts.pop(_START, None)
+        points = {name: stored for name, stored in parts.items() if _SAME not in stored}
+        points |= {name: points[str(stored[_SAME])] for name, stored in parts.items() if _SAME in stored}
+        self._points = dict(points)
+        if start is not None:
+            alpha, self.error_by_tolerance = start.pop("alpha"), float(start.pop("error"))
+            self.passed(alpha, self._state(alpha, start))
+
+    def _built(self, stored: Stored) -> DesignPoint:
+        parts = {part.removeprefix(_STATE): stored[part] for part in stored if part.startswith(_STATE)}
+        contacts, discs, edges = (int(count) for count in stored["weak"])
+        weak = WeakPoints(contacts, discs, edges, WeakChoice[str(stored["choice"])])
+        state = self._state(stored["alpha"], parts)
+        return DesignPoint(
+            alpha=stored["alpha"],
+            value=_value(stored),
+            gradient=stored["gradient"],
+            state=state,
+            weak=weak,
+            adjoint_iterations=int(stored["adjoint_iterations"]),
+            tolerance=float(stored["tolerance"]),
+            correction=float(stored["correction"]),
+            error=float(stored["error"]),
+            adjoint_multiplier=stored["adjoint"][state.torn.numbering.owned],
+        )
+
+    def _state(self, alpha: np.ndarray, parts: Stored) -> State:
+        """Build a state; its one product counts among those of the problem. Collective."""
+        problem = self._problem
+        scene = problem.scene_of(alpha)
+        state = restored_state(scene, problem.decomposition, parts, previous=self.state)
+        problem.products += state.system.products
+        return state
+
+
+def _stored_point(point: DesignPoint) -> Stored:
+    weak, numbering = point.weak, point.state.torn.numbering
+    return {
+        "alpha": point.alpha,
+        "value": np.array(point.value),
+        "gradient": point.gradient,
+        "weak": np.array([weak.contacts, weak.discs, weak.edges]),
+        "choice": np.array(weak.choice.name),
+        "adjoint_iterations": np.array(point.adjoint_iterations),
+        "tolerance": np.array(point.tolerance),
+        "correction": np.array(point.correction),
+        "error": np.array(point.error),
+        "adjoint": numbering.gather(point.adjoint_multiplier, np.arange(numbering.total)),
+        **{f"{_STATE}{part}": values for part, values in stored_state(point.state).items()},
+    }
+
+
+def _value(point: DesignPoint | Stored) -> float:
+    return point.value if isinstance(point, DesignPoint) else float(point["value"])
+
+
+def _alpha(point: DesignPoint | Stored) -> np.ndarray:
+    return point.alpha if isinstance(point, DesignPoint) else point["alpha"]

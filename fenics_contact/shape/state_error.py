@@ -1,0 +1,77 @@
+"""What an inexact state does to the objective: its residuals weighted by the adjoint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.contact import State
+from fenics_contact.qp import ContactLayout, FeasibleSet, contact_step
+from fenics_contact.shape.adjoint import Adjoint
+from fenics_contact.shape.linearised_face import LinearisedFace
+from fenics_contact.shape.objective import Partials
+
+
+@dataclass(frozen=True)
+class StateError:
+    """First-order error of an objective at an inexact state, units of the objective.
+
+    Attributes:
+        correction: What the value misses to that at the exact state, to first order.
+        spread: √Σ (share of a row or disc)², which does not vanish where shares of both signs cancel.
+    """
+
+    correction: float
+    spread: float
+
+    @property
+    def size(self) -> float:
+        """How far off the corrected value may be, a safe estimate: what is left is of second order."""
+        return max(abs(self.correction), self.spread)
+
+
+def state_error(state: State, partials: Partials, linearised: LinearisedFace, adjoint: Adjoint) -> StateError:
+    r"""Return what the residuals of a state change in the objective. Collective; no product.
+
+    The state satisfies K u = f − Bᵀλ to rounding. What it misses is r = −(B u − c) along the tested
+    directions of the face, and n = λ − P_Λ(λ − ρ r) off the face, where the law prescribes the multiplier.
+    One step of Newton's method on the face would remove both; along it the objective changes by
+
+        δJ = ζᵀ r − (∂J/∂λ − B w)ᵀ n_off,
+
+    with the adjoint w, ζ. The value J + δJ is wrong to second order only, as long as the face is the right
+    one.
+
+    Args:
+        state: An inexact state.
+        partials: Partial derivatives of the objective there.
+        linearised: Branch of the contact law.
+        adjoint: The adjoint there.
+
+    References:
+        R. Becker, R. Rannacher, An optimal control approach to a posteriori error estimation in finite
+        element methods, Acta Numer. 10 (2001) 1-102. M. B. Giles, E. Süli, ibid. 11 (2002) 145-236.
+    """
+    system, solution = state.dual, state.dual_solution
+    problem, layout = system.problem, system.problem.layout
+    trial = solution.multiplier - contact_step(layout, problem.diagonal) * solution.residual
+    miss = solution.multiplier - FeasibleSet(layout, solution.slip_bound).project(trial)
+    slope = partials.by_multiplier - system.jump(adjoint.displacement)
+    shares = adjoint.multiplier * solution.residual - slope * _off_face(miss, linearised, layout)
+    discs = shares[layout.tangential].sum(axis=1)
+    single = np.concatenate([shares[layout.equality], shares[layout.normal], discs])
+    total, squares = problem.comm.allreduce(np.array([single.sum(), single @ single]))
+    return StateError(float(total), float(np.sqrt(squares)))
+
+
+def _off_face(miss: np.ndarray, linearised: LinearisedFace, layout: ContactLayout) -> np.ndarray:
+    """Return n where contacts are open, discs are pinned, and along the force of slipping discs, owned."""
+    face, direction = linearised.face, linearised.slip_direction
+    off = np.zeros_like(miss)
+    off[layout.normal] = np.where(face.closed, 0.0, miss[layout.normal])
+    tangential = miss[layout.tangential]
+    along = np.einsum("ia,ia->i", tangential, direction)[:, None] * direction
+    slipping = np.where(face.slip[:, None], along, tangential)
+    off[layout.tangential] = np.where(face.stick[:, None], 0.0, slipping)
+    return off

@@ -1,0 +1,75 @@
+"""Small design problems that are interrupted: ``resumed_cases.py FOLDER`` goes on from what is there."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_contact.geometry import box_partition
+from fenics_contact.optimize import BundleTrust, Checkpoint, LinearConstraints, Result, minimize
+from fenics_contact.scene import Coulomb
+from fenics_contact.shape import AdaptiveTolerance, ContactForces, ShapeProblem, TotalPotential
+from tests.contact.gallery import partitions
+from tests.shape.blocks import block_on_floor, designs_of
+from tests.shape.chains import BOXES, chain, chain_designs
+from tests.shape.objectives import normal_forces
+
+#: Loose, so that states depend on where they are started from; the block's follow the optimiser.
+TOLERANCES: dict[str, float | AdaptiveTolerance] = {"block": AdaptiveTolerance(), "chain": 1e-5}
+BOUND = {"block": 0.02, "chain": 0.2}
+
+
+def posed(name: str, comm: MPI.Comm, tolerance: float | AdaptiveTolerance | None = None) -> ShapeProblem:
+    tolerance = tolerance or TOLERANCES[name]
+    if name == "block":
+        scene = block_on_floor(Coulomb(0.3), load=(0.35, 0.1, -2.0))
+        judge = ContactForces(normal_forces)
+        return ShapeProblem(scene, partitions(scene), designs_of(scene), judge, comm, tolerance=tolerance)
+    scene = chain(Coulomb(0.3))
+    cut = {body: box_partition(scene.bodies[body].mesh, BOXES) for body in scene.bodies}
+    return ShapeProblem(scene, cut, chain_designs(), TotalPotential(), comm, tolerance=tolerance)
+
+
+def minimised(name: str, problem: ShapeProblem, checkpoint: Checkpoint | None, **limits: Any) -> Result:
+    """Minimise within a box, with the volume kept to first order."""
+    size, bound = problem.size, BOUND[name]
+    _, by_volume = problem.volume(np.zeros(size))
+    return minimize(
+        problem,
+        np.zeros(size),
+        BundleTrust(**{"max_evaluations": 15, **limits}),
+        bounds=(np.full(size, -bound), np.full(size, bound)),
+        constraints=LinearConstraints(np.zeros((0, size)), np.zeros(0), by_volume[None], np.zeros(1)),
+        checkpoint=checkpoint,
+    )
+
+
+def gone_on(name: str, path: Path, comm: MPI.Comm) -> dict[str, Any]:
+    """Finish a minimisation that another run has begun. Collective."""
+    problem = posed(name, comm)
+    result = minimised(name, problem, Checkpoint(path, resume=True))
+    first, best = problem.first, problem.best
+    assert first is not None
+    assert best is not None
+    return {
+        "ranks": comm.size,
+        "evaluated here": problem.seconds["adjoint"] > 0.0,
+        "evaluations": problem.evaluations,
+        "x": result.x.tolist(),
+        "values": [record.value for record in result.history],
+        "kinds": [record.kind.name for record in result.history],
+        "first force": first.state.contact.force.tolist(),
+        "best alpha": best.alpha.tolist(),
+        "same": len(set(comm.allgather(result.x.tobytes()))) == 1,
+    }
+
+
+if __name__ == "__main__":
+    found = {name: gone_on(name, Path(sys.argv[1]) / f"{name}.npz", MPI.COMM_WORLD) for name in BOUND}
+    if MPI.COMM_WORLD.rank == 0:
+        sys.stdout.write(json.dumps(found))
