@@ -93,8 +93,8 @@ def test_the_pull_of_a_sliding_belt_grows_exponentially_with_its_wrap(
     assert state.contact.count(Status.SLIP) == AROUND + 1
     found, textbook = pull(state), np.exp(towards * friction_coefficient * ANGLE)
     expected = np.exp(towards * exponent(friction_coefficient) * ANGLE)
-    record_property("ratio of the pulls", found)
-    record_property("error", found / expected - 1)
+    record_property("ratio of the pulls", float(found))
+    record_property("error", float(found / expected - 1))
     assert found == pytest.approx(expected, rel=3e-4)
     assert abs(textbook / expected - 1) > 10 * abs(found / expected - 1), "the lever matters"
 
