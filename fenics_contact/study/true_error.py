@@ -1,0 +1,69 @@
+"""What the certificate must bound: the distance from the exact solution of the same discrete problem."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.contact import State, find_state
+from fenics_contact.errors import ConvergenceError
+from fenics_contact.qp import DualSolution, FaceNewton, solve
+
+#: Tolerances of the solution that counts as exact: the first that can be reached.
+EXACT = (1e-11, 1e-10, 1e-9)
+
+
+@dataclass(frozen=True)
+class TrueErrors:
+    """Energy norms of displacement errors over that of the displacement.
+
+    Attributes:
+        algebraic: Distance from the solution for the slip bounds that the state itself has.
+        total: Distance from the solution of the friction law, that of the slip bounds included.
+        tolerance: Residual down to which these solutions were found.
+    """
+
+    algebraic: float
+    total: float
+    tolerance: float
+
+
+def true_errors(states: tuple[State, ...]) -> TrueErrors | None:
+    """Solve the last step again, as exactly as possible, and compare. Collective.
+
+    Returns:
+        The errors; None where no such solution could be found.
+    """
+    state = states[-1]
+    if not isinstance(state.solution, DualSolution):
+        return None
+    for tolerance in EXACT:
+        try:
+            return _compared(states, FaceNewton(tolerance=tolerance))
+        except ConvergenceError:
+            continue
+    return None
+
+
+def _compared(states: tuple[State, ...], solver: FaceNewton) -> TrueErrors:
+    state = states[-1]
+    exact = find_state(
+        state.scene, state.torn.decomposition, solver=solver, previous=state,
+        slip_from=states[-2] if len(states) > 1 else None,
+    )  # fmt: skip
+    norm = np.sqrt(2.0 * exact.energies.strain)
+    total = _distance(state, exact.dual_solution, exact.torn_displacement) / norm
+    if not np.any(state.torn.friction_coefficient > 0.0):
+        return TrueErrors(total, total, solver.tolerance)
+    own = solve(state.dual.problem, state.dual_solution.slip_bound, solver, state.dual_solution.multiplier)
+    displacement = state.dual.displacement(own.multiplier, own.alpha)
+    return TrueErrors(_distance(state, own, displacement) / norm, total, solver.tolerance)
+
+
+def _distance(state: State, other: DualSolution, displacement: np.ndarray) -> float:
+    """Return √(dᵀK d) for the difference d of displacements, by K d = −Bᵀδλ. Collective."""
+    moved = displacement - state.torn_displacement
+    force = state.dual.force(state.dual_solution.multiplier - other.multiplier)
+    square = state.torn.numbering.comm.allreduce(float(moved @ force))
+    return float(np.sqrt(max(0.0, square)))
