@@ -26,6 +26,11 @@ class Energies:
     dual: float
 
     @property
+    def norm(self) -> float:
+        """Energy norm of the displacement, √(uᵀK u), [√(force · length)]."""
+        return float(np.sqrt(max(2.0 * self.strain, 0.0)))
+
+    @property
     def total_potential(self) -> float:
         """½ uᵀK u − fᵀu."""
         return self.strain - self.load

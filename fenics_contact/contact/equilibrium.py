@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from mpi4py import MPI
@@ -12,6 +14,7 @@ from fenics_contact.contact.energies import compute_energies
 from fenics_contact.contact.held import check_held
 from fenics_contact.contact.result import ContactResult, Status, no_contact
 from fenics_contact.contact.state import State
+from fenics_contact.contact.tolerance import Tolerance, checked_tolerance
 from fenics_contact.contact.warm_start import carried_over
 from fenics_contact.errors import together
 from fenics_contact.feti import (
@@ -26,6 +29,9 @@ from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, ProjectedCG,
 from fenics_contact.scene import Scene, SolverKind, choose_solver
 from fenics_contact.timing import PhaseTimer
 
+if TYPE_CHECKING:
+    from fenics_contact.accuracy import Balanced
+
 #: Largest relative residual of a scene without contact; its answer then equals that of a direct solver.
 LINEAR_TOLERANCE = 1e-10
 
@@ -36,6 +42,7 @@ def solve_scene(
     comm: MPI.Comm,
     *,
     solver: DualSolver | None = None,
+    tolerance: Tolerance = None,
 ) -> State:
     """Find the equilibrium of a scene. Collective on ``comm``.
 
@@ -45,6 +52,10 @@ def solve_scene(
             `Scene.partition` cut the bodies into subdomains of a good size.
         comm: Communicator over which the subdomains are spread.
         solver: Dual solver with its tolerance; `Scene.plan` tells which one is chosen if it is None.
+        tolerance: Largest relative residual of the answer, or `fenics_contact.accuracy.Balanced`, which
+            solves as well as the mesh deserves. By default the solver's own, and without a solver `Balanced`.
+            Give a number, 1e-6 or less, where the status of single contact points matters, or small
+            differences between states.
 
     Raises:
         InvalidInputError: If scene or partition cannot be used.
@@ -56,7 +67,7 @@ def solve_scene(
         >>> state = solve_scene(scene, parts, MPI.COMM_WORLD)  # doctest: +SKIP
     """
     decomposition, timer = decomposed(scene, partitions, comm)
-    return find_state(scene, decomposition, solver=solver, timer=timer)
+    return find_state(scene, decomposition, solver=solver, tolerance=tolerance, timer=timer)
 
 
 def decomposed(
@@ -75,6 +86,7 @@ def find_state(
     decomposition: Decomposition,
     *,
     solver: DualSolver | None = None,
+    tolerance: Tolerance = None,
     previous: State | None = None,
     slip_from: State | None = None,
     start_geometry: bool = True,
@@ -87,6 +99,7 @@ def find_state(
         scene: The scene, with the coordinates to use.
         decomposition: Its decomposition; only topology and numbering are taken from it.
         solver: Dual solver with its tolerance; `default_solver` chooses if it is None.
+        tolerance: As for `solve_scene`.
         previous: State of a neighbouring geometry or load to start from; what did not change is not
             assembled and factored again.
         slip_from: State from which slip is measured, that of the last load step; by default the undeformed
@@ -96,6 +109,8 @@ def find_state(
         timer: Collects the seconds.
     """
     timer = timer or PhaseTimer()
+    with together(decomposition.comm):
+        tolerance = checked_tolerance(tolerance)
     with timer.phase("assemble"):
         torn = build_torn_system(
             scene,
@@ -110,15 +125,50 @@ def find_state(
     kind = choose_solver(scene, decomposition.tearing.n_subdomains, sensitivity=sensitivity)
     if solver is None and kind is SolverKind.DIRECT:
         return _found_directly(torn, previous, timer)
+    chosen = solver or default_solver(kind)
     known = previous.system if previous is not None and isinstance(previous.system, DualSystem) else None
     system = DualSystem(torn, timer, previous=known)
+    start = None
+    if previous is not None and known is not None and isinstance(previous.solution, DualSolution):
+        start = carried_over(known, previous.solution, system)
+    if isinstance(tolerance, float) or (tolerance is None and solver is not None):
+        return _to_tolerance(
+            system, chosen if tolerance is None else chosen.with_tolerance(tolerance), start, timer
+        )
+    return _balanced(system, chosen, tolerance, start, timer)
+
+
+def _to_tolerance(
+    system: DualSystem, solver: DualSolver, start: np.ndarray | None, timer: PhaseTimer
+) -> State:
+    """Find the state to the tolerance of a solver. Collective."""
     with timer.phase("solve"):
-        start = None
-        if previous is not None and known is not None and isinstance(previous.solution, DualSolution):
-            start = carried_over(known, previous.solution, system)
-        solution = solve_dual(system, solver or default_solver(kind), start)
+        solution = solve_dual(system, solver, start)
     with timer.phase("state"):
         displacement = system.displacement(solution.multiplier, solution.alpha)
+    return _state(system, solution, displacement, timer)
+
+
+def _balanced(
+    system: DualSystem,
+    solver: DualSolver,
+    balanced: Balanced | None,
+    start: np.ndarray | None,
+    timer: PhaseTimer,
+) -> State:
+    """Find the state as well as the mesh deserves. Collective."""
+    # A fixed tolerance needs no estimates and does not load them.
+    from fenics_contact.accuracy import Balanced
+    from fenics_contact.contact.balancing import solve_balanced
+
+    rounds = solve_balanced(system, solve_dual, solver, balanced or Balanced(), start, timer)
+    state = _state(system, rounds.solution, rounds.displacement, timer)
+    return replace(state, known_errors=rounds.state_errors(state.energies.norm))
+
+
+def _state(system: DualSystem, solution: DualSolution, displacement: np.ndarray, timer: PhaseTimer) -> State:
+    """Return the state of a solution. Collective."""
+    with timer.phase("state"):
         contact = contact_result(system, solution)
         friction = float(np.sum(contact.slip_bound * np.linalg.norm(contact.slip, axis=1)))
         energies = compute_energies(system, displacement, solution.multiplier, friction)
@@ -143,13 +193,15 @@ def default_solver(kind: SolverKind) -> DualSolver:
     return ProjectedCG(tolerance=LINEAR_TOLERANCE)
 
 
-def solve_dual(system: DualSystem, solver: DualSolver, start: np.ndarray | None = None) -> DualSolution:
+def solve_dual(
+    system: DualSystem, solver: DualSolver, start: DualSolution | np.ndarray | None = None
+) -> DualSolution:
     """Solve the dual problem of a system with the friction laws of its scene. Collective.
 
     Args:
         system: The system.
         solver: `FaceNewton` and `FixedPoint` know Coulomb's law; a `FixedPoint` is put around `Smalse`.
-        start: Multiplier to start from, owned, or None.
+        start: Earlier solution, or multiplier to start from, owned, or None.
     """
     discs, torn = system.owned_discs(), system.torn
     tresca, coefficient = torn.tresca_bound[discs], torn.friction_coefficient[discs]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from fenics_contact.feti.temperature import temperature_of
 from fenics_contact.qp import DualSolution
 from fenics_contact.scene import Scene
 
+if TYPE_CHECKING:
+    from fenics_contact.accuracy import StateErrors
+
 
 @dataclass(frozen=True, eq=False)
 class State:
@@ -38,6 +41,7 @@ class State:
         contact: What happens on the contact surfaces, replicated.
         energies: Energies of all bodies.
         seconds: Wall time of this rank by phase, of all work up to this state that shares its timer.
+        known_errors: Errors that were found on the way, None if they were not needed; ask `errors`.
     """
 
     system: DualSystem | DirectSystem
@@ -46,6 +50,7 @@ class State:
     contact: ContactResult
     energies: Energies
     seconds: Mapping[str, float]
+    known_errors: StateErrors | None = field(default=None, repr=False)
 
     @property
     def torn(self) -> TornSystem:
@@ -79,6 +84,17 @@ class State:
     def scene(self) -> Scene:
         """The scene in the geometry of this state."""
         return self.torn.scene
+
+    @cached_property
+    def errors(self) -> StateErrors:
+        """Errors of the state by solver, friction law and mesh, in energy norm. Collective on first use."""
+        if self.known_errors is not None:
+            return self.known_errors
+        from fenics_contact.accuracy import discretisation_error, solver_errors, state_errors
+
+        solver = solver_errors(self.system, self.solution)
+        estimate = discretisation_error(self.torn, self.torn_displacement)
+        return state_errors(solver, estimate, self.energies.norm)
 
     @cached_property
     def displacement(self) -> dict[str, Any]:

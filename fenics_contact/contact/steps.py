@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact.equilibrium import decomposed, find_state
 from fenics_contact.contact.state import State
+from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.feti import Decomposition
 from fenics_contact.qp import DualSolver
 from fenics_contact.scene import LoadStep, Scene
@@ -36,10 +37,12 @@ class LoadSequence:
         comm: MPI.Comm,
         *,
         solver: DualSolver | None = None,
+        tolerance: Tolerance = None,
     ) -> None:
         """Start unloaded; arguments as for `solve_scene`."""
         self.scene, self.state = scene, None
-        self._partitions, self._comm, self._solver = partitions, comm, solver
+        self._partitions, self._comm = partitions, comm
+        self._solver, self._tolerance = solver, tolerance
         self._decomposition: Decomposition | None = None
         self._timer = PhaseTimer()
 
@@ -57,7 +60,7 @@ class LoadSequence:
         if self._decomposition is None:
             self._decomposition, self._timer = decomposed(scene, self._partitions, self._comm)
         state = find_state(
-            scene, self._decomposition, solver=self._solver, previous=self.state,
+            scene, self._decomposition, solver=self._solver, tolerance=self._tolerance, previous=self.state,
             slip_from=self.state, timer=self._timer,
         )  # fmt: skip
         self.scene, self.state = scene, state
@@ -71,6 +74,7 @@ def solve_steps(
     comm: MPI.Comm,
     *,
     solver: DualSolver | None = None,
+    tolerance: Tolerance = None,
 ) -> tuple[State, ...]:
     """Find the states at the end of every load step, see `LoadSequence`. Collective on ``comm``.
 
@@ -80,10 +84,11 @@ def solve_steps(
         partitions: As for `solve_scene`.
         comm: Communicator over which the subdomains are spread.
         solver: As for `solve_scene`.
+        tolerance: As for `solve_scene`, for every step.
 
     Example:
         >>> push = [LoadStep(f"push {s}", loads=[weight, pull(s)]) for s in (0.5, 1.0, 0.0)]  # doctest: +SKIP
         >>> states = solve_steps(scene, push, partitions, comm)  # doctest: +SKIP
     """
-    sequence = LoadSequence(scene, partitions, comm, solver=solver)
+    sequence = LoadSequence(scene, partitions, comm, solver=solver, tolerance=tolerance)
     return tuple(sequence.advance(step) for step in steps)

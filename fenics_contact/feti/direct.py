@@ -80,6 +80,14 @@ class DirectSystem:
             displacement, missing[self._fixed], float(np.linalg.norm(missing[free]) / scale)
         )
 
+    def energy_of_residual(self, displacement: np.ndarray) -> float:
+        """Return rᵀK⁻¹r of the free components, r = f − K u: the energy norm of the error, squared."""
+        (body,) = self.torn.subdomains
+        missing = (self.torn.load - body.stiffness @ displacement)[self._free]
+        correction = np.empty(len(self._free))
+        self._factor.solve(missing, correction)
+        return float(missing @ correction)
+
     def force(self, multiplier: np.ndarray) -> np.ndarray:
         """Return Bᵀλ, the reactions on all components, shape (torn_size,), [force]."""
         return np.asarray(self.torn.B.T @ multiplier)

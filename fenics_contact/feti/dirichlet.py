@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -70,10 +71,43 @@ class DirichletPreconditioner:
         contact = self._contact.on_face(restriction)
         return lambda residual: self._apply(residual, contact)
 
+    def lifting(self, restriction: sp.csr_matrix) -> Lifting:
+        """Return the displacements of the interface that close rows of a face. Collective.
+
+        Args:
+            restriction: Z with orthonormal columns, shape (n_owned, n_face), owned.
+        """
+        return Lifting(self, self._contact.on_face(restriction))
+
     def _apply(self, residual: np.ndarray, contact: _ContactBlock) -> np.ndarray:
-        jump = self._Bt @ self._numbering.to_local(contact.solve(self._equality * residual))
-        force = self._B @ self._inverse.stiffen(jump)
-        return self._equality * contact.solve(self._numbering.to_owned(force))
+        return self._force(self._inverse.stiffen(self._jump(residual, contact)), contact)
+
+    def _jump(self, residual: np.ndarray, contact: _ContactBlock) -> np.ndarray:
+        """Return D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹ r on the interface. Collective."""
+        return self._Bt @ self._numbering.to_local(contact.solve(self._equality * residual))
+
+    def _force(self, stiffened: np.ndarray, contact: _ContactBlock) -> np.ndarray:
+        """Return the transpose of `_jump` times an interface force, owned. Collective."""
+        return self._equality * contact.solve(self._numbering.to_owned(self._B @ stiffened))
+
+
+@dataclass(frozen=True, eq=False)
+class Lifting:
+    """The two factors of the preconditioner on a face, M = Lᵀ S L with L = D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹.
+
+    B L r = r on the rows of the face but for the regularisation of the contact block.
+    """
+
+    _preconditioner: DirichletPreconditioner
+    _contact: _ContactBlock
+
+    def jump(self, residual: np.ndarray) -> np.ndarray:
+        """Return L r, the interface displacement that moves rows by r, shape (n_interface,). Collective."""
+        return self._preconditioner._jump(residual, self._contact)
+
+    def multiplier(self, force: np.ndarray) -> np.ndarray:
+        """Return Lᵀ times an interface force, owned. Collective."""
+        return self._preconditioner._force(force, self._contact)
 
 
 class _ContactBlock:

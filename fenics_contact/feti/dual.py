@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -121,6 +122,15 @@ class DualSystem:
     def jump(self, displacement: np.ndarray) -> np.ndarray:
         """Return B u, owned, [length]. Collective."""
         return self.torn.jump(displacement)
+
+    def interface_jump(self, displacement: np.ndarray) -> np.ndarray:
+        """Return B u for a displacement of the interface, (n_interface,), owned, [length]. Collective."""
+        return self.torn.numbering.to_owned(self._B_interface @ displacement)
+
+    @property
+    def preconditioner(self) -> DirichletPreconditioner:
+        """The preconditioner of the unscaled problem."""
+        return cast(DirichletPreconditioner, self.problem.preconditioner)
 
     def displacement(self, multiplier: np.ndarray, alpha: np.ndarray) -> np.ndarray:
         """Return u = K⁺(f − Bᵀλ) + R α on this rank's torn dofs, [length]. Collective."""

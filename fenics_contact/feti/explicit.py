@@ -11,6 +11,10 @@ from fenics_contact.feti.condensation import Condensations
 from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.subdomain import Subdomain
 
+#: Roundings of its largest entry by which wᵀ S w, computed in single precision, may be wrong: the rows of S
+#: decay away from the diagonal, their sums are a few diagonal entries.
+ROUNDINGS = 16
+
 
 class ExplicitOperator:
     """(K⁺)_bb and S as packed triangles; S, which only preconditions, in single precision.
@@ -51,6 +55,13 @@ class ExplicitOperator:
     def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
         """Write S, rounded to single precision, times an interface displacement into ``force``."""
         force[:] = blas.sspmv(self._size, 1.0, self._stiff, displacement.astype(np.float32), lower=1)
+
+    @property
+    def stiffening_error(self) -> float:
+        """By how much wᵀ S w may be wrong for w of length one: S is rounded, and so are all sums with it."""
+        start = np.arange(self._size)
+        diagonal = self._stiff[start * (2 * self._size - start + 1) // 2]
+        return ROUNDINGS * float(np.finfo(np.float32).eps) * float(diagonal.max(initial=0.0))
 
     def invert(self, right: np.ndarray) -> np.ndarray:
         """Return K⁺ times a vector, shape (n,)."""

@@ -51,6 +51,11 @@ class FormLibrary:
         """Names of the forms compiled so far."""
         return self._templates.names
 
+    @property
+    def templates(self) -> Templates:
+        """The compiled forms; what floors above write joins them, when it is asked for."""
+        return self._templates
+
     def prepare(self, scene: Scene) -> None:
         """Compile what the scene calls for and is not there yet. Collective on the library's communicator.
 
@@ -97,6 +102,10 @@ class FormLibrary:
         cells = parts.cells if isinstance(load, ThermalStrain) else None
         functions = fields_of(load, space, points)
         return template.bind([space], load_parameters(load, parts), functions, facets, cells=cells)
+
+    def varies(self, material: Material, cell_type: str) -> bool:
+        """Return whether the stiffness of a material mentions the place that it is at."""
+        return self._templates["stiffness", (material,), cell_type].mentions(ufl.geometry.SpatialCoordinate)
 
     def typical_modulus(self, material: Material, cell_type: str) -> float:
         """Return the mean diagonal entry of the stiffness of a cell of edge length one.

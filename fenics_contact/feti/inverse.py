@@ -91,6 +91,28 @@ class TornInverse:
         """Return S times an interface displacement, shape (n_interface,)."""
         return self._each(lambda operator: operator.stiffen, displacement)
 
+    def energy(self, displacement: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return an upper bound of wᵀ S w and S w itself, shape (n_interface,).
+
+        Rigid motions have no energy; they are taken off before S, which may be rounded, is applied.
+
+        Args:
+            displacement: w, shape (n_interface,).
+        """
+        bound, force = 0.0, np.zeros_like(displacement)
+        each = zip(self._subdomains, self.operators, self._local, self._parts, strict=True)
+        for subdomain, operator, local, part in each:
+            size = float(np.abs(displacement[part]).max(initial=0.0))
+            if size == 0.0:
+                continue
+            modes, _ = np.linalg.qr(subdomain.kernel[local])
+            bent = displacement[part] / size
+            bent -= modes @ (modes.T @ bent)
+            operator.stiffen(bent, found := np.empty_like(bent))
+            bound += size**2 * (float(bent @ found) + operator.stiffening_error * float(bent @ bent))
+            force[part] = size * found
+        return max(bound, 0.0), force
+
     def row_flexibility(self, rows: sp.csr_matrix) -> np.ndarray:
         """Return bᵀ K⁺ b for each row b of a matrix with interface columns, shape (n_rows,)."""
         flexibility = np.zeros(rows.shape[0])

@@ -26,6 +26,10 @@ class LocalOperator(Protocol):
     def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
         """Write S, or a close approximation, times an interface displacement into ``force``."""
 
+    @property
+    def stiffening_error(self) -> float:
+        """By how much wᵀ S w may be wrong for a displacement w of length one, [force / length]."""
+
     def invert(self, right: np.ndarray) -> np.ndarray:
         """Return K⁺ times a vector, shape (n,)."""
 

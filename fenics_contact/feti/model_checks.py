@@ -32,7 +32,7 @@ Bind = Callable[[Any], Any]
 
 def unit_cell_stiffness(cell_type: str, bind: Bind) -> np.ndarray:
     """Return the stiffness matrix of a cell of edge length one, dense, block by block."""
-    return _cell(UNIT_CELL[cell_type], cell_type, bind)[0]
+    return stiffness_of_cell(UNIT_CELL[cell_type], cell_type, bind)[0]
 
 
 def check_model(material: Material, cell_type: str, bind: Bind) -> None:
@@ -51,7 +51,7 @@ def check_model(material: Material, cell_type: str, bind: Bind) -> None:
             has the wrong shape, dependent modes or modes that are none, or a mode without energy is missing.
     """
     name = type(material).__name__
-    K, points = _cell(_skewed(UNIT_CELL[cell_type]), cell_type, bind)
+    K, points = stiffness_of_cell(_skewed(UNIT_CELL[cell_type]), cell_type, bind)
     if not np.isfinite(K).all():
         raise InvalidInputError(
             f"stiffness and load must be finite, got NaN or infinity in the stiffness of {name}: check the "
@@ -128,8 +128,14 @@ def _skewed(vertices: np.ndarray) -> np.ndarray:
     return vertices + 0.08 * shift
 
 
-def _cell(vertices: np.ndarray, cell_type: str, bind: Bind) -> tuple[np.ndarray, np.ndarray]:
-    """Return the stiffness of one cell and its points, both block by block."""
+def stiffness_of_cell(vertices: np.ndarray, cell_type: str, bind: Bind) -> tuple[np.ndarray, np.ndarray]:
+    """Return the stiffness of one cell, dense, and its points, both block by block.
+
+    Args:
+        vertices: Coordinates in VTK order, shape (n, dim), [length].
+        cell_type: Type of the cell.
+        bind: Binds the stiffness form of a material.
+    """
     mesh = _dolfinx.local_mesh(vertices, np.arange(len(vertices))[None], cell_type)
     space = _dolfinx.coefficient(mesh, "u").function_space
     nodes, dofs = _dolfinx.node_dofs(space)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import ufl
 from mpi4py import MPI
+from ufl.algorithms.analysis import extract_type
 
 from fenics_contact import _dolfinx
 
@@ -29,7 +30,12 @@ class Template:
     ) -> None:
         """Compile ``form``. Collective on ``comm``."""
         self._form = _dolfinx.CompiledForm(comm, form)
+        self._written = form
         self._constants, self._coefficients = tuple(constants), tuple(coefficients)
+
+    def mentions(self, kind: type) -> bool:
+        """Return whether the form was written with a symbol of UFL of some kind."""
+        return bool(extract_type(self._written, kind))
 
     def bind(
         self,

@@ -17,6 +17,7 @@ FLOORS = [
     {"geometry", "linalg"},
     {"scene", "qp"},
     {"feti"},
+    {"accuracy"},
     {"contact"},
     {"shape"},
     {"optimize"},

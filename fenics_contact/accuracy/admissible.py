@@ -1,0 +1,138 @@
+"""An admissible multiplier near a computed one: within its cone and in equilibrium."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact.qp import CoarseSpace, DualProblem, FeasibleSet, contact_step
+from fenics_contact.qp.face import Marks
+from fenics_contact.qp.reductions import Vector
+
+#: Forces out of balance below this share of all forces are rounding.
+ROUNDING = 1e-13
+#: Rounds of projections on the cone and on equilibrium, one after the other.
+ROUNDS = 100
+#: A round that leaves more than this share of what was out of balance leads nowhere.
+PROGRESS = 0.9
+#: A slip bound beyond every force.
+ENDLESS = 1e300
+
+
+@dataclass(frozen=True, eq=False)
+class Admissible:
+    """A multiplier that a Tresca problem admits, with what contact does there.
+
+    Attributes:
+        multiplier: λ with λ_N ≥ 0, ‖τ‖ ≤ Ψ and G λ = e, owned.
+        closed: Contacts that press, shape (n_contact,), owned.
+        stick: Discs that stick, shape (n_friction,), owned.
+        slip: Discs on the circle, shape (n_friction,), owned; the others are pinned (Ψ = 0).
+        slip_bound: Ψ of the Tresca problem, shape (n_friction,), owned. It is the given one except where no
+            multiplier within it balances the load: at a load that all friction just resists the solver's
+            tolerance decides about that. It then is raised to the forces that were found.
+        unbalanced: What is left of G λ − e, measured in multipliers, relative to ‖λ‖.
+    """
+
+    multiplier: Vector
+    closed: Marks
+    stick: Marks
+    slip: Marks
+    slip_bound: Vector
+    unbalanced: float
+
+
+def admissible(problem: DualProblem, slip_bound: Vector, multiplier: Vector, residual: Vector) -> Admissible:
+    """Find an admissible multiplier near a computed one. Collective; no product.
+
+    Where the map w = λ − ρ r of the solver says open, the normal force is set to zero, where it says slip,
+    friction is set on its circle: what is missing there costs energy of first order, as gap and slip are not
+    small. Elsewhere λ is projected on the cone.
+
+    Args:
+        problem: The dual problem.
+        slip_bound: Ψ, shape (n_friction,), owned.
+        multiplier: λ, owned.
+        residual: r = F λ − d − Gᵀα, owned.
+    """
+    layout = problem.layout
+    trial = multiplier - contact_step(layout, problem.diagonal) * residual
+    closed = trial[layout.normal] > 0.0
+    wanted = trial[layout.tangential]
+    length = np.linalg.norm(wanted, axis=1)
+    slip = (slip_bound > 0.0) & (length >= slip_bound)
+    stick = (slip_bound > 0.0) & ~slip
+    start = np.array(multiplier)
+    start[layout.normal[~closed]] = 0.0
+    start[layout.tangential[slip]] = (slip_bound[slip] / length[slip])[:, None] * wanted[slip]
+    free = np.concatenate([layout.normal[closed], layout.tangential[stick].ravel()])
+    found, left = _balanced(problem, FeasibleSet(layout, slip_bound), start, free)
+    if left > ROUNDING:
+        endless = FeasibleSet(layout, np.full_like(slip_bound, ENDLESS))
+        found, left = _balanced(problem, endless, start, free)
+        slip_bound = np.maximum(slip_bound, np.linalg.norm(found[layout.tangential], axis=1))
+    return Admissible(found, closed, stick, slip, slip_bound, left)
+
+
+def _balanced(
+    problem: DualProblem, feasible: FeasibleSet, start: Vector, free: np.ndarray
+) -> tuple[Vector, float]:
+    """Return a multiplier of the cone in equilibrium, and how much is left of G λ − e. Collective.
+
+    Forces are balanced by the gluing rows alone, or where they do not hold every body, by the free contact
+    rows as well, and at last by all.
+    """
+    found = feasible.project(start)
+    left = _unbalanced(problem, found)
+    equality, every = problem.layout.equality, np.arange(problem.layout.size)
+    for rows in (equality, np.concatenate([equality, free]), every):
+        if left <= ROUNDING:
+            break
+        balance = _Balance.of_rows(problem, rows)
+        for _ in range(ROUNDS):
+            found = feasible.project(found + balance(found))
+            before, left = left, _unbalanced(problem, found)
+            if left <= ROUNDING or left > PROGRESS * before:
+                break
+    return found, left
+
+
+@dataclass(frozen=True, eq=False)
+class _Balance:
+    """Restores G λ = e by the shortest change of the evened multipliers of some rows."""
+
+    problem: DualProblem
+    coarse: CoarseSpace
+    spread: sp.csr_matrix
+
+    @classmethod
+    def of_rows(cls, problem: DualProblem, rows: np.ndarray) -> _Balance:
+        factor = evening(problem)
+        selection = rows_of(problem.layout.size, rows)
+        coarse = problem.evened.coarse.restricted(selection)
+        return cls(problem, coarse, (sp.diags(factor) @ selection).tocsr())
+
+    def __call__(self, multiplier: Vector) -> Vector:
+        """Return the change that balances a multiplier, as far as the rows can. Collective."""
+        missing = self.problem.coarse.residual(multiplier)
+        return np.asarray(-(self.spread @ self.coarse.transpose(self.coarse.solve(missing))))
+
+
+def evening(problem: DualProblem) -> Vector:
+    """Return the factors of the evened multipliers, one where stiffness is even, owned."""
+    return np.ones(problem.layout.size) if problem.scaling is None else problem.scaling.factor
+
+
+def rows_of(size: int, rows: np.ndarray) -> sp.csr_matrix:
+    """Return the restriction Z to some owned rows, shape (size, n_rows)."""
+    count = len(rows)
+    return sp.csr_matrix((np.ones(count), (rows, np.arange(count))), shape=(size, count))
+
+
+def _unbalanced(problem: DualProblem, multiplier: Vector) -> float:
+    coarse = problem.coarse
+    size = max(problem.norm(multiplier), coarse.norm(coarse.load))
+    left = coarse.norm(coarse.residual(multiplier))
+    return left / size if size > 0.0 else 0.0

@@ -1,0 +1,74 @@
+"""When a state is solved well enough: as soon as its mesh is what limits it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fenics_contact.accuracy.state_errors import SolverErrors
+from fenics_contact.errors import InvalidInputError
+
+#: Share of what is allowed that the next tolerance aims at: errors do not fall exactly as residuals do.
+MARGIN = 0.5
+#: Smallest and largest ratio of one tolerance to the one before.
+STEP = (1e-4, 0.3)
+
+
+@dataclass(frozen=True)
+class Balanced:
+    """A tolerance that follows the mesh: the solver's error is at most a share of the discretisation's.
+
+    The scene is solved to ``loosest``. Then the error of the discretisation is estimated, that of the solver
+    bounded (`StateErrors`), and if the latter is more than its share, the solver goes on from where it is to
+    a tolerance that the ratio tells. A mesh that represents the solution exactly is solved to ``finest``.
+
+    Displacements, contact pressures and energies then are as good as the mesh allows. That is not the same
+    for what jumps: whether a point at the edge of the contact is closed, or sticks, may still change, and
+    derivatives by the shape, which belong to one choice of these statuses, with it. Where statuses or
+    differences between neighbouring states matter, give a number: 1e-6 settles nearly all, 1e-8 all that are
+    not weakly active.
+
+    Attributes:
+        share: Largest error of the solver, law of friction included, relative to that of the mesh.
+        loosest: First tolerance, and the largest of all.
+        finest: Smallest tolerance.
+        rounds: How often the tolerance is tightened at most.
+
+    Raises:
+        InvalidInputError: If the share or the tolerances are not positive or in the wrong order.
+
+    Example:
+        >>> state = solve_scene(scene, None, comm, tolerance=Balanced(share=0.01))  # doctest: +SKIP
+    """
+
+    share: float = 0.1
+    loosest: float = 1e-2
+    finest: float = 1e-10
+    rounds: int = 4
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if not (self.share > 0.0 and 0.0 < self.finest <= self.loosest < 1.0 and self.rounds >= 1):
+            raise InvalidInputError(
+                "Balanced needs share > 0, 0 < finest <= loosest < 1 and rounds >= 1, got share "
+                f"{self.share:g}, finest {self.finest:g}, loosest {self.loosest:g}, rounds {self.rounds}: "
+                "keep the defaults of what you do not mean to change"
+            )
+
+    def satisfied(self, errors: SolverErrors, discretisation: float) -> bool:
+        """Tell whether the solver's errors are within their share of the discretisation's."""
+        return errors.together <= self.share * discretisation
+
+    def tightened(self, reached: float, errors: SolverErrors, discretisation: float) -> float:
+        """Return the next tolerance.
+
+        Args:
+            reached: Largest residual so far.
+            errors: What the solver left.
+            discretisation: Estimated error of the mesh, [√(force · length)].
+        """
+        allowed = self.share * discretisation
+        # What is far below the rounding of the residuals will not get better by small steps.
+        if allowed <= self.finest * errors.together:
+            return self.finest
+        ratio = MARGIN * allowed / errors.together
+        return max(self.finest, reached * min(max(ratio, STEP[0]), STEP[1]))

@@ -1,0 +1,38 @@
+"""How far slip bounds are from those that Coulomb's law asks for, in energy norm."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.accuracy.certificate import Certificate
+from fenics_contact.feti import DualSystem
+from fenics_contact.qp import DualSolution
+from fenics_contact.qp.reductions import global_sum
+
+
+def friction_error(system: DualSystem, solution: DualSolution, certificate: Certificate) -> float:
+    """Estimate the error by slip bounds that are not those of the solution. Collective; no product.
+
+    The slip bounds of a solution follow its normal forces, Ψ = Ψ₀ + μ λ_N, and are wrong by μ δλ_N where
+    these are wrong by δλ_N. The certificate knows δλ_N nearly: one preconditioned step. On slipping points
+    friction then changes by μ δλ_N along its direction, which bends the bodies by about √Σ F_ii (μ δλ_i)².
+
+    It is an estimate and no bound: Coulomb's law minimises nothing. It tells the difference to the solution
+    with Tresca's law and the present slip bounds, for which the certificate is an upper bound. Zero where
+    nothing slips, and where slip bounds do not follow the normal forces.
+
+    Args:
+        system: The dual system.
+        solution: A solution of its problem.
+        certificate: What `certify` found for it.
+
+    Returns:
+        Energy norm of the change, [√(force · length)].
+    """
+    torn, layout, known = system.torn, system.problem.layout, certificate.known
+    coefficient = torn.friction_coefficient[system.owned_discs()]
+    change = np.where(known.slip, coefficient * certificate.error[layout.tangential_frictional], 0.0)
+    raised = known.slip_bound - solution.slip_bound
+    flexibility = system.problem.diagonal[layout.tangential].mean(axis=1)
+    square = global_sum(system.problem.comm, flexibility @ (change**2 + raised**2))[0]
+    return float(np.sqrt(square))

@@ -1,0 +1,145 @@
+"""An admissible displacement near a computed one, and what the way there costs in energy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact.accuracy.admissible import Admissible, rows_of
+from fenics_contact.feti import DualSystem
+from fenics_contact.qp import contact_step
+from fenics_contact.qp.face import Marks
+from fenics_contact.qp.reductions import Vector, global_max, global_sum
+
+#: Corrections of what the regularised contact block leaves.
+REFINEMENTS = 12
+#: Share of the violation at the start, and of the displacements that cancel in the rows, that is rounding.
+ROUNDING, CANCELLED = 1e-9, 1e-14
+
+
+@dataclass(frozen=True, eq=False)
+class Lifted:
+    """A correction w of the interface after which all equality rows hold and no contact penetrates.
+
+    Attributes:
+        energy: Upper bound of wᵀ S w, [force · length].
+        residual: r after it, owned, [length]; rows that were closed hold exactly zero.
+        multiplier: Estimate −M r of how far the multiplier is from the solution, owned, [force].
+        left: Violation that is left, relative to the first one; more than rounding only if the rows
+            contradict each other.
+    """
+
+    energy: float
+    residual: Vector
+    multiplier: Vector
+    left: float
+
+
+def lift(system: DualSystem, known: Admissible, residual: Vector, cancelled: float) -> Lifted:
+    """Close the rows that should be closed, and all that the correction would let penetrate. Collective.
+
+    The correction is that of the Dirichlet preconditioner, w = D⁻¹Bᵀ(B D⁻¹Bᵀ)⁻¹ r, with its energy wᵀ S w:
+    the preconditioned residual rᵀ M r. What the regularised contact block leaves is corrected again, at the
+    price of that small block alone; S is applied once, for half an F-product.
+
+    Args:
+        system: The dual system.
+        known: An admissible multiplier with its statuses.
+        residual: Its r = F λ − d − Gᵀα, owned, [length].
+        cancelled: Size of the displacements that cancel in r, [length].
+    """
+    comm, tangential = system.problem.comm, system.problem.layout.tangential
+    slid = np.linalg.norm(residual[tangential], axis=1)
+    step = contact_step(system.problem.layout, system.problem.diagonal)[tangential[:, 0]]
+    # Where a slip is short, its part across the friction force is cheaper to take away than to pay for.
+    across = known.slip & (step * slid < known.slip_bound)
+    rows = _Rows(system, known, known.closed, known.stick, across)
+    closing = _close(rows, residual, cancelled)
+    if closing.left > ROUNDING:  # a node of two pairs may be told to stick where it should close
+        nothing = np.zeros_like(across)
+        closing = _close(replace(rows, stick=nothing, across=nothing), residual, cancelled)
+    energy, force = system.inverse.energy(closing.displacement)
+    energy = float(global_sum(comm, energy)[0])
+    after = closing.residual - closing.rows.spread(closing.rows.wanted(closing.residual))
+    estimate = -system.preconditioner.lifting(closing.rows.restriction).multiplier(force)
+    return Lifted(energy, after, estimate, closing.left)
+
+
+@dataclass(frozen=True, eq=False)
+class _Closing:
+    """Displacement w that closes rows, r after it, and what is left relative to the start."""
+
+    rows: _Rows
+    displacement: Vector
+    residual: Vector
+    left: float
+
+
+def _close(rows: _Rows, residual: Vector, cancelled: float) -> _Closing:
+    """Close rows, and those that penetrate after it. Collective; no application of S."""
+    system = rows.system
+    comm, w = system.problem.comm, np.zeros(len(system.inverse.interface))
+    start = global_max(comm, np.abs(rows.wanted(residual)).max(initial=0.0))
+    small = max(ROUNDING * start, CANCELLED * cancelled)
+    lifting, current, violation = system.preconditioner.lifting(rows.restriction), residual, start
+    for _ in range(REFINEMENTS):
+        w += lifting.jump(rows.spread(rows.wanted(current)))
+        current = residual - system.interface_jump(w)
+        more = rows.penetrating(current, small)
+        violation = global_max(comm, np.abs(rows.wanted(current)).max(initial=0.0))
+        if global_sum(comm, np.count_nonzero(more))[0] > 0.0:
+            rows = replace(rows, closed=rows.closed | more)
+            lifting = system.preconditioner.lifting(rows.restriction)
+        elif violation <= small:
+            return _Closing(rows, w, current, 0.0)
+    return _Closing(rows, w, current, violation / start)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """The rows that a correction closes: all equality rows and some of contacts.
+
+    Attributes:
+        system: The dual system.
+        known: An admissible multiplier.
+        closed: Contacts to close, shape (n_contact,), owned.
+        stick: Discs whose slip is taken away, shape (n_friction,), owned.
+        across: Discs whose slip across the friction force is taken away, shape (n_friction,), owned.
+    """
+
+    system: DualSystem
+    known: Admissible
+    closed: Marks
+    stick: Marks
+    across: Marks
+
+    @cached_property
+    def restriction(self) -> sp.csr_matrix:
+        """Z with orthonormal columns, shape (size, n_face), owned."""
+        layout = self.system.problem.layout
+        rows = [layout.equality, layout.normal[self.closed], layout.tangential[self.stick].ravel()]
+        single = rows_of(layout.size, np.concatenate(rows))
+        if layout.tangential.shape[1] == 1:
+            return single
+        pairs = layout.tangential[self.across]
+        tau = self.known.multiplier[pairs]
+        tau = tau / np.linalg.norm(tau, axis=1, keepdims=True)
+        values = np.stack([-tau[:, 1], tau[:, 0]], axis=1)
+        columns = np.repeat(np.arange(len(pairs)), 2)
+        turned = sp.csr_matrix((values.ravel(), (pairs.ravel(), columns)), shape=(layout.size, len(pairs)))
+        return sp.hstack([single, turned], format="csr")
+
+    def wanted(self, residual: Vector) -> Vector:
+        """Return Zᵀ r, shape (n_face,)."""
+        return np.asarray(self.restriction.T @ residual)
+
+    def spread(self, y: Vector) -> Vector:
+        """Return Z y, owned."""
+        return np.asarray(self.restriction @ y)
+
+    def penetrating(self, residual: Vector, tolerance: float) -> Marks:
+        """Mark contacts that are not closed and penetrate by more than a tolerance."""
+        return np.asarray(~self.closed & (residual[self.system.problem.layout.normal] < -tolerance))

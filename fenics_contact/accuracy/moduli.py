@@ -1,0 +1,45 @@
+"""The moduli of a material as numbers, from its stiffness on one cell."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fenics_contact.feti.composition import Composition
+from fenics_contact.feti.forms import FormLibrary
+from fenics_contact.feti.model_checks import UNIT_CELL, stiffness_of_cell
+from fenics_contact.geometry.cell_types import CELL_TYPES
+from fenics_contact.scene import Material
+
+
+def moduli(forms: FormLibrary, material: Material, cell_type: str) -> np.ndarray:
+    """Return C of C g : g, twice the energy a volume of a displacement gradient g.
+
+    A material knows stiffnesses of displacements alone, and its stress may be any UFL. On a cell with the
+    displacement g x it stores C g : g times the volume. Some materials resist displacements too: what they
+    add falls with the square of the size of the cell and drops out of two sizes.
+
+    Args:
+        forms: Compiled forms that the material is among.
+        material: A material whose moduli are the same everywhere.
+        cell_type: Type of the cell.
+
+    Returns:
+        Shape (dim², dim²), g_kj at place dim k + j, [force / length²].
+    """
+    parts = Composition((material,))
+
+    def bind(space: Any) -> Any:
+        return forms.stiffness(parts, cell_type, space)
+
+    large, small = (_on_cell_of(size, cell_type, bind) for size in (1.0, 0.5))
+    return np.asarray((4 * small - large) / 3)
+
+
+def _on_cell_of(size: float, cell_type: str, bind: Any) -> np.ndarray:
+    K, points = stiffness_of_cell(size * UNIT_CELL[cell_type], cell_type, bind)
+    n, dim = points.shape
+    motions = np.einsum("ki,nj->nikj", np.eye(dim), points).reshape(n * dim, dim * dim)
+    volume = CELL_TYPES[cell_type].reference_volume * size**dim
+    return np.asarray(motions.T @ K @ motions / volume)

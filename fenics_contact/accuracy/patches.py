@@ -1,0 +1,165 @@
+"""The patch of nodes around every site, and what fits of quadratic polynomials ask of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.accuracy.sites import Sites
+
+#: Numbers that a chunk of patches holds at once.
+CHUNK = 2_000_000
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Normal equations of the fits of some sites, in the coordinates of their patches.
+
+    Attributes:
+        rows: The sites, shape (n,).
+        matrix: Shape (n, m, m), its trace of order one, with m = dim + dim (dim + 1) / 2.
+        right: Shape (n, m, dim), [length].
+    """
+
+    rows: np.ndarray
+    matrix: np.ndarray
+    right: np.ndarray
+
+    def part(self, chosen: np.ndarray) -> Moments:
+        """Return those of some of the sites."""
+        return Moments(self.rows[chosen], self.matrix[chosen], self.right[chosen])
+
+
+@dataclass(frozen=True)
+class Patches:
+    """The patches of all sites, each with coordinates in which it is as long as wide.
+
+    The nodes of a patch are those of the cells around the site that are of its material, each weighted by the
+    number of cells that it shares with the site.
+
+    Attributes:
+        sites: The sites.
+        turn: T of each site: a difference d of places is T d in its own coordinates, shape
+            (n_sites, dim, dim), [1 / length].
+        weight: Sum of the weights of each patch, shape (n_sites,).
+    """
+
+    sites: Sites
+    turn: np.ndarray
+    weight: np.ndarray
+
+    @property
+    def dim(self) -> int:
+        """Dimension of space."""
+        return int(self.turn.shape[1])
+
+    def moments(self, displacement: np.ndarray) -> Iterator[Moments]:
+        """Yield the normal equations of all sites, some at a time. Collective.
+
+        Args:
+            displacement: Displacement of each site, shape (n_sites, dim), [length].
+        """
+        shared = self.sites.sharing.shared
+        alone = np.ones(self.sites.count, dtype=bool)
+        alone[shared] = False
+        yield self._of_all_ranks(shared, displacement)
+        for rows in self._chunks(np.flatnonzero(alone)):
+            yield self._of_this_rank(rows, displacement)
+
+    def _of_all_ranks(self, rows: np.ndarray, displacement: np.ndarray) -> Moments:
+        size, dim = polynomials(self.dim), self.dim
+        packed = np.zeros((self.sites.count if len(rows) else 0, size * (size + dim)))
+        for part in self._chunks(rows):
+            found = self._of_this_rank(part, displacement)
+            packed[part] = np.concatenate([found.matrix, found.right], axis=2).reshape(len(part), -1)
+        summed = self.sites.sharing.add_up(packed)[rows].reshape(-1, size, size + dim)
+        return Moments(rows, summed[:, :, :size], summed[:, :, size:])
+
+    def _of_this_rank(self, rows: np.ndarray, displacement: np.ndarray) -> Moments:
+        other, weight = padded(self.sites, rows)
+        points = self.sites.points
+        away = np.einsum("nij,npj->npi", self.turn[rows], points[other] - points[rows][:, None])
+        basis = monomials(away)
+        weighted = (basis * (weight / self.weight[rows, None])[..., None]).transpose(0, 2, 1)
+        jump = displacement[other] - displacement[rows][:, None]
+        return Moments(rows, weighted @ basis, weighted @ jump)
+
+    def _chunks(self, rows: np.ndarray) -> Iterator[np.ndarray]:
+        """Yield sites in chunks of about equally many neighbours."""
+        if not len(rows):
+            return
+        count = np.diff(self.sites.neighbours.indptr)[rows]
+        order = np.argsort(count, kind="stable")
+        numbers = np.cumsum(count[order]) * 2 * polynomials(self.dim)
+        yield from np.split(rows[order], np.flatnonzero(np.diff(numbers // CHUNK)) + 1)
+
+
+def find_patches(sites: Sites) -> Patches:
+    """Give every patch its coordinates. Collective."""
+    dim, table, points = sites.points.shape[1], sites.neighbours, sites.points
+    row = np.repeat(np.arange(sites.count), np.diff(table.indptr))
+    away = (points[table.indices] - points[row]).T
+    i, j = np.triu_indices(dim)
+    columns = (table.data, *(table.data * away[a] * away[b] for a, b in zip(i, j, strict=True)))
+    # Every site has neighbours: those of its own cells.
+    sums = np.column_stack([np.add.reduceat(column, table.indptr[:-1]) for column in columns])
+    weight, *products = sites.sharing.add_up(sums).T
+    mean = np.empty((sites.count, dim, dim))
+    mean[:, i, j] = mean[:, j, i] = np.stack(products, axis=1) / weight[:, None]
+    return Patches(sites, np.linalg.inv(np.linalg.cholesky(mean)), weight)
+
+
+def padded(sites: Sites, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return neighbours and their weights as tables, filled up with neighbours of no weight.
+
+    Args:
+        sites: The sites.
+        rows: Some of them.
+    """
+    table = sites.neighbours
+    start, end = table.indptr[rows], table.indptr[rows + 1]
+    place = start[:, None] + np.arange(int((end - start).max(initial=0)))
+    real = place < end[:, None]
+    place = np.where(real, place, start[:, None])
+    return table.indices[place], np.where(real, table.data[place], 0.0)
+
+
+def polynomials(dim: int) -> int:
+    """Return the number of first and second derivatives of a function."""
+    return dim + dim * (dim + 1) // 2
+
+
+def monomials(away: np.ndarray) -> np.ndarray:
+    """Return the polynomials that first and second derivatives are the coefficients of.
+
+    Mixed second derivatives count √2 times, so that the sum of squares of all is that of the matrix of second
+    derivatives and does not depend on directions.
+
+    Args:
+        away: Differences of places, shape (..., dim).
+
+    Returns:
+        Shape (..., m): d_i, then ½ d_i², then d_i d_j / √2 for i < j.
+    """
+    i, j = np.triu_indices(away.shape[-1], 1)
+    return np.concatenate([away, 0.5 * away**2, np.sqrt(0.5) * away[..., i] * away[..., j]], axis=-1)
+
+
+def curvatures(coefficients: np.ndarray) -> np.ndarray:
+    """Return the matrices of second derivatives, (n, dim (dim + 1) / 2, k) -> (n, dim, dim, k)."""
+    count = coefficients.shape[1]
+    dim = int(np.sqrt(2 * count))
+    i, j = np.triu_indices(dim, 1)
+    matrix = np.zeros((len(coefficients), dim, dim, coefficients.shape[2]))
+    matrix[:, np.arange(dim), np.arange(dim)] = coefficients[:, :dim]
+    matrix[:, i, j] = matrix[:, j, i] = np.sqrt(0.5) * coefficients[:, dim:]
+    return matrix
+
+
+def coefficients_of(matrix: np.ndarray) -> np.ndarray:
+    """Return what `curvatures` turns into given matrices."""
+    i, j = np.triu_indices(matrix.shape[1], 1)
+    diagonal = np.arange(matrix.shape[1])
+    return np.concatenate([matrix[:, diagonal, diagonal], np.sqrt(2.0) * matrix[:, i, j]], axis=1)

@@ -1,0 +1,128 @@
+"""Displacement gradients at the nodes, better than those of the cells: polynomial-preserving recovery.
+
+Around each site the differences of the displacement to the neighbouring nodes are fitted by a quadratic
+polynomial; the recovered gradient is the polynomial's at the site, exact for quadratic displacements on any
+mesh. A patch at the boundary mostly leaves some second derivatives open (two layers of nodes tell no
+curvature normal to them): these come from the neighbours, all the rest from the patch's own nodes. What no
+neighbour knows better, as in a plate one cell thick, is zero.
+
+Patches are of one material: strains may jump where materials meet.
+
+References:
+    Z. Zhang and A. Naga, A new finite element gradient recovery method: superconvergence property, SIAM J.
+    Sci. Comput. 26 (2005); O. C. Zienkiewicz and J. Z. Zhu, The superconvergent patch recovery and a
+    posteriori error estimates, Int. J. Numer. Meth. Engng 33 (1992).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.accuracy.patches import (
+    Moments,
+    Patches,
+    coefficients_of,
+    curvatures,
+    find_patches,
+    polynomials,
+)
+from fenics_contact.accuracy.sites import Sites
+
+#: Weight of second derivatives beside the moments of a patch, which are of order one: it decides only on what
+#: the patch leaves open.
+SLIGHT = 1e-8
+#: A patch leaves second derivatives open if the inverse of its moments adds up to more than this on them; on
+#: regular meshes inside a body it is below 20.
+OPEN = 60.0
+#: Their weight where neighbours tell what they should be.
+FIRM = 0.02
+
+
+def recovered_gradients(sites: Sites, displacement: np.ndarray) -> np.ndarray:
+    """Return the recovered displacement gradient at every site. Collective.
+
+    Args:
+        sites: The sites.
+        displacement: Displacement of each site, shape (n_sites, dim), [length].
+
+    Returns:
+        ∂u_k/∂x_j as entry (k, j), shape (n_sites, dim, dim), dimensionless.
+    """
+    patches = find_patches(sites)
+    dim = patches.dim
+    found = np.zeros((sites.count, polynomials(dim), dim))
+    waiting = []
+    for moments in patches.moments(displacement):
+        inverse = np.linalg.inv(moments.matrix + SLIGHT * _penalty(dim))
+        found[moments.rows] = inverse @ moments.right
+        spread = np.einsum("nii->n", inverse[:, dim:, dim:])
+        waiting.append(moments.part(np.flatnonzero(spread > OPEN)))
+    _ask_neighbours(patches, _joined(waiting), found)
+    return np.asarray(np.einsum("njk,nji->nki", found[:, :dim], patches.turn))
+
+
+def _ask_neighbours(patches: Patches, open_: Moments, found: np.ndarray) -> None:
+    """Fit again what was left open, with second derivatives of neighbours; layer by layer. Collective.
+
+    Args:
+        patches: The patches.
+        open_: Normal equations of the sites whose patches leave something open.
+        found: Coefficients of all sites, which are overwritten, shape (n_sites, m, dim), [length].
+    """
+    sites, dim = patches.sites, patches.dim
+    known = np.ones(sites.count, dtype=bool)
+    known[open_.rows] = False
+    back = np.linalg.inv(patches.turn)
+    while True:
+        heard, curvature = _mean_of_neighbours(patches, open_.rows, known, found)
+        some = np.flatnonzero(heard)
+        if not sites.sharing.comm.allreduce(len(some)):
+            return
+        ready = open_.part(some)
+        # Second derivatives by the own coordinates of the patch.
+        own = np.einsum("nia,nijk,njb->nabk", back[ready.rows], curvature[some], back[ready.rows])
+        right = ready.right.copy()
+        right[:, dim:] += FIRM * coefficients_of(own)
+        found[ready.rows] = np.linalg.solve(ready.matrix + FIRM * _penalty(dim), right)
+        known[ready.rows] = True
+        open_ = open_.part(np.flatnonzero(~heard))
+
+
+def _mean_of_neighbours(
+    patches: Patches, rows: np.ndarray, known: np.ndarray, found: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return whether sites have neighbours that are known, and the mean of their second derivatives.
+
+    Collective.
+
+    Args:
+        patches: The patches.
+        rows: The sites, shape (n,).
+        known: Which sites are known, shape (n_sites,).
+        found: Coefficients of all sites.
+
+    Returns:
+        Shapes (n,) and (n, dim, dim, dim): ∂²u_k/∂x_i∂x_j as entry (i, j, k), [1 / length].
+    """
+    sites, dim = patches.sites, patches.dim
+    links = sites.neighbours[rows]
+    needed = np.unique(links.indices)
+    needed = needed[known[needed]]
+    turn = patches.turn[needed]
+    curvature = np.einsum("nai,nabk,nbj->nijk", turn, curvatures(found[needed][:, dim:]), turn)
+    values = np.column_stack([np.ones(len(needed)), curvature.reshape(-1, dim**3)])
+    total = np.zeros((sites.count, values.shape[1]))
+    total[rows] = links[:, needed] @ values
+    total = sites.sharing.add_up(total)[rows]
+    heard = total[:, 0] > 0
+    mean = total[:, 1:] / np.where(heard, total[:, 0], 1.0)[:, None]
+    return heard, mean.reshape(-1, dim, dim, dim)
+
+
+def _penalty(dim: int) -> np.ndarray:
+    return np.diag((np.arange(polynomials(dim)) >= dim).astype(np.float64))
+
+
+def _joined(parts: list[Moments]) -> Moments:
+    columns = zip(*((part.rows, part.matrix, part.right) for part in parts), strict=True)
+    return Moments(*(np.concatenate(column) for column in columns))

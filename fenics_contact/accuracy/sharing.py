@@ -1,0 +1,46 @@
+"""Adding up what several ranks hold of the same things."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+
+class Sharing:
+    """Things that more than one rank holds a part of, recognised by numbers that all ranks know."""
+
+    def __init__(self, comm: MPI.Comm, keys: np.ndarray, mine: np.ndarray) -> None:
+        """Find out who shares what. Collective on ``comm``.
+
+        Args:
+            comm: Communicator.
+            keys: Number of each thing that this rank holds, ascending, shape (n,).
+            mine: Positions in ``keys`` of those that other ranks may hold as well.
+        """
+        self.comm = comm
+        every = comm.allgather(keys[mine]) if comm.size > 1 else [keys[mine]]
+        self._with: list[np.ndarray] = []
+        for rank, other in enumerate(every):
+            common = mine[np.isin(keys[mine], other)] if rank != comm.rank else mine[:0]
+            self._with.append(common)
+        self.shared = np.unique(np.concatenate(self._with))
+
+    def add_up(self, values: np.ndarray) -> np.ndarray:
+        """Return values in which the rows of shared things are the sums over all ranks. Collective.
+
+        The ranks that share a thing get the same sum to the last bit.
+
+        Args:
+            values: This rank's parts, shape (n, ...).
+        """
+        if self.comm.size == 1:
+            return values
+        received = self.comm.alltoall([values[rows] for rows in self._with])
+        total = values.copy()
+        total[self.shared] = 0.0
+        for rank, (rows, part) in enumerate(zip(self._with, received, strict=True)):
+            if rank == self.comm.rank:
+                total[self.shared] += values[self.shared]
+            else:
+                total[rows] += part
+        return total

@@ -1,0 +1,99 @@
+"""Sites: the nodes of the bodies, each once for every material around it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact.accuracy.sharing import Sharing
+from fenics_contact.feti import TornSystem
+
+
+@dataclass(frozen=True)
+class Sites:
+    """The nodes of this rank's cells, one site for every material that meets there.
+
+    Attributes:
+        node: Node of each site among those of all bodies, shape (n_sites,).
+        points: Coordinates, shape (n_sites, dim), [length].
+        sharing: Sites that other ranks hold as well.
+        neighbours: How many of this rank's cells of their material two sites share, shape
+            (n_sites, n_sites), without diagonal.
+        of_cells: Site of each vertex of the cells of each subdomain, as dolfinx orders the cells of its
+            mesh, vertices in the order of the body's mesh; arrays of shape (n_cells, n_vertices).
+    """
+
+    node: np.ndarray
+    points: np.ndarray
+    sharing: Sharing
+    neighbours: sp.csr_matrix
+    of_cells: tuple[np.ndarray, ...]
+
+    @property
+    def count(self) -> int:
+        """Number of sites."""
+        return len(self.node)
+
+
+def find_sites(torn: TornSystem) -> Sites:
+    """Number the sites of this rank's subdomains. Collective."""
+    scene, tearing = torn.scene, torn.decomposition.tearing
+    kinds = max(len(body.materials) for body in scene.bodies.values())
+    keys = []
+    for mesh in torn.decomposition.meshes:
+        body = scene.bodies[mesh.body]
+        nodes = tearing.global_nodes(mesh.body, body.mesh.cells[mesh.cells])
+        keys.append(nodes * kinds + body.material_of_cells[mesh.cells][:, None])
+    key, place = np.unique(np.concatenate([part.ravel() for part in keys]), return_inverse=True)
+    cuts = np.cumsum([part.size for part in keys])[:-1]
+    of_cells = tuple(
+        part.reshape(known.shape) for part, known in zip(np.split(place.ravel(), cuts), keys, strict=True)
+    )
+    node = key // kinds
+    points = np.concatenate([body.mesh.points for body in scene.bodies.values()])[node]
+    several = np.flatnonzero(_on_several_ranks(torn)[node])
+    sharing = Sharing(torn.decomposition.comm, key, several)
+    return Sites(node, points, sharing, _neighbours(of_cells, len(key)), of_cells)
+
+
+def nodal_displacement(torn: TornSystem, displacement: np.ndarray) -> np.ndarray:
+    """Return the mean over the copies of each node, on this rank's nodes. Collective.
+
+    Args:
+        torn: The torn system.
+        displacement: This rank's torn displacement, shape (torn_size,), [length].
+
+    Returns:
+        Displacement of the nodes of all bodies, NaN on nodes that this rank does not hold, shape
+        (n_nodes, dim), [length].
+    """
+    decomposition = torn.decomposition
+    tearing = decomposition.tearing
+    of_block = np.concatenate([tearing.global_nodes(mesh.body, mesh.nodes) for mesh in decomposition.meshes])
+    nodes, place = np.unique(of_block, return_inverse=True)
+    share = sp.csr_matrix((np.ones(len(place)), (place.ravel(), np.arange(len(place)))))
+    total = share @ displacement.reshape(-1, tearing.dim)
+    sharing = Sharing(decomposition.comm, nodes, np.flatnonzero(_on_several_ranks(torn)[nodes]))
+    result = np.full((tearing.n_nodes, tearing.dim), np.nan)
+    result[nodes] = sharing.add_up(total) / tearing.multiplicity[nodes, None]
+    return result
+
+
+def _on_several_ranks(torn: TornSystem) -> np.ndarray:
+    """Return whether subdomains of different ranks hold a node, shape (n_nodes,)."""
+    tearing = torn.decomposition.tearing
+    rank, first = tearing.subdomain_rank[tearing.copy_subdomain], tearing.first_copy[:-1]
+    return np.asarray(np.minimum.reduceat(rank, first) != np.maximum.reduceat(rank, first))
+
+
+def _neighbours(of_cells: tuple[np.ndarray, ...], count: int) -> sp.csr_matrix:
+    widths = np.concatenate([np.full(len(cells), cells.shape[1]) for cells in of_cells])
+    start = np.concatenate([[0], np.cumsum(widths)])
+    sites = np.concatenate([cells.ravel() for cells in of_cells])
+    incidence = sp.csr_matrix((np.ones(len(sites)), sites, start), shape=(len(widths), count))
+    together = sp.csr_matrix(incidence.T @ incidence)
+    together.setdiag(0)
+    together.eliminate_zeros()
+    return together

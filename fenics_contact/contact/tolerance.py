@@ -1,0 +1,38 @@
+"""How well a state is solved: to a number, or as well as its mesh deserves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeAlias
+
+from fenics_contact.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from fenics_contact.accuracy import Balanced
+
+#: A largest relative residual, a share of the discretisation error, or None for the default.
+Tolerance: TypeAlias = "float | Balanced | None"
+
+
+def checked_tolerance(tolerance: object) -> float | Balanced | None:
+    """Return a tolerance as it can be used.
+
+    Raises:
+        InvalidInputError: If it is neither a number between 0 and 1 nor `Balanced`.
+    """
+    if tolerance is None:
+        return None
+    if isinstance(tolerance, float | int):
+        if 0.0 < tolerance < 1.0:
+            return float(tolerance)
+        raise InvalidInputError(
+            f"tolerance must lie between 0 and 1, got {float(tolerance):g}: it is a relative residual, "
+            "1e-6 is a good one"
+        )
+    from fenics_contact.accuracy import Balanced  # whoever gives one has loaded it
+
+    if isinstance(tolerance, Balanced):
+        return tolerance
+    raise InvalidInputError(
+        f"tolerance must be a number, Balanced(...) or None, got {type(tolerance).__name__}: give a relative "
+        "residual such as 1e-6, or leave it out"
+    )

@@ -1,0 +1,99 @@
+"""Problems with a smooth solution that is known: prescribed on the whole boundary, loaded in the volume."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import ufl
+from mpi4py import MPI
+
+from fenics_contact.contact import State, solve_scene
+from fenics_contact.geometry import BodyMesh, bisection_partition, block, rectangle
+from fenics_contact.scene import Body, BodyForce, IsotropicElasticity, PlaneStrain, Scene, Support, Ufl
+from fenics_contact.scene.materials.constants import lame
+from tests.accuracy.true_error import error_by_cell
+
+YOUNG, POISSON = 1000.0, 0.3
+SIZE = 0.01
+PLANE = ("triangle", "quadrilateral")
+
+
+def displaced(x: Any, sin: Any, cos: Any, exp: Any) -> list[Any]:
+    """The solution in NumPy or UFL, x by component; of order `SIZE`."""
+    if len(x) == 2:
+        return [SIZE * sin(2 * x[0] + x[1]) * exp(x[1]), SIZE * cos(x[0] - 3 * x[1])]
+    return [
+        SIZE * sin(2 * x[0] + x[1]) * exp(x[2]),
+        SIZE * cos(x[0] - 3 * x[1]),
+        SIZE * sin(x[0] + 2 * x[2]) * cos(x[1]),
+    ]
+
+
+def gradient(points: np.ndarray) -> np.ndarray:
+    """∂u_k/∂x_j of the solution, by a central difference of complex step, exact to rounding."""
+    dim, step = points.shape[-1], 1e-30
+    columns = []
+    for j in range(dim):
+        shifted = points.astype(complex)
+        shifted[..., j] += 1j * step
+        values = displaced(np.moveaxis(shifted, -1, 0), np.sin, np.cos, np.exp)
+        columns.append(np.stack([value.imag / step for value in values], axis=-1))
+    return np.stack(columns, axis=-1)
+
+
+def body_force(poisson: float) -> Ufl:
+    """−div σ of the solution."""
+    first, shear = lame(YOUNG, poisson)
+
+    def value(x: Any) -> Any:
+        u = ufl.as_vector(displaced(x, ufl.sin, ufl.cos, ufl.exp))
+        strain = ufl.sym(ufl.grad(u))
+        return -ufl.div(first * ufl.tr(strain) * ufl.Identity(len(u)) + 2 * shear * strain)
+
+    return Ufl(value)
+
+
+@dataclass(frozen=True)
+class Found:
+    """Estimate and truth."""
+
+    state: State
+    mesh: BodyMesh
+    error: np.ndarray
+
+    @property
+    def total(self) -> float:
+        return float(np.linalg.norm(self.error))
+
+
+def mesh_of(cell: str, n: int) -> BodyMesh:
+    """A square or a cube of edge length one."""
+    if cell in PLANE:
+        return rectangle((0, 0), (1, 1), (n, n), cell)
+    return block((0, 0, 0), (1, 1, 1), (n, n, n), cell)
+
+
+def shaken(mesh: BodyMesh, size: float) -> BodyMesh:
+    """The same with inner nodes moved at random by up to ``size`` cells."""
+    points = mesh.points.copy()
+    inner = np.all((points > 1e-9) & (points < 1 - 1e-9), axis=1)
+    step = 1 / (round(mesh.n_nodes ** (1 / mesh.dim)) - 1)
+    noise = np.random.default_rng(1).uniform(-1, 1, points.shape)
+    return mesh.moved(points + size * step * np.where(inner[:, None], noise, 0.0))
+
+
+def solved(mesh: BodyMesh, poisson: float = POISSON, parts: int = 1) -> Found:
+    dim = mesh.dim
+    material = (PlaneStrain if dim == 2 else IsotropicElasticity)(YOUNG, poisson)
+
+    def component(k: int) -> Any:
+        return lambda points: displaced(points.T, np.sin, np.cos, np.exp)[k]
+
+    value = tuple(component(k) for k in range(dim))
+    supports = [Support("body", side, value) for side in mesh.surfaces]
+    scene = Scene({"body": Body(mesh, material)}, supports, [BodyForce("body", body_force(poisson))])
+    state = solve_scene(scene, {"body": bisection_partition(mesh, parts)}, MPI.COMM_SELF)
+    exact = error_by_cell(mesh, state.gather_displacement("body"), gradient, *lame(YOUNG, poisson))
+    return Found(state, mesh, exact)
