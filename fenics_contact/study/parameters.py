@@ -9,6 +9,7 @@ from typing import Any, Literal, TypeAlias
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import CELL_TYPES
+from fenics_contact.scene import Discretisation
 
 #: The tolerance that follows the discretisation estimate.
 BALANCED: Literal["balanced"] = "balanced"
@@ -34,7 +35,7 @@ class Parameters:
 
     size: int
     cell: str = "hexahedron"
-    discretisation: str = "node"
+    discretisation: Discretisation = "node"
     tolerance: Tolerance = BALANCED
     solver: str = "newton"
     subdomains: int | None = None
@@ -99,7 +100,7 @@ class Sweep:
     sizes: tuple[int, ...]
     tolerances: tuple[Tolerance, ...] = (BALANCED,)
     cells: tuple[str, ...] = ()
-    discretisations: tuple[str, ...] = ()
+    discretisations: tuple[Discretisation, ...] = ()
     fixed_points: tuple[float, ...] = ()
     subdomains: tuple[int, ...] = ()
 
@@ -107,9 +108,7 @@ class Sweep:
         """Return all runs, each once, cheap ones first."""
         base = self.base
         found = [base]
-        found += [
-            replace(base, size=n, tolerance=t) for n, t in product(self.sizes, self.tolerances)
-        ]
+        found += [replace(base, size=n, tolerance=t) for n, t in product(self.sizes, self.tolerances)]
         found += [replace(base, size=n, cell=c) for n, c in product(self.sizes, self.cells)]
         found += [
             replace(base, size=n, discretisation=d) for n, d in product(self.sizes, self.discretisations)

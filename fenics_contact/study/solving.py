@@ -46,9 +46,7 @@ def cut(scene: Scene, subdomains: int | None, ranks: int) -> dict[str, np.ndarra
     meshes = {name: body.mesh for name, body in scene.bodies.items()}
     cells = sum(mesh.n_cells for mesh in meshes.values())
     least = -(-ranks // len(meshes))
-    parts = {
-        name: max(least, round(subdomains * mesh.n_cells / cells)) for name, mesh in meshes.items()
-    }
+    parts = {name: max(least, round(subdomains * mesh.n_cells / cells)) for name, mesh in meshes.items()}
     return {
         name: default_partition(mesh, least, nodes=_nodes(mesh, parts[name]), body=name)
         for name, mesh in meshes.items()

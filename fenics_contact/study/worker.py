@@ -31,7 +31,9 @@ def main(comm: MPI.Comm, arguments: list[str] | None = None) -> None:
     """
     task = json.loads((sys.argv[1:] if arguments is None else arguments)[0])
     try:
-        record = measured(find_study(task["scene"]), parameters_from(task["parameters"]), comm, task["verify"])
+        record = measured(
+            find_study(task["scene"]), parameters_from(task["parameters"]), comm, task["verify"]
+        )
     except FenicsContactError as error:  # raised by all ranks together
         record = {"failed": {"kind": type(error).__name__, "message": str(error)}}
     except Exception:
@@ -76,16 +78,12 @@ def measured(study: StudyScene, parameters: Parameters, comm: MPI.Comm, verify: 
     }
 
 
-def error_parts(state: State) -> dict[str, float] | None:
+def error_parts(state: State) -> dict[str, float | None]:
     """Return the three parts of a state's error, relative to its energy norm. Collective."""
-    errors = getattr(state, "errors", None)
-    if errors is None:
-        return None
-    return {
-        "algebraic": float(errors.algebraic),
-        "friction": float(errors.friction),
-        "discretisation": float(errors.discretisation),
-    }
+    errors = state.errors
+    parts = {name: float(getattr(errors, name)) for name in ("algebraic", "friction", "discretisation")}
+    # Where no admissible pair was found the bound is infinite, which JSON does not know.
+    return {name: value if np.isfinite(value) else None for name, value in parts.items()}
 
 
 def _counts(states: tuple[State, ...]) -> dict[str, int]:

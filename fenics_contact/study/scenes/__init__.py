@@ -26,8 +26,8 @@ def find_study(name: str) -> StudyScene:
         return _from_file(Path(name))
     if name not in BUILT_IN:
         raise InvalidInputError(
-            f"a study is one of {list(BUILT_IN)} or a Python file, got {name!r}: use one of the names, or the "
-            "path of a file that ends in '.py' and defines `study`"
+            f"a study is one of {list(BUILT_IN)} or a Python file, got {name!r}: use one of the names, or "
+            "the path of a file that ends in '.py' and defines `study`"
         )
     module = importlib.import_module(f"{__name__}.{name}")
     return _checked(getattr(module, "study", None), name)

@@ -169,17 +169,15 @@ study = StudyScene(
         Quantity("peak pressure", "MPa", middle_pressure, lambda found: theory(found.state).peak),
         Quantity("tangential traction", "MPa √mm", weighted_traction, exact_traction, rate=1.0),
         Quantity("total friction force", "N/mm", friction_force, rate=2.0),
-        Quantity(
-            "potential energy", "N", lambda found: found.state.energies.total_potential, rate=2.0
-        ),
+        Quantity("potential energy", "N", lambda found: found.state.energies.total_potential, rate=2.0),
     ),
     sweep=SWEEP,
     quick=QUICK,
     size_name="cells on the half contact",
     spacing_unit="half width of the contact",
     about=(
-        "Two mirrored bodies in plane strain are pressed together, then sheared, with Coulomb friction. Theory "
-        "takes the measured forces; tangential traction is judged in L². Friction force and energy at the "
-        "given displacements depend on the size of the bodies and are extrapolated."
+        "Two mirrored bodies in plane strain are pressed together, then sheared, with Coulomb friction. "
+        "Theory takes the measured forces; tangential traction is judged in L². Friction force and energy at "
+        "the given displacements depend on the size of the bodies and are extrapolated."
     ),
 )

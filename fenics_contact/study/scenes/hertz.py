@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.geometry import BodyMesh, split_hexahedra
+from fenics_contact.geometry import BodyMesh
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -41,12 +41,11 @@ COARSER = 0.8
 
 def round_block(side: float, size: float, cell: str) -> BodyMesh:
     """Mesh the upper block (side 1) or the lower one (side −1), with ``size`` cells on the contact radius."""
-    mesh = nested_box(CORE, SIZE, round(CORE * size))
+    mesh = nested_box(CORE, SIZE, round(CORE * size), cell)
     mesh = mesh if side > 0 else mirrored(mesh)
     x, y, z = mesh.points.T
     lift = side * (x**2 + y**2) / (2 * RADIUS) * (1 - np.abs(z) / SIZE)
-    mesh = mesh.moved(np.column_stack([x, y, z + lift]))
-    return mesh if cell == "hexahedron" else split_hexahedra(mesh)
+    return mesh.moved(np.column_stack([x, y, z + lift]))
 
 
 def build(parameters: Parameters, comm: MPI.Comm) -> Problem:
@@ -55,7 +54,7 @@ def build(parameters: Parameters, comm: MPI.Comm) -> Problem:
     size, cell = parameters.size, parameters.cell
     material = IsotropicElasticity(YOUNG, POISSON)
     meshes = {"upper": round_block(1.0, size, cell), "lower": round_block(-1.0, COARSER * size, cell)}
-    guides = {side: (0.0, None, None) for side in ("x0", "x1")}
+    guides: dict[str, tuple[float | None, ...]] = {side: (0.0, None, None) for side in ("x0", "x1")}
     guides |= {side: (None, 0.0, None) for side in ("y0", "y1")}
     supports = [Support(body, side, value) for body in meshes for side, value in guides.items()]
     pair = ContactPair(

@@ -1,0 +1,111 @@
+"""What to do for an accuracy, and what is wasted, in words that follow from the runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from fenics_contact.study.errors import Errors
+from fenics_contact.study.parameters import BALANCED, Parameters
+from fenics_contact.study.protocol import QuantityFacts
+from fenics_contact.study.results import Run
+
+#: Relative errors that users ask for.
+TARGETS = (0.1, 0.05, 0.01, 0.005)
+
+
+def advice(errors: Errors, targets: Sequence[float] = TARGETS) -> list[str]:
+    """Return sentences: the cheapest way to every accuracy, then what is wasted."""
+    sentences = [
+        _cheapest(errors, quantity, target)
+        for quantity in errors.results.scene.quantities
+        for target in targets
+    ]
+    return [*sentences, *wasted(errors)]
+
+
+def wasted(errors: Errors) -> list[str]:
+    """Return sentences about settings that cost time and change nothing."""
+    base = errors.results.base
+    balanced = [run for run in errors.sequence(replace(base, tolerance=BALANCED))]
+    strict = {run.parameters.size: run for run in errors.sequence(errors.strictest(base))}
+    pairs = [(run, strict[run.parameters.size]) for run in balanced if run.parameters.size in strict]
+    return [_comparison(errors, run, other) for run, other in pairs[-1:] if run is not other]
+
+
+def reliable(errors: Errors, run: Run, quantity: str, target: float) -> bool:
+    """Tell whether a run meets a target, and so does every run that differs in finer meshes and tolerances.
+
+    An error that passes through zero is small by chance on one mesh, and larger again on the next.
+    """
+    error = errors.of(run, quantity)
+    if error is None or error > target:
+        return False
+    better = [other for other in errors.results.good if _refines(other.parameters, run.parameters)]
+    return all((errors.of(other, quantity) or 0.0) <= target for other in better)
+
+
+def _refines(other: Parameters, this: Parameters) -> bool:
+    """Tell whether settings are at least as fine and as strict, and equal otherwise."""
+    if replace(other, size=this.size, tolerance=this.tolerance) != this or other.size < this.size:
+        return False
+    if isinstance(other.tolerance, str) or isinstance(this.tolerance, str):
+        return other.tolerance == this.tolerance
+    return other.tolerance <= this.tolerance
+
+
+def _cheapest(errors: Errors, quantity: QuantityFacts, target: float) -> str:
+    runs = errors.results.good
+    reached = [run for run in runs if reliable(errors, run, quantity.name, target)]
+    goal = f"{percent(target)} in {quantity.name}"
+    if reached:
+        best = min(reached, key=lambda run: run.seconds_of(quantity))
+        error = errors.of(best, quantity.name)
+        assert error is not None
+        return f"For {goal}: {settings(errors, best)}; the error is {percent(error)}."
+    known = [(run, error) for run in runs if (error := errors.of(run, quantity.name)) is not None]
+    if not known:
+        return f"For {goal}: not known, nothing to compare with."
+    finest = max(known, key=lambda pair: (pair[0].parameters.size, -pair[1]))
+    return (
+        f"For {goal}: not reached by this sweep; the finest mesh gives {percent(finest[1])} with "
+        f"{settings(errors, finest[0])}."
+    )
+
+
+def settings(errors: Errors, run: Run) -> str:
+    """Return the settings and the cost of a run in words."""
+    parameters, scene = run.parameters, errors.results.scene
+    words = [f"{parameters.size} {scene.size_name}", f"{_plural(parameters.cell)}", parameters.discretisation]
+    words.append("balanced tolerance" if parameters.balanced else f"tolerance {parameters.tolerance:.0e}")
+    if parameters.solver != "newton":
+        words.append(f"by a {parameters.solver}")
+    if parameters.subdomains is not None:
+        words.append(f"about {parameters.subdomains} subdomains")
+    ranks = errors.results.ranks
+    return f"{', '.join(words)}: {run.seconds:.2g} s on {ranks} rank{'s' if ranks > 1 else ''}"
+
+
+def percent(value: float) -> str:
+    """Write a relative number in percent, with two digits."""
+    return f"{100 * value:.2g} %"
+
+
+def _plural(cell: str) -> str:
+    return {"hexahedron": "hexahedra", "tetrahedron": "tetrahedra"}.get(cell, f"{cell}s")
+
+
+def _comparison(errors: Errors, balanced: Run, strict: Run) -> str:
+    """Say what a strict tolerance costs beside the balanced one, and what it changes."""
+    changes = []
+    for quantity in errors.results.scene.quantities:
+        first, second = balanced.value(quantity.name), strict.value(quantity.name)
+        if isinstance(first, float | int) and isinstance(second, float | int) and second:
+            changes.append(f"the {quantity.name} by {abs(first / second - 1):.0e}")
+    products = [(run.counts or {}).get("f_products", 0) for run in (balanced, strict)]
+    ratio = products[1] / products[0] if products[0] else float("nan")
+    return (
+        f"Tolerance {strict.parameters.tolerance:.0e} instead of balanced, at {balanced.parameters.size} "
+        f"{errors.results.scene.size_name}, costs {strict.seconds / balanced.seconds:.2g} times the time and "
+        f"{ratio:.2g} times the products and changes {', '.join(changes)}."
+    )

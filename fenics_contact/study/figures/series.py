@@ -1,0 +1,97 @@
+"""Runs that belong together, with the look they have in every figure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from fenics_contact.study.errors import Errors
+from fenics_contact.study.parameters import BALANCED
+from fenics_contact.study.results import Run
+from fenics_contact.viz.colours import BLUE, GREEN, GREY, ORANGE
+
+WIDTH = 1600
+
+
+@dataclass(frozen=True)
+class Series:
+    """Some runs of a study.
+
+    Attributes:
+        name: In words.
+        runs: The runs, coarse ones first.
+        colour: Its colour.
+        symbol: Its symbol, so that colours are not needed.
+        connected: Whether the runs are one after the other on a way.
+    """
+
+    name: str
+    runs: tuple[Run, ...]
+    colour: str
+    symbol: str
+    connected: bool = True
+
+    def draw(self, axes: Any, x: list[float], y: list[float], label: str | None = None) -> None:
+        """Draw the series into axes with logarithmic scales or not."""
+        axes.plot(
+            x, y, linestyle="-" if self.connected else "none", marker=self.symbol, color=self.colour,
+            lw=2.0, ms=8, markeredgecolor="white", markeredgewidth=0.6, zorder=3,
+            label=self.name if label is None else label,
+        )  # fmt: skip
+
+
+def series_of(errors: Errors) -> list[Series]:
+    """Return the runs of a study sorted by what they vary; every run is in one series at most."""
+    base, results = errors.results.base, errors.results
+    strict = errors.strictest(base)
+    name = "" if strict.balanced else f"tolerance {strict.tolerance:.0e}"
+    found = [
+        Series("balanced", errors.sequence(replace(base, tolerance=BALANCED)), BLUE, "o"),
+        Series(name, () if strict.balanced else errors.sequence(strict), ORANGE, "^"),
+        *_others(errors, "cell", lambda run: run.parameters.cell, (GREEN, "s")),
+        *_others(errors, "discretisation", lambda run: run.parameters.discretisation, ("#cc79a7", "D")),
+        Series("fixed point", _varied(errors, "solver"), "#56b4e9", "v", False),
+        Series("other subdomains", _varied(errors, "subdomains"), "#e69f00", "P", False),
+    ]
+    known = [run for series in found for run in series.runs]
+    rest = tuple(run for run in results.good if run not in known)
+    found.append(Series("other tolerances", rest, GREY, ".", False))
+    return [series for series in found if series.runs]
+
+
+def _others(errors: Errors, setting: str, of: Callable[[Run], str], look: tuple[str, str]) -> list[Series]:
+    """Return the series of every value of a setting other than the base's."""
+    base = errors.results.base
+    values = {of(run): None for run in errors.results.good if of(run) != getattr(base, setting)}
+    return [
+        Series(value, errors.sequence(replace(base, **{setting: value})), *look)  # type: ignore[arg-type]
+        for value in values
+    ]
+
+
+def _varied(errors: Errors, setting: str) -> tuple[Run, ...]:
+    base = errors.results.base
+    return tuple(run for run in errors.results.good if setting in run.parameters.differences(base))
+
+
+def panels(figure: Any, count: int) -> list[Any]:
+    """Return axes for so many panels, two or three beside each other."""
+    columns = count if count < 4 else (2 if count == 4 else 3)
+    rows = -(-count // columns)
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for spare in axes[count:]:
+        spare.set_axis_off()
+    return list(axes[:count])
+
+
+def height(count: int) -> int:
+    """Return the height in pixels of a sheet with so many panels."""
+    rows = 1 if count < 4 else 2
+    return 160 + 540 * rows
+
+
+def style(axes: Any) -> None:
+    """Put a grid behind the data."""
+    axes.grid(color=GREY, alpha=0.3, which="major")
+    axes.set_axisbelow(True)

@@ -1,0 +1,175 @@
+"""Run a study: every run that is not there yet, repeated, kept as soon as it is done."""
+
+from __future__ import annotations
+
+import logging
+import statistics
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any, TextIO
+
+from fenics_contact.io import versions
+from fenics_contact.study.launching import Record, Task, launcher, measure
+from fenics_contact.study.parameters import Parameters, Sweep
+from fenics_contact.study.progress import Progress
+from fenics_contact.study.protocol import StudyScene
+from fenics_contact.study.results import Results, Run
+from fenics_contact.study.scenes import find_study
+from fenics_contact.study.store import Store, fingerprint
+
+#: A run that takes longer is measured once: what disturbs short ones matters little to it.
+SHORT = 10.0
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a study is measured.
+
+    Attributes:
+        ranks: MPI ranks of every run.
+        repeats: How often a run of less than 10 s is measured; the median counts.
+        limit: Seconds after which a run is given up.
+        verify: Compare with the exact solution of the same mesh, and measure the errors' parts.
+    """
+
+    ranks: int = 1
+    repeats: int = 3
+    limit: float = 600.0
+    verify: bool = True
+
+
+def run_study(
+    scene: str,
+    folder: str | Path,
+    *,
+    sweep: Sweep | None = None,
+    settings: Settings | None = None,
+    stream: TextIO | None = None,
+) -> Results:
+    """Measure all runs of a study that are not in its folder yet.
+
+    Every run has a process of its own, so that its memory is its own and a failure ends nothing but itself;
+    what failed is recorded with its reason. Finished runs are kept in ``folder/runs`` and used again while
+    the code and the settings stay the same.
+
+    Args:
+        scene: Name of a built-in study or a Python file, see `find_study`.
+        folder: Folder of the study; created.
+        sweep: Which runs; the scene's own by default.
+        settings: Ranks, repeats, limits.
+        stream: Where progress is told; stderr by default.
+
+    Returns:
+        What was measured.
+
+    Raises:
+        InvalidInputError: If the scene is unknown.
+        MissingRequirementError: If several ranks are asked for and there is no mpirun.
+    """
+    settings = settings or Settings()
+    study, tasks, store, _ = _prepared(scene, Path(folder), sweep, settings)
+    launcher(settings.ranks)
+    _measure_all(tasks, store, settings, study.title, stream)
+    return stored(scene, folder, sweep=sweep, settings=settings)
+
+
+def stored(
+    scene: str, folder: str | Path, *, sweep: Sweep | None = None, settings: Settings | None = None
+) -> Results:
+    """Return what is in a study's folder already; arguments as for `run_study`."""
+    settings = settings or Settings()
+    study, tasks, store, base = _prepared(scene, Path(folder), sweep, settings)
+    found = [(task, _repeats(task, store, settings.repeats)) for task in tasks]
+    runs = tuple(_joined(task.parameters, repeats) for task, repeats in found if repeats)
+    return Results(study.facts, settings.ranks, runs, base, {**versions(), "code": store.mark})
+
+
+def _prepared(
+    scene: str, folder: Path, sweep: Sweep | None, settings: Settings
+) -> tuple[StudyScene, list[Task], Store, Parameters]:
+    study = find_study(scene)
+    chosen = sweep or study.sweep
+    tasks = [Task(scene, run, settings.ranks, settings.verify, settings.limit) for run in chosen.runs()]
+    return study, tasks, Store(folder / "runs", fingerprint(scene)), chosen.base
+
+
+def _repeats(task: Task, store: Store, most: int) -> list[Record]:
+    """Return the measurements of a run, also a failure that may not happen again."""
+    found = [store.read(task, repeat, transient=repeat == 0) for repeat in range(most)]
+    return [record for record in found if record is not None] if found[0] is not None else []
+
+
+def _measure_all(
+    tasks: Sequence[Task], store: Store, settings: Settings, title: str, stream: TextIO | None
+) -> None:
+    # A run is repeated only after all others were measured: load that lasts a while hits no run alone.
+    for repeat in range(settings.repeats):
+        wanted = [task for task in tasks if _wanted(task, store, repeat)]
+        if not wanted:
+            continue
+        if repeat == 0:
+            _warm_up(wanted)
+        words = title if repeat == 0 else f"{title}, repeat {repeat + 1}"
+        with Progress([task.parameters for task in wanted], words, stream) as progress:
+            for task in wanted:
+                progress.begin(task.parameters)
+                _measure(task, store, repeat, progress)
+
+
+def _measure(task: Task, store: Store, repeat: int, progress: Progress) -> None:
+    start = perf_counter()
+    again = Task(task.scene, task.parameters, task.ranks, task.verify and repeat == 0, task.limit)
+    record = measure(again)
+    store.write(task, repeat, record)
+    failed = record.get("failed")
+    words = f"failed: {failed['message']}" if failed else f"{record['seconds']:.2f} s"
+    progress.done(task.parameters, perf_counter() - start, words)
+
+
+def _wanted(task: Task, store: Store, repeat: int) -> bool:
+    """Tell whether a measurement is missing and makes sense."""
+    if store.read(task, repeat) is not None:
+        return False
+    if repeat == 0:
+        return True
+    first = store.read(task, 0)
+    return first is not None and "failed" not in first and first["seconds"] < SHORT
+
+
+def _warm_up(tasks: Sequence[Task]) -> None:
+    """Compile the forms of every kind of cells on the smallest mesh: measured runs find them on the disk."""
+    smallest: dict[tuple[str, bool], Task] = {}
+    for task in tasks:  # coarse ones come first
+        kind = (task.parameters.cell, task.parameters.balanced)
+        smallest.setdefault(kind, task)
+    for task in smallest.values():
+        logger.info("warm-up on the smallest mesh of %s cells", task.parameters.cell)
+        measure(task)
+
+
+def _joined(parameters: Parameters, repeats: Sequence[Record]) -> Run:
+    """Return what is known of a run from all its measurements."""
+    first = repeats[0]
+    if "failed" in first:
+        return Run(parameters, failed=f"{first['failed']['kind']}: {first['failed']['message']}")
+    good = [record for record in repeats if "failed" not in record]
+    middle = sorted(good, key=lambda record: float(record["seconds"]))[(len(good) - 1) // 2]
+    known: dict[str, Any] = {
+        name: first.get(name) for name in ("counts", "residual", "quantities", "parts", "true_errors")
+    }
+    memory = [record["memory"] for record in good if record["memory"]]
+    return Run(
+        parameters,
+        seconds=float(statistics.median(record["seconds"] for record in good)),
+        spread=(min(record["seconds"] for record in good), max(record["seconds"] for record in good)),
+        repeats=len(good),
+        phases=middle["phases"],
+        phases_after=middle["phases_after"],
+        memory=max(memory) if memory else None,
+        load_average=max(record["load_average"] for record in good),
+        **known,
+    )
