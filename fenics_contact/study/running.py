@@ -13,7 +13,7 @@ from typing import Any, TextIO
 from fenics_contact.io import versions
 from fenics_contact.study.launching import Record, Task, launcher, measure
 from fenics_contact.study.parameters import Parameters, Sweep
-from fenics_contact.study.progress import Progress
+from fenics_contact.study.progress import Progress, described
 from fenics_contact.study.protocol import StudyScene
 from fenics_contact.study.results import Results, Run
 from fenics_contact.study.scenes import find_study
@@ -147,7 +147,7 @@ def _warm_up(tasks: Sequence[Task]) -> None:
         kind = (task.parameters.cell, task.parameters.balanced)
         smallest.setdefault(kind, task)
     for task in smallest.values():
-        logger.info("warm-up on the smallest mesh of %s cells", task.parameters.cell)
+        logger.info("warm-up: %s", described(task.parameters))
         measure(task)
 
 

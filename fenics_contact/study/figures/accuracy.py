@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
 from fenics_contact.study.errors import Errors
-from fenics_contact.study.figures.series import WIDTH, height, panels, series_of, style
+from fenics_contact.study.figures.series import WIDTH, against, height, logarithmic, panels, series_of, style
 from fenics_contact.study.pareto import pareto_front
 from fenics_contact.study.protocol import QuantityFacts
 from fenics_contact.viz.colours import INK
@@ -54,21 +52,9 @@ def _draw(axes: Any, errors: Errors, quantity: QuantityFacts) -> None:
     )  # fmt: skip
     axes.set_xscale("log")
     axes.set_yscale("log")
-    percent(axes)
+    logarithmic(axes.yaxis, 100.0, " %")
+    logarithmic(axes.xaxis)
     axes.set_xlabel("wall time (s)")
     axes.set_ylabel("relative error")
-    axes.set_title(f"{quantity.name} (against {errors.references[quantity.name].kind})")
-    plain_seconds(axes)
+    axes.set_title(f"{quantity.name} (against {against(errors.references[quantity.name].kind)})")
     style(axes)
-
-
-def percent(axes: Any) -> None:
-    """Write the numbers of a logarithmic axis of relative errors in percent."""
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:g} %"))
-
-
-def plain_seconds(axes: Any) -> None:
-    """Write 1, 2, 5 times powers of ten on a logarithmic axis of seconds."""
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())

@@ -8,8 +8,16 @@ from typing import Any
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from fenics_contact.study.errors import Errors
-from fenics_contact.study.figures.accuracy import percent
-from fenics_contact.study.figures.series import WIDTH, Series, height, panels, series_of, style
+from fenics_contact.study.figures.series import (
+    WIDTH,
+    Series,
+    against,
+    height,
+    logarithmic,
+    panels,
+    series_of,
+    style,
+)
 from fenics_contact.study.protocol import QuantityFacts
 from fenics_contact.study.richardson import measured_rate
 from fenics_contact.viz.colours import INK
@@ -53,7 +61,7 @@ def _draw(axes: Any, errors: Errors, quantity: QuantityFacts, ways: list[Series]
             lowest = min(lowest, known[-1], key=lambda pair: pair[1])
     if quantity.rate and lowest[1] < float("inf"):
         _slope(axes, errors, lowest, quantity.rate)
-    axes.set_title(f"{quantity.name} (against {errors.references[quantity.name].kind})")
+    axes.set_title(f"{quantity.name} (against {against(errors.references[quantity.name].kind)})")
 
 
 def _draw_estimate(axes: Any, errors: Errors, ways: list[Series]) -> None:
@@ -90,7 +98,7 @@ def _scales(axes: Any, errors: Errors) -> None:
     unit = results.scene.spacing_unit
     axes.set_xscale("log")
     axes.set_yscale("log")
-    percent(axes)
+    logarithmic(axes.yaxis, 100.0, " %")
     places = [results.scene.spacing[size] for size in sizes]
     axes.set_xticks(places)
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))

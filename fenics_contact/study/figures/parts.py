@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from fenics_contact.study.errors import Errors
-from fenics_contact.study.figures.accuracy import percent
 from fenics_contact.study.figures.series import WIDTH, style
 from fenics_contact.study.parameters import BALANCED
 from fenics_contact.study.results import Run
@@ -61,6 +60,8 @@ def _parts(runs: Sequence[Run], part: str) -> list[float]:
 def _draw_sizes(axes: Any, runs: Sequence[Run], names: Sequence[str]) -> None:
     places = list(range(len(runs)))
     for part, (words, colour, symbol) in PARTS.items():
+        if not any(_parts(runs, part)):
+            continue  # a logarithm does not know nothing
         values = [value or float("nan") for value in _parts(runs, part)]
         axes.plot(
             places, values, marker=symbol, color=colour, lw=2, ms=9, markeredgecolor="white", label=words
@@ -68,7 +69,7 @@ def _draw_sizes(axes: Any, runs: Sequence[Run], names: Sequence[str]) -> None:
     true = [float((run.true_errors or {}).get("total") or "nan") for run in runs]
     axes.plot(places, true, ls="none", marker="x", ms=9, mew=2, color=INK, label="solver and friction, true")
     axes.set_yscale("log")
-    percent(axes)
+    axes.set_xlim(-0.5, len(runs) - 0.5)
     axes.set_xticks(places, names)
     style(axes)
 
@@ -81,5 +82,6 @@ def _draw_shares(axes: Any, runs: Sequence[Run], names: Sequence[str]) -> None:
         axes.bar(range(len(runs)), heights, 0.6, bottom=below, color=colour, edgecolor="white")
         below = [low + height for low, height in zip(below, heights, strict=True)]
     axes.set_xticks(range(len(runs)), names)
+    axes.set_xlim(-0.5, len(runs) - 0.5)
     axes.set_ylim(0, 100)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g} %")

@@ -73,6 +73,7 @@ def _draw(axes: Any, runs: Sequence[Run], names: Sequence[str]) -> None:
     for place, top in enumerate(below):
         axes.annotate(f"{top:.2g}", (place, top), (0, 4), textcoords="offset points", ha="center")
     axes.set_xticks(range(len(runs)), names)
+    axes.set_xlim(-0.6, len(runs) - 0.4)
     axes.set_ylim(0, 1.12 * max(below, default=1.0))
     style(axes)
     axes.grid(visible=False, axis="x")

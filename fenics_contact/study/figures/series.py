@@ -6,6 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from fenics_contact.study.advice import plural
 from fenics_contact.study.errors import Errors
 from fenics_contact.study.parameters import BALANCED
 from fenics_contact.study.results import Run
@@ -65,7 +68,7 @@ def _others(errors: Errors, setting: str, of: Callable[[Run], str], look: tuple[
     base = errors.results.base
     values = {of(run): None for run in errors.results.good if of(run) != getattr(base, setting)}
     return [
-        Series(value, errors.sequence(replace(base, **{setting: value})), *look)  # type: ignore[arg-type]
+        Series(plural(value), errors.sequence(replace(base, **{setting: value})), *look)  # type: ignore[arg-type]
         for value in values
     ]
 
@@ -95,3 +98,22 @@ def style(axes: Any) -> None:
     """Put a grid behind the data."""
     axes.grid(color=GREY, alpha=0.3, which="major")
     axes.set_axisbelow(True)
+
+
+def logarithmic(axis: Any, scale: float = 1.0, unit: str = "") -> None:
+    """Write the numbers of a logarithmic axis in full, and 2 and 5 between powers of ten if it spans few.
+
+    Args:
+        axis: Axis of axes whose data are drawn.
+        scale: What numbers are multiplied by, 100 for percent.
+        unit: What stands behind them.
+    """
+    low, high = axis.get_view_interval()
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 50.0 * low else (1.0,), numticks=12))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{scale * value:g}{unit}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def against(kind: str) -> str:
+    """Return what errors are measured against, in words."""
+    return {"extrapolated": "the limit of the meshes", "finest mesh": "the finest mesh"}.get(kind, kind)

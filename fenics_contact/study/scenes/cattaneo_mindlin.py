@@ -160,7 +160,7 @@ QUICK = replace(
 
 study = StudyScene(
     name="cattaneo_mindlin",
-    title="Cattaneo and Mindlin: pressed, then sheared cylinders",
+    title="Cattaneo and Mindlin, sheared cylinders",
     build=build,
     quantities=(
         Quantity(

@@ -102,7 +102,7 @@ QUICK = replace(
 
 study = StudyScene(
     name="hertz",
-    title="Hertz: two round bodies",
+    title="Hertz, two round bodies",
     build=build,
     quantities=(
         Quantity("peak pressure", "MPa", peak_pressure, PEAK),
