@@ -12,7 +12,7 @@ from typing import Any
 from fenics_contact.errors import FenicsContactError, InvalidInputError
 from fenics_contact.study.parameters import BALANCED, DISCRETISATIONS, Sweep, Tolerance
 from fenics_contact.study.report import write_report
-from fenics_contact.study.running import Settings, run_study, stored
+from fenics_contact.study.running import Settings, StudyPlan, collected, measure_all, prepare
 from fenics_contact.study.scenes import BUILT_IN, find_study
 
 ABOUT = """\
@@ -56,8 +56,9 @@ def run(options: argparse.Namespace) -> int:
         sweep = sweep_from(options, study.quick if options.quick else study.sweep)
         folder = options.output or Path("output") / "studies" / study.name
         settings = Settings(options.ranks, options.repeats or (1 if options.quick else 3), options.limit)
-        status = 0 if options.report else _measure(options.scene, folder, sweep, settings)
-        results = stored(options.scene, folder, sweep=sweep, settings=settings)
+        plan = prepare(options.scene, folder, sweep=sweep, settings=settings)
+        status = 0 if options.report else _measure(plan)
+        results = collected(plan)
         if not results.good:
             reasons = "".join(f"\n  {run.failed}" for run in results.runs[:3])
             raise InvalidInputError(
@@ -72,11 +73,11 @@ def run(options: argparse.Namespace) -> int:
     return status
 
 
-def _measure(scene: str, folder: Path, sweep: Sweep, settings: Settings) -> int:
+def _measure(plan: StudyPlan) -> int:
     """Measure; return 0, or the exit status of an interrupted program."""
     before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the running process ends, too
     try:
-        run_study(scene, folder, sweep=sweep, settings=settings)
+        measure_all(plan)
     except (KeyboardInterrupt, SystemExit) as stop:
         sys.stderr.write("interrupted: what is done is kept, and the same command goes on from there\n")
         return 143 if isinstance(stop, SystemExit) else 130

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import fenics_contact
 from fenics_contact.errors import MissingRequirementError
 from fenics_contact.study.parameters import Parameters
 
@@ -116,7 +115,7 @@ def _environment(given: Mapping[str, str]) -> dict[str, str]:
     kept = {name: value for name, value in given.items() if not name.startswith(MPI_TRACES)}
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
         kept.setdefault(name, "1")  # ranks, not threads, share the cores
-    package = str(Path(fenics_contact.__file__).resolve().parents[1])
+    package = str(Path(__file__).resolve().parents[2])
     return kept | {"PYTHONPATH": os.pathsep.join(filter(None, [package, kept.get("PYTHONPATH", "")]))}
 
 

@@ -100,6 +100,8 @@ class StudyScene:
         size_name: What `Parameters.size` counts, "cells on the contact radius".
         spacing: Mesh size h by `Parameters.size`, in the unit below.
         spacing_unit: Unit of h.
+        energy_rate: Power of h with which theory lets the error fall in energy norm: 1 for linear elements,
+            less where the solution has a singularity.
         about: What a reader must know of the scene, in a few sentences.
 
     Example:
@@ -115,6 +117,7 @@ class StudyScene:
     size_name: str = "cells along an edge"
     spacing: Callable[[int], float] = lambda size: 1.0 / size
     spacing_unit: str = ""
+    energy_rate: float = 1.0
     about: str = ""
 
     def __post_init__(self) -> None:
@@ -138,7 +141,14 @@ class StudyScene:
         )
         spacing = {run.size: float(self.spacing(run.size)) for run in runs}
         return SceneFacts(
-            self.name, self.title, self.about, self.size_name, self.spacing_unit, spacing, quantities
+            self.name,
+            self.title,
+            self.about,
+            self.size_name,
+            self.spacing_unit,
+            self.energy_rate,
+            spacing,
+            quantities,
         )
 
 
@@ -162,6 +172,7 @@ class SceneFacts:
     about: str
     size_name: str
     spacing_unit: str
+    energy_rate: float
     spacing: Mapping[int, float]
     quantities: tuple[QuantityFacts, ...]
 

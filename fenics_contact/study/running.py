@@ -70,31 +70,51 @@ def run_study(
         InvalidInputError: If the scene is unknown.
         MissingRequirementError: If several ranks are asked for and there is no mpirun.
     """
-    settings = settings or Settings()
-    study, tasks, store, _ = _prepared(scene, Path(folder), sweep, settings)
-    launcher(settings.ranks)
-    _measure_all(tasks, store, settings, study.title, stream)
-    return stored(scene, folder, sweep=sweep, settings=settings)
+    plan = prepare(scene, folder, sweep=sweep, settings=settings)
+    measure_all(plan, stream)
+    return collected(plan)
 
 
-def stored(
+@dataclass(frozen=True)
+class StudyPlan:
+    """A study that can be measured.
+
+    Attributes:
+        study: The scene.
+        base: Settings around which one at a time is varied.
+        tasks: All runs, coarse ones first.
+        store: Where measurements are kept, marked with the code as it was at the start.
+        settings: Ranks, repeats, limits.
+    """
+
+    study: StudyScene
+    base: Parameters
+    tasks: tuple[Task, ...]
+    store: Store
+    settings: Settings
+
+
+def prepare(
     scene: str, folder: str | Path, *, sweep: Sweep | None = None, settings: Settings | None = None
-) -> Results:
-    """Return what is in a study's folder already; arguments as for `run_study`."""
-    settings = settings or Settings()
-    study, tasks, store, base = _prepared(scene, Path(folder), sweep, settings)
-    found = [(task, _repeats(task, store, settings.repeats)) for task in tasks]
-    runs = tuple(_joined(task.parameters, repeats) for task, repeats in found if repeats)
-    return Results(study.facts, settings.ranks, runs, base, {**versions(), "code": store.mark})
+) -> StudyPlan:
+    """Plan a study; arguments as for `run_study`.
 
-
-def _prepared(
-    scene: str, folder: Path, sweep: Sweep | None, settings: Settings
-) -> tuple[StudyScene, list[Task], Store, Parameters]:
-    study = find_study(scene)
+    Raises:
+        InvalidInputError: If the scene is unknown.
+    """
+    study, settings = find_study(scene), settings or Settings()
     chosen = sweep or study.sweep
     tasks = [Task(scene, run, settings.ranks, settings.verify, settings.limit) for run in chosen.runs()]
-    return study, tasks, Store(folder / "runs", fingerprint(scene)), chosen.base
+    store = Store(Path(folder) / "runs", fingerprint(scene))
+    return StudyPlan(study, chosen.base, tuple(tasks), store, settings)
+
+
+def collected(plan: StudyPlan) -> Results:
+    """Return what has been measured of a study so far."""
+    found = [(task, _repeats(task, plan.store, plan.settings.repeats)) for task in plan.tasks]
+    runs = tuple(_joined(task.parameters, repeats) for task, repeats in found if repeats)
+    what = {**versions(), "code": plan.store.mark}
+    return Results(plan.study.facts, plan.settings.ranks, runs, plan.base, what)
 
 
 def _repeats(task: Task, store: Store, most: int) -> list[Record]:
@@ -103,21 +123,27 @@ def _repeats(task: Task, store: Store, most: int) -> list[Record]:
     return [record for record in found if record is not None] if found[0] is not None else []
 
 
-def _measure_all(
-    tasks: Sequence[Task], store: Store, settings: Settings, title: str, stream: TextIO | None
-) -> None:
+def measure_all(plan: StudyPlan, stream: TextIO | None = None) -> None:
+    """Measure what is missing.
+
+    Args:
+        plan: The study.
+        stream: Where progress is told; stderr by default.
+    """
+    launcher(plan.settings.ranks)  # refuses ranks that cannot be started
     # A run is repeated only after all others were measured: load that lasts a while hits no run alone.
-    for repeat in range(settings.repeats):
-        wanted = [task for task in tasks if _wanted(task, store, repeat)]
+    for repeat in range(plan.settings.repeats):
+        wanted = [task for task in plan.tasks if _wanted(task, plan.store, repeat)]
         if not wanted:
             continue
         if repeat == 0:
             _warm_up(wanted)
+        title = plan.study.title
         words = title if repeat == 0 else f"{title}, repeat {repeat + 1}"
         with Progress([task.parameters for task in wanted], words, stream) as progress:
             for task in wanted:
                 progress.begin(task.parameters)
-                _measure(task, store, repeat, progress)
+                _measure(task, plan.store, repeat, progress)
 
 
 def _measure(task: Task, store: Store, repeat: int, progress: Progress) -> None:

@@ -26,7 +26,8 @@ def plot_accuracy(errors: Errors, path: Path) -> Path:
             for axes in figure.axes
             for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
         }
-        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=8)
+        columns = len(handles) if len(handles) < 7 else -(-len(handles) // 2)
+        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns)
     return path
 
 

@@ -23,9 +23,6 @@ from fenics_contact.study.richardson import measured_rate
 from fenics_contact.viz.colours import INK
 from fenics_contact.viz.sheet import sheet
 
-#: Rate of linear elements in energy norm, for solutions as smooth as these.
-ENERGY_RATE = 1.0
-
 
 def plot_convergence(errors: Errors, path: Path) -> Path:
     """Draw the error of every quantity, and the estimate of the mesh's error, over the mesh size."""
@@ -45,7 +42,6 @@ def plot_convergence(errors: Errors, path: Path) -> Path:
         _draw_estimate(drawn[-1], errors, ways)
         for axes in drawn:
             _scales(axes, errors)
-        drawn[0].set_ylabel("relative error")
     return path
 
 
@@ -61,6 +57,7 @@ def _draw(axes: Any, errors: Errors, quantity: QuantityFacts, ways: list[Series]
             lowest = min(lowest, known[-1], key=lambda pair: pair[1])
     if quantity.rate and lowest[1] < float("inf"):
         _slope(axes, errors, lowest, quantity.rate)
+    axes.set_ylabel("relative error")
     axes.set_title(f"{quantity.name} (against {against(errors.references[quantity.name].kind)})")
 
 
@@ -74,8 +71,9 @@ def _draw_estimate(axes: Any, errors: Errors, ways: list[Series]) -> None:
             last = last or (h[-1], value[-1])
             series.draw(axes, h, value, _with_rate(series.name, measured_rate(h, value)))
     if last is not None:
-        _slope(axes, errors, last, ENERGY_RATE)
-    axes.set_title("estimated error in energy norm")
+        _slope(axes, errors, last, errors.results.scene.energy_rate)
+    axes.set_ylabel("error over energy norm")
+    axes.set_title("estimated error of the displacement")
 
 
 def _with_rate(name: str, rate: float | None) -> str:
