@@ -85,7 +85,7 @@ steps = [
     LoadStep(name, supports=[base, Support("upper", "y1", (shift, -0.00205))])
     for name, shift in shifts.items()
 ]
-states = dict(zip(shifts, solve_steps(scene, steps, None, comm), strict=True))
+states = dict(zip(shifts, solve_steps(scene, steps, None, comm, tolerance=1e-6), strict=True))
 
 # ## Theory for measured forces
 #

@@ -76,7 +76,7 @@ if comm.rank == 0:
 # nothing resists.
 
 partitions = scene.partition(comm.size)
-state = solve_scene(scene, partitions, comm)
+state = solve_scene(scene, partitions, comm, tolerance=1e-6)
 
 # ## Result
 #

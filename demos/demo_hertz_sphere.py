@@ -83,7 +83,7 @@ def scene(discretisation):
 if comm.rank == 0:
     print(scene("mortar").plan(ranks=comm.size))
 
-states = {name: solve_scene(scene(name), None, comm) for name in ("mortar", "node")}
+states = {name: solve_scene(scene(name), None, comm, tolerance=1e-6) for name in ("mortar", "node")}
 
 # ## Result
 #

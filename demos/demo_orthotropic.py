@@ -115,8 +115,8 @@ def block_of(material):
 if comm.rank == 0:
     print(block_of(wood).plan(ranks=comm.size))
 
-state = solve_scene(block_of(wood), None, comm)
-compared = solve_scene(block_of(reference), None, comm)
+state = solve_scene(block_of(wood), None, comm, tolerance=1e-6)
+compared = solve_scene(block_of(reference), None, comm, tolerance=1e-6)
 
 # ## Result
 #

@@ -53,7 +53,7 @@ scene = Scene(
     contacts=[ContactPair(Surface("block", "y1"), Surface("punch", "contact"), discretisation="mortar")],
 )
 partitions = scene.partition(comm.size)
-state = solve_scene(scene, partitions, comm)
+state = solve_scene(scene, partitions, comm, tolerance=1e-6)
 
 # ## Hertz
 #

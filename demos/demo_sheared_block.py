@@ -61,7 +61,7 @@ path = np.concatenate([forth, back[1:], -back[1:]])  # mm
 steps = [
     LoadStep(f"{shift:+.2f} mm", supports=[Support("block", "z1", (shift, 0.0, -0.5))]) for shift in path
 ]
-states = solve_steps(scene, steps, None, comm)
+states = solve_steps(scene, steps, None, comm, tolerance=1e-6)
 
 # ## Shear force
 #

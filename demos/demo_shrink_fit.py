@@ -97,7 +97,7 @@ cooling = 60.0  # K
 angles = np.concatenate([np.linspace(0.0, 0.016, 9), np.linspace(0.016, -0.008, 13)[1:]])  # rad
 shrunk = [ThermalStrain("hub", -cooling)]
 steps = [LoadStep(f"{angle:g}", loads=shrunk, supports=held(angle)) for angle in angles]
-states = solve_steps(scene, steps, None, comm)
+states = solve_steps(scene, steps, None, comm, tolerance=1e-6)
 
 # ## Lamé
 #

@@ -83,7 +83,8 @@ def measure(comm: MPI.Comm, level: str) -> dict[str, Any]:
     if level == "sensitivity":
         state = with_gradient(scene, comm)
     else:
-        state = solve_scene(scene, partitions_of(scene), comm)
+        tolerance = 1e-6 if scene.contacts else 1e-10
+        state = solve_scene(scene, partitions_of(scene), comm, tolerance=tolerance)
     seconds = comm.allreduce(perf_counter() - start, op=MPI.MAX)
     plan = scene.plan(partitions_of(scene), sensitivity=level == "sensitivity")
     return {

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.qp import CoarseSpace, DualProblem, FeasibleSet, contact_step
+from fenics_contact.qp import CoarseSpace, ContactLayout, DualProblem, FeasibleSet, contact_step
 from fenics_contact.qp.face import Marks
 from fenics_contact.qp.reductions import Vector
 
@@ -67,7 +67,7 @@ def admissible(problem: DualProblem, slip_bound: Vector, multiplier: Vector, res
     start = np.array(multiplier)
     start[layout.normal[~closed]] = 0.0
     start[layout.tangential[slip]] = (slip_bound[slip] / length[slip])[:, None] * wanted[slip]
-    free = np.concatenate([layout.normal[closed], layout.tangential[stick].ravel()])
+    free = basis(layout, closed, stick, slip, start)
     found, left = _balanced(problem, FeasibleSet(layout, slip_bound), start, free)
     if left > ROUNDING:
         endless = FeasibleSet(layout, np.full_like(slip_bound, ENDLESS))
@@ -77,20 +77,26 @@ def admissible(problem: DualProblem, slip_bound: Vector, multiplier: Vector, res
 
 
 def _balanced(
-    problem: DualProblem, feasible: FeasibleSet, start: Vector, free: np.ndarray
+    problem: DualProblem, feasible: FeasibleSet, start: Vector, free: sp.csr_matrix
 ) -> tuple[Vector, float]:
     """Return a multiplier of the cone in equilibrium, and how much is left of G λ − e. Collective.
 
-    Forces are balanced by the gluing rows alone, or where they do not hold every body, by the free contact
-    rows as well, and at last by all.
+    Forces are balanced by the gluing rows alone, or where they do not hold every body, by contact forces that
+    are free to change as well, and at last by all.
+
+    Args:
+        problem: The dual problem.
+        feasible: The cone.
+        start: A multiplier, owned.
+        free: Basis of the gluing rows and of the contact forces that are free, shape (size, n).
     """
     found = feasible.project(start)
     left = _unbalanced(problem, found)
-    equality, every = problem.layout.equality, np.arange(problem.layout.size)
-    for rows in (equality, np.concatenate([equality, free]), every):
+    layout = problem.layout
+    for rows in (rows_of(layout.size, layout.equality), free, sp.identity(layout.size, format="csr")):
         if left <= ROUNDING:
             break
-        balance = _Balance.of_rows(problem, rows)
+        balance = _Balance.by(problem, rows)
         for _ in range(ROUNDS):
             found = feasible.project(found + balance(found))
             before, left = left, _unbalanced(problem, found)
@@ -108,11 +114,10 @@ class _Balance:
     spread: sp.csr_matrix
 
     @classmethod
-    def of_rows(cls, problem: DualProblem, rows: np.ndarray) -> _Balance:
-        factor = evening(problem)
-        selection = rows_of(problem.layout.size, rows)
-        coarse = problem.evened.coarse.restricted(selection)
-        return cls(problem, coarse, (sp.diags(factor) @ selection).tocsr())
+    def by(cls, problem: DualProblem, rows: sp.csr_matrix) -> _Balance:
+        """Return the balance by the columns of a basis, which does not mix contacts. Collective."""
+        coarse = problem.evened.coarse.restricted(rows)
+        return cls(problem, coarse, (sp.diags(evening(problem)) @ rows).tocsr())
 
     def __call__(self, multiplier: Vector) -> Vector:
         """Return the change that balances a multiplier, as far as the rows can. Collective."""
@@ -129,6 +134,30 @@ def rows_of(size: int, rows: np.ndarray) -> sp.csr_matrix:
     """Return the restriction Z to some owned rows, shape (size, n_rows)."""
     count = len(rows)
     return sp.csr_matrix((np.ones(count), (rows, np.arange(count))), shape=(size, count))
+
+
+def basis(
+    layout: ContactLayout, closed: Marks, stick: Marks, turning: Marks, multiplier: Vector
+) -> sp.csr_matrix:
+    """Return Z of the gluing rows and some contact rows, orthonormal, shape (size, n_face), owned.
+
+    Args:
+        layout: Positions of the multipliers.
+        closed: Contacts whose normal row is in it, shape (n_contact,).
+        stick: Discs of which both rows are in it, shape (n_friction,).
+        turning: Discs of which the direction across the friction force is in it, shape (n_friction,).
+        multiplier: Gives the friction forces, owned.
+    """
+    rows = [layout.equality, layout.normal[closed], layout.tangential[stick].ravel()]
+    single = rows_of(layout.size, np.concatenate(rows))
+    if layout.tangential.shape[1] == 1:
+        return single
+    pairs = layout.tangential[turning]
+    tau = multiplier[pairs] / np.linalg.norm(multiplier[pairs], axis=1, keepdims=True)
+    values = np.stack([-tau[:, 1], tau[:, 0]], axis=1)
+    columns = np.repeat(np.arange(len(pairs)), 2)
+    turned = sp.csr_matrix((values.ravel(), (pairs.ravel(), columns)), shape=(layout.size, len(pairs)))
+    return sp.hstack([single, turned], format="csr")
 
 
 def _unbalanced(problem: DualProblem, multiplier: Vector) -> float:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from fenics_contact.accuracy.state_errors import SolverErrors
 from fenics_contact.errors import InvalidInputError
 
@@ -21,11 +23,11 @@ class Balanced:
     bounded (`StateErrors`), and if the latter is more than its share, the solver goes on from where it is to
     a tolerance that the ratio tells. A mesh that represents the solution exactly is solved to ``finest``.
 
-    Displacements, contact pressures and energies then are as good as the mesh allows. That is not the same
-    for what jumps: whether a point at the edge of the contact is closed, or sticks, may still change, and
-    derivatives by the shape, which belong to one choice of these statuses, with it. Where statuses or
-    differences between neighbouring states matter, give a number: 1e-6 settles nearly all, 1e-8 all that are
-    not weakly active.
+    Displacements, contact pressures and energies then are as good as the mesh allows. So are supports and the
+    seams between subdomains, which hold by multipliers. That is not the same for what jumps: whether a point
+    at the edge of the contact is closed, or sticks, may still change, and derivatives by the shape, which
+    belong to one choice of these statuses, with it. Where statuses or differences between neighbouring
+    states matter, give a number: 1e-6 settles nearly all, 1e-8 all that are not weakly active.
 
     Attributes:
         share: Largest error of the solver, law of friction included, relative to that of the mesh.
@@ -66,9 +68,9 @@ class Balanced:
             errors: What the solver left.
             discretisation: Estimated error of the mesh, [√(force · length)].
         """
-        allowed = self.share * discretisation
-        # What is far below the rounding of the residuals will not get better by small steps.
-        if allowed <= self.finest * errors.together:
+        allowed, have = self.share * discretisation, errors.together
+        # Where so little is allowed no step on the way is of any use; where nothing is known each is.
+        if np.isfinite(have) and allowed <= self.finest * have:
             return self.finest
-        ratio = MARGIN * allowed / errors.together
+        ratio = MARGIN * allowed / have
         return max(self.finest, reached * min(max(ratio, STEP[0]), STEP[1]))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.accuracy.admissible import Admissible, admissible, evening, rows_of
+from fenics_contact.accuracy.admissible import Admissible, admissible, basis, evening
 from fenics_contact.accuracy.lifted import ROUNDING, lift
 from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem
 from fenics_contact.qp import DualProblem, DualSolution
@@ -93,8 +93,7 @@ def _cancelled(problem: DualProblem, solution: DualSolution) -> float:
 def _settled(problem: DualProblem, known: Admissible, residual: Vector) -> Vector:
     """Return r without the rigid motions that fit the rows that should be closed best. Collective."""
     layout = problem.layout
-    rows = [layout.equality, layout.normal[known.closed], layout.tangential[known.stick].ravel()]
-    selection = rows_of(layout.size, np.concatenate(rows))
+    selection = basis(layout, known.closed, known.stick, np.zeros_like(known.slip), known.multiplier)
     coarse = problem.evened.coarse.restricted(selection)
     alpha = coarse.coefficients(selection.T @ (evening(problem) * residual))
     return residual - problem.coarse.transpose(alpha)

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.accuracy.admissible import Admissible, rows_of
+from fenics_contact.accuracy.admissible import Admissible, basis
 from fenics_contact.feti import DualSystem
 from fenics_contact.qp import contact_step
 from fenics_contact.qp.face import Marks
@@ -120,17 +120,7 @@ class _Rows:
     def restriction(self) -> sp.csr_matrix:
         """Z with orthonormal columns, shape (size, n_face), owned."""
         layout = self.system.problem.layout
-        rows = [layout.equality, layout.normal[self.closed], layout.tangential[self.stick].ravel()]
-        single = rows_of(layout.size, np.concatenate(rows))
-        if layout.tangential.shape[1] == 1:
-            return single
-        pairs = layout.tangential[self.across]
-        tau = self.known.multiplier[pairs]
-        tau = tau / np.linalg.norm(tau, axis=1, keepdims=True)
-        values = np.stack([-tau[:, 1], tau[:, 0]], axis=1)
-        columns = np.repeat(np.arange(len(pairs)), 2)
-        turned = sp.csr_matrix((values.ravel(), (pairs.ravel(), columns)), shape=(layout.size, len(pairs)))
-        return sp.hstack([single, turned], format="csr")
+        return basis(layout, self.closed, self.stick, self.across, self.known.multiplier)
 
     def wanted(self, residual: Vector) -> Vector:
         """Return Zᵀ r, shape (n_face,)."""

@@ -28,7 +28,7 @@ class Moments:
     right: np.ndarray
 
     def part(self, chosen: np.ndarray) -> Moments:
-        """Return those of some of the sites."""
+        """Return those of some of the sites, by number or by mark."""
         return Moments(self.rows[chosen], self.matrix[chosen], self.right[chosen])
 
 
@@ -102,13 +102,17 @@ def find_patches(sites: Sites) -> Patches:
     row = np.repeat(np.arange(sites.count), np.diff(table.indptr))
     away = (points[table.indices] - points[row]).T
     i, j = np.triu_indices(dim)
-    columns = (table.data, *(table.data * away[a] * away[b] for a, b in zip(i, j, strict=True)))
+    products = [table.data * away[a] * away[b] for a, b in zip(i, j, strict=True)]
+    columns = [table.data, *(table.data * away), *products]
     # Every site has neighbours: those of its own cells.
     sums = np.column_stack([np.add.reduceat(column, table.indptr[:-1]) for column in columns])
-    weight, *products = sites.sharing.add_up(sums).T
-    mean = np.empty((sites.count, dim, dim))
-    mean[:, i, j] = mean[:, j, i] = np.stack(products, axis=1) / weight[:, None]
-    return Patches(sites, np.linalg.inv(np.linalg.cholesky(mean)), weight)
+    sums = sites.sharing.add_up(np.column_stack([sums, sites.cells]))
+    weight, own = sums[:, :1], sums[:, -1:]
+    mean = sums[:, 1 : 1 + dim] / (weight + own)
+    spread = np.empty((sites.count, dim, dim))
+    spread[:, i, j] = spread[:, j, i] = sums[:, 1 + dim : -1] / (weight + own)
+    spread -= mean[:, :, None] * mean[:, None, :]
+    return Patches(sites, np.linalg.inv(np.linalg.cholesky(spread)), weight[:, 0])
 
 
 def padded(sites: Sites, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -29,8 +29,8 @@ from fenics_contact.accuracy.patches import (
 from fenics_contact.accuracy.sites import Sites
 
 #: Weight of second derivatives beside the moments of a patch, which are of order one: it decides only on what
-#: the patch leaves open.
-SLIGHT = 1e-8
+#: the patch leaves open, and keeps rounding from deciding on it.
+SLIGHT = 1e-5
 #: A patch leaves second derivatives open if the inverse of its moments adds up to more than this on them; on
 #: regular meshes inside a body it is below 20.
 OPEN = 60.0
@@ -51,41 +51,63 @@ def recovered_gradients(sites: Sites, displacement: np.ndarray) -> np.ndarray:
     patches = find_patches(sites)
     dim = patches.dim
     found = np.zeros((sites.count, polynomials(dim), dim))
-    waiting = []
+    waiting, missing = [], []
     for moments in patches.moments(displacement):
         inverse = np.linalg.inv(moments.matrix + SLIGHT * _penalty(dim))
-        found[moments.rows] = inverse @ moments.right
+        first = inverse @ moments.right
+        # Once more with what is left, which takes the weight's own share off.
+        found[moments.rows] = first + inverse @ (moments.right - moments.matrix @ first)
         spread = np.einsum("nii->n", inverse[:, dim:, dim:])
-        waiting.append(moments.part(np.flatnonzero(spread > OPEN)))
-    _ask_neighbours(patches, _joined(waiting), found)
+        open_ = np.flatnonzero(spread > OPEN)
+        waiting.append(moments.part(open_))
+        missing.append(np.rint(SLIGHT * spread[open_]))
+    _ask_neighbours(patches, _joined(waiting), np.concatenate(missing), found)
     return np.asarray(np.einsum("njk,nji->nki", found[:, :dim], patches.turn))
 
 
-def _ask_neighbours(patches: Patches, open_: Moments, found: np.ndarray) -> None:
+def _ask_neighbours(patches: Patches, open_: Moments, missing: np.ndarray, found: np.ndarray) -> None:
     """Fit again what was left open, with second derivatives of neighbours; layer by layer. Collective.
+
+    Where no site of a body knows all, those that know most begin.
 
     Args:
         patches: The patches.
-        open_: Normal equations of the sites whose patches leave something open.
+        open_: Normal equations of the sites whose patches leave something open, n of them.
+        missing: How many second derivatives of a component each of them cannot tell, shape (n,).
         found: Coefficients of all sites, which are overwritten, shape (n_sites, m, dim), [length].
     """
-    sites, dim = patches.sites, patches.dim
-    known = np.ones(sites.count, dtype=bool)
+    comm, allowed = patches.sites.sharing.comm, 0
+    known = np.ones(patches.sites.count, dtype=bool)
     known[open_.rows] = False
-    back = np.linalg.inv(patches.turn)
-    while True:
+    while comm.allreduce(len(open_.rows)):
         heard, curvature = _mean_of_neighbours(patches, open_.rows, known, found)
-        some = np.flatnonzero(heard)
-        if not sites.sharing.comm.allreduce(len(some)):
-            return
-        ready = open_.part(some)
-        # Second derivatives by the own coordinates of the patch.
-        own = np.einsum("nia,nijk,njb->nabk", back[ready.rows], curvature[some], back[ready.rows])
-        right = ready.right.copy()
-        right[:, dim:] += FIRM * coefficients_of(own)
-        found[ready.rows] = np.linalg.solve(ready.matrix + FIRM * _penalty(dim), right)
-        known[ready.rows] = True
-        open_ = open_.part(np.flatnonzero(~heard))
+        if comm.allreduce(np.count_nonzero(heard)):
+            ready = open_.part(heard)
+            found[ready.rows] = _fitted(patches, ready, curvature[heard])
+        else:
+            allowed += 1
+            heard = missing <= allowed
+        known[open_.rows[heard]] = True
+        open_, missing = open_.part(~heard), missing[~heard]
+
+
+def _fitted(patches: Patches, moments: Moments, curvature: np.ndarray) -> np.ndarray:
+    """Fit again with given second derivatives for those that a patch leaves open.
+
+    Args:
+        patches: The patches.
+        moments: Normal equations of the sites, n of them.
+        curvature: ∂²u_k/∂x_i∂x_j as entry (i, j, k), shape (n, dim, dim, dim), [1 / length].
+
+    Returns:
+        Coefficients, shape (n, m, dim), [length].
+    """
+    dim = patches.dim
+    back = np.linalg.inv(patches.turn[moments.rows])
+    own = np.einsum("nia,nijk,njb->nabk", back, curvature, back, optimize=True)
+    right = moments.right.copy()
+    right[:, dim:] += FIRM * coefficients_of(own)
+    return np.asarray(np.linalg.solve(moments.matrix + FIRM * _penalty(dim), right))
 
 
 def _mean_of_neighbours(
@@ -109,7 +131,8 @@ def _mean_of_neighbours(
     needed = np.unique(links.indices)
     needed = needed[known[needed]]
     turn = patches.turn[needed]
-    curvature = np.einsum("nai,nabk,nbj->nijk", turn, curvatures(found[needed][:, dim:]), turn)
+    of_sites = curvatures(found[needed][:, dim:])
+    curvature = np.einsum("nai,nabk,nbj->nijk", turn, of_sites, turn, optimize=True)
     values = np.column_stack([np.ones(len(needed)), curvature.reshape(-1, dim**3)])
     total = np.zeros((sites.count, values.shape[1]))
     total[rows] = links[:, needed] @ values

@@ -23,6 +23,7 @@ class Sites:
             (n_sites, n_sites), without diagonal.
         of_cells: Site of each vertex of the cells of each subdomain, as dolfinx orders the cells of its
             mesh, vertices in the order of the body's mesh; arrays of shape (n_cells, n_vertices).
+        cells: Number of this rank's cells around each site, shape (n_sites,).
     """
 
     node: np.ndarray
@@ -30,6 +31,7 @@ class Sites:
     sharing: Sharing
     neighbours: sp.csr_matrix
     of_cells: tuple[np.ndarray, ...]
+    cells: np.ndarray
 
     @property
     def count(self) -> int:
@@ -55,7 +57,8 @@ def find_sites(torn: TornSystem) -> Sites:
     points = np.concatenate([body.mesh.points for body in scene.bodies.values()])[node]
     several = np.flatnonzero(_on_several_ranks(torn)[node])
     sharing = Sharing(torn.decomposition.comm, key, several)
-    return Sites(node, points, sharing, _neighbours(of_cells, len(key)), of_cells)
+    neighbours, cells = _neighbours(of_cells, len(key))
+    return Sites(node, points, sharing, neighbours, of_cells, cells)
 
 
 def nodal_displacement(torn: TornSystem, displacement: np.ndarray) -> np.ndarray:
@@ -88,12 +91,13 @@ def _on_several_ranks(torn: TornSystem) -> np.ndarray:
     return np.asarray(np.minimum.reduceat(rank, first) != np.maximum.reduceat(rank, first))
 
 
-def _neighbours(of_cells: tuple[np.ndarray, ...], count: int) -> sp.csr_matrix:
+def _neighbours(of_cells: tuple[np.ndarray, ...], count: int) -> tuple[sp.csr_matrix, np.ndarray]:
     widths = np.concatenate([np.full(len(cells), cells.shape[1]) for cells in of_cells])
     start = np.concatenate([[0], np.cumsum(widths)])
     sites = np.concatenate([cells.ravel() for cells in of_cells])
     incidence = sp.csr_matrix((np.ones(len(sites)), sites, start), shape=(len(widths), count))
-    together = sp.csr_matrix(incidence.T @ incidence)
-    together.setdiag(0)
-    together.eliminate_zeros()
-    return together
+    common = sp.csr_matrix(incidence.T @ incidence)
+    cells = common.diagonal()
+    common.setdiag(0)
+    common.eliminate_zeros()
+    return common, cells

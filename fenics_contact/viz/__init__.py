@@ -10,6 +10,7 @@ from fenics_contact.viz.control_net import plot_control_net
 from fenics_contact.viz.convergence import plot_convergence
 from fenics_contact.viz.curves import plot_curves
 from fenics_contact.viz.decomposition import plot_decomposition
+from fenics_contact.viz.error import plot_error
 from fenics_contact.viz.pressure import plot_contact_pressure
 from fenics_contact.viz.renderer import check_renderer
 from fenics_contact.viz.status import plot_contact_status
@@ -26,5 +27,6 @@ __all__ = [
     "plot_convergence",
     "plot_curves",
     "plot_decomposition",
+    "plot_error",
     "plot_stress",
 ]

@@ -29,6 +29,7 @@ SPARE = "#dddddd"
 #: Maps whose lightness only falls, readable in grey as well. The first stops short of black, on which no line
 #: would be seen; the last has zero in its middle.
 STRESS_MAP = ListedColormap(colormaps["magma_r"](np.linspace(0.04, 0.82, 256)), "stress")
+ERROR_MAP = colormaps["viridis_r"]
 PRESSURE_MAP = colormaps["YlGnBu"]
 SIGNED_MAP = colormaps["PuOr"]
 

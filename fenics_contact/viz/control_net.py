@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import DesignSurface
@@ -152,7 +154,8 @@ def _draw(change: _Change, target: Path, title: str, units: Units, width: int) -
         place_image(figure, before, 0, top, "before")
         place_image(figure, after, size, top, f"after, movement × {change.factor:g}")
         label = f"outward movement ({units.length})"
-        place_colour_bar(figure, (2 * size, top, before.shape[0]), SIGNED_MAP, change.clim, label)
+        key = ScalarMappable(Normalize(*change.clim), SIGNED_MAP)
+        place_colour_bar(figure, (2 * size, top, before.shape[0]), key, label)
 
 
 def _view(grid: np.ndarray) -> View:

@@ -11,22 +11,31 @@ from fenics_contact.geometry import BodyMesh
 
 
 @dataclass(frozen=True)
-class BodyFields:
-    """Displacement and stress of one body, replicated on all ranks.
+class Moved:
+    """One body and how it moves, replicated on all ranks.
 
     Attributes:
         mesh: The body's mesh in the state's geometry.
         displacement: (n_nodes, dim), [length].
-        von_mises: Constant on cells, (n_cells,), [force / length²].
     """
 
     mesh: BodyMesh
     displacement: np.ndarray
-    von_mises: np.ndarray
 
     def deformed(self, scale: float) -> np.ndarray:
         """Return the coordinates moved by ``scale`` times the displacement, (n_nodes, dim), [length]."""
         return self.mesh.points + scale * self.displacement
+
+
+@dataclass(frozen=True)
+class BodyFields(Moved):
+    """Displacement and stress of one body, replicated on all ranks.
+
+    Attributes:
+        von_mises: Constant on cells, (n_cells,), [force / length²].
+    """
+
+    von_mises: np.ndarray
 
     @property
     def nodal_von_mises(self) -> np.ndarray:
@@ -35,6 +44,13 @@ class BodyFields:
         spread = np.repeat(self.von_mises, cells.shape[1])
         summed = np.bincount(cells.ravel(), weights=spread, minlength=count)
         return np.asarray(summed / np.bincount(cells.ravel(), minlength=count))
+
+
+def moved(state: State) -> dict[str, Moved]:
+    """Collect the displacement of all bodies on every rank. Collective."""
+    return {
+        name: Moved(body.mesh, state.gather_displacement(name)) for name, body in state.scene.bodies.items()
+    }
 
 
 def gather(state: State) -> dict[str, BodyFields]:

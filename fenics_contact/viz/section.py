@@ -11,7 +11,7 @@ import pyvista as pv
 
 from fenics_contact.contact import ContactResult
 from fenics_contact.viz.colours import INK
-from fenics_contact.viz.fields import BodyFields
+from fenics_contact.viz.fields import Moved
 from fenics_contact.viz.stage import Layer
 from fenics_contact.viz.view import Frame, View, frame_around, looking_along
 
@@ -91,7 +91,7 @@ def section_frame(view: View, spot: Spot, points: np.ndarray, reach: float | Non
 
 
 def section_layers(
-    bodies: Mapping[str, BodyFields],
+    bodies: Mapping[str, Moved],
     scalars: Mapping[str, np.ndarray],
     view: View,
     origin: np.ndarray,
@@ -100,7 +100,7 @@ def section_layers(
     """Cut all bodies, as they are after deformation, by a plane and draw the cut in colours.
 
     Args:
-        bodies: Fields of the bodies.
+        bodies: The bodies.
         scalars: Body name -> values on nodes or cells.
         view: Its direction is the plane's normal.
         origin: A point of the plane, (3,).

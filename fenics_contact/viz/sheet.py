@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from fenics_contact.errors import InvalidInputError, together
@@ -144,8 +142,7 @@ def scale_bar(axes: Any, image: np.ndarray, width: float, unit: str) -> None:
 def place_colour_bar(
     figure: Any,
     box: tuple[int, int, int],
-    colours: Any,
-    clim: tuple[float, float],
+    key: Any,
     label: str,
     **options: Any,
 ) -> None:
@@ -154,11 +151,10 @@ def place_colour_bar(
     Args:
         figure: The sheet.
         box: Left, top and height in pixels.
-        colours: Colour map.
-        clim: Its range.
+        key: matplotlib's ScalarMappable: colour map and norm.
         label: What is shown, with its unit.
         **options: Keywords of matplotlib's ``colorbar``.
     """
     left, top, height = box
     axes = figure.add_axes(_box(figure, left, top, max(2, round(0.3 * figure.dpi)), height))
-    figure.colorbar(ScalarMappable(Normalize(*clim), colours), cax=axes, label=label, **options)
+    figure.colorbar(key, cax=axes, label=label, **options)

@@ -9,8 +9,8 @@ import numpy as np
 from fenics_contact.geometry import BodyMesh
 from fenics_contact.geometry.cell_types import CELL_TYPES
 
-#: Displacement gradient at points: shape (..., dim) -> (..., dim, dim), entry (k, j) is ∂u_k/∂x_j.
-Gradient = Callable[[np.ndarray], np.ndarray]
+#: Displacement gradient at points: shape (n, dim) -> (n, dim, dim), entry (k, j) is ∂u_k/∂x_j; or a number.
+Gradient = Callable[[np.ndarray], np.ndarray | float]
 #: Gauss points in a direction.
 POINTS = 4
 

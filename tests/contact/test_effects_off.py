@@ -163,7 +163,12 @@ def cuts(case: Case) -> dict[str, np.ndarray]:
 
 
 def solved(case: Case) -> State:
-    return solve_scene(case.scene, cuts(case), MPI.COMM_SELF)
+    """Solve to a fixed tolerance: by default a state also estimates the error of its mesh."""
+    return solve_scene(case.scene, cuts(case), MPI.COMM_SELF, tolerance=tolerance_of(case.scene))
+
+
+def tolerance_of(scene: Scene) -> float:
+    return 1e-6 if scene.contacts else 1e-10
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -211,7 +216,7 @@ def test_the_direct_solve_has_no_coarse_problem_and_no_products() -> None:
 def test_only_sensitivities_put_one_held_body_on_multipliers(sensitivity: bool, calls: Counter[str]) -> None:
     case = CASES["surface load"]
     decomposition = decompose(case.scene, cuts(case), MPI.COMM_SELF)
-    state = find_state(case.scene, decomposition, sensitivity=sensitivity)
+    state = find_state(case.scene, decomposition, sensitivity=sensitivity, tolerance=1e-10)
     assert set(calls) == (LINEAR if sensitivity else set())
     compiled = {kind for kind, *_ in state.torn.decomposition.forms.compiled}
     assert compiled == {"stiffness", "surface load"}, "derivatives by the shape are not compiled for a state"
@@ -249,7 +254,7 @@ def test_tresca_bounds_stay_what_they_were() -> None:
 
 def test_slip_is_carried_from_the_second_load_step_on_only(calls: Counter[str]) -> None:
     case = CASES["Coulomb"]
-    sequence = LoadSequence(case.scene, cuts(case), MPI.COMM_SELF)
+    sequence = LoadSequence(case.scene, cuts(case), MPI.COMM_SELF, tolerance=1e-6)
     sequence.advance(LoadStep("first"))
     assert "slip of earlier steps" not in calls
     sequence.advance(LoadStep("second"))
@@ -276,30 +281,31 @@ scene = Scene(
     [pair],
 )
 cuts = {{name: box_partition(body.mesh, (2, 1, 1)) for name, body in scene.bodies.items()}}
-state = solve_scene(scene, cuts, MPI.COMM_SELF)
+state = solve_scene(scene, cuts, MPI.COMM_SELF, tolerance={tolerance})
 assert state.contact.normal_force.sum() > 0.01
 print(*sys.modules)
 """
 HELD, FLOATING = 'Support("upper", "x0")', 'Support("upper", "x0", (0.0, None, None))'
 NEVER = {
-    *(f"fenics_contact.{room}" for room in ("shape", "optimize", "viz", "io")),
+    *(f"fenics_contact.{room}" for room in ("shape", "optimize", "viz", "io", "study")),
     "pyvista", "matplotlib", "vtk", "vtkmodules", "gmsh", "pymetis", "meshio",
 }  # fmt: skip
-AT_NEED = {"fenics_contact.feti.mortar", "clarabel"}
+AT_NEED = {"fenics_contact.feti.mortar", "fenics_contact.accuracy", "clarabel"}
 
 
 @pytest.mark.parametrize(
-    ("law", "discretisation", "support", "needed"),
+    ("law", "discretisation", "support", "tolerance", "needed"),
     [
-        ("None", "node", HELD, set()),
-        ("Coulomb(0.3)", "mortar", HELD, {"fenics_contact.feti.mortar"}),
-        ("Coulomb(0.3)", "node", FLOATING, {"clarabel"}),
+        ("None", "node", HELD, 1e-6, set()),
+        ("None", "node", HELD, None, {"fenics_contact.accuracy"}),
+        ("Coulomb(0.3)", "mortar", HELD, 1e-6, {"fenics_contact.feti.mortar"}),
+        ("Coulomb(0.3)", "node", FLOATING, 1e-6, {"clarabel"}),
     ],
 )
 def test_only_modules_that_a_scene_calls_for_are_imported(
-    law: str, discretisation: str, support: str, needed: set[str]
+    law: str, discretisation: str, support: str, tolerance: float | None, needed: set[str]
 ) -> None:
-    code = SCRIPT.format(law=law, discretisation=discretisation, support=support)
+    code = SCRIPT.format(law=law, discretisation=discretisation, support=support, tolerance=tolerance)
     answer = launch(1, "-c", code)
     assert answer.returncode == 0, answer.stderr
     loaded = set(answer.stdout.split())

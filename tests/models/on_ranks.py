@@ -68,7 +68,7 @@ def main() -> None:
         scene = scene_of(cell)
         boxes = {"heated": (2, 1, 1), "plain": (4, 1, 1)}
         cut = {n: box_partition(body.mesh, boxes[n][: scene.dim]) for n, body in scene.bodies.items()}
-        state = solve_scene(scene, cut, comm)
+        state = solve_scene(scene, cut, comm, tolerance=1e-10)
         for name in scene.bodies:
             field = state.gather_displacement(name), state.gather_von_mises(name)
             found[f"{cell} {name}"] = [part.ravel().tolist() for part in field]

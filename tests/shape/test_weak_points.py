@@ -137,7 +137,7 @@ def test_points_over_facet_edges_are_counted() -> None:
             contacts=[ContactPair(Surface("upper", "z0"), Surface("lower", "z1"))],
         )
         cuts = {name: np.zeros(body.mesh.n_cells, dtype=int) for name, body in bodies.items()}
-        state = solve_scene(scene, cuts, MPI.COMM_SELF)
+        state = solve_scene(scene, cuts, MPI.COMM_SELF, tolerance=1e-6)
         assert state.contact.count(Status.SLIP) > 0
         edges.append(linearise_face(state, WeakChoice.RELEASED).weak.edges)
     assert edges == [9, 0]

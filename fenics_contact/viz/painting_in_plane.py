@@ -1,4 +1,4 @@
-"""Picture of the stress of plane bodies: all of them, and where they touch at a larger scale."""
+"""Picture of a field on plane bodies: all of them, and where they touch at a larger scale."""
 
 from __future__ import annotations
 
@@ -8,18 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 
 from fenics_contact.contact import ContactResult
 from fenics_contact.scene import Scene
-from fenics_contact.viz.colours import STRESS_MAP
-from fenics_contact.viz.fields import BodyFields
+from fenics_contact.viz.fields import Moved
 from fenics_contact.viz.obstacles import shade_obstacles
+from fenics_contact.viz.paints import Paints
 from fenics_contact.viz.plane import draw_cell_edges, draw_field, draw_outline, window
 from fenics_contact.viz.sheet import sheet
-from fenics_contact.viz.units import Units
-from fenics_contact.viz.words import headline, written
 
 #: Half size of the detail, in half lengths of the closed part of the contact surface.
 REACH = 2.5
@@ -27,23 +23,6 @@ REACH = 2.5
 LARGEST_DETAIL = 0.4
 #: Room around the bodies, relative to their size.
 BORDER = 0.04
-
-
-@dataclass(frozen=True)
-class PlaneLook:
-    """How the picture is made; as the arguments of `plot_stress`."""
-
-    clim: tuple[float, float]
-    scale: float
-    smooth: bool
-    title: str
-    units: Units
-    width: int
-
-    @property
-    def colours(self) -> dict[str, Any]:
-        """Keywords of matplotlib."""
-        return {"cmap": STRESS_MAP, "vmin": self.clim[0], "vmax": self.clim[1]}
 
 
 @dataclass(frozen=True)
@@ -80,17 +59,23 @@ def contact_window(
     return middle - half, middle + half
 
 
-def draw_stress_in_plane(
+def draw_in_plane(
     scene: Scene,
-    bodies: Mapping[str, BodyFields],
+    bodies: Mapping[str, Moved],
     detail: tuple[np.ndarray, np.ndarray] | None,
     target: Path,
-    look: PlaneLook,
+    paints: Paints,
 ) -> None:
-    """Draw von Mises stress on the deformed bodies, and beside it the contact in true deformation."""
-    parts = _parts(bodies, detail, look.scale)
-    peak = max(float(body.von_mises.max()) for body in bodies.values())
-    facts = f"von Mises stress, largest {written(peak)} {look.units.stress}; displacement × {look.scale:g}"
+    """Draw a field on the deformed bodies, and beside it the contact in true deformation.
+
+    Args:
+        scene: Gives the obstacles.
+        bodies: The bodies.
+        detail: Corners of what is shown at a larger scale, or None.
+        target: PNG file to write.
+        paints: The field.
+    """
+    parts = _parts(bodies, detail, paints.scale)
     upright = len(parts) > 1 and parts[0].proportion > 2.2
     # Sizes in parts of the sheet's width, with room for tick labels, titles and the colour bar.
     if upright:
@@ -98,23 +83,20 @@ def draw_stress_in_plane(
     else:
         height = 0.8 / sum(part.proportion for part in parts) + 0.13
     height = float(np.clip(height, 0.3, 1.0))
-    with sheet(
-        target, (look.width, round(height * look.width)), headline(look.title, facts), "constrained"
-    ) as figure:
+    size = paints.width, round(height * paints.width)
+    with sheet(target, size, paints.headline, "constrained") as figure:
         ratios = {"height_ratios": [0.84 / parts[0].proportion, 0.36]} if upright else None
         ratios = ratios or {"width_ratios": [part.proportion for part in parts]}
         shape = (len(parts), 1) if upright else (1, len(parts))
         panels = figure.subplots(*shape, squeeze=False, gridspec_kw=ratios).ravel()
         for axes, part in zip(panels, parts, strict=True):
-            _draw_part(axes, scene, bodies, part, look)
-        label = f"von Mises stress ({look.units.stress})"
-        extend = "max" if peak > look.clim[1] else "neither"
-        colours = ScalarMappable(Normalize(*look.clim), STRESS_MAP)
-        figure.colorbar(colours, ax=panels.tolist(), label=label, extend=extend, aspect=30, shrink=0.95)
+            _draw_part(axes, scene, bodies, part, paints)
+        look: dict[str, Any] = {"extend": paints.extend, "aspect": 30, "shrink": 0.95}
+        figure.colorbar(paints.key, ax=panels.tolist(), label=paints.label, **look)
 
 
 def _parts(
-    bodies: Mapping[str, BodyFields], detail: tuple[np.ndarray, np.ndarray] | None, scale: float
+    bodies: Mapping[str, Moved], detail: tuple[np.ndarray, np.ndarray] | None, scale: float
 ) -> list[_Part]:
     points = np.concatenate([body.deformed(scale) for body in bodies.values()])
     low, high = points.min(axis=0), points.max(axis=0)
@@ -125,15 +107,12 @@ def _parts(
     return parts
 
 
-def _draw_part(
-    axes: Any, scene: Scene, bodies: Mapping[str, BodyFields], part: _Part, look: PlaneLook
-) -> None:
+def _draw_part(axes: Any, scene: Scene, bodies: Mapping[str, Moved], part: _Part, paints: Paints) -> None:
     shade_obstacles(axes, scene, part.low, part.high)
-    for body in bodies.values():
+    for name, body in bodies.items():
         points, cells = body.deformed(part.scale), body.mesh.cells
-        values = body.nodal_von_mises if look.smooth else body.von_mises
-        draw_field(axes, points, cells, values, look.colours)
+        draw_field(axes, points, cells, paints.shown(name), paints.of_cells)
         draw_cell_edges(axes, points, cells, part.low, part.high)
         draw_outline(axes, points, cells)
     axes.set_title(part.title)
-    window(axes, part.low, part.high, look.units.length)
+    window(axes, part.low, part.high, paints.units.length)

@@ -1,0 +1,115 @@
+"""Picture of where the discretisation error of a state is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from matplotlib.colors import LogNorm
+
+from fenics_contact.accuracy import discretisation_error
+from fenics_contact.contact import State
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.viz.colours import ERROR_MAP
+from fenics_contact.viz.fields import moved
+from fenics_contact.viz.painting import paint
+from fenics_contact.viz.paints import Paints
+from fenics_contact.viz.sheet import png_path
+from fenics_contact.viz.units import Units
+from fenics_contact.viz.words import checked_range, checked_reach, headline, written
+
+#: The colours reach down to this part of their upper end at most: what is below does not matter.
+SPAN = 1e-4
+
+
+def plot_error(
+    state: State,
+    path: str | Path,
+    by_cell: Mapping[str, np.ndarray] | None = None,
+    *,
+    clim: tuple[float, float] | None = None,
+    sections: bool = True,
+    reach: float | None = None,
+    title: str = "",
+    units: Units | None = None,
+    width: int = 1600,
+) -> Path:
+    """Draw each cell's part of the discretisation error, on a logarithmic scale. Collective.
+
+    The squares of the cells' parts, relative to the energy norm √(uᵀK u) of the displacement, add up to the
+    square of the relative error that the title states. A mesh that spends its cells well shows one colour;
+    dark cells are those to refine. Bodies are shown in true deformation, with sections through the strongest
+    contact as in `plot_stress`.
+
+    Args:
+        state: The state.
+        path: PNG file to write.
+        by_cell: Body name -> part of each cell relative to that norm, shape (n_cells,); estimated unless
+            given, see `accuracy.discretisation_error`.
+        clim: Range of the colours, positive; up to the largest part and down to a ten thousandth of it, or
+            the smallest, unless given. Give two pictures the same range to compare them.
+        sections: Draw the sections too, if a contact carries force.
+        reach: How far sections reach up and down from the contact's middle, [length]; chosen unless given.
+        title: What comes before the facts in the title.
+        units: Names of the units, mm, N and MPa unless given.
+        width: Width of the picture in pixels.
+
+    Returns:
+        The path.
+
+    Raises:
+        InvalidInputError: If parts do not fit the cells, or an option or the name of the file cannot be used.
+        MissingRequirementError: If this machine cannot render.
+    """
+    target = png_path(path)
+    checked_reach(reach)
+    given = None if clim is None else checked_range(clim)
+    if given is not None and given[0] <= 0:
+        raise InvalidInputError(f"clim of a logarithmic scale must be positive, got {clim}: try (1e-5, 1e-2)")
+    values = _estimated(state) if by_cell is None else _checked(state, by_cell)
+    total = float(np.sqrt(sum(np.sum(part**2) for part in values.values())))
+    facts = f"estimated discretisation error {written(100 * total, 3)} % in energy norm, by cell"
+    norm = LogNorm(*(given or error_range(values)), clip=False)
+    label, words = "part of a cell, relative to the energy norm of the displacement", headline(title, facts)
+    paints = Paints(values, ERROR_MAP, norm, label, words, 1.0, reach, units or Units(), width)
+    paint(state, moved(state), paints, target, sections=sections)
+    return target
+
+
+def error_range(values: Mapping[str, np.ndarray]) -> tuple[float, float]:
+    """Return the default range of the colours: half decades around the parts, about one to four decades."""
+    parts = np.concatenate(list(values.values()))
+    top = float(parts.max(initial=0.0))
+    if top <= 0:
+        return SPAN, 1.0
+    low = min(max(float(parts.min()), SPAN * top), top / 10)
+    half = np.log10(np.array([low, top])) * 2  # half decades: 1, 3, 10, 30
+    ends = 10.0 ** (np.array([np.floor(half[0]), np.ceil(half[1])]) / 2)
+    return float(ends[0]), float(ends[1])
+
+
+def _estimated(state: State) -> dict[str, np.ndarray]:
+    found = discretisation_error(state.torn, state.torn_displacement)
+    size = np.sqrt(2 * state.energies.strain)
+    cells = {name: found.by_cell(name) for name in state.scene.bodies}
+    return {name: part / size if size > 0 else np.zeros_like(part) for name, part in cells.items()}
+
+
+def _checked(state: State, by_cell: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    values = {}
+    for name, body in state.scene.bodies.items():
+        part = np.asarray(by_cell[name], dtype=np.float64) if name in by_cell else np.zeros(0)
+        if part.shape != (body.mesh.n_cells,) or not np.all(np.isfinite(part) & (part >= 0)):
+            raise InvalidInputError(
+                f"by_cell[{name!r}] must hold {body.mesh.n_cells} numbers, one a cell, finite and not "
+                f"negative, got {_described(part) if name in by_cell else 'none'}: give what by_cell(body) "
+                "of an estimate returns, divided by the norm of the displacement"
+            )
+        values[name] = part
+    return values
+
+
+def _described(part: np.ndarray) -> str:
+    worst = f", the smallest {part.min()}" if part.size else ""
+    return f"shape {part.shape}{worst}"

@@ -1,0 +1,68 @@
+"""A field on all bodies, ready to be drawn: values, their colours and the words around them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Colormap, Normalize
+
+from fenics_contact.viz.units import Units
+
+
+@dataclass(frozen=True)
+class Paints:
+    """What a picture of a field shows, apart from the bodies.
+
+    Attributes:
+        values: Body name -> values on its nodes or its cells.
+        colours: matplotlib's colour map.
+        norm: matplotlib's norm, from values to colours.
+        label: Words beside the colour bar, with the unit.
+        headline: The title.
+        scale: Factor of the displacement in the main picture.
+        reach: How far details reach to each side of the contact's middle, [length], or None.
+        units: Names of the units.
+        width: Width of the picture in pixels.
+    """
+
+    values: Mapping[str, np.ndarray]
+    colours: Colormap
+    norm: Normalize
+    label: str
+    headline: str
+    scale: float
+    reach: float | None
+    units: Units
+    width: int
+
+    def shown(self, body: str) -> np.ndarray:
+        """Return the values of a body from 0 to 1, the range of the colours; below and above outside it."""
+        return np.ma.filled(self.norm(self.values[body], clip=False), 0.0)
+
+    @property
+    def extend(self) -> str:
+        """Which ends of the colour bar are open: there are values beyond."""
+        low = min(float(values.min()) for values in self.values.values()) < self.norm.vmin
+        high = max(float(values.max()) for values in self.values.values()) > self.norm.vmax
+        return {(False, False): "neither", (True, False): "min", (False, True): "max"}.get(
+            (low, high), "both"
+        )
+
+    @property
+    def key(self) -> ScalarMappable:
+        """What matplotlib draws a colour bar of."""
+        return ScalarMappable(self.norm, self.colours)
+
+    @property
+    def of_surfaces(self) -> dict[str, Any]:
+        """Keywords of pyvista's ``add_mesh`` for `shown`."""
+        return {"cmap": self.colours, "clim": (0.0, 1.0), "n_colors": 256}
+
+    @property
+    def of_cells(self) -> dict[str, Any]:
+        """Keywords of matplotlib for `shown`."""
+        return {"cmap": self.colours, "vmin": 0.0, "vmax": 1.0}

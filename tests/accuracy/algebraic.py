@@ -1,0 +1,164 @@
+"""Scenes for the errors of solvers, and these errors against solutions that are accurate to many digits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_contact.accuracy import Certificate, certify, friction_error
+from fenics_contact.contact import State, find_state, solve_scene
+from fenics_contact.contact.equilibrium import solve_dual
+from fenics_contact.geometry import bisection_partition, block, box_partition, graph_partition, hemisphere
+from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG, solve
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    Coulomb,
+    Scene,
+    Support,
+    Surface,
+    TotalForce,
+    Traction,
+    Tresca,
+)
+from tests.contact import effect_cases, gallery
+from tests.contact.gallery import FLOOR, SOFT
+
+Cut = Callable[[Scene], Mapping[str, np.ndarray]]
+
+
+def boxes(*counts: int) -> Cut:
+    return lambda scene: {
+        name: box_partition(body.mesh, counts[: scene.dim]) for name, body in scene.bodies.items()
+    }
+
+
+def bisected(count: int) -> Cut:
+    return lambda scene: {name: bisection_partition(body.mesh, count) for name, body in scene.bodies.items()}
+
+
+def graph(count: int) -> Cut:
+    return lambda scene: {name: graph_partition(body.mesh, count) for name, body in scene.bodies.items()}
+
+
+def clamped() -> Scene:
+    mesh = block((0, 0, 0), (2, 1, 1), (8, 4, 4))
+    load = Traction("block", "z1", (1.0, 0.3, -2.0))
+    return Scene({"block": Body(mesh, SOFT)}, [Support("block", "x0")], [load])
+
+
+def stretched() -> Scene:
+    """A block whose ends have prescribed displacements, which become rows of B."""
+    scene = clamped()
+    moved = Support("block", "x1", (0.01, None, 0.02))
+    return Scene(scene.bodies, [*scene.supports, moved], scene.loads)
+
+
+def ball() -> Scene:
+    """A quarter of a ball pressed on a plane."""
+    supports = [Support("ball", "x0", (0.0, None, None)), Support("ball", "y0", (None, 0.0, None))]
+    return Scene(
+        {"ball": Body(hemisphere(1.0, 4, grading=2.0), SOFT)},
+        supports,
+        [TotalForce("ball", "top", (0.0, 0.0, -0.3))],
+        [ContactPair(Surface("ball", "contact"), FLOOR)],
+    )
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene with its partition."""
+
+    make: Callable[[], Scene]
+    cut: Cut
+
+
+CASES = {
+    "a linear block": Case(clamped, graph(5)),
+    "prescribed displacements": Case(stretched, boxes(2, 2, 1)),
+    "a ball on a plane": Case(ball, bisected(4)),
+    "a frictionless pair": Case(lambda: gallery.guided(gallery.two_blocks(None), "upper"), boxes(2, 1, 2)),
+    "Tresca's law": Case(lambda: gallery.two_blocks(Tresca(0.8)), boxes(2, 2, 1)),
+    "Coulomb's law": Case(lambda: gallery.pressed_block(Coulomb(0.3)), boxes(3, 1, 1)),
+    "a body that friction holds": Case(lambda: gallery.two_blocks(Coulomb(0.38)), boxes(2, 1, 1)),
+    "bodies that float on each other": Case(
+        lambda: gallery.stack(Coulomb(0.4), Coulomb(0.5)), boxes(2, 1, 1)
+    ),
+    "nodes in two pairs": Case(lambda: gallery.cornered_block(Coulomb(0.3)), boxes(2, 1, 1)),
+    "a mortar pair": Case(effect_cases.mortar, graph(4)),
+    "a stiff body on a soft one": Case(effect_cases.stiff_on_soft, graph(4)),
+    "a tie": Case(effect_cases.tied, graph(4)),
+    "two dimensions": Case(effect_cases.plane, graph(4)),
+}
+
+
+def solver_of(scene: Scene, tolerance: float) -> DualSolver:
+    return FaceNewton(tolerance=tolerance) if scene.contacts else ProjectedCG(tolerance=tolerance)
+
+
+@lru_cache(maxsize=1)
+def first_state(name: str) -> State:
+    """The state that the others of a case share their factors with."""
+    case = CASES[name]
+    scene = case.make()
+    return solve_scene(scene, case.cut(scene), MPI.COMM_SELF, solver=solver_of(scene, 0.1))
+
+
+def energy_norm(state: State, displacement: np.ndarray) -> float:
+    """Return √(vᵀK v) of a torn displacement. Collective."""
+    total, start = 0.0, 0
+    for subdomain in state.torn.subdomains:
+        part = displacement[start : start + subdomain.mesh.size]
+        total += float(part @ (subdomain.stiffness @ part))
+        start += subdomain.mesh.size
+    return float(np.sqrt(state.torn.numbering.comm.allreduce(total)))
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Errors of a state as found and as they are, relative to its norm.
+
+    Attributes:
+        certificate: What `certify` found.
+        bound: Its bound.
+        friction: The estimate by Coulomb's law.
+        error: The error to the solution with the state's slip bounds.
+        law: Distance of that solution from the one of Coulomb's law.
+        whole: The error to the solution of Coulomb's law.
+    """
+
+    certificate: Certificate
+    bound: float
+    friction: float
+    error: float
+    law: float
+    whole: float
+
+
+def measured(state: State, finest: float = 1e-11) -> Measured:
+    """Compare what is found for a state with solutions of many digits. Collective."""
+    system, solution, scene = state.dual, state.dual_solution, state.scene
+    certificate = certify(system, solution)
+    friction = friction_error(system, solution, certificate)
+    exact = solver_of(scene, finest)
+    tresca = solve(system.problem, solution.slip_bound, exact, solution)
+    at_bounds = system.displacement(tresca.multiplier, tresca.alpha)
+    right = at_bounds
+    if np.any(state.torn.friction_coefficient > 0):
+        coulomb = solve_dual(system, exact, solution)
+        right = system.displacement(coulomb.multiplier, coulomb.alpha)
+    norm = energy_norm(state, right)
+    differences = (state.torn_displacement - at_bounds, at_bounds - right, state.torn_displacement - right)
+    error, law, whole = (energy_norm(state, v) / norm for v in differences)
+    return Measured(certificate, certificate.bound / norm, friction / norm, error, law, whole)
+
+
+def solved(name: str, tolerance: float) -> State:
+    """Return the state of a case to a tolerance, from a cold start."""
+    first = first_state(name)
+    state = find_state(first.scene, first.torn.decomposition, solver=solver_of(first.scene, tolerance))
+    return state
