@@ -32,6 +32,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("scene", metavar="SCENE", help=f"{', '.join(BUILT_IN)}, or a file that ends in .py")
     parser.add_argument("--quick", action="store_true", help="about a minute: coarse meshes, one repeat")
     parser.add_argument("--output", type=Path, help="folder of the results (output/studies/NAME)")
+    parser.add_argument("--runs", type=Path, help="folder in which runs are kept (OUTPUT/runs)")
     parser.add_argument("--ranks", type=_positive, default=1, help="MPI ranks of every run (1)")
     parser.add_argument("--repeats", type=_positive, help="measurements of runs under 10 s (3; quick: 1)")
     parser.add_argument("--limit", type=float, default=600.0, help="seconds that a run may take (600)")
@@ -56,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
         sweep = sweep_from(options, study.quick if options.quick else study.sweep)
         folder = options.output or Path("output") / "studies" / study.name
         settings = Settings(options.ranks, options.repeats or (1 if options.quick else 3), options.limit)
-        plan = prepare(options.scene, folder, sweep=sweep, settings=settings)
+        plan = prepare(options.scene, options.runs or folder / "runs", sweep=sweep, settings=settings)
         status = 0 if options.report else _measure(plan)
         results = collected(plan)
         if not results.good:
@@ -105,10 +106,9 @@ def sweep_from(options: argparse.Namespace, sweep: Sweep) -> Sweep:
 
 
 def _positive(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise ValueError(text)
-    return value
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"needs a positive integer, got {text!r}")
+    return int(text)
 
 
 def _tolerance(text: str) -> Tolerance:

@@ -13,7 +13,7 @@ import numpy as np
 from fenics_contact.study.parameters import Parameters
 
 #: Power of `Parameters.size` with which time grows, until two sizes have shown what it is.
-GROWTH = 2.5
+GROWTH = 1.5
 
 logger = logging.getLogger(__name__)
 

@@ -44,21 +44,21 @@ class Settings:
 
 def run_study(
     scene: str,
-    folder: str | Path,
+    runs: str | Path,
     *,
     sweep: Sweep | None = None,
     settings: Settings | None = None,
     stream: TextIO | None = None,
 ) -> Results:
-    """Measure all runs of a study that are not in its folder yet.
+    """Measure all runs of a study that are not there yet.
 
     Every run has a process of its own, so that its memory is its own and a failure ends nothing but itself;
-    what failed is recorded with its reason. Finished runs are kept in ``folder/runs`` and used again while
-    the code and the settings stay the same.
+    what failed is recorded with its reason. Finished runs are kept and used again while the code and the
+    settings stay the same.
 
     Args:
         scene: Name of a built-in study or a Python file, see `find_study`.
-        folder: Folder of the study; created.
+        runs: Folder in which runs are kept, one file each; created.
         sweep: Which runs; the scene's own by default.
         settings: Ranks, repeats, limits.
         stream: Where progress is told; stderr by default.
@@ -70,7 +70,7 @@ def run_study(
         InvalidInputError: If the scene is unknown.
         MissingRequirementError: If several ranks are asked for and there is no mpirun.
     """
-    plan = prepare(scene, folder, sweep=sweep, settings=settings)
+    plan = prepare(scene, runs, sweep=sweep, settings=settings)
     measure_all(plan, stream)
     return collected(plan)
 
@@ -95,7 +95,7 @@ class StudyPlan:
 
 
 def prepare(
-    scene: str, folder: str | Path, *, sweep: Sweep | None = None, settings: Settings | None = None
+    scene: str, runs: str | Path, *, sweep: Sweep | None = None, settings: Settings | None = None
 ) -> StudyPlan:
     """Plan a study; arguments as for `run_study`.
 
@@ -105,7 +105,7 @@ def prepare(
     study, settings = find_study(scene), settings or Settings()
     chosen = sweep or study.sweep
     tasks = [Task(scene, run, settings.ranks, settings.verify, settings.limit) for run in chosen.runs()]
-    store = Store(Path(folder) / "runs", fingerprint(scene))
+    store = Store(Path(runs), fingerprint(scene))
     return StudyPlan(study, chosen.base, tuple(tasks), store, settings)
 
 
