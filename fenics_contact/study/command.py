@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fenics_contact.errors import FenicsContactError, InvalidInputError
+from fenics_contact.study.overview import write_overview
 from fenics_contact.study.parameters import BALANCED, DISCRETISATIONS, Sweep, Tolerance
 from fenics_contact.study.report import write_report
 from fenics_contact.study.running import Settings, StudyPlan, collected, measure_all, prepare
@@ -38,6 +39,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--limit", type=float, default=600.0, help="seconds that a run may take (600)")
     parser.add_argument("--report", action="store_true", help="measure nothing, write the results again")
     parser.add_argument("--no-figures", action="store_true", help="write no pictures")
+    parser.add_argument("--page", action="store_true", help="also write README.md of all studies beside it")
     chosen = parser.add_argument_group("what is varied; by default what the scene suggests")
     chosen.add_argument("--sizes", type=_positive, nargs="+", help="meshes, larger is finer")
     chosen.add_argument("--tolerances", type=_tolerance, nargs="+", help='numbers or "balanced"')
@@ -67,6 +69,8 @@ def run(options: argparse.Namespace) -> int:
                 f"run the study without --report, or mend what failed{reasons}"
             )
         words = write_report(folder, results, figures=not options.no_figures)
+        if options.page:
+            write_overview(folder.parent)
     except FenicsContactError as error:
         sys.stderr.write(f"error: {error}\n")
         return 2 if isinstance(error, InvalidInputError) else 1

@@ -95,6 +95,12 @@ class Errors:
         """Return the rate at which the error falls on the finest meshes."""
         return measured_rate(*self.convergence(parameters, quantity))
 
+    def estimate_rate(self, parameters: Parameters) -> float | None:
+        """Return the rate at which the estimated error of the displacement falls on the finest meshes."""
+        runs = [run for run in self.sequence(parameters) if (run.parts or {}).get("discretisation")]
+        spacing = [self.results.scene.spacing[run.parameters.size] for run in runs]
+        return measured_rate(spacing, [float((run.parts or {})["discretisation"] or 0.0) for run in runs])
+
     def _reference(self, quantity: QuantityFacts) -> Reference:
         if quantity.exact:
             return Reference("theory")

@@ -17,7 +17,8 @@ def write_table(path: Path, errors: Errors, advice: Sequence[str], check: Certif
     parts = [
         _heading(errors),
         _advice(advice),
-        _rates(errors),
+        "## Rates\n",
+        rates_table(errors),
         _certificates(check),
         _runs(errors),
         _failures(errors),
@@ -45,20 +46,18 @@ def _advice(advice: Sequence[str]) -> str:
     return "## Advice\n\n" + "\n".join(f"- {sentence}" for sentence in advice) + "\n"
 
 
-def _rates(errors: Errors) -> str:
-    """Tell, for each quantity, what it is compared with and how fast its error falls."""
+def rates_table(errors: Errors) -> str:
+    """Tell, for each quantity, what it is compared with and how fast its error falls, beside theory."""
     strict = errors.strictest(errors.results.base)
-    lines = [
-        "## Rates\n",
-        "| quantity | compared with | value | rate found | rate of theory |",
-        "|---|---|---|---|---|",
-    ]
+    lines = ["| quantity | compared with | value | rate found | rate of theory |", "|---|---|---|---|---|"]
     for quantity in errors.results.scene.quantities:
         reference = errors.references[quantity.name]
         kind = reference.kind + (f": {reference.note}" if reference.note else "")
         value = f"{reference.value:.6g} {quantity.unit}" if isinstance(reference.value, float) else ""
         found, theory = errors.rate(strict, quantity.name), quantity.rate
         lines.append(f"| {quantity.name} | {kind} | {value} | {_number(found)} | {_number(theory)} |")
+    found, theory = errors.estimate_rate(strict), errors.results.scene.energy_rate
+    lines.append(f"| error of the displacement | its own estimate | | {_number(found)} | {_number(theory)} |")
     return "\n".join([*lines, "", f'Of the runs that differ from "{described(strict)}" in size alone.\n'])
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.study import read_study, write_report
+from fenics_contact.study.overview import write_overview
 from tests.study.samples import results, run
 from tests.viz.states import contains, pixels
 
@@ -56,3 +57,20 @@ def test_results_that_are_not_there_or_not_whole_are_refused(tmp_path: Path) -> 
         InvalidInputError, match=r"must hold the results of a study, got .* run the study again"
     ):
         read_study(tmp_path)
+
+
+def test_the_page_of_all_studies_takes_its_numbers_from_them(tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        write_report(tmp_path / name, results(), figures=False)
+    text = write_overview(tmp_path).read_text()
+    assert text.count("## A sample") == 2
+    assert "![accuracy](second/accuracy.png)" in text
+    assert "- For 1 % in peak pressure: 4 cells on the radius" in text
+    assert "| energy | extrapolated | -10 N mm | 2.00 | 2.00 |" in text
+    assert "| error of the displacement | its own estimate | | 1.00 | 1.00 |" in text
+    assert "2.00 to 2.00 times the true error in 6 runs, 0 of them out of bounds" in text
+
+
+def test_a_page_of_no_studies_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match=r"a page of studies needs some, .* holds none: run a study"):
+        write_overview(tmp_path)
