@@ -72,7 +72,7 @@ for quantity in hertz.scene.quantities:
     rate = errors.rate(errors.strictest(base), quantity.name)
     found = "none" if rate is None else f"{rate:.2f}"
     theory = "-" if quantity.rate is None else f"{quantity.rate:g}"
-    print(f"{quantity.name:16s} against {reference.kind:13s} rate {found:5s} theory {theory} {reference.note}")
+    print(f"{quantity.name:16s} against {reference.kind:13s} rate {found:5s} theory {theory}", reference.note)
 
 # %% [markdown]
 # ## What the error consists of

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import logging
 import sys
 from collections.abc import Sequence
@@ -63,7 +64,8 @@ class Progress:
         """Announce so many measurements."""
         self._left, self._count, self._forecast = list(runs), len(runs), Forecast()
         stream = sys.stderr if stream is None else stream
-        self._bar: Any = _bar(self._count, title, stream) if stream.isatty() else None
+        shown = stream.isatty() and importlib.util.find_spec("tqdm") is not None
+        self._bar: Any = _bar(self._count, title, stream) if shown else None
 
     def __enter__(self) -> Progress:
         """Return itself."""
@@ -117,7 +119,7 @@ def described(parameters: Parameters) -> str:
 
 
 def _bar(count: int, title: str, stream: TextIO) -> Any:
-    from tqdm import tqdm  # an extra: without a terminal nobody needs it
+    from tqdm import tqdm  # an extra: where it is missing there are lines
 
     pattern = "{desc} {n_fmt}/{total_fmt} |{bar}| {postfix}"
     return tqdm(total=count, desc=title, file=stream, bar_format=pattern, dynamic_ncols=True)
