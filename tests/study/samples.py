@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fenics_contact.study import BALANCED, Parameters, Results, Run
+from fenics_contact.study.launching import Record, Task
 from fenics_contact.study.protocol import QuantityFacts, SceneFacts
 
 SIZES = (2, 4, 8)
@@ -63,6 +64,31 @@ def results(runs: Sequence[Run] | None = None) -> Results:
     failed = Run(Parameters(8, cell="tetrahedron"), failed="ConvergenceError: it did not converge")
     known = [run(size, tolerance) for size in SIZES for tolerance in (1e-8, BALANCED)]
     return Results(FACTS, 2, (*(known if runs is None else runs), failed), BASE, {"python": "3.11"})
+
+
+#: What a process writes that ran well.
+GOOD: Record = {
+    "seconds": 2.0, "phases": {"solve": 1.0}, "phases_after": {}, "memory": 100, "load_average": 0.1,
+    "counts": {"f_products": 10}, "residual": 1e-7, "parts": None, "true_errors": None,
+    "quantities": {"shortening": {"value": 0.01, "exact": 0.01, "error": 0.0}},
+}  # fmt: skip
+
+
+class Machine:
+    """Stands in for processes: counts what it is asked for, and answers as it is told."""
+
+    def __init__(self) -> None:
+        self.asked: list[Task] = []
+        self.answers: dict[int, Record | BaseException] = {}
+        self.seconds = 2.0
+
+    def __call__(self, task: Task) -> Record:
+        self.asked.append(task)
+        answer = self.answers.get(task.parameters.size, GOOD)
+        if isinstance(answer, BaseException):
+            raise answer
+        seconds = self.seconds + 0.1 * len(self.asked)
+        return answer if "failed" in answer else {**answer, "seconds": seconds}
 
 
 #: A block pressed on a plane, whose shortening is exact on every mesh; its size 3 cannot be built.

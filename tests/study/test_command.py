@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 from fenics_contact.__main__ import main
-from fenics_contact.study import read_study
+from fenics_contact.study import read_study, running
 from tests.conftest import MPI_TRACES, ROOT
-from tests.study.samples import BLOCK
+from tests.study.samples import BLOCK, Machine
 
 
 @pytest.mark.parametrize(
@@ -74,6 +74,20 @@ def test_help_names_the_scenes(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["accuracy", "--help"])
     assert "hertz, cattaneo_mindlin, chain_links" in " ".join(capsys.readouterr().out.split())
+
+
+def test_an_interrupt_from_the_keyboard_leaves_a_report_of_what_was_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene, folder = tmp_path / "pressed_block.py", tmp_path / "study"
+    scene.write_text(BLOCK)
+    machine = Machine()
+    machine.answers[4] = KeyboardInterrupt()
+    monkeypatch.setattr(running, "measure", machine)
+    assert main(["accuracy", str(scene), "--output", str(folder), "--quick", "--no-figures", "--page"]) == 130
+    assert "interrupted: what is done is kept" in capsys.readouterr().err
+    assert [run.parameters.size for run in read_study(folder).good] == [2, 3]
+    assert "## A pressed block" in (tmp_path / "README.md").read_text()
 
 
 def start(*arguments: object) -> subprocess.Popen[str]:

@@ -46,6 +46,17 @@ def test_without_a_terminal_there_are_lines(caplog: pytest.LogCaptureFixture) ->
     ]
 
 
+def test_a_terminal_without_tqdm_gets_lines(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with caplog.at_level(logging.INFO), Progress([Parameters(2)], "A study", Terminal()) as progress:
+        progress.done(Parameters(2), 5.0, "1.00 s")
+    assert [record.message for record in caplog.records] == [
+        "1/1 size 2, hexahedron, node, balanced: 1.00 s, 0 s left"
+    ]
+
+
 def test_on_a_terminal_there_is_a_bar_with_the_time_left() -> None:
     stream, runs = Terminal(), [Parameters(2), Parameters(4)]
     with Progress(runs, "A study", stream) as progress:

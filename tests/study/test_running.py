@@ -12,33 +12,9 @@ from typing import Any
 import pytest
 
 from fenics_contact.study import Settings, running
-from fenics_contact.study.launching import Record, Task
 from fenics_contact.study.running import collected, measure_all, prepare
 from fenics_contact.study.store import Store
-from tests.study.samples import BLOCK
-
-GOOD: Record = {
-    "seconds": 2.0, "phases": {"solve": 1.0}, "phases_after": {}, "memory": 100, "load_average": 0.1,
-    "counts": {"f_products": 10}, "residual": 1e-7, "parts": None, "true_errors": None,
-    "quantities": {"shortening": {"value": 0.01, "exact": 0.01, "error": 0.0}},
-}  # fmt: skip
-
-
-class Machine:
-    """Stands in for processes: counts what it is asked for, and answers as it is told."""
-
-    def __init__(self) -> None:
-        self.asked: list[Task] = []
-        self.answers: dict[int, Record | BaseException] = {}
-        self.seconds = 2.0
-
-    def __call__(self, task: Task) -> Record:
-        self.asked.append(task)
-        answer = self.answers.get(task.parameters.size, GOOD)
-        if isinstance(answer, BaseException):
-            raise answer
-        seconds = self.seconds + 0.1 * len(self.asked)
-        return answer if "failed" in answer else {**answer, "seconds": seconds}
+from tests.study.samples import BLOCK, GOOD, Machine
 
 
 @pytest.fixture
