@@ -1,14 +1,14 @@
-"""What to do for an accuracy, and what is wasted, in words that follow from the runs."""
+"""What to do for an accuracy, in words that follow from the runs."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from fenics_contact.study.errors import Errors
-from fenics_contact.study.parameters import BALANCED, Parameters
+from fenics_contact.study.parameters import Parameters
 from fenics_contact.study.protocol import QuantityFacts
 from fenics_contact.study.results import Run
+from fenics_contact.study.words import percent, plural
 
 #: Relative errors that users ask for.
 TARGETS = (0.1, 0.05, 0.01, 0.005)
@@ -17,23 +17,14 @@ AS_FAST = 1.1
 
 
 def advice(errors: Errors, targets: Sequence[float] = TARGETS) -> list[str]:
-    """Return sentences: the cheapest way to every accuracy, then what is wasted."""
+    """Return a sentence for every quantity and accuracy: the cheapest way to it."""
     sentences: list[str] = []
     for quantity in errors.results.scene.quantities:
         ways: dict[str, list[str]] = {}
         for target in targets:
             ways.setdefault(_way(errors, quantity, target), []).append(percent(target))
         sentences += [f"For {', '.join(goals)} in {quantity.name}: {way}." for way, goals in ways.items()]
-    return [*sentences, *wasted(errors)]
-
-
-def wasted(errors: Errors) -> list[str]:
-    """Return sentences about settings that cost time and change nothing."""
-    base = errors.results.base
-    balanced = errors.sequence(replace(base, tolerance=BALANCED))
-    strict = {run.parameters.size: run for run in errors.sequence(errors.strictest(base))}
-    pairs = [(run, strict[run.parameters.size]) for run in balanced if run.parameters.size in strict]
-    return [_comparison(errors, run, other) for run, other in pairs[-1:] if run is not other]
+    return sentences
 
 
 def reliable(errors: Errors, run: Run, quantity: str, target: float) -> bool:
@@ -96,30 +87,3 @@ def settings(errors: Errors, run: Run) -> str:
         words.append(f"about {parameters.subdomains} subdomains")
     ranks = errors.results.ranks
     return f"{', '.join(words)}: {run.seconds:.2g} s on {ranks} rank{'s' if ranks > 1 else ''}"
-
-
-def percent(value: float) -> str:
-    """Write a relative number in percent, with two digits."""
-    return f"{100 * value:.2g} %"
-
-
-def plural(name: str) -> str:
-    """Return what cells or a discretisation of contact are called: "hexahedra", "contact by nodes"."""
-    known = {"hexahedron": "hexahedra", "tetrahedron": "tetrahedra", "node": "contact by nodes"}
-    return known.get(name, "contact by mortar" if name == "mortar" else f"{name}s")
-
-
-def _comparison(errors: Errors, balanced: Run, strict: Run) -> str:
-    """Say what a strict tolerance costs beside the balanced one, and what it changes."""
-    changes = []
-    for quantity in errors.results.scene.quantities:
-        first, second = balanced.value(quantity.name), strict.value(quantity.name)
-        if isinstance(first, float | int) and isinstance(second, float | int) and second:
-            changes.append(f"the {quantity.name} by {abs(first / second - 1):.0e}")
-    products = [(run.counts or {}).get("f_products", 0) for run in (balanced, strict)]
-    ratio = products[1] / products[0] if products[0] else float("nan")
-    return (
-        f"Tolerance {strict.parameters.tolerance:.0e} instead of balanced, at {balanced.parameters.size} "
-        f"{errors.results.scene.size_name}, costs {strict.seconds / balanced.seconds:.2g} times the time, "
-        f"{ratio:.2g} times the products and changes {', '.join(changes)}."
-    )

@@ -11,6 +11,7 @@ from fenics_contact.study.certificates import check_certificates
 from fenics_contact.study.errors import Errors
 from fenics_contact.study.results import read_study
 from fenics_contact.study.table import rates_table
+from fenics_contact.study.waste import waste
 
 PICTURES = ("accuracy", "convergence", "parts", "phases")
 
@@ -71,10 +72,13 @@ def _section(file: Path) -> str:
     name, scene = file.parent.name, errors.results.scene
     check = check_certificates(errors.results)
     lines = [f"## {scene.title}", "", scene.about, ""]
+    lines += [f"![{picture}]({name}/{picture}.png)" for picture in PICTURES]
     lines += [
-        f"![{picture}]({name}/{picture}.png)" for picture in ("accuracy", "convergence", "parts", "phases")
+        "",
+        *(f"- {sentence}" for sentence in (*advice(errors), *waste(errors))),
+        "",
+        rates_table(errors),
     ]
-    lines += ["", *(f"- {sentence}" for sentence in advice(errors)), "", rates_table(errors)]
     if check.smallest_factor is not None and check.largest_factor is not None:
         between = f"{check.smallest_factor:.2f} to {check.largest_factor:.2f}"
         lines.append(

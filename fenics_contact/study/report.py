@@ -9,6 +9,7 @@ from fenics_contact.study.certificates import check_certificates
 from fenics_contact.study.errors import Errors
 from fenics_contact.study.results import Results, write_results
 from fenics_contact.study.table import write_table
+from fenics_contact.study.waste import waste
 
 
 def write_report(folder: str | Path, results: Results, *, figures: bool = True) -> list[str]:
@@ -23,7 +24,7 @@ def write_report(folder: str | Path, results: Results, *, figures: bool = True) 
         The advice, one sentence each.
     """
     target, errors = Path(folder), Errors(results)
-    words, check = advice(errors), check_certificates(results)
+    words, check = [*advice(errors), *waste(errors)], check_certificates(results)
     findings = {"references": errors.references, "advice": words, "certificates": check}
     write_results(target / "study.json", results, findings)
     write_table(target / "table.md", errors, words, check)

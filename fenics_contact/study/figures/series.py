@@ -8,10 +8,10 @@ from typing import Any
 
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from fenics_contact.study.advice import plural
 from fenics_contact.study.errors import Errors
 from fenics_contact.study.parameters import BALANCED
 from fenics_contact.study.results import Run
+from fenics_contact.study.words import plural
 from fenics_contact.viz.colours import BLUE, GREEN, GREY, ORANGE
 
 WIDTH = 1600

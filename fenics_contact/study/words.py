@@ -1,0 +1,19 @@
+"""Settings and numbers as readers like them."""
+
+from __future__ import annotations
+
+
+def percent(value: float) -> str:
+    """Write a relative number in percent, with two digits."""
+    return f"{100 * value:.2g} %"
+
+
+def plural(name: str) -> str:
+    """Return what cells or a discretisation of contact are called: "hexahedra", "contact by nodes"."""
+    known = {"hexahedron": "hexahedra", "tetrahedron": "tetrahedra", "node": "contact by nodes"}
+    return known.get(name, "contact by mortar" if name == "mortar" else f"{name}s")
+
+
+def joined(words: list[str]) -> str:
+    """Return "a, b and c"."""
+    return " and ".join(filter(None, [", ".join(words[:-1]), words[-1]])) if words else ""
