@@ -36,7 +36,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--runs", type=Path, help="folder in which runs are kept (OUTPUT/runs)")
     parser.add_argument("--ranks", type=_positive, default=1, help="MPI ranks of every run (1)")
     parser.add_argument("--repeats", type=_positive, help="measurements of runs under 10 s (3; quick: 1)")
-    parser.add_argument("--limit", type=float, default=600.0, help="seconds that a run may take (600)")
+    parser.add_argument("--limit", type=_seconds, default=600.0, help="seconds that a run may take (600)")
     parser.add_argument("--report", action="store_true", help="measure nothing, write the results again")
     parser.add_argument("--no-figures", action="store_true", help="write no pictures")
     parser.add_argument("--page", action="store_true", help="also write README.md of all studies beside it")
@@ -115,10 +115,23 @@ def _positive(text: str) -> int:
     return int(text)
 
 
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not value > 0.0:
+        raise argparse.ArgumentTypeError(f"needs a positive number of seconds, got {text!r}")
+    return value
+
+
 def _tolerance(text: str) -> Tolerance:
     if text == BALANCED:
         return BALANCED
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
     if not 0.0 < value < 1.0:
         raise argparse.ArgumentTypeError(
             f'a tolerance is a number between 0 and 1, or "balanced", got {text!r}'

@@ -45,6 +45,8 @@ def test_what_cannot_be_studied_is_refused(
     [
         (["accuracy", "hertz", "--tolerances", "2"], "a number between 0 and 1, or \"balanced\", got '2'"),
         (["accuracy", "hertz", "--discretisations", "dual"], "invalid choice: 'dual' (choose from"),
+        (["accuracy", "hertz", "--tolerances", "tight"], "got 'tight'"),
+        (["accuracy", "hertz", "--limit", "soon"], "a positive number of seconds, got 'soon'"),
         (["accuracy", "hertz", "--ranks", "0"], "a positive integer, got '0'"),
         (["accuracy"], "the following arguments are required: SCENE"),
         (["acuracy", "hertz"], "invalid choice: 'acuracy' (choose from"),
