@@ -8,7 +8,7 @@ from fenics_contact.study.errors import Errors
 from fenics_contact.study.parameters import Parameters
 from fenics_contact.study.protocol import QuantityFacts
 from fenics_contact.study.results import Run
-from fenics_contact.study.words import percent, plural
+from fenics_contact.study.words import percent, plural, seconds
 
 #: Relative errors that users ask for.
 TARGETS = (0.1, 0.05, 0.01, 0.005)
@@ -86,4 +86,4 @@ def settings(errors: Errors, run: Run) -> str:
     if parameters.subdomains is not None:
         words.append(f"about {parameters.subdomains} subdomains")
     ranks = errors.results.ranks
-    return f"{', '.join(words)}: {run.seconds:.2g} s on {ranks} rank{'s' if ranks > 1 else ''}"
+    return f"{', '.join(words)}: {seconds(run.seconds)} on {ranks} rank{'s' if ranks > 1 else ''}"

@@ -117,7 +117,10 @@ class Errors:
         return Reference(kind, found.value, found.rate, found.refused)
 
     def _is_finest(self, run: Run) -> bool:
-        base = self.results.base
-        mine = replace(run.parameters, tolerance=base.tolerance, solver=base.solver, size=base.size)
-        sequence = self.sequence(self.strictest(base))
-        return mine == base and bool(sequence) and run.parameters.size == sequence[-1].parameters.size
+        """Tell whether a run discretises like the one that the finest mesh's value is from."""
+        sequence = self.sequence(self.strictest(self.results.base))
+        if not sequence:
+            return False
+        finest, mine = sequence[-1].parameters, run.parameters
+        alike = (mine.cell, mine.discretisation) == (finest.cell, finest.discretisation)
+        return alike and mine.size == finest.size

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import statistics
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any, TextIO
@@ -137,7 +137,7 @@ def measure_all(plan: StudyPlan, stream: TextIO | None = None) -> None:
         if not wanted:
             continue
         if repeat == 0:
-            _warm_up(wanted)
+            _warm_up(wanted, min(task.parameters.size for task in plan.tasks))
         title = plan.study.title
         words = title if repeat == 0 else f"{title}, repeat {repeat + 1}"
         with Progress([task.parameters for task in wanted], words, stream) as progress:
@@ -148,8 +148,7 @@ def measure_all(plan: StudyPlan, stream: TextIO | None = None) -> None:
 
 def _measure(task: Task, store: Store, repeat: int, progress: Progress) -> None:
     start = perf_counter()
-    again = Task(task.scene, task.parameters, task.ranks, task.verify and repeat == 0, task.limit)
-    record = measure(again)
+    record = measure(replace(task, verify=task.verify and repeat == 0))
     store.write(task, repeat, record)
     failed = record.get("failed")
     words = f"failed: {failed['message']}" if failed else f"{record['seconds']:.2f} s"
@@ -166,12 +165,14 @@ def _wanted(task: Task, store: Store, repeat: int) -> bool:
     return first is not None and "failed" not in first and first["seconds"] < SHORT
 
 
-def _warm_up(tasks: Sequence[Task]) -> None:
-    """Compile the forms of every kind of cells on the smallest mesh: measured runs find them on the disk."""
-    smallest: dict[tuple[str, bool], Task] = {}
-    for task in tasks:  # coarse ones come first
-        kind = (task.parameters.cell, task.parameters.balanced)
-        smallest.setdefault(kind, task)
+def _warm_up(tasks: Sequence[Task], size: int) -> None:
+    """Compile the forms of all kinds of runs on the smallest mesh: measured runs find them on the disk."""
+    smallest = {
+        (task.parameters.cell, task.parameters.balanced): replace(
+            task, parameters=replace(task.parameters, size=size, subdomains=None)
+        )
+        for task in tasks
+    }
     for task in smallest.values():
         logger.info("warm-up: %s", described(task.parameters))
         measure(task)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from fenics_contact.study.errors import Errors
 from fenics_contact.study.parameters import BALANCED
 from fenics_contact.study.results import Run
-from fenics_contact.study.words import joined, percent, plural
+from fenics_contact.study.words import joined, percent, plural, seconds
 
 
 def waste(errors: Errors) -> list[str]:
@@ -62,12 +62,12 @@ def _subdomains(errors: Errors) -> list[str]:
     (least, fast), (most, slow) = counted[0], counted[-1]
     numbers = [str(number) for number in sorted({number for _, number in counted})]
     words = (
-        f"Of {joined(numbers)} subdomains {fast} take the least time, {least:.2g} s, and {slow} the most, "
+        f"Of {joined(numbers)} subdomains {fast} take the least time, {seconds(least)}, and {slow} the most, "
     )
-    words += f"{most:.2g} s"
+    words += f"{seconds(most)}"
     own = next((run for run in runs if run.parameters == base), None)
     if own is not None and base.subdomains is None:
-        words += f"; left open, {(own.counts or {}).get('subdomains', 0)} are taken: {own.seconds:.2g} s"
+        words += f"; left open, {(own.counts or {}).get('subdomains', 0)} are taken: {seconds(own.seconds)}"
     return [f"{words}."]
 
 

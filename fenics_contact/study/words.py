@@ -8,6 +8,11 @@ def percent(value: float) -> str:
     return f"{100 * value:.2g} %"
 
 
+def seconds(value: float) -> str:
+    """Write a time with two digits at least."""
+    return f"{value:.0f} s" if value >= 100 else f"{value:.2g} s"
+
+
 def plural(name: str) -> str:
     """Return what cells or a discretisation of contact are called: "hexahedra", "contact by nodes"."""
     known = {"hexahedron": "hexahedra", "tetrahedron": "tetrahedra", "node": "contact by nodes"}

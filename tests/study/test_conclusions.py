@@ -35,6 +35,8 @@ def test_errors_are_against_theory_the_limit_of_the_meshes_or_the_finest_of_them
     assert errors.of(coarse, "gradient") == pytest.approx(0.375 / (1.125**2 + 4) ** 0.5)
     assert errors.of(finest, "gradient") is None, "the finest mesh cannot be judged by itself"
     assert errors.of(errors.results.runs[-1], "energy") is None, "a failed run has no error"
+    cut = replace(finest, parameters=replace(finest.parameters, subdomains=64))
+    assert errors.of(cut, "gradient") is None, "nor by another partition of it"
 
 
 def test_a_sequence_that_does_not_converge_says_why_it_is_not_extrapolated() -> None:

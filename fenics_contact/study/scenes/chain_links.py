@@ -107,13 +107,13 @@ study = StudyScene(
     ),
     sweep=SWEEP,
     quick=QUICK,
-    size_name="cells through a link, halved",
+    size_name="cells through half the wire",
     spacing=lambda size: 16.0 / (CELLS[1] * size),
     spacing_unit="mm",
     energy_rate=GRIP,
     about=(
         "The chain of the published experiment: two links, Coulomb friction 0.3, 80 kN; size 4 is its mesh. "
-        "Energy, peak pressure and friction are extrapolated from the finest meshes; the gradient of the "
-        "energy by 28 control points is compared with that on the finest mesh."
+        "Energy, peak pressure and friction are extrapolated where they converge monotonically; the gradient "
+        "of the energy by 28 control points is compared with that on the finest mesh."
     ),
 )

@@ -6,7 +6,8 @@ that for which the contact radius is 1, a node of every mesh:
 
     p0 = 3 F / (2 π a²),   a³ = 3 F R* / (4 E*),   R* = R / 2,   E* = E / (2 (1 − ν²)).
 
-The cells of the upper body, the slave, are 4/5 as large as those of the lower one.
+The cells of the upper body, the slave, are 4/5 as large as those of the lower one. Both bodies have as many
+cells along their cores of equal cells, so that finer meshes are like coarser ones.
 """
 
 from __future__ import annotations
@@ -31,17 +32,17 @@ from fenics_contact.study.protocol import Outcome, Problem, Quantity, StudyScene
 from fenics_contact.study.scenes.nested_box import mirrored, nested_box
 
 YOUNG, POISSON, RADIUS = 1000.0, 0.3, 1000.0
-CORE, SIZE = 1.25, 40.0
+SIZE = 40.0
 CONTACT_MODULUS = YOUNG / (2 * (1 - POISSON**2))
 FORCE = 4 * CONTACT_MODULUS / (3 * (RADIUS / 2))
 PEAK = 3 * FORCE / (2 * np.pi)
-#: Cells of the master along the same way, relative to those of the slave.
-COARSER = 0.8
+#: Cells of the master relative to those of the slave.
+COARSER = 1.25
 
 
-def round_block(side: float, size: float, cell: str) -> BodyMesh:
-    """Mesh the upper block (side 1) or the lower one (side −1), with ``size`` cells on the contact radius."""
-    mesh = nested_box(CORE, SIZE, round(CORE * size), cell)
+def round_block(side: float, core: float, size: int, cell: str) -> BodyMesh:
+    """Mesh the upper block (side 1) or the lower one (side −1), with ``size`` equal cells on ``core``."""
+    mesh = nested_box(core, SIZE, size, cell)
     mesh = mesh if side > 0 else mirrored(mesh)
     x, y, z = mesh.points.T
     lift = side * (x**2 + y**2) / (2 * RADIUS) * (1 - np.abs(z) / SIZE)
@@ -53,7 +54,7 @@ def build(parameters: Parameters, comm: MPI.Comm) -> Problem:
     del comm  # every rank builds the same
     size, cell = parameters.size, parameters.cell
     material = IsotropicElasticity(YOUNG, POISSON)
-    meshes = {"upper": round_block(1.0, size, cell), "lower": round_block(-1.0, COARSER * size, cell)}
+    meshes = {"upper": round_block(1.0, 1.0, size, cell), "lower": round_block(-1.0, COARSER, size, cell)}
     guides: dict[str, tuple[float | None, ...]] = {side: (0.0, None, None) for side in ("x0", "x1")}
     guides |= {side: (None, 0.0, None) for side in ("y0", "y1")}
     supports = [Support(body, side, value) for body in meshes for side, value in guides.items()]
