@@ -7,6 +7,7 @@ NP ?= 1
 BENCH ?= full
 STUDIES ?= hertz cattaneo_mindlin chain_links
 PYTHON ?=
+JOBS ?= 2
 
 ifeq ($(strip $(PYTHON)),)
 python := .venv/bin/python
@@ -30,6 +31,7 @@ help: ## Show this list
 	@echo "  NP=2                 MPI ranks of a demo (1)"
 	@echo "  STUDIES=hertz        which studies (all three); NP ranks each"
 	@echo "  BENCH=quick|full     small cases once, or all of them (full)"
+	@echo "  JOBS=4               tests at a time (2)"
 	@echo "  PYTHON=/some/python  use this Python and its FEniCSx instead of setting up .venv"
 
 demo: $(prepare) ## Optimise the contact shape of two chain links, or run DEMO=...; results in output/
@@ -39,7 +41,7 @@ demos: $(prepare) ## Run every demo
 	for demo in demos/demo_*.py; do $(launch) $(NP) $(python) $$demo || exit 1; done
 
 test: lint ## Check style and types, run the quick tests
-	$(launch) 1 $(python) -m pytest -m "not slow"
+	$(launch) 1 $(python) -m pytest -n $(JOBS) -m "not slow"
 
 test-slow: $(prepare) ## Run the tests that take long
 	$(launch) 1 $(python) -m pytest -m slow

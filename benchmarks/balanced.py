@@ -127,7 +127,8 @@ SCENES: dict[str, Callable[[], Measured]] = {
     "cylinder": lambda: hertz_cylinder(16),
     "cattaneo-mindlin": lambda: cattaneo_mindlin(16),
     "links": lambda: links((36, 6, 14)),
-    "block": lambda: block((16, 8, 8)),
+    "links of the paper": lambda: links((48, 8, 20)),
+    "block": lambda: block((32, 16, 16)),
 }
 
 

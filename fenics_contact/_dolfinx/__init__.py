@@ -3,9 +3,9 @@
 Forms are written once on a *template*, a `ufl.Mesh` without coordinates, compiled once, and then bound to any
 number of meshes: subdomain meshes of one body differ in their numbers, never in their code.
 
-Node numbers of meshes handed in are called *input nodes*, their cells *input cells*; cells come in VTK vertex
-order. Triangles and quadrilaterals lie in the plane: their points have two coordinates, their fields two
-components.
+Node numbers of meshes handed in are called *input nodes*, their cells *input cells*; cells come in the node
+order of VTK. Triangles and quadrilaterals lie in the plane: their points have two coordinates, their fields
+two components.
 """
 
 from fenics_contact._dolfinx.assembly import (
@@ -14,7 +14,7 @@ from fenics_contact._dolfinx.assembly import (
     assemble_scalar,
     assemble_vector,
 )
-from fenics_contact._dolfinx.cells import CELL_TYPES, FACET_VERTICES, dimension
+from fenics_contact._dolfinx.cells import CELL_TYPES, degree, dimension, facet_vertices
 from fenics_contact._dolfinx.forms import CompiledForm
 from fenics_contact._dolfinx.loading import VERSION, dolfinx, jit
 from fenics_contact._dolfinx.meshes import local_mesh, rank_mesh
@@ -43,7 +43,6 @@ Function = dolfinx.fem.Function
 
 __all__ = [
     "CELL_TYPES",
-    "FACET_VERTICES",
     "VERSION",
     "CompiledForm",
     "Constant",
@@ -56,8 +55,10 @@ __all__ = [
     "cell_nodes",
     "cellwise_space",
     "coefficient",
+    "degree",
     "dimension",
     "displacement_space",
+    "facet_vertices",
     "field_symbols",
     "global_dofs",
     "input_cells",

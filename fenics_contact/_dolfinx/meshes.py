@@ -9,7 +9,7 @@ import scipy.sparse as sp
 import ufl
 from mpi4py import MPI
 
-from fenics_contact._dolfinx.cells import VERTEX_ORDER, dimension
+from fenics_contact._dolfinx.cells import NODE_ORDER, dimension
 from fenics_contact._dolfinx.loading import OLD, cpp, dolfinx
 from fenics_contact._dolfinx.templates import vector_element
 
@@ -68,7 +68,7 @@ def _with_ghosts(cells: np.ndarray, rank: np.ndarray, mine: np.ndarray, comm: MP
 def _create_mesh(
     comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, cell_type: str, destinations: Any
 ) -> Any:
-    ordered = np.ascontiguousarray(cells[:, VERTEX_ORDER[cell_type]], dtype=np.int64)
+    ordered = np.ascontiguousarray(cells[:, NODE_ORDER[cell_type]], dtype=np.int64)
     points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, dimension(cell_type))
     if isinstance(destinations, np.ndarray):
         destinations = cpp.graph.AdjacencyList_int32(destinations)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact._dolfinx.cells import FACET_VERTICES
+from fenics_contact._dolfinx.cells import cell_type_named, facet_vertices
 from fenics_contact._dolfinx.loading import OLD, dolfinx
 from fenics_contact._dolfinx.templates import cellwise_element, scalar_element, vector_element
 
@@ -15,14 +15,19 @@ def _space(mesh: Any, element: Any) -> Any:
     return dolfinx.fem.FunctionSpace(mesh, element) if OLD else dolfinx.fem.functionspace(mesh, element)
 
 
+def cell_type_of_mesh(mesh: Any) -> str:
+    """Return which of `CELL_TYPES` the cells of a mesh are."""
+    return cell_type_named(mesh.topology.cell_name(), int(mesh.geometry.cmap.degree))
+
+
 def coefficient(mesh: Any, name: str) -> Any:
     """Return a vector field on ``mesh`` with the given name (a C identifier)."""
-    return dolfinx.fem.Function(_space(mesh, vector_element(mesh.topology.cell_name())), name=name)
+    return dolfinx.fem.Function(_space(mesh, vector_element(cell_type_of_mesh(mesh))), name=name)
 
 
 def scalar_space(mesh: Any, degree: int) -> Any:
-    """Return the space of scalar fields of degree 0 (one value a cell) or 1 on ``mesh``."""
-    cell_type = mesh.topology.cell_name()
+    """Return the space of scalar fields on ``mesh``: one value a cell (degree 0) or a node (1)."""
+    cell_type = cell_type_of_mesh(mesh)
     return _space(mesh, scalar_element(cell_type) if degree == 1 else cellwise_element(cell_type))
 
 
@@ -44,7 +49,7 @@ def _input_nodes(mesh: Any) -> np.ndarray:
 
 
 def cell_nodes(mesh: Any) -> np.ndarray:
-    """Return the input nodes of this rank's cells, tensor-product order, shape (n_cells, n_vertices)."""
+    """Return the input nodes of this rank's cells, tensor-product order, shape (n_cells, nodes of a cell)."""
     dofmap = table(mesh.geometry.dofmap, cell_count(mesh))
     return _input_nodes(mesh)[dofmap]
 
@@ -88,13 +93,13 @@ def match_facets(mesh: Any, surface: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
     Args:
         mesh: A mesh on one rank.
-        surface: Facets as input nodes, shape (n_facets, n_corners), any vertex order.
+        surface: Corners of facets as input nodes, shape (n_facets, n_corners), any order.
 
     Returns:
         Cells and local facet numbers of those that lie on this mesh, one entry each.
     """
-    cell_type = mesh.topology.cell_name()
-    local = np.array(FACET_VERTICES[cell_type])
+    cell_type = cell_type_of_mesh(mesh)
+    local = np.array(facet_vertices(cell_type))
     faces = np.sort(cell_nodes(mesh)[:, local].reshape(-1, local.shape[1]), axis=1)
     wanted = np.sort(surface, axis=1)
     # One integer key a facet: rows of both tables are numbered together.

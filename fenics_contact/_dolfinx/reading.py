@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact._dolfinx.cells import VERTEX_ORDER
+from fenics_contact._dolfinx.cells import NODE_ORDER
 from fenics_contact._dolfinx.loading import OLD, cpp, dolfinx
 from fenics_contact.errors import InvalidInputError
 
@@ -140,7 +140,7 @@ def mesh_arrays(mesh: Any) -> MeshArrays:
     points = np.empty((node.size, geometry.dim))
     points[node] = geometry.x[:, : geometry.dim]
     if linear:
-        cells = cells[:, VERTEX_ORDER.get(name, slice(None))]
+        cells = cells[:, NODE_ORDER.get(name, slice(None))]
     return MeshArrays(name, topology.dim, points, cells, linear, node, cell)
 
 

@@ -7,7 +7,8 @@ from typing import Any
 
 import ufl
 
-from fenics_contact._dolfinx.cells import dimension
+from fenics_contact._dolfinx.cells import degree, dimension
+from fenics_contact._dolfinx.cells import shape as shape_of
 from fenics_contact._dolfinx.loading import OLD
 
 
@@ -15,41 +16,41 @@ def _element(cell_type: str, shape: tuple[int, ...]) -> Any:
     if not OLD:
         import basix.ufl
 
-        return basix.ufl.element("Lagrange", cell_type, 1, shape=shape)
+        return basix.ufl.element("Lagrange", shape_of(cell_type), degree(cell_type), shape=shape)
     # The variant is spelt out because ffcx 0.5 rewrites coordinate elements to it while compiling: without
     # it the signature of the next process differs and misses the compilation cache.
-    cell = ufl.Cell(cell_type)
-    return (ufl.VectorElement if shape else ufl.FiniteElement)("Lagrange", cell, 1, variant="equispaced")
+    cell, family = ufl.Cell(shape_of(cell_type)), ufl.VectorElement if shape else ufl.FiniteElement
+    return family("Lagrange", cell, degree(cell_type), variant="equispaced")
 
 
 def vector_element(cell_type: str) -> Any:
-    """Return the element of coordinates and displacements, (bi-, tri-)linear, a component a direction."""
+    """Return the element of coordinates and displacements, of the cells' degree, a component a direction."""
     return _element(cell_type, (dimension(cell_type),))
 
 
 def scalar_element(cell_type: str) -> Any:
-    """Return the (bi-, tri-)linear element of scalars."""
+    """Return the element of scalars, of the cells' degree."""
     return _element(cell_type, ())
 
 
 def cellwise_element(cell_type: str) -> Any:
     """Return the element of scalars that are constant on each cell."""
     if OLD:
-        return ufl.FiniteElement("DG", ufl.Cell(cell_type), 0)
+        return ufl.FiniteElement("DG", ufl.Cell(shape_of(cell_type)), 0)
     import basix.ufl
 
-    return basix.ufl.element("DG", cell_type, 0)
+    return basix.ufl.element("DG", shape_of(cell_type), 0)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def template(cell_type: str) -> Any:
     """Return the mesh without coordinates on which forms for cells of this type are written."""
     return ufl.Mesh(vector_element(cell_type))
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def displacement_space(cell_type: str) -> Any:
-    """Return the template's space of vector fields, linear (simplices) or bi- or trilinear."""
+    """Return the template's space of vector fields, of the cells' degree."""
     return ufl.FunctionSpace(template(cell_type), vector_element(cell_type))
 
 
@@ -61,13 +62,13 @@ def field_symbols(cell_type: str, count: int) -> list[Any]:
     return [ufl.Coefficient(displacement_space(cell_type), count=number) for number in range(count)]
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def nodal_space(cell_type: str) -> Any:
-    """Return the template's space of scalars, linear or bi- or trilinear."""
+    """Return the template's space of scalars, of the cells' degree."""
     return ufl.FunctionSpace(template(cell_type), scalar_element(cell_type))
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def cellwise_space(cell_type: str) -> Any:
     """Return the template's space of scalars that are constant on each cell."""
     return ufl.FunctionSpace(template(cell_type), cellwise_element(cell_type))

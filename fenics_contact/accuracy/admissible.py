@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -22,14 +23,46 @@ ENDLESS = 1e300
 
 
 @dataclass(frozen=True, eq=False)
-class Admissible:
-    """A multiplier that a Tresca problem admits, with what contact does there.
+class Statuses:
+    """What contact does at a multiplier, and which rows are free for it.
 
     Attributes:
-        multiplier: λ with λ_N ≥ 0, ‖τ‖ ≤ Ψ and G λ = e, owned.
+        problem: The dual problem.
         closed: Contacts that press, shape (n_contact,), owned.
         stick: Discs that stick, shape (n_friction,), owned.
         slip: Discs on the circle, shape (n_friction,), owned; the others are pinned (Ψ = 0).
+        directions: Multiplier that gives the directions of friction forces, owned.
+    """
+
+    problem: DualProblem
+    closed: Marks
+    stick: Marks
+    slip: Marks
+    directions: Vector
+
+    @cached_property
+    def free(self) -> sp.csr_matrix:
+        """Basis of the rows whose multipliers are free and in which r should vanish, shape (size, n_face)."""
+        return basis(self.problem.layout, self.closed, self.stick, self.slip, self.directions)
+
+    @cached_property
+    def coarse(self) -> CoarseSpace:
+        """Equilibrium by the free rows alone, in evened multipliers. Collective on first use."""
+        return self.problem.evened.coarse.restricted(self.free)
+
+    def settled(self, residual: Vector) -> Vector:
+        """Return r without the rigid motions that fit it best on the free rows. Collective."""
+        evened = self.free.T @ (evening(self.problem) * residual)
+        return residual - self.problem.coarse.transpose(self.coarse.coefficients(evened))
+
+
+@dataclass(frozen=True, eq=False)
+class Admissible:
+    """A multiplier that a Tresca problem admits.
+
+    Attributes:
+        multiplier: λ with λ_N ≥ 0, ‖τ‖ ≤ Ψ and G λ = e, owned.
+        statuses: What contact does.
         slip_bound: Ψ of the Tresca problem, shape (n_friction,), owned. It is the given one except where no
             multiplier within it balances the load: at a load that all friction just resists the solver's
             tolerance decides about that. It then is raised to the forces that were found.
@@ -37,9 +70,7 @@ class Admissible:
     """
 
     multiplier: Vector
-    closed: Marks
-    stick: Marks
-    slip: Marks
+    statuses: Statuses
     slip_bound: Vector
     unbalanced: float
 
@@ -59,70 +90,42 @@ def admissible(problem: DualProblem, slip_bound: Vector, multiplier: Vector, res
     """
     layout = problem.layout
     trial = multiplier - contact_step(layout, problem.diagonal) * residual
-    closed = trial[layout.normal] > 0.0
     wanted = trial[layout.tangential]
     length = np.linalg.norm(wanted, axis=1)
     slip = (slip_bound > 0.0) & (length >= slip_bound)
-    stick = (slip_bound > 0.0) & ~slip
     start = np.array(multiplier)
-    start[layout.normal[~closed]] = 0.0
+    start[layout.normal[trial[layout.normal] <= 0.0]] = 0.0
     start[layout.tangential[slip]] = (slip_bound[slip] / length[slip])[:, None] * wanted[slip]
-    free = basis(layout, closed, stick, slip, start)
-    found, left = _balanced(problem, FeasibleSet(layout, slip_bound), start, free)
+    stick = (slip_bound > 0.0) & ~slip
+    statuses = Statuses(problem, trial[layout.normal] > 0.0, stick, slip, start)
+    found, left = _balanced(statuses, FeasibleSet(layout, slip_bound), start)
     if left > ROUNDING:
         endless = FeasibleSet(layout, np.full_like(slip_bound, ENDLESS))
-        found, left = _balanced(problem, endless, start, free)
+        found, left = _balanced(statuses, endless, start)
         slip_bound = np.maximum(slip_bound, np.linalg.norm(found[layout.tangential], axis=1))
-    return Admissible(found, closed, stick, slip, slip_bound, left)
+    return Admissible(found, statuses, slip_bound, left)
 
 
-def _balanced(
-    problem: DualProblem, feasible: FeasibleSet, start: Vector, free: sp.csr_matrix
-) -> tuple[Vector, float]:
+def _balanced(statuses: Statuses, feasible: FeasibleSet, start: Vector) -> tuple[Vector, float]:
     """Return a multiplier of the cone in equilibrium, and how much is left of G λ − e. Collective.
 
-    Forces are balanced by the gluing rows alone, or where they do not hold every body, by contact forces that
-    are free to change as well, and at last by all.
-
-    Args:
-        problem: The dual problem.
-        feasible: The cone.
-        start: A multiplier, owned.
-        free: Basis of the gluing rows and of the contact forces that are free, shape (size, n).
+    The shortest change of the free multipliers balances, or where these do not suffice, of all; what then
+    leaves the cone is projected again. Contact forces next to those that were moved take part: gluing forces
+    alone would carry the difference through the bodies, which bends thin ones.
     """
-    found = feasible.project(start)
+    problem, found = statuses.problem, feasible.project(start)
     left = _unbalanced(problem, found)
-    layout = problem.layout
-    for rows in (rows_of(layout.size, layout.equality), free, sp.identity(layout.size, format="csr")):
-        if left <= ROUNDING:
-            break
-        balance = _Balance.by(problem, rows)
+    every = sp.identity(problem.layout.size, format="csr")
+    for rows, coarse in ((statuses.free, statuses.coarse), (every, problem.evened.coarse)):
         for _ in range(ROUNDS):
-            found = feasible.project(found + balance(found))
+            if left <= ROUNDING:
+                return found, left
+            lacking = rows @ coarse.transpose(coarse.solve(problem.coarse.residual(found)))
+            found = feasible.project(found - evening(problem) * lacking)
             before, left = left, _unbalanced(problem, found)
-            if left <= ROUNDING or left > PROGRESS * before:
+            if left > PROGRESS * before:
                 break
     return found, left
-
-
-@dataclass(frozen=True, eq=False)
-class _Balance:
-    """Restores G λ = e by the shortest change of the evened multipliers of some rows."""
-
-    problem: DualProblem
-    coarse: CoarseSpace
-    spread: sp.csr_matrix
-
-    @classmethod
-    def by(cls, problem: DualProblem, rows: sp.csr_matrix) -> _Balance:
-        """Return the balance by the columns of a basis, which does not mix contacts. Collective."""
-        coarse = problem.evened.coarse.restricted(rows)
-        return cls(problem, coarse, (sp.diags(evening(problem)) @ rows).tocsr())
-
-    def __call__(self, multiplier: Vector) -> Vector:
-        """Return the change that balances a multiplier, as far as the rows can. Collective."""
-        missing = self.problem.coarse.residual(multiplier)
-        return np.asarray(-(self.spread @ self.coarse.transpose(self.coarse.solve(missing))))
 
 
 def evening(problem: DualProblem) -> Vector:

@@ -63,16 +63,20 @@ def discretisation_error(torn: TornSystem, displacement: np.ndarray) -> Discreti
     """
     scene, comm = torn.scene, torn.decomposition.comm
     energies = {name: _Energies(torn, body) for name, body in scene.bodies.items()}
-    sites = find_sites(torn)
-    nodal = nodal_displacement(torn, displacement)[sites.node]
-    gradients = recovered_gradients(sites, nodal)
+    nodal = nodal_displacement(torn, displacement)
     cells = {name: [np.zeros(0, dtype=np.int64)] for name in scene.bodies}
     squares = {name: [np.zeros(0)] for name in scene.bodies}
-    for subdomain, of_cells in zip(torn.subdomains, sites.of_cells, strict=True):
-        mesh = subdomain.mesh
-        cells[mesh.body].append(mesh.cells)
-        values = energies[mesh.body].by_cell(subdomain, nodal[of_cells], gradients[of_cells])
-        squares[mesh.body].append(values)
+    for order in sorted({body.mesh.order for body in scene.bodies.values()}):
+        sites = find_sites(torn, order)
+        displacements = nodal[sites.node]
+        gradients = recovered_gradients(sites, displacements)
+        for subdomain in torn.subdomains:
+            mesh = subdomain.mesh
+            if mesh.number in sites.of_cells:
+                of_cells = sites.of_cells[mesh.number]
+                found = energies[mesh.body].by_cell(subdomain, displacements[of_cells], gradients[of_cells])
+                cells[mesh.body].append(mesh.cells)
+                squares[mesh.body].append(found)
     own = {name: (np.concatenate(cells[name]), np.concatenate(squares[name])) for name in scene.bodies}
     sums = comm.allreduce(np.array([values.sum() for _, values in own.values()]))
     by_body = {name: float(np.sqrt(value)) for name, value in zip(own, sums, strict=True)}
@@ -98,8 +102,8 @@ class _Energies:
 
         Args:
             subdomain: A subdomain of the body.
-            displacement: u at the vertices of its cells, shape (n_cells, n_vertices, dim), [length].
-            gradient: g there, shape (n_cells, n_vertices, dim, dim), dimensionless.
+            displacement: u at the nodes of its cells, shape (n_cells, nodes of a cell, dim), [length].
+            gradient: g there, shape (n_cells, nodes of a cell, dim, dim), dimensionless.
         """
         mesh, whole = subdomain.mesh, self._body.mesh
         nodes, kind = whole.cells[mesh.cells], self._body.material_of_cells[mesh.cells]

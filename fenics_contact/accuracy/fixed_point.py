@@ -16,6 +16,7 @@ def friction_error(system: DualSystem, solution: DualSolution, certificate: Cert
     The slip bounds of a solution follow its normal forces, Ψ = Ψ₀ + μ λ_N, and are wrong by μ δλ_N where
     these are wrong by δλ_N. The certificate knows δλ_N nearly: one preconditioned step. On slipping points
     friction then changes by μ δλ_N along its direction, which bends the bodies by about √Σ F_ii (μ δλ_i)².
+    Where the preconditioner exaggerates, it is at most μ times the bound: the normal forces are no worse.
 
     It is an estimate and no bound: Coulomb's law minimises nothing. It tells the difference to the solution
     with Tresca's law and the present slip bounds, for which the certificate is an upper bound. Zero where
@@ -31,8 +32,10 @@ def friction_error(system: DualSystem, solution: DualSolution, certificate: Cert
     """
     torn, layout, known = system.torn, system.problem.layout, certificate.known
     coefficient = torn.friction_coefficient[system.owned_discs()]
-    change = np.where(known.slip, coefficient * certificate.error[layout.tangential_frictional], 0.0)
+    change = np.where(known.statuses.slip, coefficient * certificate.error[layout.tangential_frictional], 0.0)
     raised = known.slip_bound - solution.slip_bound
     flexibility = system.problem.diagonal[layout.tangential].mean(axis=1)
-    square = global_sum(system.problem.comm, flexibility @ (change**2 + raised**2))[0]
-    return float(np.sqrt(square))
+    squares = global_sum(system.problem.comm, flexibility @ change**2, flexibility @ raised**2)
+    by_law, by_limit = (float(part) for part in np.sqrt(squares))
+    largest = float(torn.friction_coefficient.max(initial=0.0))
+    return min(by_law, largest * certificate.bound) + by_limit

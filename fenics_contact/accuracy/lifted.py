@@ -55,8 +55,9 @@ def lift(system: DualSystem, known: Admissible, residual: Vector, cancelled: flo
     slid = np.linalg.norm(residual[tangential], axis=1)
     step = contact_step(system.problem.layout, system.problem.diagonal)[tangential[:, 0]]
     # Where a slip is short, its part across the friction force is cheaper to take away than to pay for.
-    across = known.slip & (step * slid < known.slip_bound)
-    rows = _Rows(system, known, known.closed, known.stick, across)
+    statuses = known.statuses
+    across = statuses.slip & (step * slid < known.slip_bound)
+    rows = _Rows(system, known, statuses.closed, statuses.stick, across)
     closing = _close(rows, residual, cancelled)
     if closing.left > ROUNDING:  # a node of two pairs may be told to stick where it should close
         nothing = np.zeros_like(across)

@@ -8,7 +8,7 @@ import numpy as np
 
 from fenics_contact.feti.composition import Composition
 from fenics_contact.feti.forms import FormLibrary
-from fenics_contact.feti.model_checks import UNIT_CELL, stiffness_of_cell
+from fenics_contact.feti.model_checks import stiffness_of_cell
 from fenics_contact.geometry.cell_types import CELL_TYPES
 from fenics_contact.scene import Material
 
@@ -38,7 +38,7 @@ def moduli(forms: FormLibrary, material: Material, cell_type: str) -> np.ndarray
 
 
 def _on_cell_of(size: float, cell_type: str, bind: Any) -> np.ndarray:
-    K, points = stiffness_of_cell(size * UNIT_CELL[cell_type], cell_type, bind)
+    K, points = stiffness_of_cell(size * CELL_TYPES[cell_type].nodes, cell_type, bind)
     n, dim = points.shape
     motions = np.einsum("ki,nj->nikj", np.eye(dim), points).reshape(n * dim, dim * dim)
     volume = CELL_TYPES[cell_type].reference_volume * size**dim

@@ -1,4 +1,4 @@
-"""The patch of nodes around every site, and what fits of quadratic polynomials ask of it."""
+"""The patch of nodes around every site, and what fits of polynomials ask of it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact.accuracy.polynomials import Polynomials
 from fenics_contact.accuracy.sites import Sites
 
 #: Numbers that a chunk of patches holds at once.
@@ -19,7 +20,7 @@ class Moments:
 
     Attributes:
         rows: The sites, shape (n,).
-        matrix: Shape (n, m, m), its trace of order one, with m = dim + dim (dim + 1) / 2.
+        matrix: Shape (n, m, m), its trace of order one, with m polynomials.
         right: Shape (n, m, dim), [length].
     """
 
@@ -44,11 +45,13 @@ class Patches:
         turn: T of each site: a difference d of places is T d in its own coordinates, shape
             (n_sites, dim, dim), [1 / length].
         weight: Sum of the weights of each patch, shape (n_sites,).
+        polynomials: What is fitted, of one degree more than displacements have.
     """
 
     sites: Sites
     turn: np.ndarray
     weight: np.ndarray
+    polynomials: Polynomials
 
     @property
     def dim(self) -> int:
@@ -69,7 +72,7 @@ class Patches:
             yield self._of_this_rank(rows, displacement)
 
     def _of_all_ranks(self, rows: np.ndarray, displacement: np.ndarray) -> Moments:
-        size, dim = polynomials(self.dim), self.dim
+        size, dim = self.polynomials.count, self.dim
         packed = np.zeros((self.sites.count if len(rows) else 0, size * (size + dim)))
         for part in self._chunks(rows):
             found = self._of_this_rank(part, displacement)
@@ -81,7 +84,7 @@ class Patches:
         other, weight = padded(self.sites, rows)
         points = self.sites.points
         away = np.einsum("nij,npj->npi", self.turn[rows], points[other] - points[rows][:, None])
-        basis = monomials(away)
+        basis = self.polynomials.values(away)
         weighted = (basis * (weight / self.weight[rows, None])[..., None]).transpose(0, 2, 1)
         jump = displacement[other] - displacement[rows][:, None]
         return Moments(rows, weighted @ basis, weighted @ jump)
@@ -92,7 +95,7 @@ class Patches:
             return
         count = np.diff(self.sites.neighbours.indptr)[rows]
         order = np.argsort(count, kind="stable")
-        numbers = np.cumsum(count[order]) * 2 * polynomials(self.dim)
+        numbers = np.cumsum(count[order]) * 2 * self.polynomials.count
         yield from np.split(rows[order], np.flatnonzero(np.diff(numbers // CHUNK)) + 1)
 
 
@@ -112,7 +115,8 @@ def find_patches(sites: Sites) -> Patches:
     spread = np.empty((sites.count, dim, dim))
     spread[:, i, j] = spread[:, j, i] = sums[:, 1 + dim : -1] / (weight + own)
     spread -= mean[:, :, None] * mean[:, None, :]
-    return Patches(sites, np.linalg.inv(np.linalg.cholesky(spread)), weight[:, 0])
+    polynomials = Polynomials(dim, sites.order + 1)
+    return Patches(sites, np.linalg.inv(np.linalg.cholesky(spread)), weight[:, 0], polynomials)
 
 
 def padded(sites: Sites, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -128,42 +132,3 @@ def padded(sites: Sites, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     real = place < end[:, None]
     place = np.where(real, place, start[:, None])
     return table.indices[place], np.where(real, table.data[place], 0.0)
-
-
-def polynomials(dim: int) -> int:
-    """Return the number of first and second derivatives of a function."""
-    return dim + dim * (dim + 1) // 2
-
-
-def monomials(away: np.ndarray) -> np.ndarray:
-    """Return the polynomials that first and second derivatives are the coefficients of.
-
-    Mixed second derivatives count √2 times, so that the sum of squares of all is that of the matrix of second
-    derivatives and does not depend on directions.
-
-    Args:
-        away: Differences of places, shape (..., dim).
-
-    Returns:
-        Shape (..., m): d_i, then ½ d_i², then d_i d_j / √2 for i < j.
-    """
-    i, j = np.triu_indices(away.shape[-1], 1)
-    return np.concatenate([away, 0.5 * away**2, np.sqrt(0.5) * away[..., i] * away[..., j]], axis=-1)
-
-
-def curvatures(coefficients: np.ndarray) -> np.ndarray:
-    """Return the matrices of second derivatives, (n, dim (dim + 1) / 2, k) -> (n, dim, dim, k)."""
-    count = coefficients.shape[1]
-    dim = int(np.sqrt(2 * count))
-    i, j = np.triu_indices(dim, 1)
-    matrix = np.zeros((len(coefficients), dim, dim, coefficients.shape[2]))
-    matrix[:, np.arange(dim), np.arange(dim)] = coefficients[:, :dim]
-    matrix[:, i, j] = matrix[:, j, i] = np.sqrt(0.5) * coefficients[:, dim:]
-    return matrix
-
-
-def coefficients_of(matrix: np.ndarray) -> np.ndarray:
-    """Return what `curvatures` turns into given matrices."""
-    i, j = np.triu_indices(matrix.shape[1], 1)
-    diagonal = np.arange(matrix.shape[1])
-    return np.concatenate([matrix[:, diagonal, diagonal], np.sqrt(2.0) * matrix[:, i, j]], axis=1)

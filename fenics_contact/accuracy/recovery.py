@@ -1,10 +1,11 @@
 """Displacement gradients at the nodes, better than those of the cells: polynomial-preserving recovery.
 
-Around each site the differences of the displacement to the neighbouring nodes are fitted by a quadratic
-polynomial; the recovered gradient is the polynomial's at the site, exact for quadratic displacements on any
-mesh. A patch at the boundary mostly leaves some second derivatives open (two layers of nodes tell no
-curvature normal to them): these come from the neighbours, all the rest from the patch's own nodes. What no
-neighbour knows better, as in a plate one cell thick, is zero.
+Around each site the differences of the displacement to the neighbouring nodes are fitted by a polynomial of
+one degree more than the displacement has; the recovered gradient is the polynomial's at the site, exact for
+displacements of that degree on any mesh. A patch at the boundary mostly leaves some of the highest
+derivatives open (of linear cells, two layers of nodes tell no curvature normal to them): these come from the
+neighbours, all the rest from the patch's own nodes. What no neighbour knows better, as in a plate one cell
+thick, is zero.
 
 Patches are of one material: strains may jump where materials meet.
 
@@ -18,22 +19,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.accuracy.patches import (
-    Moments,
-    Patches,
-    coefficients_of,
-    curvatures,
-    find_patches,
-    polynomials,
-)
+from fenics_contact.accuracy.patches import Moments, Patches, find_patches
 from fenics_contact.accuracy.sites import Sites
 
-#: Weight of second derivatives beside the moments of a patch, which are of order one: it decides only on what
-#: the patch leaves open, and keeps rounding from deciding on it.
+#: Weight of the highest derivatives beside the moments of a patch, which are of order one: it decides only on
+#: what the patch leaves open, and keeps rounding from deciding on it.
 SLIGHT = 1e-5
-#: A patch leaves second derivatives open if the inverse of its moments adds up to more than this on them; on
-#: regular meshes inside a body it is below 20.
-OPEN = 60.0
+#: By degree: a patch leaves highest derivatives open if the inverse of its moments adds up to more than this
+#: on them; on regular meshes inside a body it is below 20 for the second, below 300 for the third.
+OPEN = {2: 60.0, 3: 500.0}
 #: Their weight where neighbours tell what they should be.
 FIRM = 0.02
 
@@ -49,16 +43,16 @@ def recovered_gradients(sites: Sites, displacement: np.ndarray) -> np.ndarray:
         ∂u_k/∂x_j as entry (k, j), shape (n_sites, dim, dim), dimensionless.
     """
     patches = find_patches(sites)
-    dim = patches.dim
-    found = np.zeros((sites.count, polynomials(dim), dim))
-    waiting, missing = [], []
+    dim, penalty = patches.dim, _penalty(patches)
+    found = np.zeros((sites.count, patches.polynomials.count, dim))
+    waiting, missing, highest = [], [], patches.polynomials.highest
     for moments in patches.moments(displacement):
-        inverse = np.linalg.inv(moments.matrix + SLIGHT * _penalty(dim))
+        inverse = np.linalg.inv(moments.matrix + SLIGHT * penalty)
         first = inverse @ moments.right
         # Once more with what is left, which takes the weight's own share off.
         found[moments.rows] = first + inverse @ (moments.right - moments.matrix @ first)
-        spread = np.einsum("nii->n", inverse[:, dim:, dim:])
-        open_ = np.flatnonzero(spread > OPEN)
+        spread = np.einsum("nii->n", inverse[:, highest, highest])
+        open_ = np.flatnonzero(spread > OPEN[patches.polynomials.degree])
         waiting.append(moments.part(open_))
         missing.append(np.rint(SLIGHT * spread[open_]))
     _ask_neighbours(patches, _joined(waiting), np.concatenate(missing), found)
@@ -66,24 +60,24 @@ def recovered_gradients(sites: Sites, displacement: np.ndarray) -> np.ndarray:
 
 
 def _ask_neighbours(patches: Patches, open_: Moments, missing: np.ndarray, found: np.ndarray) -> None:
-    """Fit again what was left open, with second derivatives of neighbours; layer by layer. Collective.
+    """Fit again what was left open, with highest derivatives of neighbours; layer by layer. Collective.
 
     Where no site of a body knows all, those that know most begin.
 
     Args:
         patches: The patches.
         open_: Normal equations of the sites whose patches leave something open, n of them.
-        missing: How many second derivatives of a component each of them cannot tell, shape (n,).
+        missing: How many highest derivatives of a component each of them cannot tell, shape (n,).
         found: Coefficients of all sites, which are overwritten, shape (n_sites, m, dim), [length].
     """
     comm, allowed = patches.sites.sharing.comm, 0
     known = np.ones(patches.sites.count, dtype=bool)
     known[open_.rows] = False
     while comm.allreduce(len(open_.rows)):
-        heard, curvature = _mean_of_neighbours(patches, open_.rows, known, found)
+        heard, derivatives = _mean_of_neighbours(patches, open_.rows, known, found)
         if comm.allreduce(np.count_nonzero(heard)):
             ready = open_.part(heard)
-            found[ready.rows] = _fitted(patches, ready, curvature[heard])
+            found[ready.rows] = _fitted(patches, ready, derivatives[heard])
         else:
             allowed += 1
             heard = missing <= allowed
@@ -91,29 +85,27 @@ def _ask_neighbours(patches: Patches, open_: Moments, missing: np.ndarray, found
         open_, missing = open_.part(~heard), missing[~heard]
 
 
-def _fitted(patches: Patches, moments: Moments, curvature: np.ndarray) -> np.ndarray:
-    """Fit again with given second derivatives for those that a patch leaves open.
+def _fitted(patches: Patches, moments: Moments, derivatives: np.ndarray) -> np.ndarray:
+    """Fit again with given highest derivatives for those that a patch leaves open.
 
     Args:
         patches: The patches.
         moments: Normal equations of the sites, n of them.
-        curvature: ∂²u_k/∂x_i∂x_j as entry (i, j, k), shape (n, dim, dim, dim), [1 / length].
+        derivatives: ∂u_k/∂x_i...∂x_j as entry (i, ..., j, k), shape (n, dim, ..., dim, dim).
 
     Returns:
         Coefficients, shape (n, m, dim), [length].
     """
-    dim = patches.dim
-    back = np.linalg.inv(patches.turn[moments.rows])
-    own = np.einsum("nia,nijk,njb->nabk", back, curvature, back, optimize=True)
+    polynomials, back = patches.polynomials, np.linalg.inv(patches.turn[moments.rows])
     right = moments.right.copy()
-    right[:, dim:] += FIRM * coefficients_of(own)
-    return np.asarray(np.linalg.solve(moments.matrix + FIRM * _penalty(dim), right))
+    right[:, polynomials.highest] += FIRM * polynomials.coefficients_of(polynomials.turned(derivatives, back))
+    return np.asarray(np.linalg.solve(moments.matrix + FIRM * _penalty(patches), right))
 
 
 def _mean_of_neighbours(
     patches: Patches, rows: np.ndarray, known: np.ndarray, found: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return whether sites have neighbours that are known, and the mean of their second derivatives.
+    """Return whether sites have neighbours that are known, and the mean of their highest derivatives.
 
     Collective.
 
@@ -124,26 +116,29 @@ def _mean_of_neighbours(
         found: Coefficients of all sites.
 
     Returns:
-        Shapes (n,) and (n, dim, dim, dim): ∂²u_k/∂x_i∂x_j as entry (i, j, k), [1 / length].
+        Shapes (n,) and (n, dim, ..., dim, dim): ∂u_k/∂x_i...∂x_j as entry (i, ..., j, k).
     """
     sites, dim = patches.sites, patches.dim
     links = sites.neighbours[rows]
     needed = np.unique(links.indices)
     needed = needed[known[needed]]
-    turn = patches.turn[needed]
-    of_sites = curvatures(found[needed][:, dim:])
-    curvature = np.einsum("nai,nabk,nbj->nijk", turn, of_sites, turn, optimize=True)
-    values = np.column_stack([np.ones(len(needed)), curvature.reshape(-1, dim**3)])
+    polynomials = patches.polynomials
+    of_sites = polynomials.tensors(found[needed][:, polynomials.highest])
+    turned = polynomials.turned(of_sites, patches.turn[needed])
+    size = dim ** (polynomials.degree + 1)
+    values = np.column_stack([np.ones(len(needed)), turned.reshape(len(needed), size)])
     total = np.zeros((sites.count, values.shape[1]))
     total[rows] = links[:, needed] @ values
     total = sites.sharing.add_up(total)[rows]
     heard = total[:, 0] > 0
     mean = total[:, 1:] / np.where(heard, total[:, 0], 1.0)[:, None]
-    return heard, mean.reshape(-1, dim, dim, dim)
+    return heard, mean.reshape(len(mean), *(dim,) * (polynomials.degree + 1))
 
 
-def _penalty(dim: int) -> np.ndarray:
-    return np.diag((np.arange(polynomials(dim)) >= dim).astype(np.float64))
+def _penalty(patches: Patches) -> np.ndarray:
+    weight = np.zeros(patches.polynomials.count)
+    weight[patches.polynomials.highest] = 1.0
+    return np.diag(weight)
 
 
 def _joined(parts: list[Moments]) -> Moments:

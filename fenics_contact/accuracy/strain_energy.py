@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.geometry.cell_types import CELL_TYPES
+from fenics_contact.geometry import CELL_TYPES, CellType, quadrature, shape_gradients, shape_values
 from fenics_contact.geometry.quality import determinants
 
 
@@ -16,46 +16,43 @@ def energy_of_difference(
     Args:
         moduli: C as `moduli` gives it, shape (dim², dim²), [force / length²].
         cell_type: Type of the cells.
-        points: Coordinates of the vertices, shape (n, n_vertices, dim), [length].
-        displacement: u at the vertices, shape (n, n_vertices, dim), [length].
-        gradient: g at the vertices, (k, j) for ∂u_k/∂x_j, shape (n, n_vertices, dim, dim).
+        points: Coordinates of the nodes, shape (n, nodes of a cell, dim), [length].
+        displacement: u at the nodes, shape (n, nodes of a cell, dim), [length].
+        gradient: g at the nodes, (k, j) for ∂u_k/∂x_j, shape (n, nodes of a cell, dim, dim).
 
     Returns:
         Shape (n,), [force · length].
     """
-    on_simplices = CELL_TYPES[cell_type].is_simplex
-    integrate = _over_simplices if on_simplices else _over_tensor_cells
-    return integrate(moduli, cell_type, points, displacement, gradient)
+    cell = CELL_TYPES[cell_type]
+    integrate = _over_simplices if cell.is_affine else _by_quadrature
+    return integrate(moduli, cell, points, displacement, gradient)
 
 
 def _over_simplices(
-    moduli: np.ndarray, cell_type: str, points: np.ndarray, displacement: np.ndarray, gradient: np.ndarray
+    moduli: np.ndarray, cell: CellType, points: np.ndarray, displacement: np.ndarray, gradient: np.ndarray
 ) -> np.ndarray:
     """The difference d is linear: ∫ C d : d = |K| (Σ C d_v : d_v + C Σd_v : Σd_v) / (m (m + 1))."""
-    n, m, dim = points.shape
-    slopes = np.vstack([-np.ones(dim), np.eye(dim)])
+    n, m, _ = points.shape
+    (slopes,) = shape_gradients(cell, cell.vertices[:1])
     of_cells, jacobian = _cell_gradients(points, displacement, slopes)
     difference = (gradient - of_cells[:, None]).reshape(n, m, -1)
     difference = np.concatenate([difference, difference.sum(axis=1, keepdims=True)], axis=1)
     density = np.einsum("nva,nva->n", difference @ moduli, difference)
-    return np.asarray(CELL_TYPES[cell_type].reference_volume * jacobian * density / (m * (m + 1)))
+    return np.asarray(cell.reference_volume * jacobian * density / (m * (m + 1)))
 
 
-def _over_tensor_cells(
-    moduli: np.ndarray, cell_type: str, points: np.ndarray, displacement: np.ndarray, gradient: np.ndarray
+def _by_quadrature(
+    moduli: np.ndarray, cell: CellType, points: np.ndarray, displacement: np.ndarray, gradient: np.ndarray
 ) -> np.ndarray:
-    """Two Gauss points in a direction: exact for a difference of first degree in each coordinate."""
-    vertices, n = CELL_TYPES[cell_type].vertices, len(points)
-    total = np.zeros(n)
-    for place in 0.5 + (vertices - 0.5) / np.sqrt(3.0):  # a few places, all cells at once
-        factors = np.where(vertices == 1.0, place, 1 - place)
-        others = [np.delete(factors, axis, axis=1).prod(axis=1) for axis in range(len(place))]
-        slopes = (2 * vertices - 1) * np.column_stack(others)
-        of_cells, jacobian = _cell_gradients(points, displacement, slopes)
-        here = np.tensordot(gradient, factors.prod(axis=1), axes=(1, 0))
-        difference = (here - of_cells).reshape(n, -1)
-        total += jacobian * np.einsum("na,na->n", difference @ moduli, difference)
-    return total / len(vertices)
+    """Exact where the map from the reference cell is affine."""
+    positions, weights = quadrature(cell)
+    values, slopes = shape_values(cell, positions), shape_gradients(cell, positions)
+    total = np.zeros(len(points))
+    for weight, value, slope in zip(weights, values, slopes, strict=True):  # a few places, all cells at once
+        of_cells, jacobian = _cell_gradients(points, displacement, slope)
+        difference = (np.tensordot(gradient, value, axes=(1, 0)) - of_cells).reshape(len(points), -1)
+        total += weight * jacobian * np.einsum("na,na->n", difference @ moduli, difference)
+    return total
 
 
 def _cell_gradients(
@@ -64,9 +61,9 @@ def _cell_gradients(
     """Return ∇u and the Jacobian determinant of cells at one place, shapes (n, dim, dim) and (n,).
 
     Args:
-        points: Coordinates of the vertices, shape (n, n_vertices, dim).
-        displacement: u there, shape (n, n_vertices, dim).
-        slopes: Of the shape functions at the place, shape (n_vertices, dim).
+        points: Coordinates of the nodes, shape (n, nodes of a cell, dim).
+        displacement: u there, shape (n, nodes of a cell, dim).
+        slopes: Of the shape functions at the place, shape (nodes of a cell, dim).
     """
     jacobian = np.matmul(points.transpose(0, 2, 1), slopes)
     determinant, adjugate = determinants(jacobian), _adjugate(jacobian)

@@ -14,7 +14,8 @@ from fenics_contact.feti.subdomain import Subdomain
 from fenics_contact.feti.templates import Template, Written, scalar_constants, volume_measure
 from fenics_contact.scene import Material
 
-#: Of the quadrature: gradients of both kinds are linear, or of first degree in each coordinate.
+#: Of the quadrature on linear cells, where gradients of both kinds are of first degree in each coordinate;
+#: it is twice that on quadratic ones.
 DEGREE = 2
 
 
@@ -60,9 +61,10 @@ def energy_on_subdomain(
         form: The compiled form of the material.
         material: The material.
         subdomain: The subdomain.
-        blocks: Block of each vertex of some cells, shape (n, n_vertices); elsewhere the result is of no use.
-        displacement: u at these vertices, shape (n, n_vertices, dim), [length].
-        gradient: g there, shape (n, n_vertices, dim, dim), dimensionless.
+        blocks: Block of each node of some cells, shape (n, nodes of a cell); elsewhere the result is of no
+            use.
+        displacement: u at these nodes, shape (n, nodes of a cell, dim), [length].
+        gradient: g there, shape (n, nodes of a cell, dim, dim), dimensionless.
 
     Returns:
         Shape (n_cells,), in the order of the subdomain's mesh, [force · length].

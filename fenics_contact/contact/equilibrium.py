@@ -99,7 +99,7 @@ def find_state(
         scene: The scene, with the coordinates to use.
         decomposition: Its decomposition; only topology and numbering are taken from it.
         solver: Dual solver with its tolerance; `default_solver` chooses if it is None.
-        tolerance: As for `solve_scene`.
+        tolerance: As for `solve_scene`; with ``sensitivity`` the default is a number, too.
         previous: State of a neighbouring geometry or load to start from; what did not change is not
             assembled and factored again.
         slip_from: State from which slip is measured, that of the last load step; by default the undeformed
@@ -126,16 +126,24 @@ def find_state(
     if solver is None and kind is SolverKind.DIRECT:
         return _found_directly(torn, previous, timer)
     chosen = solver or default_solver(kind)
+    system, start = _dual_system(torn, previous, timer)
+    if isinstance(tolerance, float):
+        return _to_tolerance(system, chosen.with_tolerance(tolerance), start, timer)
+    # Derivatives belong to the statuses of single points, which a balanced state leaves open.
+    if tolerance is None and (solver is not None or sensitivity):
+        return _to_tolerance(system, chosen, start, timer)
+    return _balanced(system, chosen, tolerance, start, timer)
+
+
+def _dual_system(
+    torn: TornSystem, previous: State | None, timer: PhaseTimer
+) -> tuple[DualSystem, np.ndarray | None]:
+    """Return the dual system and where to start, both with what an earlier state knows. Collective."""
     known = previous.system if previous is not None and isinstance(previous.system, DualSystem) else None
     system = DualSystem(torn, timer, previous=known)
-    start = None
     if previous is not None and known is not None and isinstance(previous.solution, DualSolution):
-        start = carried_over(known, previous.solution, system)
-    if isinstance(tolerance, float) or (tolerance is None and solver is not None):
-        return _to_tolerance(
-            system, chosen if tolerance is None else chosen.with_tolerance(tolerance), start, timer
-        )
-    return _balanced(system, chosen, tolerance, start, timer)
+        return system, carried_over(known, previous.solution, system)
+    return system, None
 
 
 def _to_tolerance(

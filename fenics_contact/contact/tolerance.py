@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeAlias
 
+import numpy as np
+
 from fenics_contact.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -21,7 +23,7 @@ def checked_tolerance(tolerance: object) -> float | Balanced | None:
     """
     if tolerance is None:
         return None
-    if isinstance(tolerance, float | int):
+    if isinstance(tolerance, float | int | np.floating):
         if 0.0 < tolerance < 1.0:
             return float(tolerance)
         raise InvalidInputError(

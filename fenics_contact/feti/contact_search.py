@@ -12,6 +12,7 @@ from mpi4py import MPI
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.contact_points import ContactPoints, join_points, tangent_frames
 from fenics_contact.feti.copies import Tearing
+from fenics_contact.feti.facet_areas import nodal_areas
 from fenics_contact.feti.projection import Projection, join, project
 from fenics_contact.feti.surface import FacetedSurface, faceted_surface, shape_functions
 from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie
@@ -45,8 +46,15 @@ def find_tied_points(
 
 
 def surface_of(scene: Scene, surface: Surface) -> FacetedSurface:
-    """Return a named surface with its averaged normals."""
-    return faceted_surface(scene.bodies[surface.body].mesh.points, scene.facets(surface))
+    """Return a named surface with its averaged normals: linear facets through its nodes."""
+    mesh = scene.bodies[surface.body].mesh
+    found = faceted_surface(mesh.points, scene.facets(surface))
+    if mesh.order == 1:
+        return found
+    # The area of a node is the force that a unit pressure puts there, which is not what linear facets say.
+    facets = mesh.surfaces[surface.name]
+    areas = np.bincount(facets.ravel(), nodal_areas(mesh.points, facets).ravel(), minlength=mesh.n_nodes)
+    return replace(found, areas=areas[found.nodes])
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from mpi4py import MPI
 
 from fenics_contact import _dolfinx
 from fenics_contact.feti.composition import Composition, integrate, possible
+from fenics_contact.feti.facet_areas import quadrature_areas
 from fenics_contact.feti.load_forms import Symbol, fields_of, load_key, load_name, load_parameters, load_work
 from fenics_contact.feti.model_checks import check_model, unit_cell_stiffness
-from fenics_contact.feti.surface import quadrature_areas
 from fenics_contact.feti.templates import (
     LOADED,
     QUADRATURE_DEGREE,
@@ -23,7 +23,7 @@ from fenics_contact.feti.templates import (
     surface_measure,
     volume_measure,
 )
-from fenics_contact.scene import Load, Material, Scene, Surface, ThermalStrain, TotalForce, Traction
+from fenics_contact.scene import Load, Material, Scene, ThermalStrain, TotalForce, Traction
 
 __all__ = [
     "LOADED",
@@ -154,6 +154,6 @@ def as_tractions(scene: Scene) -> tuple[Load, ...]:
 
 
 def _spread(scene: Scene, load: TotalForce) -> Traction:
-    facets = scene.facets(Surface(load.body, load.surface))
-    area = float(quadrature_areas(scene.bodies[load.body].mesh.points, facets).sum())
+    mesh = scene.bodies[load.body].mesh
+    area = float(quadrature_areas(mesh.points, mesh.surfaces[load.surface]).sum())
     return Traction(load.body, load.surface, tuple(component / area for component in load.value))

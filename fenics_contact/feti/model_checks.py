@@ -9,18 +9,9 @@ import numpy as np
 
 from fenics_contact import _dolfinx
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry import CELL_TYPES
 from fenics_contact.scene import Material
 
-#: Vertices of cells with edges of length one along the axes, in VTK order.
-UNIT_CELL = {
-    "triangle": np.array([[0, 0], [1, 0], [0, 1]], dtype=np.float64),
-    "quadrilateral": np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float64),
-    "tetrahedron": np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float64),
-    "hexahedron": np.array(
-        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]],
-        dtype=np.float64,
-    ),
-}
 #: Below this, relative to the largest, an eigenvalue or an entry counts as rounding.
 ROUNDING = 1e-11
 #: Largest ‖K R‖ relative to ‖K‖ ‖R‖.
@@ -32,7 +23,7 @@ Bind = Callable[[Any], Any]
 
 def unit_cell_stiffness(cell_type: str, bind: Bind) -> np.ndarray:
     """Return the stiffness matrix of a cell of edge length one, dense, block by block."""
-    return stiffness_of_cell(UNIT_CELL[cell_type], cell_type, bind)[0]
+    return stiffness_of_cell(CELL_TYPES[cell_type].nodes, cell_type, bind)[0]
 
 
 def check_model(material: Material, cell_type: str, bind: Bind) -> None:
@@ -51,7 +42,7 @@ def check_model(material: Material, cell_type: str, bind: Bind) -> None:
             has the wrong shape, dependent modes or modes that are none, or a mode without energy is missing.
     """
     name = type(material).__name__
-    K, points = stiffness_of_cell(_skewed(UNIT_CELL[cell_type]), cell_type, bind)
+    K, points = stiffness_of_cell(_skewed(CELL_TYPES[cell_type].nodes), cell_type, bind)
     if not np.isfinite(K).all():
         raise InvalidInputError(
             f"stiffness and load must be finite, got NaN or infinity in the stiffness of {name}: check the "
@@ -121,11 +112,11 @@ def _checked_kernel(material: Material, points: np.ndarray) -> np.ndarray:
     return R
 
 
-def _skewed(vertices: np.ndarray) -> np.ndarray:
+def _skewed(nodes: np.ndarray) -> np.ndarray:
     """Return a cell without any symmetry; the same for every material."""
-    n, dim = vertices.shape
+    n, dim = nodes.shape
     shift = np.sin(1.0 + 2.3 * np.arange(n * dim)).reshape(n, dim)
-    return vertices + 0.08 * shift
+    return np.asarray(nodes + 0.08 * shift, dtype=np.float64)
 
 
 def stiffness_of_cell(vertices: np.ndarray, cell_type: str, bind: Bind) -> tuple[np.ndarray, np.ndarray]:

@@ -14,6 +14,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.composition import Composition, composition
 from fenics_contact.feti.forms import FormLibrary
 from fenics_contact.feti.model_checks import check_kernel
+from fenics_contact.geometry import corners_of
 from fenics_contact.scene import Body, Load, SurfaceLoad
 
 
@@ -53,7 +54,7 @@ class SubdomainMesh:
         """Return the part of a surface of the body that lies on this mesh: cells, local facets."""
         if surface not in self.facets:
             used = np.sort(self.nodes)
-            facets = body.mesh.surfaces[surface]
+            facets = corners_of(body.mesh.surfaces[surface], body.mesh.dim)
             inside = np.isin(facets, used).all(axis=1)
             own = np.searchsorted(used, facets[inside])
             self.facets[surface] = _dolfinx.match_facets(self.space.mesh, own)

@@ -150,21 +150,3 @@ def faceted_surface(points: np.ndarray, facets: np.ndarray) -> FacetedSurface:
     share = np.linalg.norm(products.sum(axis=1), axis=1) / {2: 2, 3: 6, 4: 4}[corners] / corners
     np.add.at(areas, local, np.broadcast_to(share[:, None], local.shape))
     return FacetedSurface(nodes, local, own, summed / np.linalg.norm(summed, axis=1)[:, None], areas)
-
-
-def quadrature_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
-    """Return facet areas by two Gauss points a direction, as the load forms integrate, shape (n_facets,).
-
-    In the plane: the lengths of the edges.
-    """
-    if facets.shape[1] == 2:
-        return np.asarray(np.linalg.norm(corner_products(points, facets)[:, 0], axis=1), dtype=np.float64)
-    if facets.shape[1] == 3:
-        return 0.5 * np.linalg.norm(corner_products(points, facets)[:, 0], axis=1)
-    corners, total = points[facets], np.zeros(len(facets))
-    for s in (-1 / np.sqrt(3), 1 / np.sqrt(3)):
-        for t in (-1 / np.sqrt(3), 1 / np.sqrt(3)):
-            _, derivatives = shape_functions(np.array([[s, t]]), 4)
-            tangents = np.einsum("ka,nkd->nda", derivatives[0], corners)
-            total += np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=1)
-    return total

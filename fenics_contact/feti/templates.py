@@ -13,8 +13,16 @@ from ufl.algorithms.analysis import extract_type
 from fenics_contact import _dolfinx
 
 #: Gauss rule of the volume: two points a direction on tensor-product cells, one on simplices suit linear
-#: elasticity.
-QUADRATURE_DEGREE = {"hexahedron": 2, "tetrahedron": 1, "quadrilateral": 2, "triangle": 1}
+#: elasticity, three a direction and one on each edge the quadratic cells.
+QUADRATURE_DEGREE = {
+    "hexahedron": 2,
+    "tetrahedron": 1,
+    "quadrilateral": 2,
+    "triangle": 1,
+    "hexahedron27": 4,
+    "quadrilateral9": 4,
+    "triangle6": 2,
+}
 #: Tag that every loaded surface gets inside a load form.
 LOADED = 1
 
@@ -126,11 +134,15 @@ def scalar_constants(cell_type: str, count: int) -> tuple[Any, ...]:
 
 
 def volume_measure(cell_type: str, degree: int | None = None) -> Any:
-    """Return dx on the template with the package's quadrature degree, or the given one."""
-    degree = QUADRATURE_DEGREE[cell_type] if degree is None else degree
+    """Return dx on the template with the package's quadrature degree, or the given one.
+
+    The given one is for linear cells; quadratic ones get twice that.
+    """
+    degree = QUADRATURE_DEGREE[cell_type] if degree is None else degree * _dolfinx.degree(cell_type)
     return ufl.dx(domain=_dolfinx.template(cell_type), metadata={"quadrature_degree": degree})
 
 
 def surface_measure(cell_type: str) -> Any:
     """Return ds of the loaded surface on the template."""
-    return ufl.ds(domain=_dolfinx.template(cell_type), metadata={"quadrature_degree": 2})(LOADED)
+    degree = 2 * _dolfinx.degree(cell_type)
+    return ufl.ds(domain=_dolfinx.template(cell_type), metadata={"quadrature_degree": degree})(LOADED)

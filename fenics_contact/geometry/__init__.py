@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from fenics_contact.geometry.block import block, box_lattice
 from fenics_contact.geometry.bolted import bolt, drilled_plate
-from fenics_contact.geometry.cell_types import CELL_TYPES, CellType, cell_type_of
+from fenics_contact.geometry.cell_types import CELL_TYPES, FACET_TYPES, CellType, cell_type_of
 from fenics_contact.geometry.chain import Chain, chain
 from fenics_contact.geometry.coincidence import merge_duplicate_nodes
 from fenics_contact.geometry.default_partition import default_partition, target_parts
 from fenics_contact.geometry.dolfinx_import import from_dolfinx, read_xdmf
 from fenics_contact.geometry.extrusion import extrude
-from fenics_contact.geometry.faces import boundary_faces, orient, vector_areas
+from fenics_contact.geometry.faces import boundary_faces, corners_of, orient, vector_areas
 from fenics_contact.geometry.gmsh_import import from_gmsh_model, read_msh
 from fenics_contact.geometry.graph_partition import graph_partition
 from fenics_contact.geometry.half_disc import half_disc
@@ -26,8 +26,10 @@ from fenics_contact.geometry.partition import (
     merge_pieces,
     torn_node_counts,
 )
+from fenics_contact.geometry.quadratic import quadratic
 from fenics_contact.geometry.rectangle import rectangle, rectangle_lattice, split_quadrilaterals
 from fenics_contact.geometry.ring import LinkShape
+from fenics_contact.geometry.shape_functions import quadrature, shape_gradients, shape_values
 from fenics_contact.geometry.structured import split_hexahedra
 from fenics_contact.geometry.touch import (
     PULL_AXIS,
@@ -40,6 +42,7 @@ from fenics_contact.geometry.touch import (
 
 __all__ = [
     "CELL_TYPES",
+    "FACET_TYPES",
     "PULL_AXIS",
     "BodyMesh",
     "CellType",
@@ -62,6 +65,7 @@ __all__ = [
     "check_one_piece",
     "check_penetration",
     "combine",
+    "corners_of",
     "default_partition",
     "drilled_plate",
     "extrude",
@@ -75,10 +79,14 @@ __all__ = [
     "merge_pieces",
     "mutual_clearance",
     "orient",
+    "quadratic",
+    "quadrature",
     "read_msh",
     "read_xdmf",
     "rectangle",
     "rectangle_lattice",
+    "shape_gradients",
+    "shape_values",
     "split_hexahedra",
     "split_quadrilaterals",
     "target_parts",

@@ -1,4 +1,4 @@
-"""The four types of cells and what is known of each: vertices, faces, edges. Vertices come in VTK order."""
+"""The types of cells and what is known of each: nodes, faces, edges. Nodes come in the order of VTK."""
 
 from __future__ import annotations
 
@@ -11,113 +11,249 @@ from fenics_contact.errors import InvalidInputError
 
 @dataclass(frozen=True, eq=False)
 class CellType:
-    """One type of linear cells.
+    """One type of cells.
 
     Attributes:
-        name: The name that dolfinx gives it too.
+        name: The name of the linear ones is dolfinx's.
         plural: How a message speaks of such cells.
-        dim: Dimension of the cell and of the space it lies in, 2 or 3.
-        vertices: Reference coordinates of the vertices, (n_vertices, dim).
+        dim: Dimension of the cell, and of the space it lies in unless it is a facet.
+        nodes: Reference coordinates of the nodes, vertices first, (n_nodes, dim).
         faces: Local nodes of the faces, outward: in 3D the right-hand normal points out of the cell, in 2D,
-            where a face is an edge, the cell lies to the left of it; (n_faces, nodes of a face).
+            where a face is an edge, the cell lies to the left of it; (n_faces, nodes of a face), corners in
+            cyclic order first, then the midpoints of the edges that follow them, then the centre.
         edges: Other ends of the edges at every vertex, right-handed, (n_vertices, dim).
         reference_volume: Volume (area) of the reference cell.
+        pieces: Local nodes of the linear cells of the same shape that make up the cell, (n_pieces,
+            n_vertices).
+        face_pieces: Positions in a row of ``faces`` of the linear facets that make up a face, (n, corners).
     """
 
     name: str
     plural: str
     dim: int
-    vertices: np.ndarray
+    nodes: np.ndarray
     faces: np.ndarray
     edges: np.ndarray
     reference_volume: float
+    pieces: np.ndarray
+    face_pieces: np.ndarray
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """Reference coordinates of the vertices, (n_vertices, dim)."""
+        return self.nodes[: len(self.edges)]
+
+    @property
+    def order(self) -> int:
+        """Degree of the shape functions, 1 or 2."""
+        return 1 if len(self.nodes) == len(self.edges) else 2
 
     @property
     def is_simplex(self) -> bool:
+        """Whether it is a triangle or a tetrahedron."""
+        return self.dim > 1 and len(self.edges) == self.dim + 1
+
+    @property
+    def is_affine(self) -> bool:
         """Whether the map from the reference cell is affine."""
-        return self.vertices.shape[0] == self.dim + 1
+        return self.order == 1 and self.is_simplex
 
 
 def _table(rows: list[list[int]]) -> np.ndarray:
     return np.array(rows, dtype=np.int64)
 
 
+def _linear(
+    name: str,
+    plural: str,
+    vertices: list[list[float]],
+    faces: list[list[int]],
+    edges: list[list[int]],
+    volume: float,
+) -> CellType:
+    nodes, facet = np.array(vertices), np.arange(len(faces[0]))
+    return CellType(
+        name,
+        plural,
+        nodes.shape[1],
+        nodes,
+        _table(faces),
+        _table(edges),
+        volume,
+        np.arange(len(nodes))[None],
+        facet[None],
+    )
+
+
+def _quadratic(
+    linear: CellType, name: str, plural: str, extra: list[list[float]], pieces: list[list[int]]
+) -> CellType:
+    """Return the quadratic cells of a shape; the nodes of their faces are found by where they lie."""
+    nodes = np.concatenate([linear.nodes, np.array(extra)])
+    number = {tuple(place): index for index, place in enumerate(nodes)}
+    faces = []
+    for face in linear.faces:
+        corners = linear.nodes[face]
+        middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
+        more = middles[:1] if len(face) == 2 else [*middles, corners.mean(axis=0)]
+        faces.append([*face, *(number[tuple(place)] for place in more)])
+    face_pieces = EDGE3.pieces if linear.dim == 2 else _table(_QUARTERS)
+    return CellType(
+        name,
+        plural,
+        linear.dim,
+        nodes,
+        _table(faces),
+        linear.edges,
+        linear.reference_volume,
+        _table(pieces),
+        face_pieces,
+    )
+
+
 _SQUARE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+_HALF = [[0.5, 0.0], [1.0, 0.5], [0.5, 1.0], [0.0, 0.5]]
+_QUARTERS = [[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]]
 
-TRIANGLE = CellType(
-    name="triangle",
-    plural="triangles",
-    dim=2,
-    vertices=np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]),
-    faces=_table([[0, 1], [1, 2], [2, 0]]),
-    edges=_table([[1, 2], [2, 0], [0, 1]]),
-    reference_volume=1.0 / 2.0,
+EDGE = _linear("edge", "edges", [[0.0], [1.0]], [[0], [1]], [[1], [0]], 1.0)
+"""A facet of plane cells; no cell."""
+TRIANGLE = _linear(
+    "triangle",
+    "triangles",
+    [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
+    [[0, 1], [1, 2], [2, 0]],
+    [[1, 2], [2, 0], [0, 1]],
+    1.0 / 2.0,
 )
-QUADRILATERAL = CellType(
-    name="quadrilateral",
-    plural="quadrilaterals",
-    dim=2,
-    vertices=np.array(_SQUARE),
-    faces=_table([[0, 1], [1, 2], [2, 3], [3, 0]]),
-    edges=_table([[1, 3], [2, 0], [3, 1], [0, 2]]),
-    reference_volume=1.0,
+QUADRILATERAL = _linear(
+    "quadrilateral",
+    "quadrilaterals",
+    _SQUARE,
+    [[0, 1], [1, 2], [2, 3], [3, 0]],
+    [[1, 3], [2, 0], [3, 1], [0, 2]],
+    1.0,
 )
-TETRAHEDRON = CellType(
-    name="tetrahedron",
-    plural="tetrahedra",
-    dim=3,
-    vertices=np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
-    faces=_table([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
-    edges=_table([[1, 2, 3], [2, 0, 3], [0, 1, 3], [0, 2, 1]]),
-    reference_volume=1.0 / 6.0,
+TETRAHEDRON = _linear(
+    "tetrahedron",
+    "tetrahedra",
+    [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+    [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
+    [[1, 2, 3], [2, 0, 3], [0, 1, 3], [0, 2, 1]],
+    1.0 / 6.0,
 )
-HEXAHEDRON = CellType(
-    name="hexahedron",
-    plural="hexahedra",
-    dim=3,
-    vertices=np.array([[*corner, z] for z in (0.0, 1.0) for corner in _SQUARE]),
-    faces=_table([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [2, 3, 7, 6], [0, 4, 7, 3], [1, 2, 6, 5]]),
-    edges=_table([[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]]),
-    reference_volume=1.0,
+HEXAHEDRON = _linear(
+    "hexahedron",
+    "hexahedra",
+    [[*corner, z] for z in (0.0, 1.0) for corner in _SQUARE],
+    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [2, 3, 7, 6], [0, 4, 7, 3], [1, 2, 6, 5]],
+    [[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]],
+    1.0,
+)
+EDGE3 = CellType(
+    "edge3",
+    "quadratic edges",
+    1,
+    np.array([[0.0], [1.0], [0.5]]),
+    EDGE.faces,
+    EDGE.edges,
+    1.0,
+    _table([[0, 2], [2, 1]]),
+    EDGE.face_pieces,
+)
+"""A facet of quadratic plane cells."""
+TRIANGLE6 = _quadratic(
+    TRIANGLE,
+    "triangle6",
+    "quadratic triangles",
+    [[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]],
+    [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
+)
+QUADRILATERAL9 = _quadratic(
+    QUADRILATERAL,
+    "quadrilateral9",
+    "quadratic quadrilaterals",
+    [*_HALF, [0.5, 0.5]],
+    _QUARTERS,
+)
+HEXAHEDRON27 = _quadratic(
+    HEXAHEDRON,
+    "hexahedron27",
+    "quadratic hexahedra",
+    [
+        *([*place, 0.0] for place in _HALF),
+        *([*place, 1.0] for place in _HALF),
+        *([*corner, 0.5] for corner in _SQUARE),
+        *(
+            [
+                [0.0, 0.5, 0.5],
+                [1.0, 0.5, 0.5],
+                [0.5, 0.0, 0.5],
+                [0.5, 1.0, 0.5],
+                [0.5, 0.5, 0.0],
+                [0.5, 0.5, 1.0],
+            ]
+        ),
+        [0.5, 0.5, 0.5],
+    ],
+    [
+        [0, 8, 24, 11, 16, 22, 26, 20],
+        [8, 1, 9, 24, 22, 17, 21, 26],
+        [24, 9, 2, 10, 26, 21, 18, 23],
+        [11, 24, 10, 3, 20, 26, 23, 19],
+        [16, 22, 26, 20, 4, 12, 25, 15],
+        [22, 17, 21, 26, 12, 5, 13, 25],
+        [26, 21, 18, 23, 25, 13, 6, 14],
+        [20, 26, 23, 19, 15, 25, 14, 7],
+    ],
 )
 
-CELL_TYPES = {cell.name: cell for cell in (TRIANGLE, QUADRILATERAL, TETRAHEDRON, HEXAHEDRON)}
+FACET_TYPES = {(2, 2): EDGE, (3, 2): EDGE3, (3, 3): TRIANGLE, (4, 3): QUADRILATERAL, (9, 3): QUADRILATERAL9}
+"""(nodes of a facet, dimension of space) to its type."""
+CELL_TYPES = {
+    cell.name: cell
+    for cell in (TRIANGLE, QUADRILATERAL, TETRAHEDRON, HEXAHEDRON, TRIANGLE6, QUADRILATERAL9, HEXAHEDRON27)
+}
 """Name to type, all there are."""
 
 
 QUADRATIC = (
-    "quadratic cells are not supported: the contact constraints are one for every node and need nodal forces "
-    "that are positive under a uniform pressure, which those of quadratic facets are not; write the mesh "
-    "with linear cells (gmsh: Mesh.ElementOrder = 1)"
+    "such quadratic cells are not supported: the contact constraints are one for every node and need nodal "
+    "forces that are positive under a uniform pressure, which those of their facets are not; use linear "
+    "cells, which `quadratic` gives 27 nodes (hexahedra), in the plane 9 (quadrilaterals) or 6 (triangles)"
 )
 """Why, and what to do."""
+QUADRATIC_FILE = (
+    "quadratic cells are not read from files: write the mesh with linear ones (gmsh: Mesh.ElementOrder = 1), "
+    "which `quadratic` makes quadratic where they are hexahedra or plane cells"
+)
+"""What to do."""
 
-_QUADRATIC_NODES = {2: (6, 9), 3: (10, 20, 27)}
+_QUADRATIC_NODES = (10, 20)
 
 
 def cell_type_of(cells: np.ndarray, dim: int) -> CellType:
     """Return the type of cells; those of four nodes need the dimension to be told apart.
 
     Args:
-        cells: Node numbers, (n_cells, n_vertices).
+        cells: Node numbers, (n_cells, nodes of a cell).
         dim: Dimension of the space, 2 or 3.
 
     Raises:
         InvalidInputError: If there are no such cells in this dimension.
     """
     for cell in CELL_TYPES.values():
-        if cell.dim == dim and cells.ndim == 2 and cells.shape[1] == cell.vertices.shape[0]:
+        if cell.dim == dim and cells.ndim == 2 and cells.shape[1] == cell.nodes.shape[0]:
             return cell
-    if cells.ndim == 2 and cells.shape[1] in _QUADRATIC_NODES.get(dim, ()):
+    if dim == 3 and cells.ndim == 2 and cells.shape[1] in _QUADRATIC_NODES:
         raise InvalidInputError(f"cells of {cells.shape[1]} nodes in {dim} dimensions: {QUADRATIC}")
     known = " or ".join(
-        f"(n_cells, {cell.vertices.shape[0]}) for {cell.plural}"
+        f"(n_cells, {cell.nodes.shape[0]}) for {cell.plural}"
         for cell in CELL_TYPES.values()
         if cell.dim == dim
     )
     if not known:
         raise InvalidInputError(f"dim must be 2 or 3, got {dim}: give the number of coordinates of a node")
     raise InvalidInputError(
-        f"cells in {dim} dimensions must have shape {known}, got {cells.shape}: give the vertices of every "
+        f"cells in {dim} dimensions must have shape {known}, got {cells.shape}: give the nodes of every "
         "cell in VTK order, and dim=2 for a plane mesh"
     )

@@ -23,7 +23,15 @@ NEAR = (0.8, 1.25)
 COMPACT = 2.0
 """Largest ratio of the sides of a box, in cells."""
 
-_NODES_PER_CELL = {"hexahedron": 1.0, "tetrahedron": 1.0 / 5.5, "quadrilateral": 1.0, "triangle": 0.5}
+_NODES_PER_CELL = {
+    "hexahedron": 1.0,
+    "tetrahedron": 1.0 / 5.5,
+    "quadrilateral": 1.0,
+    "triangle": 0.5,
+    "hexahedron27": 8.0,
+    "quadrilateral9": 4.0,
+    "triangle6": 2.0,
+}
 """In the interior of a large mesh; for tetrahedra as mesh generators make them (6 in a split hexahedron)."""
 
 

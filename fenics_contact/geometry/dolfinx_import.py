@@ -14,7 +14,7 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.geometry.bodies import bodies_of
-from fenics_contact.geometry.cell_types import CELL_TYPES, QUADRATIC
+from fenics_contact.geometry.cell_types import CELL_TYPES, QUADRATIC_FILE
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.plane import flattened, turned_right_handed
 from fenics_contact.geometry.tagged_mesh import Label, TaggedMesh
@@ -150,7 +150,7 @@ def _tagged_mesh(mesh: Any, cell_tags: Any, facet_tags: Any, source: str) -> Tag
     arrays = reading.mesh_arrays(mesh)
     if not arrays.linear:
         raise InvalidInputError(
-            f"{source} has cells of type '{arrays.cell_type}' with more nodes: {QUADRATIC}"
+            f"{source} has cells of type '{arrays.cell_type}' with more nodes: {QUADRATIC_FILE}"
         )
     if arrays.cell_type not in CELL_TYPES:
         raise InvalidInputError(

@@ -2,7 +2,8 @@
 
 A face is written as its node numbers in cyclic order, such that the right-hand rule gives the normal
 that points out of the cell. In two dimensions faces are edges, listed such that the cell lies to the left of
-them. Two faces are the same when they have the same nodes.
+them. Faces of quadratic cells list their corners first, then the midpoints of the edges that follow the
+corners, then the centre. Two faces are the same when they have the same corners.
 
 Cells of four nodes are tetrahedra unless the caller says ``dim=2``.
 """
@@ -12,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry.cell_types import cell_type_of
+from fenics_contact.geometry.cell_types import HEXAHEDRON27, cell_type_of
 
 
 def cell_faces(cells: np.ndarray, dim: int = 3) -> np.ndarray:
@@ -20,7 +21,7 @@ def cell_faces(cells: np.ndarray, dim: int = 3) -> np.ndarray:
 
     Args:
         cells: Node numbers, (n_cells, 8) for hexahedra, (n_cells, 4) for tetrahedra or (dim=2)
-            quadrilaterals, (n_cells, 3) for triangles.
+            quadrilaterals, (n_cells, 3) for triangles; quadratic ones have 27, 9 or 6.
         dim: Dimension of the space, 2 or 3.
 
     Returns:
@@ -29,17 +30,23 @@ def cell_faces(cells: np.ndarray, dim: int = 3) -> np.ndarray:
     return cells[:, cell_type_of(cells, dim).faces]
 
 
+def corners_of(faces: np.ndarray, dim: int) -> np.ndarray:
+    """Return the corners of faces, linear or quadratic, in cyclic order, (n, 4 | 3 | 2)."""
+    return faces[:, : min(faces.shape[1], 4 if dim == 3 else 2)]
+
+
 def face_keys(faces: np.ndarray) -> np.ndarray:
     """Reduce faces to two integers each that do not depend on the order of the nodes.
 
     Args:
-        faces: Node numbers, (n, 4 | 3 | 2), all below 2**31.
+        faces: Node numbers, (n, 4 | 3 | 2) or of quadratic cells (n, 9 | 3), all below 2**31.
 
     Returns:
         (n, 2) int64; equal rows belong to faces with equal nodes.
     """
     nodes = np.zeros((faces.shape[0], 4), dtype=np.int64)
-    nodes[:, : faces.shape[1]] = np.sort(faces, axis=1)
+    corners = faces[:, :4]
+    nodes[:, : corners.shape[1]] = np.sort(corners, axis=1)
     return (nodes[:, [0, 2]] << 31) + nodes[:, [1, 3]]
 
 
@@ -47,7 +54,7 @@ def number_faces(faces: np.ndarray) -> np.ndarray:
     """Number faces so that those with the same nodes get the same number.
 
     Args:
-        faces: Node numbers, (n, 4 | 3 | 2).
+        faces: Node numbers, as in `face_keys`.
 
     Returns:
         (n,) int64 numbers from 0 without holes.
@@ -70,7 +77,7 @@ def boundary_faces(cells: np.ndarray, dim: int = 3) -> tuple[np.ndarray, np.ndar
         dim: Dimension of the space, 2 or 3.
 
     Returns:
-        The faces, outward, (n, 4 | 3 | 2), and the cell that each belongs to, (n,), ascending.
+        The faces, outward, (n, nodes of a face), and the cell that each belongs to, (n,), ascending.
     """
     faces = cell_faces(cells, dim)
     flat = faces.reshape(-1, faces.shape[2])
@@ -128,7 +135,7 @@ def orient(cells: np.ndarray, facets: np.ndarray, dim: int = 3) -> np.ndarray:
 
     Args:
         cells: Node numbers, as in `cell_faces`.
-        facets: Node numbers in any order, (n, 4 | 3 | 2).
+        facets: Node numbers, (n, nodes of a face), the corners in any order.
         dim: Dimension of the space, 2 or 3.
 
     Returns:
@@ -138,7 +145,7 @@ def orient(cells: np.ndarray, facets: np.ndarray, dim: int = 3) -> np.ndarray:
         InvalidInputError: If a facet is not on the boundary.
     """
     boundary, _ = boundary_faces(cells, dim)
-    found = match_faces(facets, boundary)
+    found = match_faces(corners_of(facets, dim), corners_of(boundary, dim))
     if np.any(found < 0):
         lost = np.flatnonzero(found < 0)
         raise InvalidInputError(
@@ -170,18 +177,22 @@ def vector_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
     """Integrate the outward normal over every facet.
 
     The vector area of a bilinear facet is half the cross product of its diagonals, exactly. In two dimensions
-    it is the edge turned clockwise by a right angle. Over a closed surface the vector areas add up to zero.
+    it is the chord turned clockwise by a right angle, whatever the edge between its ends. Quadratic facets in
+    space are looked at as four bilinear ones. Over a closed surface the vector areas add up to zero.
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2).
-        facets: Node numbers in cyclic order, (n, 4 | 3), or edges with the body on their left, (n, 2).
+        facets: Node numbers in cyclic order, (n, 4 | 3) or quadratic (n, 9), or edges with the body on their
+            left, (n, 2 | 3).
 
     Returns:
         (n, 3 | 2) vectors: normal times area (for a warped facet: of its projection along the mean normal) or
         length.
     """
+    if facets.shape[1] == 9:
+        return np.asarray(sum(vector_areas(points, facets[:, piece]) for piece in HEXAHEDRON27.face_pieces))
     corners = points[facets]
-    if facets.shape[1] == 2:
+    if points.shape[1] == 2:
         along = corners[:, 1] - corners[:, 0]
         return np.column_stack([along[:, 1], -along[:, 0]])
     if facets.shape[1] == 3:

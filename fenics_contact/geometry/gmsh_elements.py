@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry.cell_types import QUADRATIC
+from fenics_contact.geometry.cell_types import QUADRATIC_FILE
 from fenics_contact.geometry.plane import flattened, turned_counter_clockwise
 from fenics_contact.geometry.tagged_mesh import Label, TaggedMesh
 
@@ -77,7 +77,7 @@ def _elements(gmsh: ModuleType, dim: int, source: str) -> dict[int, dict[str, np
         for number, tags in zip(types, nodes, strict=True):
             name, _, order, vertices, *_ = gmsh.model.mesh.getElementProperties(number)
             if order > 1:
-                raise InvalidInputError(f"{source} has cells of type '{name}': {QUADRATIC}")
+                raise InvalidInputError(f"{source} has cells of type '{name}': {QUADRATIC_FILE}")
             if number not in _TYPES:
                 raise InvalidInputError(
                     f"cells must be tetrahedra or hexahedra (in two dimensions triangles or quadrilaterals), "

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -31,11 +32,13 @@ class BodyMesh:
     Attributes:
         points: Coordinates, (n_nodes, 3 | 2) float64, in the scene's unit of length.
         cells: Node numbers, (n_cells, 8) for hexahedra, (n_cells, 4) for tetrahedra; in two dimensions
-            (n_cells, 4) for quadrilaterals, (n_cells, 3) for triangles; int64, vertices in the order of VTK
-            and gmsh, Jacobian positive (in two dimensions: counter-clockwise).
+            (n_cells, 4) for quadrilaterals, (n_cells, 3) for triangles; quadratic hexahedra have 27 nodes,
+            quadratic quadrilaterals 9 and triangles 6 (`quadratic` makes them); int64, nodes in the order of
+            VTK, Jacobian positive (in two dimensions: counter-clockwise).
         surfaces: Name to facets, (n_facets, 4 | 3) int64 node numbers in cyclic order, the right-hand
             normal pointing out of the body. In two dimensions (n_facets, 2) edges with the body on their
-            left: run through in their direction, the boundary goes round the body counter-clockwise.
+            left: run through in their direction, the boundary goes round the body counter-clockwise. Facets
+            of quadratic cells have their midpoints after the corners, 9 or 3 nodes in all.
         grid: Structured index of every cell, (n_cells, 3 | 2) int64, or None. The simplices that a cell was
             split into share its index.
         regions: Name to ascending cell numbers, int64, of the parts of the body that differ, in their
@@ -78,8 +81,17 @@ class BodyMesh:
 
     @property
     def cell_type(self) -> str:
-        """``"hexahedron"``, ``"tetrahedron"``, ``"quadrilateral"`` or ``"triangle"``."""
+        """Name of the type of cells.
+
+        ``"hexahedron"``, ``"tetrahedron"``, ``"quadrilateral"`` or ``"triangle"``; the quadratic ones are
+        ``"hexahedron27"``, ``"quadrilateral9"`` and ``"triangle6"``.
+        """
         return cell_type_of(self.cells, self.dim).name
+
+    @property
+    def order(self) -> int:
+        """Degree of the displacements and of the map from the reference cell, 1 or 2."""
+        return cell_type_of(self.cells, self.dim).order
 
     @property
     def dim(self) -> int:
@@ -123,5 +135,31 @@ class BodyMesh:
             "move the nodes less, spread the motion over more cells, or coarsen the mesh there",
         )
         result = copy(self)
+        result.__dict__.pop("linear", None)
         result._set(points=new_points)
+        return result
+
+    @cached_property
+    def linear(self) -> BodyMesh:
+        """The linear cells through the same nodes; the mesh itself unless its cells are quadratic.
+
+        Contact is searched and pictures are drawn on them. Each cell of order two makes 2^dim of them, one
+        after the other; facets in the same way. There is no grid.
+        """
+        kind = cell_type_of(self.cells, self.dim)
+        if kind.order == 1:
+            return self
+        count, pieces = len(kind.pieces), kind.face_pieces
+        result = copy(self)
+        result._set(
+            cells=self.cells[:, kind.pieces].reshape(-1, kind.pieces.shape[1]),
+            surfaces={
+                name: facets[:, pieces].reshape(-1, pieces.shape[1]) for name, facets in self.surfaces.items()
+            },
+            grid=None,
+            regions={
+                name: (count * cells[:, None] + np.arange(count)).ravel()
+                for name, cells in self.regions.items()
+            },
+        )
         return result

@@ -9,14 +9,15 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.geometry.cell_types import CellType, cell_type_of
+from fenics_contact.geometry.shape_functions import quadrature, shape_gradients
 
 HEXAHEDRON_LATTICE = np.stack(np.meshgrid(*3 * [[0.0, 0.5, 1.0]], indexing="ij"), axis=-1).reshape(-1, 3)
 """Vertices, edge and face midpoints and centre: where the Jacobian of a hexahedron is looked at.
 
 The determinant is quadratic in each coordinate, so these 27 values fix it everywhere."""
 
-_BEST_CORNER = {"tetrahedron": np.sqrt(2.0), "triangle": 2.0 / np.sqrt(3.0)}
-"""One over the corner determinant of unit edge vectors in a regular simplex."""
+_BEST_CORNER = {3: np.sqrt(2.0), 2: 2.0 / np.sqrt(3.0)}
+"""One over the corner determinant of unit edge vectors in a regular simplex, by dimension."""
 
 
 def determinants(matrices: np.ndarray) -> np.ndarray:
@@ -32,15 +33,14 @@ def determinants(matrices: np.ndarray) -> np.ndarray:
     )
 
 
-def _shape_gradients(vertices: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """Gradients of the bi- or trilinear shape functions at one reference position, (n_vertices, d)."""
-    factor = np.where(vertices == 1.0, position, 1.0 - position)
-    others = [np.delete(factor, d, axis=1).prod(axis=1) for d in range(vertices.shape[1])]
-    return np.asarray((2.0 * vertices - 1.0) * np.column_stack(others))
-
-
 def _critical_positions(cell: CellType) -> np.ndarray:
-    """Where the Jacobian is looked at: that of a quadrilateral is linear, so its vertices fix it."""
+    """Where the Jacobian is looked at.
+
+    That of a quadrilateral is linear, so its vertices fix it; that of a hexahedron is fixed by the lattice.
+    On quadratic cells, where no few values bound it, it is looked at in the nodes and in the Gauss points.
+    """
+    if cell.order == 2:
+        return np.concatenate([cell.nodes, quadrature(cell)[0]])
     return HEXAHEDRON_LATTICE if cell.dim == 3 else cell.vertices
 
 
@@ -49,25 +49,25 @@ def jacobians(points: np.ndarray, cells: np.ndarray, positions: np.ndarray | Non
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2).
-        cells: Node numbers, (n_cells, n_vertices).
-        positions: Reference coordinates, (m, 3 | 2), for hexahedra and quadrilaterals; unless given the 27
-            points of `HEXAHEDRON_LATTICE`, or the four vertices. A simplex has one constant Jacobian: six
-            times its volume, or twice its area.
+        cells: Node numbers, (n_cells, nodes of a cell).
+        positions: Reference coordinates, (m, 3 | 2), for all but linear simplices; unless given the 27 points
+            of `HEXAHEDRON_LATTICE`, the four vertices, or nodes and Gauss points of quadratic cells. A linear
+            simplex has one constant Jacobian: six times its volume, or twice its area.
 
     Returns:
-        (n_cells, m), or (n_cells, 1) for simplices, in units of volume (area).
+        (n_cells, m), or (n_cells, 1) for linear simplices, in units of volume (area).
     """
     cell = cell_type_of(cells, points.shape[1])
     corners = points[cells]
-    if cell.is_simplex:
+    if cell.is_affine:
         return determinants(corners[:, 1:] - corners[:, :1])[:, None]
     if positions is None:
         positions = _critical_positions(cell)
     columns = np.ascontiguousarray(corners.transpose(0, 2, 1)).reshape(-1, cells.shape[1])
     values = np.empty((cells.shape[0], positions.shape[0]))
-    for m, position in enumerate(positions):  # a few positions, all cells at once: keeps the arrays small
-        gradients = columns @ _shape_gradients(cell.vertices, position)
-        values[:, m] = determinants(gradients.reshape(-1, cell.dim, cell.dim))
+    # A few positions, all cells at once: keeps the arrays small.
+    for m, gradients in enumerate(shape_gradients(cell, positions)):
+        values[:, m] = determinants((columns @ gradients).reshape(-1, cell.dim, cell.dim))
     return values
 
 
@@ -92,24 +92,27 @@ def scaled_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
         (n_cells,) values in [-1, 1]: 1 for a box or a regular simplex, 0 or less where inverted.
     """
     cell = cell_type_of(cells, points.shape[1])
-    corners = points[cells]
+    corners = points[cells[:, : len(cell.edges)]]
     edges = corners[:, cell.edges] - corners[:, :, None, :]
     length = np.linalg.norm(edges, axis=-1, keepdims=True)
     values = determinants(edges / np.maximum(length, np.finfo(float).tiny)).min(axis=1)
-    return np.asarray(_BEST_CORNER.get(cell.name, 1.0) * values)
+    return np.asarray((_BEST_CORNER[cell.dim] if cell.is_simplex else 1.0) * values)
 
 
 def cell_volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Compute the volume (area) of every cell, exactly.
 
-    Two Gauss points in each direction integrate the quadratic Jacobian of a trilinear map.
+    Two Gauss points in each direction integrate the quadratic Jacobian of a trilinear map, three that of a
+    triquadratic one, of degree five.
 
     Returns:
         (n_cells,) volumes.
     """
     cell = cell_type_of(cells, points.shape[1])
-    gauss = (cell.vertices - 0.5) / np.sqrt(3.0) + 0.5
-    return np.asarray(cell.reference_volume * jacobians(points, cells, gauss).mean(axis=1))
+    if cell.is_affine:
+        return np.asarray(cell.reference_volume * jacobians(points, cells)[:, 0])
+    positions, weights = quadrature(cell)
+    return np.asarray(jacobians(points, cells, positions) @ weights)
 
 
 def volume(points: np.ndarray, cells: np.ndarray) -> float:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry.cell_types import cell_type_of
-from fenics_contact.geometry.faces import boundary_faces, match_faces, start_at_smallest
+from fenics_contact.geometry.faces import boundary_faces, corners_of, match_faces, start_at_smallest
 from fenics_contact.geometry.quality import is_inverted, jacobian_ratio
 
 
@@ -52,7 +52,7 @@ def _check_range(nodes: np.ndarray, n_nodes: int, name: str) -> None:
 
 
 def checked_cells(cells: ArrayLike, n_nodes: int, dim: int) -> np.ndarray:
-    """Return cells, (n_cells, n_vertices) int64, that use every one of the ``n_nodes`` nodes."""
+    """Return cells, (n_cells, nodes of a cell) int64, that use every one of the ``n_nodes`` nodes."""
     array = _integers(cells, "cells")
     cell_type_of(array, dim)
     if array.shape[0] == 0:
@@ -72,7 +72,7 @@ def check_jacobians(points: np.ndarray, cells: np.ndarray, remedy: str) -> None:
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2).
-        cells: Node numbers, (n_cells, n_vertices).
+        cells: Node numbers, (n_cells, nodes of a cell).
         remedy: What to do about it; ends the message.
 
     Raises:
@@ -94,7 +94,7 @@ def check_jacobians(points: np.ndarray, cells: np.ndarray, remedy: str) -> None:
 def checked_surfaces(
     surfaces: Mapping[str, ArrayLike], cells: np.ndarray, n_nodes: int, dim: int
 ) -> dict[str, np.ndarray]:
-    """Return named facets, (n_facets, 4 | 3 | 2) int64 each, that are outward boundary faces of the cells."""
+    """Return named facets, (n_facets, nodes of a facet) int64, outward boundary faces of the cells."""
     checked: dict[str, np.ndarray] = {}
     if not surfaces:
         return checked
@@ -107,13 +107,16 @@ def checked_surfaces(
                 f"got {array.shape}: leave out a surface that is empty"
             )
         _check_range(array, n_nodes, f"surface '{name}'")
-        _check_facets(name, array, boundary, dim)
-        checked[name] = array
+        found = _facets_found(name, array, boundary, dim)
+        # Midpoints follow from the corners; from here on they stand where `boundary_faces` has them.
+        checked[name] = array if boundary.shape[1] == corners_of(boundary, dim).shape[1] else boundary[found]
+        checked[name].setflags(write=False)
     return checked
 
 
-def _check_facets(name: str, facets: np.ndarray, boundary: np.ndarray, dim: int) -> None:
-    found = match_faces(facets, boundary)
+def _facets_found(name: str, facets: np.ndarray, boundary: np.ndarray, dim: int) -> np.ndarray:
+    """Return which boundary faces the facets are, (n_facets,)."""
+    found = match_faces(corners_of(facets, dim), corners_of(boundary, dim))
     lost = np.flatnonzero(found < 0)
     if lost.size:
         raise InvalidInputError(
@@ -121,7 +124,17 @@ def _check_facets(name: str, facets: np.ndarray, boundary: np.ndarray, dim: int)
             f"are not, first facet {lost[0]} with nodes {facets[lost[0]].tolist()}: take them from "
             f"`boundary_faces(cells, dim={dim})`"
         )
-    same = (start_at_smallest(facets) == start_at_smallest(boundary[found])).all(axis=1)
+    there = boundary[found]
+    wrong = np.flatnonzero((np.sort(facets, axis=1) != np.sort(there, axis=1)).any(axis=1))
+    if wrong.size:
+        raise InvalidInputError(
+            f"surface '{name}' must list the corners of each facet, then the midpoints of its edges, then "
+            f"its centre, {wrong.size} of {facets.shape[0]} facets have other nodes, first facet {wrong[0]} "
+            f"with nodes {facets[wrong[0]].tolist()} instead of {there[wrong[0]].tolist()}: take them from "
+            f"`boundary_faces(cells, dim={dim})`"
+        )
+    given, known = (start_at_smallest(corners_of(faces, dim)) for faces in (facets, there))
+    same = (given == known).all(axis=1)
     if not same.all():
         first = int(np.argmin(same))
         raise InvalidInputError(
@@ -129,6 +142,7 @@ def _check_facets(name: str, facets: np.ndarray, boundary: np.ndarray, dim: int)
             f"{np.count_nonzero(~same)} of {facets.shape[0]} facets do not, first facet {first} with nodes "
             f"{facets[first].tolist()}: order them with `orient(cells, facets, dim={dim})`"
         )
+    return found
 
 
 def checked_grid(grid: ArrayLike | None, n_cells: int, dim: int) -> np.ndarray | None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry.cell_types import QUADRATIC
+from fenics_contact.geometry.cell_types import QUADRATIC_FILE
 
 _FACETS = {
     "tetrahedron": ("triangle",),
@@ -98,7 +98,7 @@ def _check_topology(grid: Grid, path: Path) -> None:
         )
     if "_" in grid.topology:  # Tetrahedron_10, Hexahedron_27
         raise InvalidInputError(
-            f"grid '{grid.name}' of file '{path}' is of type '{grid.topology}': {QUADRATIC}"
+            f"grid '{grid.name}' of file '{path}' is of type '{grid.topology}': {QUADRATIC_FILE}"
         )
     if grid.topology in ("wedge", "pyramid"):
         raise InvalidInputError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -19,33 +20,46 @@ _MESHIO_NAMES = {
     "tetrahedron": "tetra",
     "quadrilateral": "quad",
     "triangle": "triangle",
+    "hexahedron27": "hexahedron27",
+    "quadrilateral9": "quad9",
+    "triangle6": "triangle6",
 }
 
 
-def write_vtu(state: State, folder: str | Path, name: str = "state") -> Path:
+def write_vtu(
+    state: State,
+    folder: str | Path,
+    name: str = "state",
+    *,
+    cell_fields: Mapping[str, Mapping[str, np.ndarray]] | None = None,
+) -> Path:
     """Write a state for ParaView: a file for each body and a multi-block file to open. Collective.
 
-    On points: ``displacement`` and the fields of `contact_fields`. On cells: ``von_mises`` and ``subdomain``,
-    numbered over all bodies. Plane bodies lie in the plane z = 0, their vectors have no z component.
+    On points: ``displacement`` and the fields of `contact_fields`. On cells: ``von_mises``, ``subdomain``,
+    numbered over all bodies, and what is given. Plane bodies lie in the plane z = 0, their vectors have no z
+    component.
 
     Args:
         state: The state.
         folder: Where to write; created.
         name: What the files' names begin with: "state" gives "state.vtm" and, for a body "link 1",
             "state_link_1.vtu". Files are replaced when the new ones are complete.
+        cell_fields: More fields: name -> body -> a number or a row for every cell, such as
+            ``{"discretisation_error": {body: estimate.by_cell(body) for body in state.scene.bodies}}``.
 
     Returns:
         The multi-block file.
 
     Raises:
-        InvalidInputError: If the name holds a folder.
+        InvalidInputError: If the name holds a folder, or a field lacks a body or does not fit its cells.
     """
     if not name.strip(".") or Path(name).name != name:
         raise InvalidInputError(
             f"name must be the beginning of a file's name, got {name!r}: put folders into folder"
         )
+    more = {body: _checked(state, body, cell_fields or {}) for body in state.scene.bodies}
     index = Path(folder) / f"{name}.vtm"
-    meshes = {body: _gathered(state, body) for body in state.scene.bodies}
+    meshes = {body: _gathered(state, body, more[body]) for body in state.scene.bodies}
     files = list(file_of_each(meshes, index.parent, name, ".vtu").values())
     comm = state.torn.decomposition.comm
     with together(comm):
@@ -58,18 +72,34 @@ def write_vtu(state: State, folder: str | Path, name: str = "state") -> Path:
     return index
 
 
-def _gathered(state: State, body: str) -> meshio.Mesh:
+def _checked(
+    state: State, body: str, fields: Mapping[str, Mapping[str, np.ndarray]]
+) -> dict[str, np.ndarray]:
+    count, found = state.scene.bodies[body].mesh.n_cells, {}
+    for name, values in fields.items():
+        found[name] = np.asarray(values[body]) if body in values else np.zeros(0)
+        if found[name].shape[:1] != (count,):
+            given = f"shape {found[name].shape}" if body in values else "none"
+            raise InvalidInputError(
+                f"the cell field {name!r} must have {count} rows for body {body!r}, one a cell, got {given}: "
+                "give every body an array in the order of the cells of its mesh"
+            )
+    return found
+
+
+def _gathered(state: State, body: str, more: Mapping[str, np.ndarray]) -> meshio.Mesh:
     mesh = state.scene.bodies[body].mesh
     decomposition = state.torn.decomposition
     tearing = decomposition.tearing
     first = int(tearing.subdomain_offset[tearing.body_names.index(body)])
     subdomain = np.asarray(decomposition.partitions[body], dtype=np.int32) + np.int32(first)
     fields = {"displacement": state.gather_displacement(body), **contact_fields(state, body)}
+    cells = {"von_mises": state.gather_von_mises(body), "subdomain": subdomain, **more}
     return meshio.Mesh(
         _in_space(mesh.points),
         [(_MESHIO_NAMES[mesh.cell_type], mesh.cells)],
         point_data={key: _in_space(values) for key, values in fields.items()},
-        cell_data={"von_mises": [state.gather_von_mises(body)], "subdomain": [subdomain]},
+        cell_data={key: [_in_space(values)] for key, values in cells.items()},
     )
 
 

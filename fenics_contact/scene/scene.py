@@ -55,6 +55,7 @@ class Scene:
             self._require(pair.slave.body, pair.slave.name, f"{kind}.slave")
             if isinstance(pair.master, Surface):
                 self._require(pair.master.body, pair.master.name, f"{kind}.master")
+                self._require_linear(pair.slave, pair.master, pair.discretisation, kind)
             else:
                 self._require_dimension(pair.master)
 
@@ -92,6 +93,16 @@ class Scene:
                 "a RigidSphere for a round bar"
             )
 
+    def _require_linear(self, slave: Surface, master: Surface, discretisation: str, kind: str) -> None:
+        """Refuse mortar coupling of quadratic facets."""
+        orders = {surface.name: self.bodies[surface.body].mesh.order for surface in (slave, master)}
+        if discretisation == "mortar" and max(orders.values()) > 1:
+            raise InvalidInputError(
+                f"{kind} with discretisation='mortar' needs linear cells on both sides, got cells of order "
+                f"{orders}: mean gaps of linear facets do not pass the patch test between quadratic cells; "
+                "use discretisation='node', or linear cells"
+            )
+
     def _require_expansion(self, load: ThermalStrain) -> None:
         stiff = [material for material in self.bodies[load.body].materials if not can_expand(material)]
         if stiff:
@@ -121,8 +132,8 @@ class Scene:
         return tuple(self.bodies)
 
     def facets(self, surface: Surface) -> np.ndarray:
-        """Return the facets of a surface, rows of node numbers of its body."""
-        return self.bodies[surface.body].mesh.surfaces[surface.name]
+        """Return the linear facets through the nodes of a surface, rows of node numbers of its body."""
+        return self.bodies[surface.body].mesh.linear.surfaces[surface.name]
 
     def moved(self, points: Mapping[str, np.ndarray]) -> Scene:
         """Return the scene with new coordinates for some bodies; topology and names stay.

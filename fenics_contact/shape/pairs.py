@@ -11,15 +11,21 @@ from fenics_contact.scene import Scene, Surface
 
 
 def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
-    """Refuse designs that move surfaces of mortar contact or of ties.
+    """Refuse designs that move surfaces of mortar contact or of ties, or bodies of quadratic cells.
 
     Args:
         scene: The scene.
         moving: Body name -> whether a design moves each node, shape (n_nodes,).
 
     Raises:
-        InvalidInputError: Names the pair and the surface.
+        InvalidInputError: Names the pair and the surface, or the body.
     """
+    for body, nodes in moving.items():
+        if nodes.any() and scene.bodies[body].mesh.order > 1:
+            raise InvalidInputError(
+                f"a design may move only bodies of linear cells, those of {body!r} are of order "
+                f"{scene.bodies[body].mesh.order}: use the mesh that `quadratic` was given"
+            )
     for number, pair in enumerate(scene.contacts):
         if pair.discretisation == "mortar" and isinstance(pair.master, Surface):
             _check(scene, moving, (pair.slave, pair.master), f"mortar contact pair {number}", "node")

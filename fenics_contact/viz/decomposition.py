@@ -77,13 +77,14 @@ def _draw(
     cells = sum(body.mesh.n_cells for body in scene.bodies.values())
     title = f"{_number(count, 'subdomain')} of {_number(len(scene.bodies), 'body', 'bodies')}, "
     title += f"{written(cells)} cells"
+    parts = [_linear(body.mesh, partitions[name]) for name, body in scene.bodies.items()]
+    points = np.concatenate([mesh.points for mesh, _ in parts])
     if scene.dim == 2:
-        _draw_in_plane(scene, partitions, target, (explode, title, width))
+        _draw_in_plane(parts, points, target, (explode, title, width))
         return
     layers = []
-    for family, (name, body) in enumerate(scene.bodies.items()):
-        layers += _body_layers(body.mesh, np.asarray(partitions[name]), family, explode)
-    points = np.concatenate([body.mesh.points for body in scene.bodies.values()])
+    for family, (mesh, partition) in enumerate(parts):
+        layers += _body_layers(mesh, partition, family, explode)
     view = oblique_view(points)
     frame = frame_around(view, points)
     image = render(layers, view, frame, width)
@@ -92,24 +93,28 @@ def _draw(
         place_image(figure, image, 0, band)
 
 
+def _linear(mesh: BodyMesh, partition: np.ndarray) -> tuple[BodyMesh, np.ndarray]:
+    """Return the linear cells to draw and the subdomain of each."""
+    return mesh.linear, np.repeat(np.asarray(partition), mesh.linear.n_cells // mesh.n_cells)
+
+
 def _number(count: int, one: str, many: str = "") -> str:
     return f"{count} {one if count == 1 else many or one + 's'}"
 
 
 def _draw_in_plane(
-    scene: Scene, partitions: Mapping[str, np.ndarray], target: Path, look: tuple[float, str, int]
+    parts: list[tuple[BodyMesh, np.ndarray]], points: np.ndarray, target: Path, look: tuple[float, str, int]
 ) -> None:
     explode, title, width = look
-    points = np.concatenate([body.mesh.points for body in scene.bodies.values()])
     border = 0.03 * float(np.ptp(points, axis=0).max())
     low, high = points.min(axis=0) - border, points.max(axis=0) + border
     height = float(np.clip(0.85 * (high - low)[1] / (high - low)[0] + 0.1, 0.3, 1.0))
     with sheet(target, (width, round(height * width)), title, "constrained") as figure:
         axes = figure.subplots()
-        for family, (name, body) in enumerate(scene.bodies.items()):
-            _draw_plane_body(axes, body.mesh, np.asarray(partitions[name]), family, explode)
+        for family, (mesh, partition) in enumerate(parts):
+            _draw_plane_body(axes, mesh, partition, family, explode)
             if not explode:
-                draw_cell_edges(axes, body.mesh.points, body.mesh.cells, low, high)
+                draw_cell_edges(axes, mesh.points, mesh.cells, low, high)
         window(axes, low, high, "length")
         axes.set_axis_off()
 

@@ -15,7 +15,7 @@ class Moved:
     """One body and how it moves, replicated on all ranks.
 
     Attributes:
-        mesh: The body's mesh in the state's geometry.
+        mesh: The body's mesh in the state's geometry, quadratic cells cut into linear ones.
         displacement: (n_nodes, dim), [length].
     """
 
@@ -55,7 +55,9 @@ def moved(state: State) -> dict[str, Moved]:
 
 def gather(state: State) -> dict[str, BodyFields]:
     """Collect displacement and stress of all bodies on every rank. Collective."""
-    return {
-        name: BodyFields(body.mesh, state.gather_displacement(name), state.gather_von_mises(name))
-        for name, body in state.scene.bodies.items()
-    }
+    found = {}
+    for name, body in state.scene.bodies.items():
+        linear = body.mesh.linear
+        stress = np.repeat(state.gather_von_mises(name), linear.n_cells // body.mesh.n_cells)
+        found[name] = BodyFields(linear, state.gather_displacement(name), stress)
+    return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -12,12 +12,22 @@ from mpi4py import MPI
 from fenics_contact.accuracy import Certificate, certify, friction_error
 from fenics_contact.contact import State, find_state, solve_scene
 from fenics_contact.contact.equilibrium import solve_dual
-from fenics_contact.geometry import bisection_partition, block, box_partition, graph_partition, hemisphere
+from fenics_contact.geometry import (
+    bisection_partition,
+    block,
+    box_partition,
+    graph_partition,
+    hemisphere,
+    quadratic,
+    rectangle,
+)
 from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG, solve
 from fenics_contact.scene import (
     Body,
     ContactPair,
     Coulomb,
+    PlaneStress,
+    RigidSphere,
     Scene,
     Support,
     Surface,
@@ -69,12 +79,34 @@ def ball() -> Scene:
     )
 
 
+def belt() -> Scene:
+    """A thin belt that is drawn around a quarter of a drum: all of it slides, and hardly stretches."""
+    mesh = rectangle((0.0, 0.0), (np.pi / 2, 0.02), (100, 1))
+    angle, radius = mesh.points[:, 0], 1.0 + mesh.points[:, 1]
+    mesh = mesh.moved(np.column_stack([radius * np.sin(angle), radius * np.cos(angle)]))
+    return Scene(
+        {"belt": Body(mesh, PlaneStress(1e6, 0.3))},
+        [Support("belt", "x0", (lambda x: -0.03 * x[:, 1], None))],
+        [Traction("belt", "x1", (0.0, -50.0))],
+        [ContactPair(Surface("belt", "y0"), RigidSphere((0.0, 0.0), 1.0), Coulomb(0.3))],
+    )
+
+
+def curved() -> Scene:
+    """The pressed plate of quadratic cells, whose corners and midpoints are contact points."""
+    scene = effect_cases.plane()
+    return replace(
+        scene, bodies={name: replace(b, mesh=quadratic(b.mesh)) for name, b in scene.bodies.items()}
+    )
+
+
 @dataclass(frozen=True)
 class Case:
-    """A scene with its partition."""
+    """A scene with its partition, and the tolerance of the solution that counts as exact."""
 
     make: Callable[[], Scene]
     cut: Cut
+    finest: float = 1e-11
 
 
 CASES = {
@@ -92,6 +124,8 @@ CASES = {
     "a mortar pair": Case(effect_cases.mortar, graph(4)),
     "a stiff body on a soft one": Case(effect_cases.stiff_on_soft, graph(4)),
     "a tie": Case(effect_cases.tied, graph(4)),
+    "a thin belt": Case(belt, boxes(6, 1), 1e-9),
+    "quadratic cells": Case(curved, graph(4)),
     "two dimensions": Case(effect_cases.plane, graph(4)),
 }
 

@@ -47,7 +47,7 @@ def estimated(scene: Scene, field: Field, parts: int = 1) -> DiscretisationError
 def recovered(scene: Scene, field: Field, parts: int = 1) -> tuple[Sites, np.ndarray]:
     """Sites and recovered gradients of a field that is taken at the nodes."""
     torn = torn_up(scene, parts)
-    sites = find_sites(torn)
+    sites = find_sites(torn, next(iter(scene.bodies.values())).mesh.order)
     return sites, recovered_gradients(sites, nodal_displacement(torn, torn_field(torn, field))[sites.node])
 
 
@@ -61,6 +61,21 @@ def linear(dim: int) -> tuple[Field, np.ndarray]:
     """A linear displacement of order 0.01 with strain and rotation, and its gradient."""
     slope = 0.01 * np.cos(np.arange(dim * dim)).reshape(dim, dim)
     return (lambda points: points @ slope.T + 0.3), slope
+
+
+def cubic(dim: int) -> tuple[Field, Callable[[np.ndarray], np.ndarray]]:
+    """A cubic displacement and its gradient at points, (n, dim, dim)."""
+    add, slope = quadratic(dim)
+    along = np.cos(2.0 + np.arange(2 * dim)).reshape(2, dim)
+
+    def field(points: np.ndarray) -> np.ndarray:
+        return add(points) + 0.01 * (points @ along[0])[:, None] ** 3 * along[1]
+
+    def gradient(points: np.ndarray) -> np.ndarray:
+        bend = 0.03 * (points @ along[0])[:, None, None] ** 2 * along[1][:, None] * along[0]
+        return np.asarray(slope(points) + bend)
+
+    return field, gradient
 
 
 def quadratic(dim: int) -> tuple[Field, Callable[[np.ndarray], np.ndarray]]:

@@ -10,7 +10,7 @@ import ufl
 from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
-from fenics_contact.geometry import BodyMesh, bisection_partition, block, rectangle
+from fenics_contact.geometry import CELL_TYPES, BodyMesh, bisection_partition, block, quadratic, rectangle
 from fenics_contact.scene import Body, BodyForce, IsotropicElasticity, PlaneStrain, Scene, Support, Ufl
 from fenics_contact.scene.materials.constants import lame
 from tests.accuracy.true_error import error_by_cell
@@ -68,15 +68,20 @@ class Found:
         return float(np.linalg.norm(self.error))
 
 
-def mesh_of(cell: str, n: int) -> BodyMesh:
-    """A square or a cube of edge length one."""
+def mesh_of(cell: str, n: int, shake: float = 0.0) -> BodyMesh:
+    """A square or a cube of edge length one, inner nodes moved at random by up to ``shake`` cells."""
+    if CELL_TYPES[cell].order == 2:
+        return quadratic(mesh_of(cell.rstrip("0123456789"), n, shake))
+    return _shaken(_linear(cell, n), shake)
+
+
+def _linear(cell: str, n: int) -> BodyMesh:
     if cell in PLANE:
         return rectangle((0, 0), (1, 1), (n, n), cell)
     return block((0, 0, 0), (1, 1, 1), (n, n, n), cell)
 
 
-def shaken(mesh: BodyMesh, size: float) -> BodyMesh:
-    """The same with inner nodes moved at random by up to ``size`` cells."""
+def _shaken(mesh: BodyMesh, size: float) -> BodyMesh:
     points = mesh.points.copy()
     inner = np.all((points > 1e-9) & (points < 1 - 1e-9), axis=1)
     step = 1 / (round(mesh.n_nodes ** (1 / mesh.dim)) - 1)

@@ -113,6 +113,14 @@ def test_a_number_beats_the_tolerance_of_the_solver() -> None:
     assert share.counts["f_products"] < own.counts["f_products"]
 
 
+def test_derivatives_have_a_fixed_tolerance() -> None:
+    scene = CASES[PAIR].make()
+    decomposition = decompose(scene, CASES[PAIR].cut(scene), MPI.COMM_SELF)
+    state = find_state(scene, decomposition, sensitivity=True)
+    assert state.dual_solution.residuals.within(1e-6)
+    assert not remarks(state)
+
+
 def test_every_load_step_is_balanced() -> None:
     scene = effect_cases.plane()
     steps = effect_cases.there_and_back()

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from fenics_contact.geometry import BodyMesh, block, half_disc, hemisphere, rectangle
+from fenics_contact.geometry import quadratic as quadratic_cells
 from fenics_contact.geometry.rectangle import rectangle_lattice
 from fenics_contact.scene import Body, IsotropicElasticity, PlaneStrain, Scene
 from tests.accuracy.fields import (
+    cubic,
     estimated,
     linear,
     norm,
@@ -55,6 +57,31 @@ def test_the_recovered_gradient_of_a_quadratic_displacement_is_exact_at_every_no
     assert sites.count == mesh.n_nodes
     assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
     assert estimated(scene_of(mesh), field).total > 1e-3, "the cells cannot follow"
+
+
+@pytest.mark.parametrize("name", [f"bent {cell}" for cell in ("triangle", "quadrilateral", "hexahedron")])
+def test_on_quadratic_cells_the_recovered_gradient_of_a_cubic_displacement_is_exact(name: str) -> None:
+    mesh = quadratic_cells(MESHES[name]())
+    assert mesh.order == 2
+    field, gradient = cubic(mesh.dim)
+    sites, found = recovered(scene_of(mesh), field, 2)
+    expected = gradient(sites.points)
+    assert sites.count == mesh.n_nodes
+    assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
+    assert estimated(scene_of(mesh), field).total > 1e-4, "the cells cannot follow"
+    straight, _ = quadratic(mesh.dim)
+    assert estimated(scene_of(mesh), straight).total < 1e-3 * estimated(scene_of(mesh), field).total
+
+
+def test_bodies_of_linear_and_of_quadratic_cells_have_estimates_side_by_side() -> None:
+    low, high = rectangle((0, 0), (2, 1), (6, 4)), rectangle((0, 1), (2, 2), (5, 3))
+    bodies = {"low": Body(quadratic_cells(low), steel(2)), "high": Body(high, steel(2))}
+    field, _ = cubic(2)
+    alone = {name: estimated(Scene({name: body}), field, 2).by_body[name] for name, body in bodies.items()}
+    found = estimated(Scene(bodies), field, 3)
+    assert found.by_body == pytest.approx(alone, rel=1e-9)
+    assert found.by_cell("low").shape == (24,)
+    assert np.linalg.norm(found.by_cell("low")) == pytest.approx(alone["low"])
 
 
 def test_a_mesh_with_one_layer_of_cells_still_recovers_what_its_nodes_tell() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_steps
-from fenics_contact.geometry import block, graph_partition, rectangle
+from fenics_contact.geometry import block, graph_partition, quadratic, rectangle
 from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG
 from fenics_contact.scene import (
     Body,
@@ -48,6 +48,13 @@ def stiff_on_soft() -> Scene:
     scene = two_blocks(Tresca(0.8))
     bodies = {**scene.bodies, "upper": replace(scene.bodies["upper"], material=IsotropicElasticity(3e5, 0.3))}
     return replace(scene, bodies=bodies)
+
+
+def quadratic_on_linear() -> Scene:
+    """The lower block of quadratic cells, the crowned upper one of linear ones."""
+    scene = two_blocks(Coulomb(0.38))
+    lower = replace(scene.bodies["lower"], mesh=quadratic(scene.bodies["lower"].mesh))
+    return replace(scene, bodies={**scene.bodies, "lower": lower})
 
 
 def tied() -> Scene:
@@ -95,6 +102,7 @@ AS_IT_IS = [LoadStep("all at once")]
 CASES: dict[str, tuple[Callable[[], Scene], list[LoadStep]]] = {
     "mortar": (mortar, AS_IT_IS),
     "stiff on soft": (stiff_on_soft, AS_IT_IS),
+    "quadratic": (quadratic_on_linear, AS_IT_IS),
     "tied": (tied, AS_IT_IS),
     "load steps in the plane": (plane, there_and_back()),
 }

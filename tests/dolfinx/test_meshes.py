@@ -67,7 +67,7 @@ def test_moved_coordinates_reach_the_nodes_they_are_meant_for(cell: str) -> None
 def test_facets_are_found_whatever_the_order_of_their_vertices(cell: str) -> None:
     mesh = skewed_block(cell)
     own = _dolfinx.local_mesh(mesh.points, mesh.cells, cell)
-    corners = np.array(_dolfinx.FACET_VERTICES[cell])
+    corners = np.array(_dolfinx.facet_vertices(cell))
     for facets in mesh.surfaces.values():
         rng = np.random.default_rng(5)
         shuffled = rng.permuted(facets, axis=1)[rng.permutation(len(facets))]

@@ -177,3 +177,39 @@ def test_weighting_by_stiffness_saves_products_where_materials_differ(
     weighted = products()
     monkeypatch.setattr(DualSystem, "_compliance", lambda self: np.ones(len(self.inverse.interface)))
     assert weighted < 0.75 * products()
+
+
+@pytest.mark.parametrize("kind", [LocalKind.IMPLICIT, LocalKind.EXPLICIT])
+@pytest.mark.parametrize("unit", [1e-12, 1.0, 1e9])
+def test_the_energy_of_a_displacement_is_bounded_from_above_and_closely(kind: LocalKind, unit: float) -> None:
+    scene, parts = touching_blocks()
+    system = DualSystem(build_torn_system(scene, decompose(scene, parts, MPI.COMM_SELF)), kind=kind)
+    exact = DualSystem(system.torn, kind=LocalKind.IMPLICIT).inverse
+    rng = np.random.default_rng(0)
+    rigid = system.kernel[system.inverse.interface] @ rng.normal(size=system.kernel.shape[1])
+    for share in (1.0, 1e-3):
+        bent = share * rng.normal(size=len(rigid))
+        energy = bent @ exact.stiffen(bent)
+        assert energy > 0.0
+        bound, force = system.inverse.energy(unit * (rigid + bent))
+        assert (1 - 1e-9) * unit**2 * energy <= bound <= 1.001 * unit**2 * energy
+        np.testing.assert_allclose(
+            force, unit * exact.stiffen(bent), atol=1e-5 * unit * np.abs(force / unit).max()
+        )
+    assert system.inverse.energy(np.zeros_like(rigid))[0] == 0.0
+
+
+def test_a_lifting_closes_the_rows_of_a_face() -> None:
+    scene, parts = touching_blocks()
+    system = DualSystem(build_torn_system(scene, decompose(scene, parts, MPI.COMM_SELF)))
+    layout = system.problem.layout
+    rows = np.concatenate([layout.equality, layout.normal[::2]])
+    face = sp.csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(layout.size, len(rows)))
+    jump = face @ np.random.default_rng(1).normal(size=len(rows))
+    lifting = system.preconditioner.lifting(face)
+    moved = system.interface_jump(lifting.jump(jump))
+    assert len(layout.normal) > 3
+    np.testing.assert_allclose(moved[rows], jump[rows], atol=1e-3 * np.abs(jump).max())
+    _, force = system.inverse.energy(lifting.jump(jump))
+    expected = system.preconditioner.on_face(face)(jump)
+    np.testing.assert_allclose(lifting.multiplier(force), expected, atol=1e-5 * np.abs(expected).max())

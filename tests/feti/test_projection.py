@@ -7,8 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from fenics_contact.feti.facet_areas import quadrature_areas
 from fenics_contact.feti.projection import Projection, project
-from fenics_contact.feti.surface import FacetedSurface, faceted_surface, quadrature_areas, shape_functions
+from fenics_contact.feti.surface import FacetedSurface, faceted_surface, shape_functions
 
 CORNERS = [4, 3]
 Height = Callable[[np.ndarray, np.ndarray], np.ndarray]

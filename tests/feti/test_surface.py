@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.facet_areas import quadrature_areas
 from fenics_contact.feti.surface import (
     FacetedSurface,
     edge_distance,
     faceted_surface,
     outside,
-    quadrature_areas,
     shape_functions,
     shape_second_mixed,
 )

@@ -85,10 +85,10 @@ def test_duplicate_nodes_are_refused_with_their_body(tmp_path: Path) -> None:
         read_msh(path)
 
 
-def test_quadratic_cells_are_refused_with_the_reason(tmp_path: Path) -> None:
+def test_quadratic_cells_of_a_file_are_refused_with_what_to_do(tmp_path: Path) -> None:
     points = [(0, 0, 0), (2, 0, 0), (0, 2, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
     path = write_22(tmp_path / "q.msh", points, [(TRIANGLE_6, 1, range(6))], {(2, 1): "lug"})
-    message = r"'Triangle 6': quadratic cells are not supported: the contact .* Mesh\.ElementOrder = 1"
+    message = r"'Triangle 6': quadratic cells are not read from files: .* Mesh\.ElementOrder = 1"
     with pytest.raises(InvalidInputError, match=message):
         read_msh(path)
 

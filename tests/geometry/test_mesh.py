@@ -68,7 +68,7 @@ def test_a_coordinate_that_is_not_finite_is_named(parts: dict[str, Any], value: 
 
 def test_cells_of_another_shape_are_refused(parts: dict[str, Any]) -> None:
     parts["cells"] = parts["cells"][:, :6]
-    with pytest.raises(InvalidInputError, match=r"\(n_cells, 8\) for hexahedra, got \(2, 6\)"):
+    with pytest.raises(InvalidInputError, match=r"\(n_cells, 8\) for hexahedra or .*, got \(2, 6\)"):
         BodyMesh(**parts)
 
 
@@ -196,8 +196,8 @@ def test_a_mesh_needs_no_surfaces_and_no_grid() -> None:
     assert boundary_faces(plain.cells)[0].shape == (6, 4)
 
 
-@pytest.mark.parametrize(("dim", "nodes"), [(3, 10), (3, 20), (3, 27), (2, 6), (2, 9)])
-def test_quadratic_cells_are_refused_with_the_reason(dim: int, nodes: int) -> None:
-    points = np.random.default_rng(0).random((nodes, dim))
+@pytest.mark.parametrize("nodes", [10, 20])
+def test_quadratic_cells_without_force_at_corners_are_refused_with_the_reason(nodes: int) -> None:
+    points = np.random.default_rng(0).random((nodes, 3))
     with pytest.raises(InvalidInputError, match=r"quadratic cells are not supported: .* positive under a"):
         BodyMesh(points, np.arange(nodes)[None])

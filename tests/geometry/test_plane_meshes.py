@@ -144,13 +144,13 @@ def test_regular_cells_have_the_best_quality_there_is() -> None:
 @pytest.mark.parametrize("name", CELL_TYPES)
 def test_the_reference_cell_has_its_volume_and_faces_outwards(name: str) -> None:
     cell = CELL_TYPES[name]
-    alone = np.arange(cell.vertices.shape[0])[None]
-    assert volume(cell.vertices, alone) == pytest.approx(cell.reference_volume)
-    areas = vector_areas(cell.vertices, cell.faces)
-    outward = cell.vertices[cell.faces].mean(axis=1) - cell.vertices.mean(axis=0)
+    alone = np.arange(cell.nodes.shape[0])[None]
+    assert volume(cell.nodes, alone) == pytest.approx(cell.reference_volume)
+    areas = vector_areas(cell.nodes, cell.faces)
+    outward = cell.nodes[cell.faces].mean(axis=1) - cell.nodes.mean(axis=0)
     assert np.sum(areas * outward, axis=1).min() > 0.0
     assert areas.sum(axis=0) == pytest.approx(np.zeros(cell.dim), abs=1e-15)
-    assert scaled_jacobian(cell.vertices, alone)[0] > 0.5
+    assert scaled_jacobian(cell.nodes, alone)[0] > 0.5
 
 
 def test_triangles_of_three_coordinates_are_no_solid() -> None:

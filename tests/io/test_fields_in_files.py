@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 
+from fenics_contact.accuracy import discretisation_error
 from fenics_contact.contact import State, Status
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.io import write_vtu, write_xdmf
@@ -60,6 +61,33 @@ def test_vtu_files_number_the_subdomains_of_all_bodies(tmp_path: Path) -> None:
     for first, (name, partition) in zip((0, 2), partitions(state.scene).items(), strict=True):
         np.testing.assert_array_equal(read[name].cell_data["subdomain"], first + partition)
         assert len(np.unique(partition)) == 2
+
+
+def test_vtu_files_hold_further_fields_of_the_cells(tmp_path: Path) -> None:
+    for state in (touching_blocks(), plane_block()):
+        found = discretisation_error(state.torn, state.torn_displacement)
+        error = {body: found.by_cell(body) for body in state.scene.bodies}
+        middle = {name: b.mesh.points[b.mesh.cells].mean(axis=1) for name, b in state.scene.bodies.items()}
+        read = pv.read(write_vtu(state, tmp_path, cell_fields={"error": error, "middle": middle}))
+        for name, body in state.scene.bodies.items():
+            assert error[name].min() > 0
+            np.testing.assert_array_equal(read[name].cell_data["error"], error[name])
+            assert read[name].cell_data["middle"].shape == (body.mesh.n_cells, 3)
+
+
+@pytest.mark.parametrize(
+    ("field", "message"),
+    [
+        ({}, r"the cell field 'error' must have 192 rows for body 'block', one a cell, got none: give every"),
+        ({"block": np.zeros(3)}, r"must have 192 rows for body 'block', one a cell, got shape \(3,\)"),
+    ],
+)
+def test_a_field_that_does_not_fit_the_cells_is_refused(
+    field: dict[str, np.ndarray], message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        write_vtu(plane_block(), tmp_path, cell_fields={"error": field})
+    assert not list(tmp_path.iterdir())
 
 
 def test_vtu_files_hold_the_contact_of_the_slave(tmp_path: Path) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fenics_contact.geometry import CELL_TYPES, FACET_TYPES, quadrature
+
 
 def local_coordinates(points: np.ndarray, flat: np.ndarray) -> np.ndarray:
     """Invert the (bi)linear map of flat facets.
@@ -52,18 +54,6 @@ def rule(dim: int) -> tuple[np.ndarray, np.ndarray]:
 
     Returns:
         Barycentric coordinates, shape (q, dim), and weights that add up to one, shape (q,).
-
-    References:
-        Radon, J.: Zur mechanischen Kubatur. Monatshefte für Mathematik 52 (1948).
     """
-    if dim == 2:
-        x = 0.5 + np.sqrt(0.15) * np.array([-1.0, 0.0, 1.0])
-        return np.column_stack([1 - x, x]), np.array([5.0, 8.0, 5.0]) / 18
-    root = np.sqrt(15.0)
-    points: list[np.ndarray] = [np.full((1, 3), 1 / 3)]
-    weights = [0.225]
-    for sign in (-1, 1):
-        near, share = (6 + sign * root) / 21, (155 + sign * root) / 1200
-        points.append(np.where(np.eye(3, dtype=bool), 1 - 2 * near, near))
-        weights += [share] * 3
-    return np.concatenate(points), np.array(weights)
+    positions, weights = quadrature(FACET_TYPES[3, 2] if dim == 2 else CELL_TYPES["triangle6"])
+    return np.column_stack([1 - positions.sum(axis=1), positions]), weights / weights.sum()
