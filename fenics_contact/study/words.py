@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fenics_contact.geometry import CELL_TYPES
+
 
 def percent(value: float) -> str:
     """Write a relative number in percent, with two digits."""
@@ -15,8 +17,9 @@ def seconds(value: float) -> str:
 
 def plural(name: str) -> str:
     """Return what cells or a discretisation of contact are called: "hexahedra", "contact by nodes"."""
-    known = {"hexahedron": "hexahedra", "tetrahedron": "tetrahedra", "node": "contact by nodes"}
-    return known.get(name, "contact by mortar" if name == "mortar" else f"{name}s")
+    if name in CELL_TYPES:
+        return CELL_TYPES[name].plural
+    return {"node": "contact by nodes", "mortar": "contact by mortar"}.get(name, name)
 
 
 def joined(words: list[str]) -> str:

@@ -27,7 +27,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import State, Status
-from fenics_contact.geometry import BodyMesh, rectangle_lattice
+from fenics_contact.geometry import CELL_TYPES, BodyMesh, quadratic, rectangle_lattice
 from fenics_contact.scene import Body, ContactPair, Coulomb, LoadStep, PlaneStrain, Scene, Support, Surface
 from fenics_contact.study.parameters import BALANCED, Parameters, Sweep
 from fenics_contact.study.protocol import Outcome, Problem, Quantity, StudyScene
@@ -52,7 +52,9 @@ def half(side: float, n: int, cell: str = "quadrilateral") -> BodyMesh:
     """Mesh the upper body (side 1) or its mirror image (side −1), n cells on the half contact."""
     across, down = ticks(1.25, 1 / n, 1 + 1 / n), ticks(1 / n, 1 / n, 1 + 1 / n)
     lines = [np.concatenate([-across[:0:-1], across]), down if side > 0 else -down[::-1]]
-    mesh = rectangle_lattice(lines, cell)
+    curved = CELL_TYPES[cell].order == 2
+    mesh = rectangle_lattice(lines, "quadrilateral" if curved else cell)
+    mesh = quadratic(mesh) if curved else mesh
     x, y = mesh.points.T
     return mesh.moved(np.column_stack([x, y + side * x**2 / (2 * RADIUS) * (1 - np.abs(y) / SIZE)]))
 
@@ -151,9 +153,9 @@ def friction_force(outcome: Outcome) -> float:
 BASE = Parameters(16, cell="quadrilateral", discretisation="node")
 SWEEP = Sweep(
     BASE,
-    sizes=(4, 8, 16, 32, 64),
+    sizes=(4, 8, 16, 32),
     tolerances=(1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, BALANCED),
-    cells=("triangle",),
+    cells=("triangle", "quadrilateral9"),
     discretisations=("mortar",),
     fixed_points=(1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8),
     subdomains=(2, 4, 8, 16, 32),
