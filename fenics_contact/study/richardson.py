@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 #: Rates between which a sequence counts as converging: beyond them an extrapolated value means nothing.
-RATES = (0.3, 6.0)
+RATES = (0.45, 6.0)
 #: Relative changes below this are rounding.
 ROUNDING = 1e-12
 

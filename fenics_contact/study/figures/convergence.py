@@ -46,7 +46,7 @@ def plot_convergence(errors: Errors, path: Path) -> Path:
 
 
 def _draw(axes: Any, errors: Errors, quantity: QuantityFacts, ways: list[Series]) -> None:
-    spacing, lowest = errors.results.scene.spacing, (1.0, float("inf"))
+    spacing, first = errors.results.scene.spacing, None
     for series in ways:
         known = [
             (spacing[run.parameters.size], e) for run in series.runs if (e := errors.of(run, quantity.name))
@@ -54,9 +54,9 @@ def _draw(axes: Any, errors: Errors, quantity: QuantityFacts, ways: list[Series]
         if known:
             h, error = [h for h, _ in known], [e for _, e in known]
             series.draw(axes, h, error, _with_rate(series.name, measured_rate(h, error)))
-            lowest = min(lowest, known[-1], key=lambda pair: pair[1])
-    if quantity.rate and lowest[1] < float("inf"):
-        _slope(axes, errors, lowest, quantity.rate)
+            first = first or known[-1]
+    if quantity.rate and first is not None:
+        _slope(axes, errors, first, quantity.rate)
     axes.set_ylabel("relative error")
     axes.set_title(f"{quantity.name} (against {against(errors.references[quantity.name].kind)})")
 
@@ -103,5 +103,5 @@ def _scales(axes: Any, errors: Errors) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.minorticks_off()
     axes.set_xlabel(f"mesh size h{f' ({unit})' if unit else ''}")
-    axes.legend(loc="best", fontsize=11)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2, fontsize=10)
     style(axes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +15,9 @@ from fenics_contact.study.words import plural
 from fenics_contact.viz.colours import BLUE, GREEN, GREY, ORANGE
 
 WIDTH = 1600
+#: Colours and symbols of cells and of discretisations of contact other than the base's, in turn.
+CELL_LOOKS = ((GREEN, "s"), ("#882255", "X"), ("#332288", "p"))
+CONTACT_LOOKS = (("#cc79a7", "D"),)
 
 
 @dataclass(frozen=True)
@@ -52,8 +55,8 @@ def series_of(errors: Errors) -> list[Series]:
     found = [
         Series("balanced", errors.sequence(replace(base, tolerance=BALANCED)), BLUE, "o"),
         Series(name, () if strict.balanced else errors.sequence(strict), ORANGE, "^"),
-        *_others(errors, "cell", lambda run: run.parameters.cell, (GREEN, "s")),
-        *_others(errors, "discretisation", lambda run: run.parameters.discretisation, ("#cc79a7", "D")),
+        *_others(errors, "cell", lambda run: run.parameters.cell, CELL_LOOKS),
+        *_others(errors, "discretisation", lambda run: run.parameters.discretisation, CONTACT_LOOKS),
         Series("fixed point", _varied(errors, "solver"), "#56b4e9", "v", False),
         Series("other subdomains", _varied(errors, "subdomains"), "#e69f00", "P", False),
     ]
@@ -63,14 +66,17 @@ def series_of(errors: Errors) -> list[Series]:
     return [series for series in found if series.runs]
 
 
-def _others(errors: Errors, setting: str, of: Callable[[Run], str], look: tuple[str, str]) -> list[Series]:
+def _others(
+    errors: Errors, setting: str, of: Callable[[Run], str], looks: Sequence[tuple[str, str]]
+) -> list[Series]:
     """Return the series of every value of a setting other than the base's."""
     base = errors.results.base
-    values = {of(run): None for run in errors.results.good if of(run) != getattr(base, setting)}
-    return [
-        Series(plural(value), errors.sequence(replace(base, **{setting: value})), *look)  # type: ignore[arg-type]
-        for value in values
-    ]
+    values = dict.fromkeys(of(run) for run in errors.results.good if of(run) != getattr(base, setting))
+    found = []
+    for number, value in enumerate(values):
+        runs = errors.sequence(replace(base, **{setting: value}))  # type: ignore[arg-type]
+        found.append(Series(plural(value), runs, *looks[number % len(looks)]))
+    return found
 
 
 def _varied(errors: Errors, setting: str) -> tuple[Run, ...]:
@@ -91,7 +97,7 @@ def panels(figure: Any, count: int) -> list[Any]:
 def height(count: int) -> int:
     """Return the height in pixels of a sheet with so many panels."""
     rows = 1 if count < 4 else 2
-    return 160 + 540 * rows
+    return 160 + 560 * rows
 
 
 def style(axes: Any) -> None:
