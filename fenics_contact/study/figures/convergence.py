@@ -23,6 +23,9 @@ from fenics_contact.study.richardson import measured_rate
 from fenics_contact.viz.colours import INK
 from fenics_contact.viz.sheet import sheet
 
+#: Height of the legends under a row of panels in pixels.
+LEGENDS = 120
+
 
 def plot_convergence(errors: Errors, path: Path) -> Path:
     """Draw the error of every quantity, and the estimate of the mesh's error, over the mesh size."""
@@ -35,7 +38,7 @@ def plot_convergence(errors: Errors, path: Path) -> Path:
     ]
     count = len(quantities) + 1
     title = f"{errors.results.scene.title}: convergence"
-    with sheet(path, (WIDTH, height(count)), title, "constrained") as figure:
+    with sheet(path, (WIDTH, height(count) + LEGENDS * (1 + (count > 3))), title, "constrained") as figure:
         drawn = panels(figure, count)
         for axes, quantity in zip(drawn, quantities, strict=False):
             _draw(axes, errors, quantity, ways)
@@ -103,5 +106,5 @@ def _scales(axes: Any, errors: Errors) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.minorticks_off()
     axes.set_xlabel(f"mesh size h{f' ({unit})' if unit else ''}")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2, fontsize=10)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), fontsize=11)
     style(axes)
