@@ -5,6 +5,7 @@ DEMO ?= chain_links
 SIZE ?=
 NP ?= 1
 BENCH ?= full
+STUDIES ?= hertz cattaneo_mindlin chain_links
 PYTHON ?=
 JOBS ?= 2
 
@@ -19,7 +20,7 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demos test test-slow test-hard study-optimisation benchmark lint setup
+.PHONY: help demo demos test test-slow test-hard benchmark studies study-optimisation lint setup
 
 help: ## Show this list
 	@echo "Targets:"
@@ -28,6 +29,7 @@ help: ## Show this list
 	@echo "  DEMO=hertz_sphere    which demo (chain_links); all are in demos/"
 	@echo "  SIZE=small|paper     size of the chain links (paper)"
 	@echo "  NP=2                 MPI ranks of a demo (1)"
+	@echo "  STUDIES=hertz        which studies (all three); NP ranks each"
 	@echo "  BENCH=quick|full     small cases once, or all of them (full)"
 	@echo "  JOBS=4               tests at a time (2)"
 	@echo "  PYTHON=/some/python  use this Python and its FEniCSx instead of setting up .venv"
@@ -52,6 +54,10 @@ study-optimisation: $(prepare) ## Measure what state tolerances do to an optimis
 
 benchmark: $(prepare) ## Measure time, memory and products; results in benchmarks/
 	$(python) -m benchmarks $(if $(filter quick,$(BENCH)),--quick)
+
+studies: $(prepare) ## Measure what accuracy costs in time; results in docs/studies/
+	for study in $(STUDIES); do $(launch) 1 $(python) -m fenics_contact accuracy $$study --ranks $(NP) --page \
+	  --output docs/studies/$$study --runs output/studies/$$study || exit 1; done
 
 lint: $(prepare) ## Check style (ruff) and types (mypy)
 	$(python) -m ruff check .

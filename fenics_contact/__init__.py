@@ -11,7 +11,8 @@ The floors of the package, from the ground up; each imports only those before it
 * `fenics_contact.shape`: design → value and subgradient,
 * `fenics_contact.optimize`: the bundle trust method.
 
-Beside them: `fenics_contact.viz` (pictures) and `fenics_contact.io` (files).
+Beside them: `fenics_contact.viz` (pictures) and `fenics_contact.io` (files). On top: `fenics_contact.study`
+(what accuracy costs in time).
 """
 
 from fenics_contact import _requirements

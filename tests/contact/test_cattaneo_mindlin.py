@@ -1,15 +1,7 @@
 """Cattaneo and Mindlin: two equal cylinders pressed, then sheared until the edges of the contact slip.
 
-The bodies mirror each other and are of the same material: what one's surface does under pressure and shear,
-the other's does in the mirror, so that pressing calls for no friction and shearing changes no pressure,
-also in bodies that are no half planes and on meshes that mirror each other. What is left of the size of the
-bodies, 30 times the contact, is its curvature of the surfaces over the contact, (1/30)², below a
-thousandth: the errors on the finest mesh are more than twice that. Far edges are moved, not loaded. How far
-belongs to the size of the bodies, as a line load shifts a half plane without bounds; tractions do not know
-about it, so theory takes the measured forces P and Q. The radius is a thousand times the contact, as theory
-presses along one direction, and contact along its normals.
-
-Both a and c end at nodes of all meshes to within a thousandth, so that errors fall at clean rates.
+The scene and its theory are those of `fenics_contact.study.scenes.cattaneo_mindlin`. The errors on the finest
+mesh are more than twice what is left of the size of the bodies.
 """
 
 from __future__ import annotations
@@ -21,52 +13,26 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status, solve_steps
-from fenics_contact.geometry import BodyMesh, rectangle_lattice
+from fenics_contact.contact import Status, solve_steps
 from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import Body, ContactPair, Coulomb, LoadStep, PlaneStrain, Scene, Support, Surface
+from fenics_contact.study import Outcome, Parameters
+from fenics_contact.study.scenes.cattaneo_mindlin import FRICTION, build, stick_half_width, theory, tractions
 from tests.contact.checks import assert_solved
 
-YOUNG, POISSON, FRICTION = 1000.0, 0.3, 0.4
-RADIUS, SIZE = 2000.0, 30.0
-PRESS, SHEAR = 0.00205, 0.000735
 TOLERANCE = 1e-6
 SIZES = (8, 16, 32)
 
 
-def ticks(fine: float, cell: float, growth: float) -> np.ndarray:
-    """Equal cells up to ``fine``, then growing ones up to the size of the body."""
-    count = int(np.ceil(np.log1p((SIZE - fine) / cell * (growth - 1)) / np.log(growth)))
-    tail = np.cumsum(growth ** np.arange(count))
-    equal = np.linspace(0.0, fine, round(fine / cell) + 1)
-    return np.concatenate([equal, fine + (SIZE - fine) * tail / tail[-1]])
-
-
-def half(side: float, n: int) -> BodyMesh:
-    """The upper body (side 1) or its mirror image (side −1), n cells on the half contact."""
-    across, down = ticks(1.25, 1 / n, 1 + 1 / n), ticks(1 / n, 1 / n, 1 + 1 / n)
-    lines = [np.concatenate([-across[:0:-1], across]), down if side > 0 else -down[::-1]]
-    mesh = rectangle_lattice(lines)
-    x, y = mesh.points.T
-    return mesh.moved(np.column_stack([x, y + side * x**2 / (2 * RADIUS) * (1 - np.abs(y) / SIZE)]))
-
-
-def sheared(n: int) -> tuple[State, State]:
+def sheared(n: int) -> Outcome:
     """Return the states after pressing and after shearing."""
-    material = PlaneStrain(YOUNG, POISSON)
-    pair = ContactPair(Surface("upper", "y0"), Surface("lower", "y1"), Coulomb(FRICTION))
-    scene = Scene(
-        {"upper": Body(half(1, n), material), "lower": Body(half(-1, n), material)}, contacts=[pair]
+    parameters = Parameters(n, cell="quadrilateral")
+    problem = build(parameters)
+    states = solve_steps(
+        problem.scene, problem.steps, None, MPI.COMM_SELF, solver=FaceNewton(tolerance=TOLERANCE)
     )
-    base = Support("lower", "y0", (0.0, 0.0))
-    steps = [
-        LoadStep(f"{shift:g}", supports=[base, Support("upper", "y1", (shift, -PRESS))])
-        for shift in (0.0, SHEAR)
-    ]
-    states = solve_steps(scene, steps, None, MPI.COMM_SELF, solver=FaceNewton(tolerance=TOLERANCE))
     for state in states:
         assert_solved(state, TOLERANCE)
-    return states[0], states[1]
+    return Outcome(problem, states, parameters)
 
 
 @dataclass(frozen=True)
@@ -79,41 +45,28 @@ class Errors:
     peak: float
 
 
-def ellipse(x: np.ndarray, a: float) -> np.ndarray:
-    return np.sqrt(np.maximum(0.0, 1 - (x / a) ** 2))
-
-
-def errors(state: State) -> Errors:
+def errors(outcome: Outcome) -> Errors:
     """Compare with theory for the measured forces."""
-    contact = state.contact
-    points = np.concatenate([body.mesh.points for body in state.scene.bodies.values()])
-    x, area = points[contact.points.slave, 0], contact.points.area
-    pressure, traction = contact.pressure, np.abs(contact.friction_force[:, 0]) / area
-    force, shear = contact.normal_force.sum(), np.abs(contact.friction_force.sum())
-    a = np.sqrt(2 * force * RADIUS / np.pi * 2 * (1 - POISSON**2) / YOUNG)
-    c = a * np.sqrt(1 - shear / (FRICTION * force))
-    peak = 2 * force / (np.pi * a)
-    exact = FRICTION * peak * (ellipse(x, a) - c / a * ellipse(x, c))
-    assert a == pytest.approx(1.0, abs=2e-3)
-    assert c == pytest.approx(0.625, abs=2e-3)
-    # Where it sticks (μp − q)² = (μ p0 / a)² (c² − x²): a line over x², fitted, ends at c².
-    sticks = contact.status == Status.STICK
-    assert np.count_nonzero(sticks) >= 9
+    contact, known = outcome.state.contact, theory(outcome.state)
+    (x, traction), area = tractions(outcome), contact.points.area
+    assert known.half_width == pytest.approx(1.0, abs=2e-3)
+    assert known.stick == pytest.approx(0.625, abs=2e-3)
+    assert contact.count(Status.STICK) >= 9
     assert contact.count(Status.SLIP) >= 6
-    slope, start = np.polyfit(x[sticks] ** 2, (FRICTION * pressure - traction)[sticks] ** 2, 1)
+    exact = known.traction(x)
     error = traction - exact
     return Errors(
-        float(np.sqrt(-start / slope) / c - 1),
+        float(stick_half_width(outcome) / known.stick - 1),
         float(np.sqrt(area @ error**2 / (area @ exact**2))),
-        float(area @ np.abs(error) / shear),
-        float(pressure[np.argmin(np.abs(x))] / peak - 1),
+        float(area @ np.abs(error) / np.abs(contact.friction_force.sum())),
+        float(contact.pressure[np.argmin(np.abs(x))] / known.peak - 1),
     )
 
 
 def test_stick_width_and_traction_converge_to_those_of_cattaneo_and_mindlin(
     record_property: Callable[[str, object], None],
 ) -> None:
-    found = [errors(sheared(n)[1]) for n in SIZES]
+    found = [errors(sheared(n)) for n in SIZES]
     table = np.array([[abs(e.stick), e.traction, e.misplaced] for e in found])
     rates = np.log2(table[:-1] / table[1:])
     print("\ncells on a | error of c, rate | of q in L2, rate | of q in L1, rate | of p(0)")
@@ -132,7 +85,7 @@ def test_stick_width_and_traction_converge_to_those_of_cattaneo_and_mindlin(
 
 
 def test_shear_changes_no_pressure_and_pressing_calls_for_no_friction() -> None:
-    pressed, pushed = (state.contact for state in sheared(8))
+    pressed, pushed = (state.contact for state in sheared(8).states)
     largest = pressed.pressure.max()
     tangential = np.abs(pressed.friction_force[:, 0]) / pressed.points.area
     assert np.abs(pushed.friction_force).sum() > 0.5 * FRICTION * pushed.normal_force.sum()

@@ -1,0 +1,33 @@
+"""What accuracy costs in time: runs of one scene with other meshes, tolerances and discretisations.
+
+`run_study` measures, `write_report` concludes; `python -m fenics_contact accuracy SCENE` does both. A scene
+of one's own is a Python file that defines ``study``, a `StudyScene`.
+"""
+
+from __future__ import annotations
+
+from fenics_contact.study.errors import Errors
+from fenics_contact.study.parameters import BALANCED, Parameters, Sweep
+from fenics_contact.study.protocol import Outcome, Problem, Quantity, StudyScene
+from fenics_contact.study.report import write_report
+from fenics_contact.study.results import Results, Run, read_study
+from fenics_contact.study.running import Settings, run_study
+from fenics_contact.study.scenes import find_study
+
+__all__ = [
+    "BALANCED",
+    "Errors",
+    "Outcome",
+    "Parameters",
+    "Problem",
+    "Quantity",
+    "Results",
+    "Run",
+    "Settings",
+    "StudyScene",
+    "Sweep",
+    "find_study",
+    "read_study",
+    "run_study",
+    "write_report",
+]

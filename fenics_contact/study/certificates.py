@@ -1,0 +1,58 @@
+"""Does the certificate keep its promise: never below the true error, and not far above it?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fenics_contact.study.progress import described
+from fenics_contact.study.results import Results
+
+#: How far above the true error a certificate may be.
+LARGEST_FACTOR = 10.0
+
+
+@dataclass(frozen=True)
+class CertificateCheck:
+    """The certificates of all runs beside the true errors.
+
+    Attributes:
+        checked: Runs of which both are known.
+        unknown: Runs without one of them.
+        smallest_factor: Smallest ratio of the certificate to the true error, 1 or more if it is a bound.
+        largest_factor: Largest ratio.
+        broken: What was promised and not kept, in words.
+    """
+
+    checked: int
+    unknown: int
+    smallest_factor: float | None
+    largest_factor: float | None
+    broken: tuple[str, ...]
+
+
+def check_certificates(results: Results) -> CertificateCheck:
+    """Compare the certificate of every run with its true algebraic error.
+
+    The solution that counts as exact has a certificate of its own, which is how uncertain the comparison is.
+    """
+    factors, broken, unknown = [], [], 0
+    for run in results.good:
+        bound = (run.parts or {}).get("algebraic")
+        if bound is None or run.true_errors is None:
+            unknown += 1
+            continue
+        true, doubt = run.true_errors["algebraic"], run.true_errors["uncertainty"]
+        if bound + doubt < true:
+            broken.append(f"{described(run.parameters)}: {bound:.3e} is below the true error {true:.3e}")
+        if bound > LARGEST_FACTOR * (true + doubt):
+            times = f"more than {LARGEST_FACTOR:g} times the true error"
+            broken.append(f"{described(run.parameters)}: {bound:.3e} is {times} {true:.3e}")
+        if true > doubt:
+            factors.append(bound / true)
+    return CertificateCheck(
+        len(results.good) - unknown,
+        unknown,
+        min(factors, default=None),
+        max(factors, default=None),
+        tuple(broken),
+    )

@@ -1,0 +1,60 @@
+"""The scenes that can be studied by name."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+from pathlib import Path
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.study.protocol import StudyScene
+
+BUILT_IN = ("hertz", "cattaneo_mindlin", "chain_links")
+
+
+def find_study(name: str) -> StudyScene:
+    """Return the built-in study of a name, or the one that a Python file defines as ``study``.
+
+    Args:
+        name: One of `BUILT_IN`, or the path of a file that ends in ".py".
+
+    Raises:
+        InvalidInputError: If there is no such study, or the file defines none.
+    """
+    if name.endswith(".py"):
+        return _from_file(Path(name))
+    if name not in BUILT_IN:
+        raise InvalidInputError(
+            f"a study is one of {list(BUILT_IN)} or a Python file, got {name!r}: use one of the names, or "
+            "the path of a file that ends in '.py' and defines `study`"
+        )
+    module = importlib.import_module(f"{__name__}.{name}")
+    return _checked(getattr(module, "study", None), name)
+
+
+def scene_file(name: str) -> Path | None:
+    """Return the file that defines a study of the user's own, None for a built-in one."""
+    return Path(name) if name.endswith(".py") else None
+
+
+def _from_file(path: Path) -> StudyScene:
+    if not path.is_file():
+        raise InvalidInputError(f"a study needs a file that exists, got {str(path)!r}: correct the path")
+    module_name = f"_fenics_contact_study_{path.stem}"
+    spec = importlib.util.spec_from_file_location(module_name, path)
+    if spec is None or spec.loader is None:
+        raise InvalidInputError(f"{str(path)!r} cannot be read as Python: give a file that ends in '.py'")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[module_name] = module  # dataclasses of the file look themselves up there
+    spec.loader.exec_module(module)
+    return _checked(getattr(module, "study", None), str(path))
+
+
+def _checked(found: object, name: str) -> StudyScene:
+    if not isinstance(found, StudyScene):
+        raise InvalidInputError(
+            f"{name!r} must define `study`, a StudyScene, got {type(found).__name__}: see "
+            "fenics_contact/study/scenes/hertz.py for an example"
+        )
+    return found

@@ -1,0 +1,193 @@
+"""Cattaneo and Mindlin: two equal cylinders pressed, then sheared until the edges of the contact slip.
+
+The bodies mirror each other and are of the same material: what one's surface does under pressure and shear,
+the other's does in the mirror, so that pressing calls for no friction and shearing changes no pressure,
+also in bodies that are no half planes and on meshes that mirror each other. What is left of the size of the
+bodies, 30 times the contact, is its curvature of the surfaces over the contact, (1/30)², below a
+thousandth. Far edges are moved, not loaded. How far belongs to the size of the bodies, as a line load shifts
+a half plane without bounds; tractions do not know about it, so theory takes the measured forces P and Q:
+
+    a² = 2 P R / (π E*),  p0 = 2 P / (π a),  c = a √(1 − Q / (μ P)),
+    q(x) = μ p0 [√(1 − x²/a²) − c/a √(1 − x²/c²)].
+
+The radius is a thousand times the contact, as theory presses along one direction, and contact along its
+normals. Both a and c end at nodes of all meshes to within a thousandth, so that errors fall at clean rates.
+
+References:
+    K. L. Johnson, Contact Mechanics, Cambridge 1985, section 7.2. M. L. Williams, Stress singularities
+    resulting from various boundary conditions in angular corners of plates in extension, J. Appl. Mech. 19
+    (1952).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_contact.contact import State, Status
+from fenics_contact.geometry import CELL_TYPES, BodyMesh, quadratic, rectangle_lattice
+from fenics_contact.scene import Body, ContactPair, Coulomb, LoadStep, PlaneStrain, Scene, Support, Surface
+from fenics_contact.study.parameters import BALANCED, Parameters, Sweep
+from fenics_contact.study.protocol import Outcome, Problem, Quantity, StudyScene
+
+YOUNG, POISSON, FRICTION = 1000.0, 0.3, 0.4
+RADIUS, SIZE = 2000.0, 30.0
+PRESS, SHEAR = 0.00205, 0.000735
+#: Displacements go like r^0.711 at the corners between free and held edges, with ν = 0.3 in plane strain:
+#: sin²(λπ/2) = (4 (1 − ν)² − λ²) / (3 − 4ν) [Williams 1952].
+CORNER = 0.711
+
+
+def ticks(fine: float, cell: float, growth: float) -> np.ndarray:
+    """Equal cells up to ``fine``, then growing ones up to the size of the body."""
+    count = int(np.ceil(np.log1p((SIZE - fine) / cell * (growth - 1)) / np.log(growth)))
+    tail = np.cumsum(growth ** np.arange(count))
+    equal = np.linspace(0.0, fine, round(fine / cell) + 1)
+    return np.concatenate([equal, fine + (SIZE - fine) * tail / tail[-1]])
+
+
+def half(side: float, n: int, cell: str = "quadrilateral") -> BodyMesh:
+    """Mesh the upper body (side 1) or its mirror image (side −1), n cells on the half contact."""
+    across, down = ticks(1.25, 1 / n, 1 + 1 / n), ticks(1 / n, 1 / n, 1 + 1 / n)
+    lines = [np.concatenate([-across[:0:-1], across]), down if side > 0 else -down[::-1]]
+    curved = CELL_TYPES[cell].order == 2
+    mesh = rectangle_lattice(lines, "quadrilateral" if curved else cell)
+    mesh = quadratic(mesh) if curved else mesh
+    x, y = mesh.points.T
+    return mesh.moved(np.column_stack([x, y + side * x**2 / (2 * RADIUS) * (1 - np.abs(y) / SIZE)]))
+
+
+def build(parameters: Parameters, comm: MPI.Comm | None = None) -> Problem:
+    """Return the bodies and the two steps: pressed, sheared."""
+    del comm  # every rank builds the same
+    material = PlaneStrain(YOUNG, POISSON)
+    bodies = {
+        name: Body(half(side, parameters.size, parameters.cell), material)
+        for name, side in (("upper", 1.0), ("lower", -1.0))
+    }
+    pair = ContactPair(
+        Surface("upper", "y0"), Surface("lower", "y1"), Coulomb(FRICTION), parameters.discretisation
+    )
+    base = Support("lower", "y0", (0.0, 0.0))
+    steps = [
+        LoadStep(f"{shift:g}", supports=[base, Support("upper", "y1", (shift, -PRESS))])
+        for shift in (0.0, SHEAR)
+    ]
+    return Problem(Scene(bodies, contacts=[pair]), steps)
+
+
+@dataclass(frozen=True)
+class Theory:
+    """What the measured forces P and Q of a state give.
+
+    Attributes:
+        half_width: a, [length].
+        stick: c, [length].
+        peak: p0, [force / length²].
+    """
+
+    half_width: float
+    stick: float
+    peak: float
+
+    def traction(self, x: np.ndarray) -> np.ndarray:
+        """Return q(x), shape (n,), [force / length²]."""
+        a, c = self.half_width, self.stick
+        return np.asarray(FRICTION * self.peak * (ellipse(x, a) - c / a * ellipse(x, c)))
+
+
+def theory(state: State) -> Theory:
+    """Return Cattaneo's and Mindlin's answer for the forces of a state."""
+    contact = state.contact
+    force, shear = contact.normal_force.sum(), np.abs(contact.friction_force.sum())
+    a = np.sqrt(2 * force * RADIUS / np.pi * 2 * (1 - POISSON**2) / YOUNG)
+    c = a * np.sqrt(max(0.0, 1 - shear / (FRICTION * force)))
+    return Theory(float(a), float(c), float(2 * force / (np.pi * a)))
+
+
+def ellipse(x: np.ndarray, a: float) -> np.ndarray:
+    """Return √(1 − x²/a²), zero outside."""
+    return np.sqrt(np.maximum(0.0, 1 - (x / a) ** 2))
+
+
+def tractions(outcome: Outcome) -> tuple[np.ndarray, np.ndarray]:
+    """Return x and |q| of every contact point."""
+    contact = outcome.state.contact
+    return outcome.slave_points()[:, 0], np.abs(contact.friction_force[:, 0]) / contact.points.area
+
+
+def stick_half_width(outcome: Outcome) -> float:
+    """Fit c: where it sticks (μp − q)² = (μ p0 / a)² (c² − x²), a line over x² that ends at c²."""
+    contact, (x, traction) = outcome.state.contact, tractions(outcome)
+    sticks = contact.status == Status.STICK
+    if np.count_nonzero(sticks) < 2:
+        return 0.0
+    lack = FRICTION * contact.pressure - traction
+    slope, start = np.polyfit(x[sticks] ** 2, lack[sticks] ** 2, 1)
+    return float(np.sqrt(max(0.0, -start / slope)))
+
+
+def weighted_traction(outcome: Outcome) -> np.ndarray:
+    """Return q times the root of the nodal area: its Euclidean norm is that of q in L²."""
+    return np.asarray(tractions(outcome)[1] * np.sqrt(outcome.state.contact.points.area))
+
+
+def exact_traction(outcome: Outcome) -> np.ndarray:
+    """Return what `weighted_traction` should be."""
+    exact = theory(outcome.state).traction(outcome.slave_points()[:, 0])
+    return np.asarray(exact * np.sqrt(outcome.state.contact.points.area))
+
+
+def middle_pressure(outcome: Outcome) -> float:
+    """Return the pressure at x = 0."""
+    return float(outcome.state.contact.pressure[np.argmin(np.abs(outcome.slave_points()[:, 0]))])
+
+
+def friction_force(outcome: Outcome) -> float:
+    """Return Q, the sum of all friction forces."""
+    return float(abs(outcome.state.contact.friction_force.sum()))
+
+
+BASE = Parameters(16, cell="quadrilateral", discretisation="node")
+SWEEP = Sweep(
+    BASE,
+    sizes=(4, 8, 16, 32),
+    tolerances=(1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, BALANCED),
+    cells=("triangle", "quadrilateral9"),
+    discretisations=("mortar",),
+    fixed_points=(1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8),
+    subdomains=(2, 4, 8, 16, 32),
+)
+QUICK = replace(
+    SWEEP, base=replace(BASE, size=8), sizes=(4, 8, 16), tolerances=(1e-2, 1e-8, BALANCED),
+    fixed_points=(1e-2, 1e-6), subdomains=(4,),
+)  # fmt: skip
+
+study = StudyScene(
+    name="cattaneo_mindlin",
+    title="Cattaneo and Mindlin, sheared cylinders",
+    build=build,
+    quantities=(
+        Quantity(
+            "stick half width", "mm", stick_half_width, lambda found: theory(found.state).stick, rate=1.0
+        ),
+        Quantity("peak pressure", "MPa", middle_pressure, lambda found: theory(found.state).peak),
+        Quantity("tangential traction", "MPa √mm", weighted_traction, exact_traction, rate=1.0),
+        Quantity("total friction force", "N/mm", friction_force, rate=2 * CORNER),
+        Quantity(
+            "potential energy", "N", lambda found: found.state.energies.total_potential, rate=2 * CORNER
+        ),
+    ),
+    sweep=SWEEP,
+    quick=QUICK,
+    size_name="cells on the half contact",
+    spacing_unit="half width of the contact",
+    energy_rate=CORNER,
+    about=(
+        "Two mirrored bodies in plane strain are pressed together, then sheared, with Coulomb friction. "
+        "Theory takes the measured forces; tangential traction is judged in L². Friction force and energy at "
+        "the given displacements depend on the size of the bodies and are extrapolated."
+    ),
+)

@@ -1,0 +1,110 @@
+"""Solve the problem of one run with its settings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_contact.contact import FixedPoint, LoadSequence, State, solve_scene
+from fenics_contact.geometry import BodyMesh, default_partition
+from fenics_contact.qp import FaceNewton
+from fenics_contact.scene import Scene
+from fenics_contact.shape import ShapeProblem, TotalPotential
+from fenics_contact.study.parameters import Parameters
+from fenics_contact.study.protocol import Problem
+from fenics_contact.timing import PhaseTimer
+
+
+def solve_problem(problem: Problem, parameters: Parameters, comm: MPI.Comm) -> tuple[State, ...]:
+    """Return the states of all load steps. Collective."""
+    partitions = cut(problem.scene, parameters.subdomains, comm.size)
+    options = solver_options(parameters)
+    if not problem.steps:
+        return (solve_scene(problem.scene, partitions, comm, **options),)
+    sequence = LoadSequence(problem.scene, partitions, comm, **options)
+    return tuple(sequence.advance(step) for step in problem.steps)
+
+
+def solver_options(parameters: Parameters) -> dict[str, Any]:
+    """Return how `solve_scene` is told about tolerance and method."""
+    if parameters.balanced:
+        return {}
+    newton = FaceNewton(tolerance=float(parameters.tolerance))
+    return {"solver": FixedPoint(newton) if parameters.solver == "fixed point" else newton}
+
+
+def cut(scene: Scene, subdomains: int | None, ranks: int) -> dict[str, np.ndarray] | None:
+    """Cut the bodies into about so many subdomains together, in proportion to their cells.
+
+    Returns:
+        Body name -> subdomain of every cell; None where the number is left open.
+    """
+    if subdomains is None:
+        return None
+    meshes = {name: body.mesh for name, body in scene.bodies.items()}
+    cells = sum(mesh.n_cells for mesh in meshes.values())
+    least = -(-ranks // len(meshes))
+    parts = {name: max(least, round(subdomains * mesh.n_cells / cells)) for name, mesh in meshes.items()}
+    return {
+        name: default_partition(mesh, least, nodes=_nodes(mesh, parts[name]), body=name)
+        for name, mesh in meshes.items()
+    }
+
+
+def _nodes(mesh: BodyMesh, parts: int) -> float:
+    """Return how many nodes a subdomain has when a body is cut into so many."""
+    side = (mesh.n_nodes / parts) ** (1.0 / mesh.dim)
+    return max(2.0**mesh.dim, (side + 1.0) ** mesh.dim)
+
+
+class GradientOf(ShapeProblem):
+    """Differentiates the total potential at a state that is known already."""
+
+    def __init__(self, problem: Problem, state: State) -> None:
+        """Prepare the adjoint, as accurate as the state. Collective."""
+        assert problem.design is not None
+        decomposition = state.torn.decomposition
+        solver = FaceNewton(tolerance=max(reached(state), 1e-11))
+        self._state = state
+        super().__init__(
+            problem.scene, decomposition.partitions, problem.design, TotalPotential(), decomposition.comm,
+            solver=solver,
+        )  # fmt: skip
+
+    def state_of(self, alpha: np.ndarray) -> State:
+        """Return the known state."""
+        return self._state
+
+
+def gradient_of(problem: Problem, state: State) -> tuple[np.ndarray, dict[str, float], int]:
+    """Return the derivative of the total potential by the design, seconds by phase, products. Collective."""
+    if problem.design is None:
+        return np.zeros(0), {}, 0
+    before = state.dual.products
+    differentiated = GradientOf(problem, state)
+    point = differentiated.evaluate(np.zeros(differentiated.size))
+    seconds = {name: differentiated.seconds.get(name, 0.0) for name in ("objective", "adjoint", "gradient")}
+    return point.gradient, seconds, state.dual.products - before
+
+
+def reached(state: State) -> float:
+    """Return the largest relative residual of a state."""
+    return float(max(state.solution.natural_residual, state.solution.gluing_residual))
+
+
+def slowest(comm: MPI.Comm, timer_seconds: dict[str, float]) -> dict[str, float]:
+    """Return the seconds of the slowest rank in each phase. Collective."""
+    names = comm.bcast(sorted(timer_seconds))
+    spent = np.array([timer_seconds.get(name, 0.0) for name in names])
+    comm.Allreduce(MPI.IN_PLACE, spent, op=MPI.MAX)
+    return dict(zip(names, spent.tolist(), strict=True))
+
+
+def build_problem(build: Any, parameters: Parameters, comm: MPI.Comm, timer: PhaseTimer) -> Problem:
+    """Build the problem and note how long that took. Collective."""
+    with timer.phase("mesh"):
+        problem = build(parameters, comm)
+    assert isinstance(problem, Problem)
+    return problem

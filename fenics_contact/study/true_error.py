@@ -1,0 +1,76 @@
+"""What the certificate must bound: the distance from the exact solution of the same discrete problem."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.accuracy import certify
+from fenics_contact.contact import State, find_state
+from fenics_contact.errors import ConvergenceError
+from fenics_contact.qp import DualSolution, FaceNewton, solve
+
+#: Tolerances of the solution that counts as exact: the first that can be reached.
+EXACT = (1e-11, 1e-10, 1e-9)
+
+
+@dataclass(frozen=True)
+class TrueErrors:
+    """Energy norms of displacement errors over that of the displacement.
+
+    Attributes:
+        algebraic: Distance from the solution for the slip bounds that the state itself has.
+        total: Distance from the solution of the friction law, that of the slip bounds included.
+        uncertainty: How far these solutions may be from exact ones, by their own certificates.
+        tolerance: Residual down to which they were found.
+    """
+
+    algebraic: float
+    total: float
+    uncertainty: float
+    tolerance: float
+
+
+def true_errors(states: tuple[State, ...]) -> TrueErrors | None:
+    """Solve the last step again, as exactly as possible, and compare. Collective.
+
+    Returns:
+        The errors; None where no such solution could be found.
+    """
+    state = states[-1]
+    if not isinstance(state.solution, DualSolution):
+        return None
+    for tolerance in EXACT:
+        try:
+            found = _compared(states, FaceNewton(tolerance=tolerance))
+        except ConvergenceError:
+            continue
+        if np.isfinite(found.uncertainty):
+            return found
+    return None
+
+
+def _compared(states: tuple[State, ...], solver: FaceNewton) -> TrueErrors:
+    state = states[-1]
+    exact = find_state(
+        state.scene, state.torn.decomposition, solver=solver, previous=state,
+        slip_from=states[-2] if len(states) > 1 else None,
+    )  # fmt: skip
+    norm = np.sqrt(2.0 * exact.energies.strain)
+    total = _distance(state, exact.dual_solution, exact.torn_displacement) / norm
+    if not np.any(state.torn.friction_coefficient > 0.0):
+        doubt = certify(exact.dual, exact.dual_solution).bound / norm
+        return TrueErrors(total, total, doubt, solver.tolerance)
+    own = solve(state.dual.problem, state.dual_solution.slip_bound, solver, state.dual_solution.multiplier)
+    displacement = state.dual.displacement(own.multiplier, own.alpha)
+    doubt = certify(state.dual, own).bound / norm
+    return TrueErrors(_distance(state, own, displacement) / norm, total, doubt, solver.tolerance)
+
+
+def _distance(state: State, other: DualSolution, displacement: np.ndarray) -> float:
+    """Return √(dᵀK d) for the difference d of displacements, by K d = −Bᵀδλ. Collective."""
+    moved = displacement - state.torn_displacement
+    force = state.dual.force(state.dual_solution.multiplier - other.multiplier)
+    square = state.torn.numbering.comm.allreduce(float(moved @ force))
+    return float(np.sqrt(max(0.0, square)))

@@ -1,0 +1,77 @@
+"""The built-in studies: what they measure is right, their certificates hold, ranks agree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.study import Parameters, Settings, find_study, run_study
+from fenics_contact.study.certificates import check_certificates
+from fenics_contact.study.errors import Errors
+from fenics_contact.study.launching import Task, measure
+from fenics_contact.study.scenes import BUILT_IN
+from fenics_contact.study.scenes.nested_box import mirrored, nested_box
+from fenics_contact.study.worker import measured
+
+
+@pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])
+def test_a_nested_box_fills_its_cube_and_its_mirror_image_too(cell: str) -> None:
+    mesh = nested_box(1.25, 40.0, 2, cell)
+    assert mesh.volume == pytest.approx(40.0**3)
+    assert mirrored(mesh).volume == pytest.approx(40.0**3)
+    sides = np.linalg.norm(mesh.points[mesh.cells[:, 1]] - mesh.points[mesh.cells[:, 0]], axis=1)
+    assert sides.max() / sides.min() > 10, "nothing is graded"
+    assert set(mesh.surfaces) == {"x0", "x1", "y0", "y1", "z0", "z1"}
+
+
+def test_one_run_knows_its_errors_and_what_bounds_them() -> None:
+    study = find_study("hertz")
+    record = measured(study, replace(study.sweep.base, size=2, tolerance=1e-3), MPI.COMM_SELF, verify=True)
+    parts, true = record["parts"], record["true_errors"]
+    assert 1e-8 < true.algebraic <= parts["algebraic"] <= 10 * true.algebraic
+    assert true.uncertainty < 1e-3 * true.algebraic
+    assert parts["friction"] == 0.0
+    assert record["quantities"]["contact radius"]["error"] == pytest.approx(-0.0254, abs=0.002)
+    assert set(record["phases"]) >= {"mesh", "factor", "solve"}
+    assert sum(record["phases"].values()) <= 1.01 * record["seconds"]
+
+
+def test_every_built_in_study_plans_all_that_it_promises() -> None:
+    for name in BUILT_IN:
+        study = find_study(name)
+        assert study.name == name
+        assert len(study.sweep.sizes) >= 4
+        assert len(study.quick.runs()) < len(study.sweep.runs())
+        assert study.sweep.base in study.sweep.runs()
+        assert {"balanced", 1e-8} <= set(study.sweep.tolerances)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_certificates_hold_in_every_run_of_a_quick_study(name: str, tmp_path: Path) -> None:
+    results = run_study(name, tmp_path, sweep=find_study(name).quick, settings=Settings(repeats=1))
+    assert [run.failed for run in results.runs] == [""] * len(results.runs)
+    check = check_certificates(results)
+    assert check.broken == ()
+    assert (check.checked, check.unknown) == (len(results.runs), 0)
+    errors = Errors(results)
+    strict = errors.sequence(errors.strictest(results.base))
+    estimates = [run.parts["discretisation"] for run in strict if run.parts]
+    assert len(estimates) == 3
+    assert estimates == sorted(estimates, reverse=True), "finer meshes are better"
+
+
+@pytest.mark.slow
+def test_two_ranks_find_what_one_finds() -> None:
+    tasks = [Task("chain_links", Parameters(2, tolerance=1e-8), n, verify=True, limit=300.0) for n in (1, 2)]
+    one, two = map(measure, tasks)
+    assert "failed" not in one, one
+    assert "failed" not in two, two
+    for quantity in find_study("chain_links").quantities:
+        values = [record["quantities"][quantity.name]["value"] for record in (one, two)]
+        np.testing.assert_allclose(values[0], values[1], rtol=1e-5)
+    assert two["memory"] > one["memory"]

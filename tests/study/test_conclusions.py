@@ -1,0 +1,142 @@
+"""What is concluded from runs: errors, rates, the Pareto front, advice, and whether certificates hold."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from fenics_contact.study import BALANCED, Errors, Run
+from fenics_contact.study.advice import advice, reliable
+from fenics_contact.study.certificates import check_certificates
+from fenics_contact.study.pareto import pareto_front
+from fenics_contact.study.waste import waste
+from tests.study.samples import BASE, results, run
+
+
+def test_the_front_holds_what_nothing_else_beats() -> None:
+    seconds = [1.0, 2.0, 3.0, 1.5, 4.0, 1.0]
+    errors = [0.5, 0.1, 0.2, 0.6, 0.01, 0.7]
+    assert pareto_front(seconds, errors) == [0, 1, 4]
+    assert pareto_front([], []) == []
+
+
+def test_errors_are_against_theory_the_limit_of_the_meshes_or_the_finest_of_them() -> None:
+    errors = Errors(results())
+    kinds = {name: reference.kind for name, reference in errors.references.items()}
+    assert kinds == {"peak pressure": "theory", "energy": "extrapolated", "gradient": "finest mesh"}
+    assert errors.references["energy"].value == pytest.approx(-10.0)
+    assert errors.references["energy"].rate == pytest.approx(2.0)
+    coarse, finest = errors.results.runs[0], errors.results.runs[-2]
+    assert (coarse.parameters.size, finest.parameters.size) == (2, 8)
+    assert errors.of(coarse, "peak pressure") == pytest.approx(0.04)
+    assert errors.of(coarse, "energy") == pytest.approx(0.025)
+    assert errors.of(coarse, "gradient") == pytest.approx(0.375 / (1.125**2 + 4) ** 0.5)
+    assert errors.of(finest, "gradient") is None, "the finest mesh cannot be judged by itself"
+    assert errors.of(errors.results.runs[-1], "energy") is None, "a failed run has no error"
+    cut = replace(finest, parameters=replace(finest.parameters, subdomains=64))
+    assert errors.of(cut, "gradient") is None, "nor by another partition of it"
+
+
+def test_a_sequence_that_does_not_converge_says_why_it_is_not_extrapolated() -> None:
+    runs = [run(size, 1e-8) for size in (2, 4, 8)]
+    runs[1] = replace(runs[1], quantities={"energy": {"value": -20.0}})
+    reference = Errors(results(runs)).references["energy"]
+    assert (reference.kind, reference.value) == ("finest mesh", -10.0 + 1 / 64)
+    assert "does not converge monotonically" in reference.note
+
+
+def test_rates_are_those_of_the_strictest_tolerance() -> None:
+    errors = Errors(results())
+    strict = errors.strictest(BASE)
+    assert strict.tolerance == 1e-8
+    assert errors.rate(strict, "peak pressure") == pytest.approx(2.0)
+
+
+def test_advice_names_the_fastest_run_that_reaches_an_accuracy() -> None:
+    words = advice(Errors(results()), targets=(0.1, 0.05, 0.01, 0.001))
+    assert words[:3] == [
+        "For 10 %, 5 % in peak pressure: 2 cells on the radius, hexahedra, contact by mortar, balanced "
+        "tolerance: 0.4 s on 2 ranks; the error is 4 %.",
+        "For 1 % in peak pressure: 4 cells on the radius, hexahedra, contact by mortar, balanced tolerance: "
+        "1.6 s on 2 ranks; the error is 1 %.",
+        "For 0.1 % in peak pressure: not reached by this sweep; the finest mesh gives 0.25 % with 8 cells on "
+        "the radius, hexahedra, contact by mortar, tolerance 1e-08: 9.6 s on 2 ranks.",
+    ]
+
+
+def test_what_comes_after_the_state_counts_for_quantities_that_need_it() -> None:
+    found = results()
+    coarse = found.runs[0]
+    gradient, energy = found.scene.quantity("gradient"), found.scene.quantity("energy")
+    assert coarse.seconds_of(gradient) == pytest.approx(coarse.seconds_of(energy) + 0.5)
+
+
+def test_a_strict_tolerance_is_told_by_what_it_costs_and_changes() -> None:
+    runs = [run(size, tolerance) for size in (2, 4, 8) for tolerance in (1e-8, BALANCED)]
+    runs[-1] = run(8, error=0.0025 + 1e-5)
+    assert waste(Errors(results(runs)))[0] == (
+        "Tolerance 1e-08 instead of balanced, at 8 cells on the radius, costs 1.5 times the time and 1.6 "
+        "times the products and changes the peak pressure by 1e-05 and the energy by 0e+00."
+    )
+
+
+def varied(seconds: float, error: float | None = None, **settings: Any) -> Run:
+    known = run(4, settings.get("tolerance", BALANCED), seconds=seconds, error=error)
+    counts = {**(known.counts or {}), "subdomains": settings.get("subdomains") or 4}
+    return replace(known, parameters=replace(known.parameters, **settings), counts=counts)
+
+
+def test_other_settings_are_told_by_what_they_cost_and_give() -> None:
+    runs = [
+        varied(2.0, 0.01),
+        varied(3.0, tolerance=1e-6),
+        varied(6.0, tolerance=1e-6, solver="fixed point"),
+        varied(1.0, subdomains=2),
+        varied(8.0, subdomains=16),
+        varied(3.0, 0.05, cell="tetrahedron"),
+        varied(1.0, 0.25, discretisation="node"),
+    ]
+    assert waste(Errors(results(runs)))[1:] == [
+        "A fixed point instead of the law of friction in every Newton step, at tolerance 1e-06, costs 2 "
+        "times the time and 1 times the products.",
+        "Of 2, 4 and 16 subdomains 2 take the least time, 1 s, and 16 the most, 8 s; left open, 4 are taken: "
+        "2 s.",
+        "Tetrahedra instead of hexahedra, at 4 cells on the radius: 5 % error in peak pressure instead of "
+        "1 %, 1.5 times the time.",
+        "Contact by nodes instead of contact by mortar, at 4 cells on the radius: 25 % error in peak "
+        "pressure instead of 1 %, 0.5 times the time.",
+    ]
+
+
+def test_an_error_that_is_small_by_chance_is_no_advice() -> None:
+    runs = [run(2), run(4, error=0.0), run(8, error=0.02)]
+    errors = Errors(results(runs))
+    assert not reliable(errors, runs[1], "peak pressure", 0.01)
+    assert reliable(errors, runs[1], "peak pressure", 0.02)
+    (words,) = [words for words in advice(errors, targets=(0.01,)) if "peak pressure" in words]
+    assert "not reached by this sweep; the finest mesh gives 2 %" in words
+
+
+def test_certificates_are_compared_with_true_errors() -> None:
+    check = check_certificates(results())
+    assert (check.checked, check.unknown, check.broken) == (6, 0, ())
+    assert check.smallest_factor == check.largest_factor == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("bound", "words"), [(5e-4, "is below the true error"), (5e-2, "more than 10 times the true error")]
+)
+def test_a_broken_certificate_is_told(bound: float, words: str) -> None:
+    broken = run(4)
+    parts = {**(broken.parts or {}), "algebraic": bound}
+    check = check_certificates(results([run(2), replace(broken, parts=parts)]))
+    assert len(check.broken) == 1
+    assert "size 4, hexahedron, mortar, balanced" in check.broken[0]
+    assert words in check.broken[0]
+
+
+def test_a_run_without_certificate_is_not_counted_as_checked() -> None:
+    check = check_certificates(results([replace(run(2), parts=None)]))
+    assert (check.checked, check.unknown, check.largest_factor) == (0, 1, None)

@@ -1,0 +1,76 @@
+"""Files of a study: they appear whole, can be read again, and show what was found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.study import read_study, write_report
+from fenics_contact.study.overview import write_overview
+from tests.study.samples import results, run
+from tests.viz.states import contains, pixels
+
+
+def test_results_survive_their_file(tmp_path: Path) -> None:
+    known = results()
+    words = write_report(tmp_path, known, figures=False)
+    assert read_study(tmp_path) == known
+    assert read_study(tmp_path / "study.json") == known
+    assert write_report(tmp_path, read_study(tmp_path), figures=False) == words
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["study.json", "table.md"]
+
+
+def test_the_table_has_advice_rates_certificates_runs_and_failures(tmp_path: Path) -> None:
+    write_report(tmp_path, results(), figures=False)
+    text = (tmp_path / "table.md").read_text()
+    assert "- For 1 % in peak pressure: 4 cells on the radius" in text
+    assert "| peak pressure | theory |  | 2.00 | 1.00 |" in text
+    assert "| energy | extrapolated | -10 N mm | 2.00 | 2.00 |" in text
+    assert "finest mesh: several numbers are not extrapolated" in text
+    assert "between 2.00 and 2.00 times the true error in 6 runs" in text
+    assert "- size 8, tetrahedron, node, balanced: ConvergenceError: it did not converge" in text
+    (row,) = [line for line in text.splitlines() if line.startswith("| 4 | hexahedron | mortar | 1e-08 ")]
+    assert "| 6400 | 4 | 80 | 2.40 | 100 | 1.0e-02 |" in row
+
+
+def test_figures_show_every_way_to_spend_time(tmp_path: Path) -> None:
+    known = results()
+    more = replace(run(4), parameters=replace(run(4).parameters, cell="tetrahedron"))
+    write_report(tmp_path, replace(known, runs=(*known.runs, more)))
+    pictures = {path.stem: pixels(path) for path in tmp_path.glob("*.png")}
+    assert pictures.keys() == {"accuracy", "convergence", "parts", "phases"}
+    for colour in ("#0072b2", "#d55e00", "#009e73", "#222222"):  # balanced, strict, tetrahedra, Pareto front
+        assert contains(pictures["accuracy"], colour)
+    assert contains(pictures["convergence"], "#d55e00")
+    assert contains(pictures["parts"], "#0072b2")
+    assert contains(pictures["phases"], "#4466aa")
+
+
+def test_results_that_are_not_there_or_not_whole_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match=r"study\.json, which does not exist: run the study first"):
+        read_study(tmp_path)
+    (tmp_path / "study.json").write_text('{"scene": {}}')
+    with pytest.raises(
+        InvalidInputError, match=r"must hold the results of a study, got .* run the study again"
+    ):
+        read_study(tmp_path)
+
+
+def test_the_page_of_all_studies_takes_its_numbers_from_them(tmp_path: Path) -> None:
+    for name in ("first", "second"):
+        write_report(tmp_path / name, results(), figures=False)
+    text = write_overview(tmp_path).read_text()
+    assert text.count("## A sample") == 2
+    assert "![accuracy](second/accuracy.png)" in text
+    assert "- For 1 % in peak pressure: 4 cells on the radius" in text
+    assert "| energy | extrapolated | -10 N mm | 2.00 | 2.00 |" in text
+    assert "| error of the displacement | its own estimate | | 1.00 | 1.00 |" in text
+    assert "2.00 to 2.00 times the true error in 6 runs, 0 of them out of bounds" in text
+
+
+def test_a_page_of_no_studies_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match=r"a page of studies needs some, .* holds none: run a study"):
+        write_overview(tmp_path)
