@@ -43,7 +43,7 @@ class Balanced:
     """
 
     share: float = 0.1
-    loosest: float = 1e-2
+    loosest: float = 1e-3
     finest: float = 1e-10
     rounds: int = 4
 

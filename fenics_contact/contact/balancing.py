@@ -22,9 +22,9 @@ from fenics_contact.feti import DualSystem
 from fenics_contact.qp import DualSolution, DualSolver, SolverStep
 from fenics_contact.timing import PhaseTimer
 
-#: An estimate is made again if the solver's error was more than this share of it: torn displacements, whose
-#: copies it averages, look rough.
-DOUBTED = 0.5
+#: An estimate is made again if the solver's error was more than this share of it: the seams of displacements
+#: that are not solved look rough, by about three times the solver's error.
+DOUBTED = 0.1
 #: A solution this good is kept where the solver cannot reach what the mesh asks for.
 GOOD = 1e-6
 
