@@ -73,8 +73,13 @@ class Violations:
         return max(self.penetration, self.complementarity, self.friction)
 
 
-def violations(state: State) -> Violations:
-    """Recompute everything. On one rank."""
+def violations(state: State, force_scale: float = 0.0) -> Violations:
+    """Recompute everything. On one rank.
+
+    Args:
+        state: The answer.
+        force_scale: The smallest force that contact forces are compared with, [force].
+    """
     scene, whole = state.scene, Whole(state.scene)
     found = residuals(state)
     u = np.concatenate([state.gather_displacement(name) for name in scene.bodies])
@@ -92,7 +97,7 @@ def violations(state: State) -> Violations:
     gap = whole.gap + np.einsum("nd,nd->n", jump, points.normal)
     slip = np.einsum("nad,nd->na", points.tangents, jump) - contact.slip_before
     normal, tau, bound = _forces(state)
-    size, length = _size(state), _length(u, whole.gap)
+    size, length = max(_size(state), force_scale), _length(u, whole.gap)
     speed, friction = np.linalg.norm(slip, axis=1), np.linalg.norm(tau, axis=1)
     # τ acts on the master, along the slip: zero where a point sticks, or friction is all it can be.
     unopposed = (bound * speed - (tau * slip).sum(axis=1)).max(initial=0.0)

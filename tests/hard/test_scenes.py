@@ -86,7 +86,7 @@ def test_hard_scene(sentence: str, record: Record, on_ranks: OnRanks) -> None:
 def solved(case: Trial, sentence: str, on_ranks: OnRanks) -> dict[str, Any]:
     """Solve a trial, require all that must hold of it, and return its columns of the table."""
     state = case.solve()
-    found = violations(state)
+    found = violations(state, case.force_scale)
     assert_holds(found, case.solver.tolerance, case.amplification)
     if case.checks is not None:
         case.checks(state)

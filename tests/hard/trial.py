@@ -46,7 +46,7 @@ class Trial:
         displacements: Whether displacements are unique, else only their differences of energy are.
         amplification: What conditioning may make of the tolerance in the balance of nodes and in distances.
         agreement: Largest relative difference between answers that should be one.
-        force_scale: The smallest force that contact forces are compared with, [force].
+        force_scale: The smallest force that contact forces are compared with, in its own unit.
         checks: Asserts what is known of this very answer.
         remark: Says something measured about it, for the table.
         twins: Other scenes that must have the same answer, given in the coordinates and units of this one.

@@ -262,7 +262,8 @@ def capstan(thickness: float, angle: float, friction: float, around: int) -> Tri
     def wrapped(state: State) -> None:
         assert state.contact.count(Status.SLIP) > 0.9 * state.contact.points.count
 
-    return cut_trial(scene, cut=boxes(scene, (4, 1)), checks=wrapped)
+    # Slip everywhere, and bending next to nothing: small residuals leave room for the forces of single nodes.
+    return cut_trial(scene, cut=boxes(scene, (4, 1)), checks=wrapped, agreement=1e-3)
 
 
 for _thickness, _angle, _name, _friction in (
