@@ -93,11 +93,11 @@ class SharedFactor:
 
     def _factor(self, rows: sp.csr_matrix) -> None:
         start, height = self._bounds[self._comm.rank], rows.shape[0]
-        # Every diagonal entry must be there for the shift.
-        place = sp.csr_matrix(
-            (np.zeros(height), (np.arange(height), start + np.arange(height))), shape=rows.shape
-        )
-        rows = (rows + place).tocsr()
+        # Every diagonal entry must be there for the shift, also zeros, which sums of sparse matrices drop.
+        entries, own = rows.tocoo(), np.arange(height)
+        value = np.concatenate([entries.data, np.zeros(height)])
+        place = np.concatenate([entries.row, own]), np.concatenate([entries.col, start + own])
+        rows = sp.csr_matrix((value, place), shape=rows.shape)
         csr = (rows.indptr.astype(PETSc.IntType), rows.indices.astype(PETSc.IntType), rows.data)
         shape = ((height, self.size), (height, self.size))
         self._matrix = PETSc.Mat().createAIJ(shape, csr=csr, comm=self._subset)
