@@ -71,7 +71,8 @@ class ExplicitOperator:
         """By how much wᵀ S w may be wrong for w of length one: S is rounded, and so are all sums with it."""
         start = np.arange(self._size)
         diagonal = self._stiff[start * (2 * self._size - start + 1) // 2]
-        return ROUNDINGS * float(np.finfo(np.float32).eps) * float(diagonal.max(initial=0.0))
+        largest = self._unit * float(diagonal.max(initial=0.0))
+        return ROUNDINGS * float(np.finfo(np.float32).eps) * largest
 
     def invert(self, right: np.ndarray) -> np.ndarray:
         """Return K⁺ times a vector, shape (n,)."""
