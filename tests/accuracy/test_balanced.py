@@ -59,9 +59,9 @@ def test_the_peak_pressure_is_as_good_as_the_mesh_allows(name: str) -> None:
 
 
 def test_a_smaller_share_is_reached_from_where_the_solver_is() -> None:
-    state, plain = solved(PAIR, Balanced(share=1e-4)), solved(PAIR)
+    state, plain = solved(PAIR, Balanced(share=3e-4)), solved(PAIR)
     errors = state.errors
-    assert 0.0 < errors.algebraic + errors.friction <= 1e-4 * errors.discretisation
+    assert 0.0 < errors.algebraic + errors.friction <= 3e-4 * errors.discretisation
     rounds, products = remarks(state), state.counts["f_products"]
     assert len(rounds) == 2
     assert len(remarks(plain)) == 1
