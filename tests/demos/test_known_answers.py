@@ -33,7 +33,7 @@ DEMOS: dict[str, tuple[dict[str, float | list[float]], set[str]]] = {
     ),
     "hertz_sphere": (
         {"peak_pressure": 7287.7, "radius": 0.987318},
-        {"stress", "pressure", "curve"},
+        {"stress", "pressure", "curve", "error"},
     ),
     "bolted_joint": (
         {
