@@ -122,8 +122,10 @@ if comm.rank == 0:
 # ## How far off it says it is
 #
 # Theory is known here; elsewhere a state has to judge itself. It knows an estimate of the mesh's error, from
-# how rough its strains are, and an upper bound of the solver's, both in energy norm. Averages like the contact
-# radius are better than the strains in single cells: this norm is a strict judge.
+# how rough its strains are, and an upper bound of the solver's, both in energy norm. Averages like the
+# contact radius are better than the strains in single cells: this norm is a strict judge.
+#
+# ![Each cell's part of the estimated error](../docs/pictures/hertz_sphere_error.png)
 
 errors = states["mortar"].errors
 if comm.rank == 0:
