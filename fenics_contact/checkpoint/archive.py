@@ -42,7 +42,7 @@ def write_archive(path: Path, kind: str, fingerprint: Mapping[str, str], arrays:
         "_kind": kind,
         "_fingerprint": json.dumps(dict(fingerprint)),
     }
-    members = {name: np.asarray(value) for name, value in {**head, **arrays}.items()}
+    members: dict[str, Any] = {name: np.asarray(value) for name, value in {**head, **arrays}.items()}
     np.savez(buffer, **members, _digest=np.array(_digest(members)))
     write_whole(path, buffer.getvalue())
 

@@ -71,7 +71,7 @@ class MethodState:
 
         columns = [stored[f"history.{field.name}"].tolist() for field in fields(Record)]
         kinds = [field.name for field in fields(Record)].index("kind")
-        columns[kinds] = [Kind[name] for name in columns[kinds]]
+        columns[kinds] = [Kind[str(name)] for name in columns[kinds]]
         return MethodState(
             centre=part(Evaluation, "centre"),
             bundle=part(Bundle, "bundle"),

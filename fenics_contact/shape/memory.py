@@ -63,7 +63,7 @@ class DesignMemory:
         """Remember nothing."""
         self._problem = problem
         self._points: dict[str, DesignPoint | Stored] = {}
-        self._alpha = np.zeros(0)
+        self._alpha: np.ndarray = np.zeros(0)
         self.state: State | None = None
         self.error_by_tolerance = 0.0
 
