@@ -14,7 +14,7 @@ from fenics_contact._dolfinx.assembly import (
     assemble_scalar,
     assemble_vector,
 )
-from fenics_contact._dolfinx.cells import CELL_TYPES, degree, dimension, facet_vertices
+from fenics_contact._dolfinx.cells import CELL_TYPES, degree, dimension, facet_vertices, shape
 from fenics_contact._dolfinx.forms import CompiledForm
 from fenics_contact._dolfinx.loading import VERSION, dolfinx, jit
 from fenics_contact._dolfinx.meshes import local_mesh, rank_mesh
@@ -69,6 +69,7 @@ __all__ = [
     "node_dofs",
     "rank_mesh",
     "scalar_space",
+    "shape",
     "template",
     "update_coordinates",
     "write_xdmf",

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.qp import CoarseSpace, ContactLayout, DualProblem, FeasibleSet, contact_step
-from fenics_contact.qp.face import Marks
+from fenics_contact.qp.face import Marks, face_basis
 from fenics_contact.qp.reductions import Vector
 
 #: Forces out of balance below this share of all forces are rounding.
@@ -133,16 +133,10 @@ def evening(problem: DualProblem) -> Vector:
     return np.ones(problem.layout.size) if problem.scaling is None else problem.scaling.factor
 
 
-def rows_of(size: int, rows: np.ndarray) -> sp.csr_matrix:
-    """Return the restriction Z to some owned rows, shape (size, n_rows)."""
-    count = len(rows)
-    return sp.csr_matrix((np.ones(count), (rows, np.arange(count))), shape=(size, count))
-
-
 def basis(
     layout: ContactLayout, closed: Marks, stick: Marks, turning: Marks, multiplier: Vector
 ) -> sp.csr_matrix:
-    """Return Z of the gluing rows and some contact rows, orthonormal, shape (size, n_face), owned.
+    """Return Z of a face, see `fenics_contact.qp.face.face_basis`, by the directions of friction forces.
 
     Args:
         layout: Positions of the multipliers.
@@ -151,16 +145,10 @@ def basis(
         turning: Discs of which the direction across the friction force is in it, shape (n_friction,).
         multiplier: Gives the friction forces, owned.
     """
-    rows = [layout.equality, layout.normal[closed], layout.tangential[stick].ravel()]
-    single = rows_of(layout.size, np.concatenate(rows))
-    if layout.tangential.shape[1] == 1:
-        return single
-    pairs = layout.tangential[turning]
-    tau = multiplier[pairs] / np.linalg.norm(multiplier[pairs], axis=1, keepdims=True)
-    values = np.stack([-tau[:, 1], tau[:, 0]], axis=1)
-    columns = np.repeat(np.arange(len(pairs)), 2)
-    turned = sp.csr_matrix((values.ravel(), (pairs.ravel(), columns)), shape=(layout.size, len(pairs)))
-    return sp.hstack([single, turned], format="csr")
+    tau = multiplier[layout.tangential]
+    length = np.linalg.norm(tau, axis=1, keepdims=True)
+    direction = np.divide(tau, length, out=np.zeros_like(tau), where=length > 0.0)
+    return face_basis(layout, closed, stick, turning, direction)
 
 
 def _unbalanced(problem: DualProblem, multiplier: Vector) -> float:

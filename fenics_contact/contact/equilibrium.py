@@ -155,7 +155,7 @@ def _to_tolerance(
         solution = solve_dual(system, solver, start)
     with timer.phase("state"):
         displacement = system.displacement(solution.multiplier, solution.alpha)
-    return _state(system, solution, displacement, timer)
+    return state_of(system, solution, displacement, timer)
 
 
 def _balanced(
@@ -171,12 +171,14 @@ def _balanced(
     from fenics_contact.contact.balancing import solve_balanced
 
     rounds = solve_balanced(system, solve_dual, solver, balanced or Balanced(), start, timer)
-    state = _state(system, rounds.solution, rounds.displacement, timer)
+    state = state_of(system, rounds.solution, rounds.displacement, timer)
     return replace(state, known_errors=rounds.state_errors(state.energies.norm))
 
 
-def _state(system: DualSystem, solution: DualSolution, displacement: np.ndarray, timer: PhaseTimer) -> State:
-    """Return the state of a solution. Collective."""
+def state_of(
+    system: DualSystem, solution: DualSolution, displacement: np.ndarray, timer: PhaseTimer
+) -> State:
+    """Return the state of a solution with its torn displacement. Collective."""
     with timer.phase("state"):
         contact = contact_result(system, solution)
         friction = float(np.sum(contact.slip_bound * np.linalg.norm(contact.slip, axis=1)))

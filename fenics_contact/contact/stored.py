@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
-from fenics_contact.contact.energies import compute_energies
-from fenics_contact.contact.equilibrium import contact_result, find_state
+from fenics_contact.contact.equilibrium import find_state, state_of
 from fenics_contact.contact.state import State
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.feti import Decomposition, DirectSystem, DualSystem, TornSystem, build_torn_system
+from fenics_contact.feti import Decomposition, DirectSystem, DualSystem, build_torn_system
 from fenics_contact.qp import Coulomb, CountedOperator, DualSolution, SlipLaw, Tresca
 from fenics_contact.qp.iterate import iterate_at
 from fenics_contact.scene import Scene
@@ -80,18 +78,14 @@ def restored_state(
     with timer.phase("state"):
         solution = _solution(system, stored["multiplier"][owned], stored["motion"])
         displacement = system.displacement(solution.multiplier, solution.alpha)
-        contact = contact_result(system, solution)
-        friction = float(np.sum(contact.slip_bound * np.linalg.norm(contact.slip, axis=1)))
-        energies = compute_energies(system, displacement, solution.multiplier, friction)
-    return State(system, solution, displacement, contact, energies, dict(timer.seconds))
+    return state_of(system, solution, displacement, timer)
 
 
 def _solution(system: DualSystem, multiplier: np.ndarray, motion: np.ndarray) -> DualSolution:
     """Compute residuals of a known multiplier. Collective; one product."""
-    problem, law = system.problem, _law(system.torn, system)
+    problem, law = system.problem, _law(system)
     operator = CountedOperator(problem.operator)
     iterate = iterate_at(problem, law, multiplier, operator(multiplier), motion)
-    details: dict[str, Any] = {"iterations": 0, "products": operator.products, "history": ()}
     return DualSolution(
         problem=problem,
         multiplier=multiplier,
@@ -101,12 +95,14 @@ def _solution(system: DualSystem, multiplier: np.ndarray, motion: np.ndarray) ->
         slip_bound=law.bound(multiplier),
         residuals=iterate.residuals,
         reason="read from a checkpoint",
-        **details,
+        iterations=0,
+        products=operator.products,
+        history=(),
     )
 
 
-def _law(torn: TornSystem, system: DualSystem) -> SlipLaw:
-    discs, layout = system.owned_discs(), system.problem.layout
+def _law(system: DualSystem) -> SlipLaw:
+    discs, layout, torn = system.owned_discs(), system.problem.layout, system.torn
     tresca, coefficient = torn.tresca_bound[discs], torn.friction_coefficient[discs]
     if np.any(torn.friction_coefficient > 0):
         return Coulomb(layout, coefficient, tresca)

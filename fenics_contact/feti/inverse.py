@@ -102,15 +102,14 @@ class TornInverse:
         bound, force = 0.0, np.zeros_like(displacement)
         each = zip(self._subdomains, self.operators, self._local, self._parts, strict=True)
         for subdomain, operator, local, part in each:
-            size = float(np.abs(displacement[part]).max(initial=0.0))
-            if size == 0.0:
+            moved = displacement[part]
+            if not moved.any():
                 continue
             modes, _ = np.linalg.qr(subdomain.kernel[local])
-            bent = displacement[part] / size
-            bent -= modes @ (modes.T @ bent)
+            bent = moved - modes @ (modes.T @ moved)
             operator.stiffen(bent, found := np.empty_like(bent))
-            bound += size**2 * (float(bent @ found) + operator.stiffening_error * float(bent @ bent))
-            force[part] = size * found
+            bound += float(bent @ found) + operator.stiffening_error * float(bent @ bent)
+            force[part] = found
         return max(bound, 0.0), force
 
     def row_flexibility(self, rows: sp.csr_matrix) -> np.ndarray:

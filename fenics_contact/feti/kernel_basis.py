@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.feti.subdomain import Subdomain
+from fenics_contact.feti.subdomain import Subdomain, common_kernel
 from fenics_contact.feti.torn import TornSystem
 
 #: Modes of a subdomain must give those of its body up to this, or the body keeps the subdomains' own.
@@ -29,7 +29,9 @@ def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:
     Returns:
         Coefficients of the new basis vectors in the old ones as columns, (n_modes, n_modes), replicated.
     """
-    mine = {part.mesh.number: _coefficients(torn, part) for part in torn.subdomains}
+    bodies = {name: torn.scene.bodies[name] for name in {part.mesh.body for part in torn.subdomains}}
+    modes = {name: common_kernel(body.materials, body.mesh.points) for name, body in bodies.items()}
+    mine = {part.mesh.number: _coefficients(part, modes[part.mesh.body]) for part in torn.subdomains}
     parts = {
         number: found for share in torn.numbering.comm.allgather(mine) for number, found in share.items()
     }
@@ -53,12 +55,12 @@ def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:
     return (motions + sp.diags(kept)).tocsr()
 
 
-def _coefficients(torn: TornSystem, subdomain: Subdomain) -> np.ndarray | None:
-    """Return the body's modes in those of a subdomain, a mode a column; None if it has others."""
-    body = torn.scene.bodies[subdomain.mesh.body]
-    kernels = [np.asarray(material.kernel(body.mesh.points)) for material in body.materials]
-    kernel = min(kernels, key=lambda modes: modes.shape[-1])
-    wanted = kernel[subdomain.mesh.nodes].reshape(-1, kernel.shape[-1])
+def _coefficients(subdomain: Subdomain, modes: np.ndarray) -> np.ndarray | None:
+    """Return the body's modes, (n_nodes, dim, n_modes), in those of a subdomain, a mode a column.
+
+    None if the subdomain has others.
+    """
+    wanted = modes[subdomain.mesh.nodes].reshape(-1, modes.shape[-1])
     found = np.linalg.lstsq(subdomain.kernel, wanted, rcond=None)[0]
     error = np.abs(subdomain.kernel @ found - wanted).max(initial=0.0)
     return found if error <= SPANNED * np.abs(wanted).max(initial=0.0) else None

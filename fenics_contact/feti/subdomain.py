@@ -15,7 +15,7 @@ from fenics_contact.feti.composition import Composition, composition
 from fenics_contact.feti.forms import FormLibrary
 from fenics_contact.feti.model_checks import check_kernel
 from fenics_contact.geometry import corners_of
-from fenics_contact.scene import Body, Load, SurfaceLoad
+from fenics_contact.scene import Body, Load, Material, SurfaceLoad
 
 
 @dataclass(frozen=True)
@@ -196,12 +196,18 @@ def _with_stiffness(
     matrix = Forgettable(stiffness)
     K = matrix.get()
     _check_finite(K.data, mesh)
-    # A motion without energy has none in any of the materials.
-    kernels = [material.kernel(points).reshape(mesh.size, -1) for material in parts.materials]
-    kernel = min(kernels, key=lambda modes: modes.shape[1])
+    kernel = common_kernel(parts.materials, points).reshape(mesh.size, -1)
     check_kernel(K, kernel, f"subdomain {mesh.number} of body {mesh.body!r}")
     typical = float(K.diagonal().mean())
     return Subdomain(mesh, parts, (), points, np.zeros(mesh.size), kernel, typical, matrix)
+
+
+def common_kernel(materials: Sequence[Material], points: np.ndarray) -> np.ndarray:
+    """Return the modes without energy of a body of several materials at points, (n, dim, n_modes)."""
+    # A motion without energy has none in any of the materials.
+    return min(
+        (np.asarray(material.kernel(points)) for material in materials), key=lambda modes: modes.shape[-1]
+    )
 
 
 def _check_finite(values: np.ndarray, mesh: SubdomainMesh) -> None:

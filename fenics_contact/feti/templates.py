@@ -12,17 +12,9 @@ from ufl.algorithms.analysis import extract_type
 
 from fenics_contact import _dolfinx
 
-#: Gauss rule of the volume: two points a direction on tensor-product cells, one on simplices suit linear
-#: elasticity, three a direction and one on each edge the quadratic cells.
-QUADRATURE_DEGREE = {
-    "hexahedron": 2,
-    "tetrahedron": 1,
-    "quadrilateral": 2,
-    "triangle": 1,
-    "hexahedron27": 4,
-    "quadrilateral9": 4,
-    "triangle6": 2,
-}
+#: Gauss rule of the volume by shape: two points a direction on tensor-product cells, one on simplices suit
+#: linear elasticity; quadratic cells get twice the degree.
+QUADRATURE_DEGREE = {"hexahedron": 2, "tetrahedron": 1, "quadrilateral": 2, "triangle": 1}
 #: Tag that every loaded surface gets inside a load form.
 LOADED = 1
 
@@ -138,8 +130,9 @@ def volume_measure(cell_type: str, degree: int | None = None) -> Any:
 
     The given one is for linear cells; quadratic ones get twice that.
     """
-    degree = QUADRATURE_DEGREE[cell_type] if degree is None else degree * _dolfinx.degree(cell_type)
-    return ufl.dx(domain=_dolfinx.template(cell_type), metadata={"quadrature_degree": degree})
+    linear = QUADRATURE_DEGREE[_dolfinx.shape(cell_type)] if degree is None else degree
+    metadata = {"quadrature_degree": linear * _dolfinx.degree(cell_type)}
+    return ufl.dx(domain=_dolfinx.template(cell_type), metadata=metadata)
 
 
 def surface_measure(cell_type: str) -> Any:

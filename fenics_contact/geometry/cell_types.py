@@ -25,7 +25,6 @@ class CellType:
         reference_volume: Volume (area) of the reference cell.
         pieces: Local nodes of the linear cells of the same shape that make up the cell, (n_pieces,
             n_vertices).
-        face_pieces: Positions in a row of ``faces`` of the linear facets that make up a face, (n, corners).
     """
 
     name: str
@@ -36,12 +35,16 @@ class CellType:
     edges: np.ndarray
     reference_volume: float
     pieces: np.ndarray
-    face_pieces: np.ndarray
 
     @property
     def vertices(self) -> np.ndarray:
         """Reference coordinates of the vertices, (n_vertices, dim)."""
         return self.nodes[: len(self.edges)]
+
+    @property
+    def face_pieces(self) -> np.ndarray:
+        """Positions in a row of ``faces`` of the linear facets that make up a face, (n, corners)."""
+        return FACET_TYPES[self.faces.shape[1], self.dim].pieces
 
     @property
     def order(self) -> int:
@@ -71,18 +74,9 @@ def _linear(
     edges: list[list[int]],
     volume: float,
 ) -> CellType:
-    nodes, facet = np.array(vertices), np.arange(len(faces[0]))
-    return CellType(
-        name,
-        plural,
-        nodes.shape[1],
-        nodes,
-        _table(faces),
-        _table(edges),
-        volume,
-        np.arange(len(nodes))[None],
-        facet[None],
-    )
+    nodes = np.array(vertices)
+    whole = np.arange(len(nodes))[None]
+    return CellType(name, plural, nodes.shape[1], nodes, _table(faces), _table(edges), volume, whole)
 
 
 def _quadratic(
@@ -97,7 +91,6 @@ def _quadratic(
         middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
         more = middles[:1] if len(face) == 2 else [*middles, corners.mean(axis=0)]
         faces.append([*face, *(number[tuple(place)] for place in more)])
-    face_pieces = EDGE3.pieces if linear.dim == 2 else _table(_QUARTERS)
     return CellType(
         name,
         plural,
@@ -107,7 +100,6 @@ def _quadratic(
         linear.edges,
         linear.reference_volume,
         _table(pieces),
-        face_pieces,
     )
 
 
@@ -158,7 +150,6 @@ EDGE3 = CellType(
     EDGE.edges,
     1.0,
     _table([[0, 2], [2, 1]]),
-    EDGE.face_pieces,
 )
 """A facet of quadratic plane cells."""
 TRIANGLE6 = _quadratic(

@@ -10,6 +10,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry.cell_types import HEXAHEDRON27, QUADRILATERAL9, TRIANGLE6, CellType, cell_type_of
 from fenics_contact.geometry.faces import boundary_faces, corners_of, match_faces
 from fenics_contact.geometry.mesh import BodyMesh
+from fenics_contact.geometry.shape_functions import shape_values
 from fenics_contact.geometry.validation import check_jacobians
 
 Place = Callable[[np.ndarray], np.ndarray]
@@ -46,7 +47,7 @@ def quadratic(mesh: BodyMesh, onto: Mapping[str, Place] | None = None) -> BodyMe
             f"quadratic needs linear hexahedra, quadrilaterals or triangles, got {linear.plural}: mesh the "
             "body with hexahedra; facets of quadratic tetrahedra bear no force at their corners"
         )
-    points, cells = _with_more_nodes(mesh.points, mesh.cells, kind)
+    points, cells = _with_more_nodes(mesh.points, mesh.cells, linear, kind)
     boundary, _ = boundary_faces(cells, mesh.dim)
     surfaces = {
         name: boundary[match_faces(facets, corners_of(boundary, mesh.dim))]
@@ -70,9 +71,12 @@ def quadratic(mesh: BodyMesh, onto: Mapping[str, Place] | None = None) -> BodyMe
     return BodyMesh(points, cells, surfaces, mesh.grid, mesh.regions, coincident_nodes=mesh.coincident_nodes)
 
 
-def _with_more_nodes(points: np.ndarray, cells: np.ndarray, kind: CellType) -> tuple[np.ndarray, np.ndarray]:
+def _with_more_nodes(
+    points: np.ndarray, cells: np.ndarray, linear: CellType, kind: CellType
+) -> tuple[np.ndarray, np.ndarray]:
     """Add a node in the middle of all vertices that lie around it, once for all cells that share it."""
-    parents = [_around(kind, place) for place in kind.nodes[len(kind.vertices) :]]
+    # Those whose linear shape functions are not zero there.
+    parents = [np.flatnonzero(values) for values in shape_values(linear, kind.nodes[len(linear.nodes) :])]
     result = np.concatenate([cells, np.empty((len(cells), len(parents)), dtype=np.int64)], axis=1)
     for count in sorted({len(around) for around in parents}):
         columns = [index for index, around in enumerate(parents) if len(around) == count]
@@ -103,12 +107,3 @@ def _follow(points: np.ndarray, cells: np.ndarray, kind: CellType, placed: np.nd
         points[cells[:, 26]] = 0.25 * (points[cells[:, 8:20]].sum(axis=1) - points[cells[:, :8]].sum(axis=1))
         return
     points[cells[:, 8]] = 0.5 * points[cells[:, 4:8]].sum(axis=1) - 0.25 * points[cells[:, :4]].sum(axis=1)
-
-
-def _around(kind: CellType, place: np.ndarray) -> list[int]:
-    """Return the vertices in whose middle a node lies: their linear shape functions are not zero there."""
-    if kind.is_simplex:
-        values = np.concatenate([[1.0 - place.sum()], place])
-    else:
-        values = (1.0 - np.abs(kind.vertices - place)).prod(axis=1)
-    return [int(vertex) for vertex in np.flatnonzero(values)]

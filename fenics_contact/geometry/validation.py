@@ -87,7 +87,7 @@ def check_jacobians(points: np.ndarray, cells: np.ndarray, remedy: str) -> None:
     raise InvalidInputError(
         f"every cell must have a positive Jacobian, {inverted.size} of {cells.shape[0]} are inverted or "
         f"flat; the worst is cell {inverted[worst]} at ({centre}) with a "
-        f" Jacobian ratio (smallest over largest) of {ratios[worst]:.3g}: {remedy}"
+        f"Jacobian ratio (smallest over largest) of {ratios[worst]:.3g}: {remedy}"
     )
 
 

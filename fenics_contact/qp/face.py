@@ -47,17 +47,7 @@ class Face:
     @cached_property
     def restriction(self) -> sp.csr_matrix:
         """Z with orthonormal columns, shape (size, n_face), owned rows and columns."""
-        layout = self.layout
-        single = np.concatenate(
-            [layout.equality, layout.normal[self.closed], layout.tangential[self.stick].ravel()]
-        )
-        sliding = self._sliding
-        rows = np.concatenate([single, layout.tangential[sliding].ravel()])
-        width = layout.tangential.shape[1]
-        slip_columns = np.repeat(len(single) + np.arange(len(sliding)), width)
-        columns = np.concatenate([np.arange(len(single)), slip_columns])
-        values = np.concatenate([np.ones(len(single)), self._tangents[sliding].ravel()])
-        return sp.csr_matrix((values, (rows, columns)), shape=(layout.size, len(single) + len(sliding)))
+        return face_basis(self.layout, self.closed, self.stick, self.slip, self.direction)
 
     @property
     def n_face(self) -> int:
@@ -131,9 +121,27 @@ class Face:
         """Slipping discs that have a tangent to move along; none in two dimensions."""
         return np.flatnonzero(self.slip) if self.layout.tangential.shape[1] == 2 else np.zeros(0, np.int64)
 
-    @property
-    def _tangents(self) -> Vector:
-        return np.stack([-self.direction[:, -1], self.direction[:, 0]], axis=1)
+
+def face_basis(
+    layout: ContactLayout, closed: Marks, stick: Marks, sliding: Marks, direction: Vector
+) -> sp.csr_matrix:
+    """Return Z of a face: its columns are orthonormal, shape (size, n_face), owned rows and columns.
+
+    Args:
+        layout: Positions of the multipliers.
+        closed: Contacts whose normal row is free, shape (n_contact,).
+        stick: Discs of which both rows are free, shape (n_friction,).
+        sliding: Discs that are free across a direction; in two dimensions there is none across.
+        direction: Unit vectors of these discs, shape (n_friction, t).
+    """
+    single = np.concatenate([layout.equality, layout.normal[closed], layout.tangential[stick].ravel()])
+    across = np.flatnonzero(sliding) if layout.tangential.shape[1] == 2 else np.zeros(0, np.int64)
+    tangents = np.stack([-direction[across, -1], direction[across, 0]], axis=1)
+    pairs = layout.tangential[across]
+    rows = np.concatenate([single, pairs.ravel()])
+    columns = np.concatenate([np.arange(len(single)), np.repeat(len(single) + np.arange(len(across)), 2)])
+    values = np.concatenate([np.ones(len(single)), tangents.ravel()])
+    return sp.csr_matrix((values, (rows, columns)), shape=(layout.size, len(single) + len(across)))
 
 
 def classify(

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp.certify import Certificate, certify
 from fenics_contact.qp.iterate import Iterate, Start
 from fenics_contact.qp.newton_steps import NewtonSteps
 from fenics_contact.qp.problem import CountedOperator, DualProblem
-from fenics_contact.qp.rescue import rescue
+from fenics_contact.qp.rescue import DIVERGED, rescue
 from fenics_contact.qp.slip_law import SlipLaw
 from fenics_contact.qp.smalse import Smalse
 from fenics_contact.qp.solution import DualSolution, SolverStep
@@ -92,7 +90,7 @@ class FaceNewton:
             before, after = best.residuals, iterate.residuals
             progress = after.worst_beside(before) < 0.5 * before.worst_beside(after)
             best, since_best = (iterate, 0) if progress else (best, since_best + 1)
-            if since_best < self.patience and np.isfinite(after.worst):
+            if since_best < self.patience and after.worst_beside(before) < DIVERGED:
                 continue
             # Where Newton could do nothing with the last rescue, the next one must go further.
             origin, last = _sound(problem, best, first), origin

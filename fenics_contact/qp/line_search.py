@@ -13,7 +13,11 @@ from fenics_contact.qp.reductions import global_sum
 from fenics_contact.qp.residual import Residuals, contact_step, measure
 from fenics_contact.qp.slip_law import SlipLaw
 
-FRACTIONS = (0.5, 0.25, 0.1, 0.01)
+FRACTIONS = (0.5, 0.25, 0.1)
+#: Taken only near a solution: far from one, a step as short as this stays where nothing is known yet.
+SHORTEST = 0.01
+#: The largest relative residual that counts as near.
+NEAR = 0.5
 #: The whole step is taken where the potential rises at its end by less than this fraction of its first fall.
 STEEP = 0.3
 #: The slope at which a minimum of the potential counts as found, relative to the first one.
@@ -50,7 +54,8 @@ def damp(
         if residuals is not None and not _worse(after.residuals, residuals):
             return Damped(after, 1.0)
     candidates = [Damped(after, 1.0)]
-    candidates += [Damped(_between(problem, law, before, after, part), part) for part in FRACTIONS]
+    fractions = (*FRACTIONS, SHORTEST) if before.residuals.worst < NEAR else FRACTIONS
+    candidates += [Damped(_between(problem, law, before, after, part), part) for part in fractions]
     return min(candidates, key=lambda candidate: candidate.iterate.residuals.worst_beside(after.residuals))
 
 

@@ -155,4 +155,5 @@ def _image(
     )
     projected = image - system.coarse.transpose(system.coarse.solve(sums[:m]))
     slope, curvature = float(sums[m]), float(sums[m + 1])
-    return projected, slope, curvature, CURVATURE_TOLERANCE * float(np.sqrt(sums[m + 2] * sums[m + 3]))
+    lengths = np.sqrt(sums[m + 2 :])
+    return projected, slope, curvature, CURVATURE_TOLERANCE * float(lengths[0] * lengths[1])

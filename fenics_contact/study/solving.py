@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import FixedPoint, LoadSequence, State, solve_scene
+from fenics_contact.contact import FixedPoint, State, solve_scene, solve_steps
 from fenics_contact.geometry import BodyMesh, default_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import Scene
@@ -23,8 +23,7 @@ def solve_problem(problem: Problem, parameters: Parameters, comm: MPI.Comm) -> t
     options = solver_options(parameters)
     if not problem.steps:
         return (solve_scene(problem.scene, partitions, comm, **options),)
-    sequence = LoadSequence(problem.scene, partitions, comm, **options)
-    return tuple(sequence.advance(step) for step in problem.steps)
+    return solve_steps(problem.scene, problem.steps, partitions, comm, **options)
 
 
 def solver_options(parameters: Parameters) -> dict[str, Any]:

@@ -57,7 +57,7 @@ def _compared(states: tuple[State, ...], solver: FaceNewton) -> TrueErrors:
         state.scene, state.torn.decomposition, solver=solver, previous=state,
         slip_from=states[-2] if len(states) > 1 else None,
     )  # fmt: skip
-    norm = np.sqrt(2.0 * exact.energies.strain)
+    norm = exact.energies.norm
     total = _distance(state, exact.dual_solution, exact.torn_displacement) / norm
     if not np.any(state.torn.friction_coefficient > 0.0):
         doubt = certify(exact.dual, exact.dual_solution).bound / norm

@@ -73,6 +73,18 @@ def test_a_step_may_be_worse_than_the_last_iterate_if_it_is_better_than_the_one_
     assert damp(problem.dual, law, good, fair, bad.residuals).iterate is fair
 
 
+@pytest.mark.parametrize(("size", "fraction"), [(1.0, 0.01), (100.0, 0.1)], ids=["near", "far"])
+def test_the_shortest_step_is_taken_near_a_solution_only(size, fraction):
+    """Far from one the residual is made of contacts that are still to close, and falls little by little."""
+    problem = random_problem(3)
+    law = Tresca(problem.layout, problem.slip_bound)
+    solution = solve(problem.dual, problem.slip_bound, FaceNewton(tolerance=1e-10))
+    before, after = (
+        iterate(problem, solution.multiplier, solution.alpha + size * part) for part in (-0.01, 0.99)
+    )
+    assert damp(problem.dual, law, before, after).fraction == fraction
+
+
 def test_the_minimum_of_the_potential_on_a_segment_is_found():
     problem = random_problem(3)
     dual, law = problem.dual, Tresca(problem.layout, problem.slip_bound)
