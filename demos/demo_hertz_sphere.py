@@ -10,8 +10,8 @@
 #
 # with the contact radius $a$ [mm], the peak pressure $p_0$ [N/mm²] and the contact modulus $E^*$ [N/mm²].
 # The meshes of ball and block do not match. We solve with both discretisations of contact that the package
-# has: "mortar" is the accurate one, to 1 % here; "node" errs by tens of percents, because forces between
-# single nodes and facets cannot represent an even pressure on such meshes.
+# has: "mortar" is the accurate one, to 1 % here; "node" errs by some percents, however fine the meshes are,
+# because forces between single nodes and facets cannot represent an even pressure where meshes do not match.
 #
 # Run it with `make demo DEMO=hertz_sphere`, on two ranks with `make demo DEMO=hertz_sphere NP=2`.
 
@@ -163,11 +163,12 @@ plot_curves(
 if comm.rank == 0:
     print(f"pictures and files in {output}/")
 
-# Peak pressure and contact radius of the mortar method agree with Hertz to 2 %; the node method does not.
+# Peak pressure and contact radius of the mortar method agree with Hertz to 2 %, of the node method to 5 %.
 
 assert abs(found["mortar"]["peak"] / p0 - 1) < 0.02
 assert abs(found["mortar"]["a"] / a - 1) < 0.02
-assert abs(found["node"]["peak"] / p0 - 1) > 0.05
+assert 0.02 < abs(found["node"]["peak"] / p0 - 1) < 0.05
+assert 0.02 < abs(found["node"]["a"] / a - 1) < 0.05
 
 # ## What to try next
 #

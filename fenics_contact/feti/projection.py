@@ -19,6 +19,9 @@ NEWTON_STEPS = 25
 PATIENCE = 8
 #: How far outside a facet a projection may lie, in local coordinates: rounding on shared edges, no more.
 EDGE_TOLERANCE = 1e-9
+#: How far beyond the outer edges of the surface. Where a plane of symmetry cuts two round bodies the averaged
+#: normals lean a little out of that plane, and nodes of one body would just miss the other.
+MARGIN = 0.1
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,17 @@ class Projection:
     local: np.ndarray
     gap: np.ndarray
     normal: np.ndarray
+
+    def part(self, chosen: np.ndarray) -> Projection:
+        """Return some of the projections, by number or by a mask."""
+        return Projection(
+            self.point[chosen], self.facet[chosen], self.local[chosen], self.gap[chosen], self.normal[chosen]
+        )
+
+    def beside(self, corners: int) -> np.ndarray:
+        """Return how far outside their facets they lie, in local coordinates, shape (n,); 0 for rounding."""
+        distance = outside(self.local, corners)
+        return np.where(distance <= EDGE_TOLERANCE, 0.0, distance)
 
 
 def interpolated_normal(weights: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -78,6 +92,8 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
     x(ξ) is the (bi)linear facet, in the plane a straight edge, and n(ξ) the interpolated, normalised nodal
     normal. Because n is continuous, so are gap, normal and weights while a point slides from facet to facet.
     Of several projections the one with the smallest |g| counts; surfaces that face the same way do not touch.
+    Points without any that lie beside the surface by no more than a twentieth of a facet's width meet the
+    facet's continuation.
 
     Args:
         points: Slave nodes, shape (n, dim), [length].
@@ -88,10 +104,11 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
     centroids = corners.mean(axis=1)
     radius = np.linalg.norm(corners - centroids[:, None], axis=2).max(axis=1)
     tree = cKDTree(centroids)
-    first = _best(_solve(points, normals, master, *_nearest(tree, points)))
+    near = _solve(points, normals, master, *_nearest(tree, points))
+    first = _best(near.part(near.beside(master.corners) == 0.0), master.corners)
     waiting = np.setdiff1d(np.arange(len(points)), first.point)
-    second = _best(_solve(points, normals, master, *_within_reach(tree, radius, points, waiting)))
-    return join([first, second])
+    reached = _solve(points, normals, master, *_within_reach(tree, radius, points, waiting))
+    return join([first, _best(reached, master.corners)])
 
 
 def _nearest(tree: cKDTree, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -119,7 +136,7 @@ def _within_reach(
 def _solve(
     points: np.ndarray, normals: np.ndarray, master: FacetedSurface, point: np.ndarray, facet: np.ndarray
 ) -> Projection:
-    """Solve for each (point, facet) pair by Newton's method; keep pairs with an answer inside the facet."""
+    """Solve for each (point, facet) pair by Newton's method; keep answers in a facet or barely beside it."""
     nodes = master.facets[facet]
     corners, corner_normals, target = master.points[nodes], master.normals[nodes], points[point]
     size = np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).max(axis=1)
@@ -141,7 +158,7 @@ def _solve(
     normal, _ = interpolated_normal(values, corner_normals)
     residual = np.einsum("nk,nkd->nd", values, corners) + gap[:, None] * normal - target
     good = np.linalg.norm(residual, axis=1) < 1e-10 * (size + np.abs(gap))
-    good &= outside(local, master.corners) <= EDGE_TOLERANCE
+    good &= outside(local, master.corners) <= MARGIN * (0.5 if master.corners == 3 else 1.0)
     good &= np.einsum("nd,nd->n", normal, normals[point]) < 0
     return Projection(point[good], facet[good], local[good], gap[good], normal[good])
 
@@ -164,13 +181,12 @@ def _newton_step(
     return np.where(regular[:, None], -np.linalg.solve(matrix, residual[:, :, None])[:, :, 0], 0.0)
 
 
-def _best(found: Projection) -> Projection:
-    """Keep the smallest |gap| of each point; of equal ones (a shared edge) that of the lowest facet."""
+def _best(found: Projection, corners: int) -> Projection:
+    """Keep of each point what lies least beside its facet; then the smallest |gap|, then the lowest facet."""
     rounded = np.round(np.abs(found.gap), 12)
-    order = np.lexsort((found.facet, rounded, found.point))
+    order = np.lexsort((found.facet, rounded, found.beside(corners), found.point))
     _, first = np.unique(found.point[order], return_index=True)
-    keep = order[first]
-    return Projection(*(getattr(found, name)[keep] for name in ("point", "facet", "local", "gap", "normal")))
+    return found.part(order[first])
 
 
 def join(parts: Sequence[Projection]) -> Projection:

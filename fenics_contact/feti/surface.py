@@ -68,7 +68,7 @@ def outside(local: np.ndarray, corners: int) -> np.ndarray:
 
 
 def edge_distance(local: np.ndarray, corners: int) -> np.ndarray:
-    """Return how far points inside a facet are from its edges, in local coordinates, shape (n,)."""
+    """Return how far inside facets points are, in local coordinates, negative outside, shape (n,)."""
     if corners == 2:
         return 1 - np.abs(local[:, 0])
     s, t = local[:, 0], local[:, 1]

@@ -113,7 +113,8 @@ def _points_on_edges(state: State) -> int:
         if isinstance(pair.master, Surface):
             closed = (points.pair == index) & (state.contact.normal_force > 0)
             corners = state.scene.facets(pair.master).shape[1]
-            total += int(np.count_nonzero(edge_distance(points.local[closed], corners) < EDGE_TOLERANCE))
+            distance = np.abs(edge_distance(points.local[closed], corners))
+            total += int(np.count_nonzero(distance < EDGE_TOLERANCE))
     return total
 
 

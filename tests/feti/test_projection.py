@@ -121,9 +121,35 @@ def test_nodes_of_the_surface_itself_project_onto_themselves(corners: int) -> No
 
 def test_points_beyond_the_rim_have_no_projection() -> None:
     x, y = np.meshgrid(np.linspace(0, 1, 4), np.linspace(0, 1, 4), indexing="ij")
-    points = np.array([[0.5, 0.5, 0.1], [1.01, 0.5, 0.1], [0.5, -0.01, 0.1], [1.0, 1.0, 0.1]])
+    points = np.array([[0.5, 0.5, 0.1], [1.02, 0.5, 0.1], [0.5, -0.02, 0.1], [1.0, 1.0, 0.1]])
     found = project(points, downwards(4), lattice(x, y, 0 * x, 4))
     assert found.point.tolist() == [0, 3]
+
+
+@pytest.mark.parametrize("corners", CORNERS)
+@pytest.mark.parametrize("gap", [0.05, -0.05])
+def test_nodes_in_a_plane_of_symmetry_meet_the_half_that_is_meshed(corners: int, gap: float) -> None:
+    """The averaged normals of the half lean out of that plane, and away from every point above it."""
+    x, y = np.meshgrid(np.linspace(0.0, 0.6, 7), np.linspace(-0.3, 0.3, 7), indexing="ij")
+    half = lattice(x, y, cylinder(x, y), corners)
+    assert half.normals[np.isclose(half.points[:, 0], 0.0), 0].min() > 0.04
+    along = np.linspace(-0.29, 0.29, 30)
+    points = np.column_stack([np.zeros(30), along, np.full(30, 1.0 + gap)])
+    found = project(points, downwards(30), half)
+    np.testing.assert_array_equal(found.point, np.arange(30))
+    np.testing.assert_allclose(found.gap, gap, atol=2e-3 * abs(gap))
+    np.testing.assert_allclose(foot(found, half), [[0.0, y, 1.0] for y in along], atol=0.06 * abs(gap))
+
+
+@pytest.mark.parametrize("corners", CORNERS)
+def test_points_meet_the_continuation_of_a_surface_for_a_twentieth_of_a_facet(corners: int) -> None:
+    x, y = np.meshgrid(np.linspace(0.0, 1.0, 5), np.linspace(0.0, 1.0, 5), indexing="ij")
+    plane = lattice(x, y, np.zeros_like(x), corners)
+    beside = np.array([0.0, 0.01, 0.0124, 0.0126, 0.1])
+    points = np.column_stack([1.0 + beside, np.full(5, 0.55), np.full(5, 0.3)])
+    found = project(points, downwards(5), plane)
+    np.testing.assert_array_equal(found.point, [0, 1, 2])
+    np.testing.assert_allclose(foot(found, plane), points[:3] * [1, 1, 0], atol=1e-13)
 
 
 def test_surfaces_that_face_the_same_way_do_not_touch() -> None:
@@ -238,6 +264,6 @@ def test_gap_and_normal_do_not_jump_between_edges() -> None:
 
 def test_points_beyond_the_ends_of_a_curve_and_from_behind_have_no_projection() -> None:
     line = faceted_surface(np.array([[0.0, 0], [0.5, 0], [1, 0]]), np.array([[1, 0], [2, 1]]))
-    points = np.array([[0.5, 0.1], [1.01, 0.1], [-0.01, 0.1], [1.0, 0.1], [0.3, 0.1]])
+    points = np.array([[0.5, 0.1], [1.03, 0.1], [-0.03, 0.1], [1.0, 0.1], [0.3, 0.1]])
     normals = np.array([[0.0, -1], [0, -1], [0, -1], [0, -1], [0, 1]])
     assert project(points, normals, line).point.tolist() == [0, 3]
