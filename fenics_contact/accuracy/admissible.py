@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -49,6 +50,15 @@ class Statuses:
     def coarse(self) -> CoarseSpace:
         """Equilibrium by the free rows alone, in evened multipliers. Collective on first use."""
         return self.problem.evened.coarse.restricted(self.free)
+
+    def spaces(self) -> Iterator[tuple[sp.csr_matrix, CoarseSpace]]:
+        """Bases of rows with their equilibrium: of the free rows, of all contacts that press, of all."""
+        yield self.free, self.coarse
+        layout, evened = self.problem.layout, self.problem.evened.coarse
+        nowhere = np.zeros_like(self.slip)
+        pressing = basis(layout, self.closed, self.stick | self.slip, nowhere, self.directions)
+        yield pressing, evened.restricted(pressing)
+        yield sp.identity(layout.size, format="csr"), evened
 
     def settled(self, residual: Vector) -> Vector:
         """Return r without the rigid motions that fit it best on the free rows. Collective."""
@@ -109,14 +119,14 @@ def admissible(problem: DualProblem, slip_bound: Vector, multiplier: Vector, res
 def _balanced(statuses: Statuses, feasible: FeasibleSet, start: Vector) -> tuple[Vector, float]:
     """Return a multiplier of the cone in equilibrium, and how much is left of G λ − e. Collective.
 
-    The shortest change of the free multipliers balances, or where these do not suffice, of all; what then
-    leaves the cone is projected again. Contact forces next to those that were moved take part: gluing forces
-    alone would carry the difference through the bodies, which bends thin ones.
+    The shortest change of the free multipliers balances, or where these do not suffice, of all that press, or
+    of all; what then leaves the cone is projected again. Contact forces next to those that were moved take
+    part: gluing forces alone would carry the difference through the bodies, which bends thin ones. Forces
+    across open gaps come last, as each costs its gap in energy.
     """
     problem, found = statuses.problem, feasible.project(start)
     left = _unbalanced(problem, found)
-    every = sp.identity(problem.layout.size, format="csr")
-    for rows, coarse in ((statuses.free, statuses.coarse), (every, problem.evened.coarse)):
+    for rows, coarse in statuses.spaces():
         for _ in range(ROUNDS):
             if left <= ROUNDING:
                 return found, left

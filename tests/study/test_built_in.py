@@ -14,7 +14,7 @@ from fenics_contact.study.certificates import check_certificates
 from fenics_contact.study.errors import Errors
 from fenics_contact.study.launching import Task, measure
 from fenics_contact.study.scenes import BUILT_IN
-from fenics_contact.study.scenes.nested_box import mirrored, nested_box
+from fenics_contact.study.scenes.nested_box import mirrored, nested_box, nested_half
 from fenics_contact.study.worker import measured
 
 
@@ -28,6 +28,20 @@ def test_a_nested_box_fills_its_cube_and_its_mirror_image_too(cell: str) -> None
     assert set(mesh.surfaces) == {"x0", "x1", "y0", "y1", "z0", "z1"}
 
 
+@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+def test_a_nested_half_fills_its_rectangle_with_cells_that_are_not_slender(cell: str) -> None:
+    mesh = nested_half(1.25, 30.0, 5, cell)
+    upside_down = mirrored(mesh)
+    assert mesh.volume == pytest.approx(2 * 30.0**2)
+    assert upside_down.volume == pytest.approx(2 * 30.0**2)
+    assert (mesh.points[:, 1].min(), upside_down.points[:, 1].max()) == (0.0, 0.0)
+    corners = mesh.points[mesh.cells]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    assert (sides.max(axis=1) / sides.min(axis=1)).max() < 3.0
+    assert sides.max() / sides.min() > 10, "nothing is graded"
+    assert set(mesh.surfaces) == {"x0", "x1", "y0", "y1"}
+
+
 def test_one_run_knows_its_errors_and_what_bounds_them() -> None:
     study = find_study("hertz")
     record = measured(study, replace(study.sweep.base, size=2, tolerance=1e-3), MPI.COMM_SELF, verify=True)
@@ -38,6 +52,15 @@ def test_one_run_knows_its_errors_and_what_bounds_them() -> None:
     assert record["quantities"]["contact radius"]["error"] == pytest.approx(-0.0254, abs=0.002)
     assert set(record["phases"]) >= {"mesh", "factor", "solve"}
     assert sum(record["phases"].values()) <= 1.01 * record["seconds"]
+
+
+def test_forces_that_balance_do_not_bridge_open_gaps() -> None:
+    """Of four contacts that press three slip: what they lack once cost the gaps of the thirty open ones."""
+    study = find_study("chain_links")
+    parameters = replace(study.sweep.base, size=2, discretisation="mortar")
+    record = measured(study, parameters, MPI.COMM_SELF, verify=True)
+    true = record["true_errors"].algebraic
+    assert true <= record["parts"]["algebraic"] <= 10 * true
 
 
 def test_every_built_in_study_plans_all_that_it_promises() -> None:

@@ -27,33 +27,27 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import State, Status
-from fenics_contact.geometry import CELL_TYPES, BodyMesh, quadratic, rectangle_lattice
+from fenics_contact.geometry import CELL_TYPES, BodyMesh, quadratic
 from fenics_contact.scene import Body, ContactPair, Coulomb, LoadStep, PlaneStrain, Scene, Support, Surface
 from fenics_contact.study.parameters import BALANCED, Parameters, Sweep
 from fenics_contact.study.protocol import Outcome, Problem, Quantity, StudyScene
+from fenics_contact.study.scenes.nested_box import mirrored, nested_half
 
 YOUNG, POISSON, FRICTION = 1000.0, 0.3, 0.4
 RADIUS, SIZE = 2000.0, 30.0
+#: Half the width of what has equal cells; the half contact is 1.
+CORE = 1.25
 PRESS, SHEAR = 0.00205, 0.000735
 #: Displacements go like r^0.711 at the corners between free and held edges, with ν = 0.3 in plane strain:
 #: sin²(λπ/2) = (4 (1 − ν)² − λ²) / (3 − 4ν) [Williams 1952].
 CORNER = 0.711
 
 
-def ticks(fine: float, cell: float, growth: float) -> np.ndarray:
-    """Equal cells up to ``fine``, then growing ones up to the size of the body."""
-    count = int(np.ceil(np.log1p((SIZE - fine) / cell * (growth - 1)) / np.log(growth)))
-    tail = np.cumsum(growth ** np.arange(count))
-    equal = np.linspace(0.0, fine, round(fine / cell) + 1)
-    return np.concatenate([equal, fine + (SIZE - fine) * tail / tail[-1]])
-
-
 def half(side: float, n: int, cell: str = "quadrilateral") -> BodyMesh:
     """Mesh the upper body (side 1) or its mirror image (side −1), n cells on the half contact."""
-    across, down = ticks(1.25, 1 / n, 1 + 1 / n), ticks(1 / n, 1 / n, 1 + 1 / n)
-    lines = [np.concatenate([-across[:0:-1], across]), down if side > 0 else -down[::-1]]
     curved = CELL_TYPES[cell].order == 2
-    mesh = rectangle_lattice(lines, "quadrilateral" if curved else cell)
+    mesh = nested_half(CORE, SIZE, round(CORE * n), "quadrilateral" if curved else cell)
+    mesh = mesh if side > 0 else mirrored(mesh)
     mesh = quadratic(mesh) if curved else mesh
     x, y = mesh.points.T
     return mesh.moved(np.column_stack([x, y + side * x**2 / (2 * RADIUS) * (1 - np.abs(y) / SIZE)]))
