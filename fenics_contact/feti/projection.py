@@ -160,7 +160,7 @@ def _solve(
     good = np.linalg.norm(residual, axis=1) < 1e-10 * (size + np.abs(gap))
     good &= outside(local, master.corners) <= MARGIN * (0.5 if master.corners == 3 else 1.0)
     good &= np.einsum("nd,nd->n", normal, normals[point]) < 0
-    return Projection(point[good], facet[good], local[good], gap[good], normal[good])
+    return Projection(point, facet, local, gap, normal).part(good)
 
 
 def _newton_step(
