@@ -43,7 +43,7 @@ debian_release() {
     debian:trixie:*) echo trixie ;;
     *) die "needs Debian 12 (bookworm) or Debian 13 (trixie), got ${found##*:}." \
       "Elsewhere, install FEniCSx with real PETSc (CHOLMOD or MUMPS) and gmsh yourself, for instance from conda-forge," \
-      "then pip install -e '.[viz,test]' there, and name that Python: make ... PYTHON=/path/to/python" ;;
+      "then pip install -e '.[dev]' there, and name that Python: make ... PYTHON=/path/to/python" ;;
   esac
 }
 
@@ -93,7 +93,7 @@ build_venv() {
   say "installing Python packages into $venv"
   # As an environment variable the constraints hold for the build of the package, too.
   PIP_CONSTRAINT=$constraints retry $venv/bin/python -m pip install --quiet --disable-pip-version-check \
-    -e '.[viz,test]' || die "pip install failed: see the lines above; is the network reachable?"
+    -e '.[dev]' || die "pip install failed: see the lines above; is the network reachable?"
 }
 
 release=$(debian_release)
