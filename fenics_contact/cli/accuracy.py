@@ -23,9 +23,10 @@ from fenics_contact.study.running import Settings, StudyPlan, collected, measure
 from fenics_contact.study.scenes import find_study
 
 ABOUT = (
-    f"Measure what accuracy costs in time. SCENE is one of {options.NAMES}, or a Python file that defines `study`, "
-    "a fenics_contact.study.StudyScene. Results, table, figures and advice are written to a folder; what was "
-    "measured already is not measured again. Runs have processes of their own: ask for ranks with --ranks."
+    f"Measure what accuracy costs in time. SCENE is one of {options.NAMES}, or a Python file that defines "
+    "`study`, a fenics_contact.study.StudyScene. Results, table, figures and advice are written to a folder; "
+    "what was measured already is not measured again. Runs have processes of their own: ask for ranks with "
+    "--ranks."
 )
 #: Options that take any number of values: --sizes 2 3 4. An option without a value stands for none.
 LISTS = ("--sizes", "--tolerances", "--cells", "--discretisations", "--fixed-points", "--subdomains")

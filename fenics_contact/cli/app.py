@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from fenics_contact import __version__
 from fenics_contact.cli import accuracy, demos, info, optimize, run, schema, view
 from fenics_contact.cli.desk import Desk
 from fenics_contact.cli.endings import EPILOG, terminable, told
+from fenics_contact.io import versions
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -63,7 +63,7 @@ for module in (run, optimize, demos, view, accuracy, info, schema):
 
 def _version(wanted: bool) -> None:
     if wanted:
-        sys.stdout.write(f"fenics_contact {__version__}\n")
+        sys.stdout.write(f"fenics_contact {versions()['fenics_contact']}\n")
         raise typer.Exit()
 
 

@@ -115,23 +115,39 @@ def _plotter(path: Path, look: tuple[str, float], *, off_screen: bool) -> Any:
             f"--field must be one of {names}, got {field!r}: {suggestion(field, names)}choose one of them"
         )
     plotter = pyvista.Plotter(off_screen=off_screen, window_size=(1600, 1000))
-    ranges = [
-        np.asarray(block[field], dtype=float) for block in blocks.values() if field in block.array_names
-    ]
-    sizes = [np.linalg.norm(values, axis=1) if values.ndim == 2 else values for values in ranges]
-    clim = (float(min(map(np.nanmin, sizes))), float(max(map(np.nanmax, sizes))))
+    clim = _range(blocks, field)
     for block in blocks.values():
         moved = block.copy()
         if "displacement" in moved.point_data:
             moved.points = moved.points + scale * np.asarray(moved.point_data["displacement"])
         if field in moved.array_names:
+            bar = {"title": f"{_WORDS.get(field, field.replace('_', ' '))}\n", **_BAR}
             plotter.add_mesh(
-                moved, scalars=field, clim=clim, cmap=STRESS_MAP, show_edges=True, edge_opacity=0.2,
-                scalar_bar_args={"title": field.replace("_", " "), "color": "black"},
+                moved, scalars=field, clim=clim, cmap=STRESS_MAP, ambient=0.3, scalar_bar_args=bar,
+                show_edges=True, edge_opacity=0.2,
             )  # fmt: skip
         else:
             plotter.add_mesh(moved, color="lightgrey")
     plotter.background_color = "white"
     flat = all(np.ptp(block.points[:, 2]) == 0 for block in blocks.values())
     plotter.view_xy() if flat else plotter.view_isometric()
+    plotter.camera.SetWindowCenter(0.15, 0.0)  # room for the bar on the right
     return plotter
+
+
+_WORDS = {"von_mises": "von Mises stress"}
+#: The colours end at this quantile.
+QUANTILE = 0.995
+#: Colour bar on the right, clear of the bodies.
+_BAR = {
+    "vertical": True, "position_x": 0.88, "position_y": 0.2, "height": 0.6, "width": 0.05, "n_labels": 5,
+    "fmt": "%.4g", "title_font_size": 28, "label_font_size": 24, "color": "black",
+}  # fmt: skip
+
+
+def _range(blocks: dict[str, Any], field: str) -> tuple[float, float]:
+    """Return the range of the colours: all values but the largest few, which would leave one shade."""
+    found = [np.asarray(block[field], dtype=float) for block in blocks.values() if field in block.array_names]
+    sizes = [np.linalg.norm(values, axis=1) if values.ndim == 2 else values for values in found]
+    values = np.concatenate([size.ravel() for size in sizes])
+    return float(np.nanmin(values)), float(np.nanquantile(values, QUANTILE))

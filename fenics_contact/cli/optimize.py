@@ -52,6 +52,7 @@ def optimize(
         file = read(desk, scene, output, tolerance, settings)
         file.require_design()
         show_plan(desk, file, sensitivity=True)
+        desk.say()
         if dry_run:
             show_outputs(desk, file, draws=pictures)
             return
@@ -60,11 +61,15 @@ def optimize(
         result = _minimised(desk, file, task, resume)
         desk.show(facts(_facts(file, task, result)))
         drawn = _draw(desk, file, task, result) if pictures and can_draw(desk) else []
-    names = ", ".join(["result.json", "designs.pvd", *(path.name for path in drawn)])
+    names = ", ".join(["result.json", *_films(file), *(path.name for path in drawn)])
     desk.say(f"results in {file.folder}/: {names}")
     if not result.reason.success:
         desk.say(f"not converged: {result.reason.value}")
         raise typer.Exit(int(Ending.NOT_CONVERGED))
+
+
+def _films(file: SceneFile) -> list[str]:
+    return ["designs.pvd"] if file.document.output.files else []
 
 
 def _minimised(desk: Desk, file: SceneFile, task: ShapeTask, resume: bool | None) -> Result:

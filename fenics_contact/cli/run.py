@@ -54,13 +54,22 @@ def run(
     with shown(desk.comm):
         file = read(desk, scene, output, tolerance, settings)
         show_plan(desk, file)
+        desk.say()
         if dry_run:
             show_outputs(desk, file, draws=pictures)
             return
         states = _through_steps(desk, file, resume) if file.steps else _at_once(desk, file)
         drawn = draw_state(desk, file, states) if pictures and _wanted(file) and can_draw(desk) else []
-    names = ", ".join(["result.json", *(path.name for path in drawn)])
+    names = ", ".join(["result.json", *_files(file), *(path.name for path in drawn)])
     desk.say(f"results in {file.folder}/: {names}")
+
+
+def _files(file: SceneFile) -> list[str]:
+    """Return the names of files of fields that are to be opened."""
+    kinds = file.document.output.files
+    if file.steps:
+        return ["history.pvd"] if kinds else []
+    return ["state.vtm"] if "vtu" in kinds else []
 
 
 def _wanted(file: SceneFile) -> bool:

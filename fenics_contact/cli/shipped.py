@@ -7,7 +7,6 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-import fenics_contact
 from fenics_contact.errors import InvalidInputError
 
 
@@ -18,7 +17,7 @@ class Shipped:
     Attributes:
         name: How it is called.
         path: Its file.
-        title: Its first line of text.
+        title: Its first line of text, up to the first full stop.
     """
 
     name: str
@@ -37,7 +36,7 @@ def folder_of_demos() -> Path:
     Raises:
         InvalidInputError: If there is none beside this package.
     """
-    package = Path(fenics_contact.__file__).resolve().parent
+    package = Path(__file__).resolve().parents[1]
     for folder in (package.parent / "demos", package / "demos"):
         if any(folder.glob("demo_*.py")):
             return folder
@@ -60,7 +59,7 @@ def shipped() -> dict[str, Shipped]:
 def _title(path: Path) -> str:
     lines = path.read_text(encoding="utf-8").splitlines()
     words = [line.lstrip("# ").rstrip() for line in lines[:5] if line.startswith("# ")]
-    return words[0] if words else ""
+    return re.split(r"[.;](?: |$)", words[0])[0] if words else ""
 
 
 def optimises(path: Path) -> bool:

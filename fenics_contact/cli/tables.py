@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from rich import box
 from rich.table import Table
 
 from fenics_contact.contact import State, Status
@@ -65,7 +66,7 @@ def step_row(number: int, name: str, state: State) -> tuple[str, ...]:
         str(counts["f_products"]),
         *(str(contact.count(status)) for status in Status),
         f"{contact.normal_force.sum():.6g}",
-        f"{np.linalg.norm(contact.friction_force.sum(axis=0)):.6g}",
+        f"{_resultant(state):.6g}",
         f"{contact.pressure.max(initial=0.0):.5g}",
     )
 
@@ -73,9 +74,11 @@ def step_row(number: int, name: str, state: State) -> tuple[str, ...]:
 def step_table(rows: Sequence[tuple[str, ...]], file: SceneFile) -> Table:
     """Return one row for every load step."""
     units = file.document.units
-    table = Table(title=f"{file.title}: load steps", title_justify="left")
+    table = Table(
+        title=f"{file.title}: load steps", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False
+    )
     table.add_column("", justify="right")
-    table.add_column("step")
+    table.add_column("step", no_wrap=True)
     for name in (
         "iterations", "products", "open", "stick", "slip", f"normal force\n({units.force})",
         f"friction\n({units.force})", f"largest pressure\n({units.stress})",
@@ -84,6 +87,13 @@ def step_table(rows: Sequence[tuple[str, ...]], file: SceneFile) -> Table:
     for row in rows:
         table.add_row(*row)
     return table
+
+
+def _resultant(state: State) -> float:
+    """Return the size of the sum of all friction forces, [force]."""
+    contact = state.contact
+    tangential = contact.force - contact.normal_force[:, None] * contact.points.normal
+    return float(np.linalg.norm(tangential.sum(axis=0)))
 
 
 def _largest_displacement(state: State) -> float:

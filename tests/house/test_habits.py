@@ -29,9 +29,11 @@ def python_files() -> list[Path]:
 
 #: The program chooses the communicator of its commands; the package is handed one.
 PROGRAM = "fenics_contact.__main__"
+#: Where all commands write through, on rank 0 alone.
+CONSOLE = "fenics_contact.cli.desk"
 
 
-@pytest.mark.parametrize(("name", "allowed"), [("print", []), ("COMM_WORLD", [PROGRAM])])
+@pytest.mark.parametrize(("name", "allowed"), [("print", [CONSOLE]), ("COMM_WORLD", [PROGRAM])])
 def test_the_package_never_uses(name: str, allowed: list[str]) -> None:
     house = modules()
     assert len(house) > 10, "hardly any modules were found: nothing was tested"
