@@ -51,26 +51,74 @@ def test_several_mistakes_are_all_listed_in_the_order_of_their_lines(tmp_path: P
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('friction = { law = "coulomb", coefficient = 0.3 }', "friction = 0.3", "line 40: contacts.0.friction must be a table with 'law'"),
+        (
+            'friction = { law = "coulomb", coefficient = 0.3 }',
+            "friction = 0.3",
+            "contacts.0.friction must be a table with 'law'",
+        ),
         ('title = "Two blocks"', "title = 3", "line 1: title must be text in quotes, got 3"),
-        ("[solver]", "[output]\ncheckpoint = 1\n[solver]", "line 43: output.checkpoint must be true or false, got 1"),
-        ("[solver]", "[output]\nfiles = 'vtu'\n[solver]", "line 43: output.files must be a list in brackets, got \"vtu\""),
-        ("[solver]", "[output]\nfiles = ['vtk']\n[solver]", "line 43: output.files.0 must be one of 'vtu', 'vtx', 'xdmf', got \"vtk\""),
+        (
+            "[solver]",
+            "[output]\ncheckpoint = 1\n[solver]",
+            "line 43: output.checkpoint must be true or false, got 1",
+        ),
+        (
+            "[solver]",
+            "[output]\nfiles = 'vtu'\n[solver]",
+            'line 43: output.files must be a list in brackets, got "vtu"',
+        ),
+        (
+            "[solver]",
+            "[output]\nfiles = ['vtk']\n[solver]",
+            "line 43: output.files.0 must be one of 'vtu', 'vtx', 'xdmf', got \"vtk\"",
+        ),
         ("tolerance = 1e-8", "max_products = 2.5", "solver.max_products must be an integer, got 2.5"),
         ("tolerance = 1e-8", "max_products = 0", "solver.max_products must be a number of at least 1, got 0"),
-        ("tolerance = 1e-8", "subdomains = 0", "solver.subdomains must be \"auto\", a positive integer, three"),
-        ("tolerance = 1e-8", "subdomains = {uper = 2}", "solver.subdomains.uper must be a body, one of 'lower', 'upper'"),
-        ('[solver]', '[[steps]]\nloads.push = 3\n[solver]', "steps.0.loads.push must be the name of a load, one of none, got \"push\""),
-        ('[[supports]]', '[[supports]]\nvalue = [0.0, "fre", 0.0]', "supports.0.value: a formula may hold"),
-        ('[[supports]]', '[[supports]]\nvalue = 0.0', "supports.0.value must be three numbers, formulas or 'free' in brackets"),
-        ('[[supports]]', '[[supports]]\nvalue = ["free", "free", "free"]', "line 27: supports.0: Support.value must hold three entries"),
-        ('[[supports]]', '[[supports]]\nvalue = [0.0, 0.0]', "supports.0: Support.value of body 'lower' must hold three, for x, y and z"),
-        ("[materials.steel]", "[materials.steel]\nmodel = 'steel.py:Steel'", "materials.steel.young_modulus is not known"),
-        ("young_modulus = 2.1e5\npoisson_ratio = 0.3", "model = 'nowhere.py:Steel'", "materials.steel: there must be a Python file"),
+        ("tolerance = 1e-8", "subdomains = 0", 'solver.subdomains must be "auto", a positive integer, three'),
+        (
+            "tolerance = 1e-8",
+            "subdomains = {uper = 2}",
+            "solver.subdomains.uper must be a body, one of 'lower', 'upper'",
+        ),
+        (
+            "[solver]",
+            "[[steps]]\nloads.push = 3\n[solver]",
+            'steps.0.loads.push must be the name of a load, one of none, got "push"',
+        ),
+        ("[[supports]]", '[[supports]]\nvalue = [0.0, "fre", 0.0]', "supports.0.value: a formula may hold"),
+        (
+            "[[supports]]",
+            "[[supports]]\nvalue = 0.0",
+            "supports.0.value must be three numbers, formulas or 'free' in brackets",
+        ),
+        (
+            "[[supports]]",
+            '[[supports]]\nvalue = ["free", "free", "free"]',
+            "line 27: supports.0: Support.value must hold three entries",
+        ),
+        (
+            "[[supports]]",
+            "[[supports]]\nvalue = [0.0, 0.0]",
+            "supports.0: Support.value of body 'lower' must hold three, for x, y and z",
+        ),
+        (
+            "[materials.steel]",
+            "[materials.steel]\nmodel = 'steel.py:Steel'",
+            "materials.steel.young_modulus is not known",
+        ),
+        (
+            "young_modulus = 2.1e5\npoisson_ratio = 0.3",
+            "model = 'nowhere.py:Steel'",
+            "materials.steel: there must be a Python file",
+        ),
         ('shape = "block"', 'file = "nowhere.msh"', "meshes.lower.lower is not known"),
-        ('mesh = "lower"', 'mesh = "lower"\npart = "first"', "bodies.lower.part must be a body of the mesh 'lower'"),
+        (
+            'mesh = "lower"',
+            'mesh = "lower"\npart = "first"',
+            "bodies.lower.part must be a body of the mesh 'lower'",
+        ),
     ],
-)  # fmt: skip
+)
 def test_further_mistakes_are_named(old: str, new: str, message: str, tmp_path: Path) -> None:
     text = GOOD.replace(old, new, 1)
     assert text != GOOD
