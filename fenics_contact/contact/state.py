@@ -18,6 +18,7 @@ from fenics_contact.contact.fields import (
     von_mises,
 )
 from fenics_contact.contact.result import ContactResult
+from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem, TornSystem
 from fenics_contact.feti.temperature import temperature_of
@@ -43,6 +44,7 @@ class State:
         energies: Energies of all bodies.
         seconds: Wall time of this rank by phase, of all work up to this state that shares its timer.
         known_errors: Errors that were found on the way, None if they were not needed; ask `errors`.
+        tolerance: What it was solved to, a relative residual or `Balanced`; None where no solver iterated.
     """
 
     system: DualSystem | DirectSystem
@@ -52,6 +54,7 @@ class State:
     energies: Energies
     seconds: Mapping[str, float]
     known_errors: StateErrors | None = field(default=None, repr=False)
+    tolerance: Tolerance = None
 
     @property
     def torn(self) -> TornSystem:
@@ -128,6 +131,30 @@ class State:
     def gather_von_mises(self, body: str) -> np.ndarray:
         """Return the von Mises stress of a body's cells on every rank, shape (n_cells,). Collective."""
         return cell_values(self.von_mises[body], self.scene.bodies[body].mesh.cells)
+
+    def to_pyvista(self, deformed: float = 0.0) -> Any:
+        """Return all bodies with their fields for pyvista, the same on every rank. Collective.
+
+        Args:
+            deformed: Factor of the displacement by which points are moved; 0 leaves them where they were.
+
+        Returns:
+            A ``pyvista.MultiBlock`` with an ``UnstructuredGrid`` for each body under its name, which holds
+            the fields that `io.write_vtu` writes: on points ``displacement``, ``contact_status``,
+            ``contact_pressure``, ``contact_force`` and ``contact_slip``, on cells ``von_mises`` and
+            ``subdomain``; see `GatheredFields`. Plane bodies lie in the plane z = 0.
+
+        Raises:
+            InvalidInputError: If ``deformed`` is not finite.
+            MissingRequirementError: If pyvista is not installed.
+
+        Example:
+            >>> blocks = state.to_pyvista(deformed=10.0)  # doctest: +SKIP
+            >>> blocks["block"].plot(scalars="von_mises")  # doctest: +SKIP
+        """
+        from fenics_contact.contact.multi_block import multi_block
+
+        return multi_block(self, deformed)
 
     @property
     def counts(self) -> dict[str, int]:
