@@ -54,7 +54,7 @@ class State:
 
     @property
     def torn(self) -> TornSystem:
-        """The torn system: subdomains, rows, contact points."""
+        """The torn system, that is subdomains, rows and contact points."""
         return self.system.torn
 
     @property
@@ -129,7 +129,7 @@ class State:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Sizes and work: torn unknowns, multipliers by kind, products, steps."""
+        """Sizes and work, such as torn unknowns, multipliers by kind, products, steps."""
         torn = self.torn
         return {
             "torn_unknowns": torn.decomposition.torn_unknowns,

@@ -124,8 +124,11 @@ class ThermalStrain:
         return self.temperature_change
 
 
+#: What acts on a surface.
 SurfaceLoad = Traction | TotalForce | Pressure
+#: What acts in the volume of a body.
 VolumeLoad = BodyForce | ThermalStrain
+#: All that loads a scene.
 Load = SurfaceLoad | VolumeLoad
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene.obstacles import RigidObstacle
 
+#: Where the contact conditions are asked: at the slave's nodes, or weighted by its shape functions (mortar).
 Discretisation: TypeAlias = Literal["node", "mortar"]
 
 
@@ -59,6 +60,7 @@ class Tresca:
             )
 
 
+#: A law of friction, or none.
 Friction: TypeAlias = Coulomb | Tresca | None
 
 

@@ -45,11 +45,6 @@ class ShapeProblem:
 
     Attributes:
         designs: The moving surfaces; α is their variables one after the other.
-        first: The design evaluated first; after a run was resumed, built again when it is first asked for, by
-            all ranks together.
-        best: The design with the smallest objective so far, likewise.
-        last: The design evaluated last.
-        seconds: Wall time of this rank by phase, over all evaluations.
         products: F-products of states and adjoints so far.
         evaluations: Number of designs evaluated.
     """
@@ -115,7 +110,7 @@ class ShapeProblem:
 
     @property
     def first(self) -> DesignPoint | None:
-        """The design evaluated first. Collective after a run was resumed."""
+        """The design evaluated first. Collective after a run was resumed, for it is built again then."""
         return self._memory.point("first")
 
     @property
