@@ -20,7 +20,7 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demos test test-slow test-hard benchmark studies study-optimisation lint setup
+.PHONY: help demo demos test test-slow test-hard docs benchmark studies study-optimisation lint setup
 
 help: ## Show this list
 	@echo "Targets:"
@@ -48,6 +48,9 @@ test-slow: $(prepare) ## Run the tests that take long
 
 test-hard: $(prepare) ## Run the hard cases; writes docs/hard_cases.md
 	$(launch) 1 $(python) -m pytest tests/hard -m hard --hard-table docs/hard_cases.md
+
+docs: $(prepare) ## Build the documentation; output/docs/index.html
+	$(launch) 1 $(python) -m sphinx -W --keep-going -q -c docs -d output/docs-doctrees . output/docs
 
 study-optimisation: $(prepare) ## Measure what state tolerances do to an optimisation; docs/studies/
 	$(python) -m benchmarks.optimisation_tolerance $(if $(filter quick,$(BENCH)),--quick)

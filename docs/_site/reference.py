@@ -18,6 +18,7 @@ from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 from sphinx.pycode import ModuleAnalyzer
+from sphinx.util.docutils import SphinxDirective
 
 import fenics_contact
 
@@ -31,6 +32,7 @@ ORDER = (
 OUTSIDE = [
     ("py:.*", r"(numpy|np|scipy|sp|mpi4py|MPI|PETSc|petsc4py|dolfinx|ufl|pyvista|matplotlib)\b.*"),
     ("py:.*", r"(abc|collections|enum|pathlib|typing)\..*|Path"),
+    ("py:.*", "ArrayLike|ndarray|dtype|generic|bool_|float64|int64"),
 ]
 
 
@@ -79,7 +81,10 @@ def page(room: str) -> str:
     module = module_of(room)
     borrowed = {name: place for name, place in homes(room).items() if place != f"{module.__name__}.{name}"}
     names = [name for name in public_names(module) if name not in borrowed]
-    blocks = [f"# {room}\n", eval_rst(f".. automodule:: {module.__name__}\n   :no-members:\n")]
+    blocks = [
+        f"---\ntocdepth: 3\n---\n\n# {module.__name__}\n",
+        eval_rst(f".. automodule:: {module.__name__}\n   :no-members:\n"),
+    ]
     for kind, heading in HEADINGS.items():
         chosen = [name for name in names if kind_of(getattr(module, name)) == kind]
         if chosen:
@@ -170,6 +175,23 @@ def eval_rst(text: str) -> str:
     return f"```{{eval-rst}}\n{text}```\n"
 
 
+class Rooms(SphinxDirective):
+    """``{rooms}``: a table of the rooms with what each is for, and their places in the sidebar."""
+
+    def run(self) -> list[nodes.Node]:
+        """Make the nodes."""
+        rows = [f"* - [{room}](/docs/reference/{room}.md)\n  - {purpose(room)}" for room in rooms()]
+        contents = [f"{room} </docs/reference/{room}>" for room in rooms()]
+        table = ["```{list-table}", ":class: autosummary", ":widths: auto", "", *rows, "```", ""]
+        tree = ["```{toctree}", ":hidden:", ":maxdepth: 1", "", *contents, "```", ""]
+        return self.parse_text_to_nodes("\n".join(table + tree))
+
+
+def purpose(room: str) -> str:
+    """Return the first line of a room's docstring."""
+    return (inspect.getdoc(module_of(room)) or "").partition("\n")[0]
+
+
 def write_pages(folder: Path) -> None:
     """Write a page a room into ``folder``, where it differs from what is there; remove others."""
     folder.mkdir(exist_ok=True)
@@ -236,13 +258,28 @@ def private_names() -> frozenset[str]:
     return frozenset(names - {""})
 
 
-def without_underscores(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
-    """Write NumPy's ``bool_`` so that it is no link in reStructuredText."""
-    lines[:] = [line.replace("numpy.bool_", "numpy.bool") for line in lines]
+def types_beside_names(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Move the type of each attribute, which napoleon puts below its text, beside its name."""
+    here = 0
+    for number, line in enumerate(list(lines)):
+        if line.startswith(".. attribute:: "):
+            here = number
+        elif line.startswith("   :type: ") and lines[here].startswith(".. attribute:: "):
+            lines[here] += f"\n{shortened(line)}"
+            lines[number] = ""
+    lines[:] = "\n".join(lines).splitlines()
+
+
+def shortened(line: str) -> str:
+    """Write NumPy's types without its name, and its union of all that can become an array as it is known."""
+    if "_SupportsArray" in line:
+        return "   :type: ArrayLike" + (" | None" if line.endswith("None") else "")
+    return line.replace("numpy.", "")
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Connect to Sphinx."""
+    app.add_directive("rooms", Rooms)
     app.connect("missing-reference", resolve)
-    app.connect("autodoc-process-docstring", without_underscores, priority=AFTER_NAPOLEON)
+    app.connect("autodoc-process-docstring", types_beside_names, priority=AFTER_NAPOLEON)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

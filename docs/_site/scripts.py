@@ -16,6 +16,8 @@ DEMOS = (
     "hertz_sphere punch_2d cattaneo_mindlin patch_test sheared_block shrink_fit bolted_joint five_links "
     "orthotropic chain_links"
 ).split()
+#: Endings of pictures that show bodies, the best thumbnails first.
+BODIES = ("stress", "status")
 
 
 def not_pages(root: Path) -> list[str]:
@@ -27,8 +29,20 @@ def not_pages(root: Path) -> list[str]:
 def read(text: str) -> nbformat.NotebookNode:
     """Read a script, in the light format or with percent signs, as a notebook without results."""
     notebook = jupytext.reads(text, fmt="py")
+    notebook.cells = joined(notebook.cells)
     notebook.metadata["language_info"] = {"name": "python", "pygments_lexer": "python"}
     return notebook
+
+
+def joined(cells: list[nbformat.NotebookNode]) -> list[nbformat.NotebookNode]:
+    """Join code that only an empty line divides: it is one thought."""
+    kept: list[nbformat.NotebookNode] = []
+    for cell in cells:
+        if kept and cell.cell_type == kept[-1].cell_type == "code":
+            kept[-1].source += f"\n\n{cell.source}"
+        else:
+            kept.append(cell)
+    return kept
 
 
 def demos(root: Path) -> list[Path]:
@@ -62,22 +76,25 @@ def title(path: Path) -> str:
     return found[1]
 
 
-def pictures(path: Path, root: Path) -> list[str]:
-    """Return the pictures that the text shows, as paths from ``root``."""
+def thumbnail(path: Path, root: Path) -> str | None:
+    """Return the picture of a card, as a path from ``root``: of those in the text bodies before curves."""
     links = re.findall(r"!\[[^\]]*\]\(([^)]+\.png)\)", prose(path))
-    return ["/" + str((path.parent / link).resolve().relative_to(root)) for link in links]
+    name = path.stem.removeprefix("demo_")
+    bodies = [root / "docs" / "pictures" / f"{name}_{kind}.png" for kind in BODIES]
+    shown = [*filter(Path.exists, bodies), *((path.parent / link).resolve() for link in links)]
+    return f"/{shown[0].relative_to(root)}" if shown else None
 
 
 def cards(paths: list[Path], root: Path) -> str:
     """Write a grid of cards, each with title and first picture, that lead to the pages."""
     grid = ["::::{grid} 1 2 2 3", ":gutter: 3", ":class-container: gallery", ""]
     for path in paths:
-        shown = pictures(path, root)
+        picture = thumbnail(path, root)
         name, _, what = title(path).partition(": ")
         page = "/" + str(path.relative_to(root).with_suffix(""))
         grid += [f":::{{grid-item-card}} {name}", f":link: {page}", ":link-type: doc"]
-        if shown:
-            grid += [f":img-top: {shown[0]}", f":img-alt: {name}"]
+        if picture:
+            grid += [f":img-top: {picture}", f":img-alt: {name}"]
         grid += ["", what[:1].upper() + what[1:], ":::", ""]
     return "\n".join([*grid, "::::", ""])
 
