@@ -14,6 +14,8 @@ GUIDE = DOCS / "guide"
 NOT_RUN = "# not run: "
 #: Numbers on a page may miss those of a run by this part: rounding of another library shows in some.
 TOLERANCE = 0.05
+#: Numbers below this are errors and residuals, of which the size alone is compared, to this factor.
+SMALL, FACTOR = 1e-3, 3.0
 
 _FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```[ \t]*$", re.MULTILINE | re.DOTALL)
 _NUMBER = re.compile(r"(?<![\w.])[-+−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w])")
@@ -87,7 +89,10 @@ def _equal(have: str, wanted: str) -> bool:
     if not (_NUMBER.fullmatch(have) and _NUMBER.fullmatch(wanted)):
         return False
     one, other = (float(number.replace("−", "-")) for number in (have, wanted))
-    return abs(one - other) <= TOLERANCE * max(abs(one), abs(other))
+    small, large = sorted((abs(one), abs(other)))
+    if one * other > 0.0 and large < SMALL:
+        return large <= FACTOR * small
+    return abs(one - other) <= TOLERANCE * large
 
 
 def links_of(text: str) -> list[str]:

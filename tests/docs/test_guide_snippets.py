@@ -66,6 +66,8 @@ def test_output_is_that_of_the_fence_right_behind() -> None:
     [
         ("a 1.00\nb", "a 1.02 b", True),
         ("a 1.00", "a 1.20", False),
+        ("a 1.0e-07", "a 2e-7", True),
+        ("a 1e-05", "a 1e-07", False),
         ("a b", "a c", False),
         ("a b c d", "a ... d", True),
         ("a b c d", "a ... c", False),
