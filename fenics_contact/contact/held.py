@@ -116,7 +116,7 @@ class _RigidBody:
 
 
 def _resisted_by_material(body: Body, modes: np.ndarray) -> np.ndarray:
-    """Return an orthonormal basis of the rigid motions that cost energy, as on an elastic bed, (n_modes, n)."""
+    """Return an orthonormal basis of the rigid motions that cost energy, shape (n_modes, n)."""
     count = modes.shape[2]
     flat = modes.reshape(-1, count)
     kernel = common_kernel(body.materials, body.mesh.points).reshape(len(flat), -1)

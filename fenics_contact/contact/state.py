@@ -97,6 +97,12 @@ class State:
         return state_errors(solver, estimate, self.energies.norm)
 
     @cached_property
+    def contact_places(self) -> np.ndarray:
+        """Where the slave nodes of the contact points are before deformation, shape (n, dim), [length]."""
+        places = np.concatenate([body.mesh.points for body in self.scene.bodies.values()])
+        return np.asarray(places[self.contact.points.slave])
+
+    @cached_property
     def displacement(self) -> dict[str, Any]:
         """Displacement of each body as a Function on its own mesh, [length]. Collective on first use."""
         decomposition = self.torn.decomposition
