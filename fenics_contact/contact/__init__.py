@@ -3,6 +3,7 @@
 from fenics_contact.contact.coulomb import FixedPoint
 from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.equilibrium import find_state, solve_scene
+from fenics_contact.contact.gathered import GatheredFields, contact_fields, gathered_fields, in_space
 from fenics_contact.contact.held import check_held
 from fenics_contact.contact.result import ContactResult, Status
 from fenics_contact.contact.slip_bounds import Damping
@@ -15,11 +16,15 @@ __all__ = [
     "Damping",
     "Energies",
     "FixedPoint",
+    "GatheredFields",
     "LoadSequence",
     "State",
     "Status",
     "check_held",
+    "contact_fields",
     "find_state",
+    "gathered_fields",
+    "in_space",
     "restored_state",
     "solve_scene",
     "solve_steps",

@@ -97,6 +97,12 @@ class State:
         return state_errors(solver, estimate, self.energies.norm)
 
     @cached_property
+    def contact_places(self) -> np.ndarray:
+        """Where the slave nodes of the contact points are before deformation, shape (n, dim), [length]."""
+        places = np.concatenate([body.mesh.points for body in self.scene.bodies.values()])
+        return np.asarray(places[self.contact.points.slave])
+
+    @cached_property
     def displacement(self) -> dict[str, Any]:
         """Displacement of each body as a Function on its own mesh, [length]. Collective on first use."""
         decomposition = self.torn.decomposition
@@ -126,6 +132,30 @@ class State:
     def gather_von_mises(self, body: str) -> np.ndarray:
         """Return the von Mises stress of a body's cells on every rank, shape (n_cells,). Collective."""
         return cell_values(self.von_mises[body], self.scene.bodies[body].mesh.cells)
+
+    def to_pyvista(self, deformed: float = 0.0) -> Any:
+        """Return all bodies with their fields for pyvista, the same on every rank. Collective.
+
+        Args:
+            deformed: Factor of the displacement by which points are moved; 0 leaves them where they were.
+
+        Returns:
+            A ``pyvista.MultiBlock`` with an ``UnstructuredGrid`` for each body under its name, which holds
+            the fields that `io.write_vtu` writes: on points ``displacement``, ``contact_status``,
+            ``contact_pressure``, ``contact_force`` and ``contact_slip``, on cells ``von_mises`` and
+            ``subdomain``; see `GatheredFields`. Plane bodies lie in the plane z = 0.
+
+        Raises:
+            InvalidInputError: If ``deformed`` is not finite.
+            MissingRequirementError: If pyvista is not installed.
+
+        Example:
+            >>> blocks = state.to_pyvista(deformed=10.0)  # doctest: +SKIP
+            >>> blocks["block"].plot(scalars="von_mises")  # doctest: +SKIP
+        """
+        from fenics_contact.contact.multi_block import multi_block
+
+        return multi_block(self, deformed)
 
     @property
     def counts(self) -> dict[str, int]:

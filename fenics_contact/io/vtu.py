@@ -9,9 +9,8 @@ from xml.sax.saxutils import quoteattr
 import meshio
 import numpy as np
 
-from fenics_contact.contact import State
+from fenics_contact.contact import State, gathered_fields, in_space
 from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.io.fields import contact_fields
 from fenics_contact.io.names import file_of_each
 from fenics_contact.io.replacing import replacing
 
@@ -35,9 +34,8 @@ def write_vtu(
 ) -> Path:
     """Write a state for ParaView: a file for each body and a multi-block file to open. Collective.
 
-    On points: ``displacement`` and the fields of `contact_fields`. On cells: ``von_mises``, ``subdomain``,
-    numbered over all bodies, and what is given. Plane bodies lie in the plane z = 0, their vectors have no z
-    component.
+    On points and cells the fields of `contact.GatheredFields`, and on cells what is given. Plane bodies lie
+    in the plane z = 0, their vectors have no z component.
 
     Args:
         state: The state.
@@ -89,24 +87,13 @@ def _checked(
 
 def _gathered(state: State, body: str, more: Mapping[str, np.ndarray]) -> meshio.Mesh:
     mesh = state.scene.bodies[body].mesh
-    decomposition = state.torn.decomposition
-    tearing = decomposition.tearing
-    first = int(tearing.subdomain_offset[tearing.body_names.index(body)])
-    subdomain = np.asarray(decomposition.partitions[body], dtype=np.int32) + np.int32(first)
-    fields = {"displacement": state.gather_displacement(body), **contact_fields(state, body)}
-    cells = {"von_mises": state.gather_von_mises(body), "subdomain": subdomain, **more}
+    fields = gathered_fields(state, body)
     return meshio.Mesh(
-        _in_space(mesh.points),
+        in_space(mesh.points),
         [(_MESHIO_NAMES[mesh.cell_type], mesh.cells)],
-        point_data={key: _in_space(values) for key, values in fields.items()},
-        cell_data={key: [_in_space(values)] for key, values in cells.items()},
+        point_data={key: in_space(values) for key, values in fields.points.items()},
+        cell_data={key: [in_space(values)] for key, values in {**fields.cells, **more}.items()},
     )
-
-
-def _in_space(values: np.ndarray) -> np.ndarray:
-    """Give plane points and vectors the third component that the format knows alone."""
-    plane = values.ndim == 2 and values.shape[1] == 2
-    return np.pad(values, ((0, 0), (0, 1))) if plane else values
 
 
 def _multi_block(bodies: list[str], files: list[Path]) -> str:

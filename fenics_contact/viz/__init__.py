@@ -2,7 +2,8 @@
 
 Three-dimensional parts are rendered by pyvista, everything around them (titles, colour bars, diagrams) is set
 by matplotlib, which draws plane bodies as well. On several ranks the fields are gathered by all and drawn by
-rank 0.
+rank 0. Every ``plot_`` function returns a `Picture`, which Jupyter shows and which is written where a path is
+given.
 """
 
 from fenics_contact.viz._libraries import check_libraries
@@ -11,6 +12,7 @@ from fenics_contact.viz.convergence import plot_convergence
 from fenics_contact.viz.curves import plot_curves
 from fenics_contact.viz.decomposition import plot_decomposition
 from fenics_contact.viz.error import plot_error
+from fenics_contact.viz.picture import Picture
 from fenics_contact.viz.pressure import plot_contact_pressure
 from fenics_contact.viz.renderer import check_renderer
 from fenics_contact.viz.status import plot_contact_status
@@ -18,6 +20,7 @@ from fenics_contact.viz.stress import plot_stress
 from fenics_contact.viz.units import Units
 
 __all__ = [
+    "Picture",
     "Units",
     "check_libraries",
     "check_renderer",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -14,7 +14,8 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import DesignSurface
 from fenics_contact.viz.colours import GREY, INK, ORANGE, SIGNED_MAP
 from fenics_contact.viz.curved_net import curved_net
-from fenics_contact.viz.sheet import TITLE, draw_on_one_rank, place_colour_bar, place_image, png_path, sheet
+from fenics_contact.viz.picture import Picture, draw_picture, png_path
+from fenics_contact.viz.sheet import TITLE, place_colour_bar, place_image, sheet
 from fenics_contact.viz.stage import Layer, balls, render, surface, tubes
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.view import Frame, View, frame_around, looking_along
@@ -35,7 +36,7 @@ def plot_control_net(
     design: DesignSurface,
     points: tuple[np.ndarray, np.ndarray],
     net: tuple[np.ndarray, np.ndarray],
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     clim: tuple[float, float] | None = None,
     magnify: float | None = None,
@@ -43,14 +44,14 @@ def plot_control_net(
     units: Units | None = None,
     width: int = 1600,
     comm: MPI.Comm | None = None,
-) -> Path:
+) -> Picture:
     """Draw the design surface with its control net before and after, coloured by how far it moved outwards.
 
     Args:
         design: Nodes of the surface, their order and outward normals.
         points: The body's nodes before and after, (n_nodes, 3) each, [length].
         net: Control points before and after, (n_s, n_t, 3) each, [length].
-        path: PNG file to write.
+        path: PNG file to write, None to write none.
         clim: Range of the colours, [length]; symmetric about zero unless given.
         magnify: Factor of the movement in the right picture; chosen and stated unless given.
         title: What comes before the facts in the title.
@@ -59,7 +60,7 @@ def plot_control_net(
         comm: If given, only rank 0 draws, and all ranks learn of an error.
 
     Returns:
-        The path.
+        The picture, which stands for its file where a path is needed.
 
     Raises:
         InvalidInputError: If arrays do not fit each other, are not finite, or an option cannot be used.
@@ -87,8 +88,7 @@ def plot_control_net(
     shown = (-largest, largest) if clim is None else checked_range(clim)
     moves = (movement * factor, (nets[1] - nets[0]) * factor)
     change = _Change(start.reshape(*design.counts, 3), nets[0], moves, outward, factor, shown)
-    draw_on_one_rank(comm, lambda: _draw(change, target, title, units or Units(), width))
-    return target
+    return draw_picture(comm, target, lambda paper: _draw(change, paper, title, units or Units(), width))
 
 
 def _checked(name: str, values: np.ndarray, dimensions: int) -> np.ndarray:
@@ -133,7 +133,7 @@ class _Change:
         return float(np.ptp(self.start.reshape(-1, 3), axis=0).max())
 
 
-def _draw(change: _Change, target: Path, title: str, units: Units, width: int) -> None:
+def _draw(change: _Change, paper: BinaryIO, title: str, units: Units, width: int) -> None:
     view = _view(change.start)
     everything = [change.start, change.end, change.net, change.end_net]
     frame = frame_around(view, np.concatenate([points.reshape(-1, 3) for points in everything]), 0.05)
@@ -150,7 +150,7 @@ def _draw(change: _Change, target: Path, title: str, units: Units, width: int) -
     low, high = (written(float(value), 3) for value in (change.outward.min(), change.outward.max()))
     words = headline(title, f"surface moved by {low} to {high} {units.length} along its outward normal")
     top = round((TITLE + 0.03) * width)
-    with sheet(target, (width, top + before.shape[0] + round(0.01 * width)), words) as figure:
+    with sheet(paper, (width, top + before.shape[0] + round(0.01 * width)), words) as figure:
         place_image(figure, before, 0, top, "before")
         place_image(figure, after, size, top, f"after, movement × {change.factor:g}")
         label = f"outward movement ({units.length})"

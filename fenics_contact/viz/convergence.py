@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import BLUE, GREY, ORANGE
-from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet
+from fenics_contact.viz.picture import Picture, draw_picture, png_path
+from fenics_contact.viz.sheet import sheet
 from fenics_contact.viz.words import headline, written
 
 if TYPE_CHECKING:
@@ -23,26 +24,26 @@ KINDS = ("start", "serious", "null", "rejected", "refined")
 def plot_convergence(
     values: Sequence[float] | np.ndarray,
     kinds: Sequence[str],
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     label: str = "objective",
     title: str = "",
     width: int = 1200,
     comm: MPI.Comm | None = None,
-) -> Path:
+) -> Picture:
     """Draw the objective of every evaluation: the start and serious steps connected, null steps beside them.
 
     Args:
         values: Objective of each trial point in the order of evaluation, (n,); NaN where it was rejected.
         kinds: What became of each: "start", "serious", "null", "rejected" or "refined".
-        path: PNG file to write.
+        path: PNG file to write, None to write none.
         label: Name of the objective, with its unit.
         title: What comes before the facts in the title.
         width: Width of the picture in pixels.
         comm: If given, only rank 0 draws, and all ranks learn of an error.
 
     Returns:
-        The path.
+        The picture, which stands for its file where a path is needed.
 
     Raises:
         InvalidInputError: If the arrays do not belong together or hold no start.
@@ -52,8 +53,7 @@ def plot_convergence(
     """
     target = png_path(path)
     objective, kind = _checked(values, kinds)
-    draw_on_one_rank(comm, lambda: _draw(objective, kind, target, (label, title), width))
-    return target
+    return draw_picture(comm, target, lambda paper: _draw(objective, kind, paper, (label, title), width))
 
 
 def _checked(values: Sequence[float] | np.ndarray, kinds: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
@@ -77,7 +77,7 @@ def _checked(values: Sequence[float] | np.ndarray, kinds: Sequence[str]) -> tupl
     return objective, kind
 
 
-def _draw(values: np.ndarray, kind: np.ndarray, target: Path, words: tuple[str, str], width: int) -> None:
+def _draw(values: np.ndarray, kind: np.ndarray, paper: BinaryIO, words: tuple[str, str], width: int) -> None:
     label, title = words
     number = np.arange(len(values))
     centre = np.isin(kind, ("start", "serious", "refined"))
@@ -85,7 +85,7 @@ def _draw(values: np.ndarray, kind: np.ndarray, target: Path, words: tuple[str, 
     facts = f"{written(first, 6)} → {written(last, 6)}"
     if first != 0:
         facts += f", {100 * abs((last - first) / first):.2f} % {'lower' if last <= first else 'higher'}"
-    with sheet(target, (width, round(0.6 * width)), headline(title, facts), "constrained") as figure:
+    with sheet(paper, (width, round(0.6 * width)), headline(title, facts), "constrained") as figure:
         axes = figure.subplots()
         axes.plot(
             number[centre], values[centre], "-o", color=BLUE, lw=2, ms=8, label="start and serious steps"

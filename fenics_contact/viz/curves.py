@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
 
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import BLUE, GREEN, GREY, INK, ORANGE
-from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet
+from fenics_contact.viz.picture import Picture, draw_picture, png_path
+from fenics_contact.viz.sheet import sheet
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -33,7 +34,7 @@ MOST_SYMBOLS = 90
 
 def plot_curves(
     series: Mapping[str, Curve],
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     xlabel: str,
     ylabel: str,
@@ -43,12 +44,12 @@ def plot_curves(
     title: str = "",
     width: int = 1200,
     comm: MPI.Comm | None = None,
-) -> Path:
+) -> Picture:
     """Draw series of points, each in its colour and symbol, on top of dark reference curves.
 
     Args:
         series: Name -> places and values, what was computed or measured. NaN leaves a gap.
-        path: PNG file to write.
+        path: PNG file to write, None to write none.
         xlabel: Name of the places with their unit.
         ylabel: Name of the values with their unit.
         reference: Name -> places and values, what they are compared with.
@@ -59,7 +60,7 @@ def plot_curves(
         comm: If given, only rank 0 draws, and all ranks learn of an error.
 
     Returns:
-        The path.
+        The picture, which stands for its file where a path is needed.
 
     Raises:
         InvalidInputError: If there is nothing to draw or a curve has not as many places as values.
@@ -77,9 +78,9 @@ def plot_curves(
     if not shown and not behind:
         raise InvalidInputError("a diagram needs at least one curve, got none: pass series={'name': (x, y)}")
 
-    def draw() -> None:
+    def draw(paper: BinaryIO) -> None:
         size = (width, round(0.6 * width))
-        with sheet(target, size, title, "constrained") as figure:
+        with sheet(paper, size, title, "constrained") as figure:
             axes = figure.subplots()
             _draw_reference(axes, behind)
             _draw_series(axes, shown, connected)
@@ -92,8 +93,7 @@ def plot_curves(
             axes.set_axisbelow(True)
             figure.legend(loc="outside lower center", ncols=_columns([*shown, *behind]))
 
-    draw_on_one_rank(comm, draw)
-    return target
+    return draw_picture(comm, target, draw)
 
 
 def _checked(name: str, curve: Curve) -> tuple[np.ndarray, np.ndarray]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from matplotlib.collections import PolyCollection
@@ -13,8 +13,9 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import BodyMesh, boundary_faces
 from fenics_contact.scene import Scene
 from fenics_contact.viz.colours import INK, colour_subdomains, neighbours
+from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.plane import draw_cell_edges, draw_outline, window
-from fenics_contact.viz.sheet import TITLE, draw_on_one_rank, place_image, png_path, sheet
+from fenics_contact.viz.sheet import TITLE, place_image, sheet
 from fenics_contact.viz.stage import Layer, render, segments, surface
 from fenics_contact.viz.view import frame_around, oblique_view
 from fenics_contact.viz.words import written
@@ -26,24 +27,24 @@ if TYPE_CHECKING:
 def plot_decomposition(
     scene: Scene,
     partitions: Mapping[str, np.ndarray],
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     explode: float = 0.0,
     width: int = 1600,
     comm: MPI.Comm | None = None,
-) -> Path:
+) -> Picture:
     """Draw the subdomains of all bodies; neighbours have different colours.
 
     Args:
         scene: The bodies.
         partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
-        path: PNG file to write.
+        path: PNG file to write, None to write none.
         explode: How much each subdomain shrinks towards its centre, from 0 (whole bodies) to below 1.
         width: Width of the picture in pixels.
         comm: If given, only rank 0 draws, and all ranks learn of an error.
 
     Returns:
-        The path.
+        The picture, which stands for its file where a path is needed.
 
     Raises:
         InvalidInputError: If a partition does not fit its body or ``explode`` is out of range.
@@ -57,8 +58,7 @@ def plot_decomposition(
         raise InvalidInputError(f"explode must be at least 0 and below 1, got {explode}: try 0.1")
     for name, body in scene.bodies.items():
         _check_partition(name, body.mesh, partitions)
-    draw_on_one_rank(comm, lambda: _draw(scene, partitions, target, explode, width))
-    return target
+    return draw_picture(comm, target, lambda paper: _draw(scene, partitions, paper, explode, width))
 
 
 def _check_partition(name: str, mesh: BodyMesh, partitions: Mapping[str, np.ndarray]) -> None:
@@ -71,7 +71,7 @@ def _check_partition(name: str, mesh: BodyMesh, partitions: Mapping[str, np.ndar
 
 
 def _draw(
-    scene: Scene, partitions: Mapping[str, np.ndarray], target: Path, explode: float, width: int
+    scene: Scene, partitions: Mapping[str, np.ndarray], paper: BinaryIO, explode: float, width: int
 ) -> None:
     count = sum(np.unique(partitions[name]).size for name in scene.bodies)
     cells = sum(body.mesh.n_cells for body in scene.bodies.values())
@@ -80,7 +80,7 @@ def _draw(
     parts = [_linear(body.mesh, partitions[name]) for name, body in scene.bodies.items()]
     points = np.concatenate([mesh.points for mesh, _ in parts])
     if scene.dim == 2:
-        _draw_in_plane(parts, points, target, (explode, title, width))
+        _draw_in_plane(parts, points, paper, (explode, title, width))
         return
     layers = []
     for family, (mesh, partition) in enumerate(parts):
@@ -89,7 +89,7 @@ def _draw(
     frame = frame_around(view, points)
     image = render(layers, view, frame, width)
     band = round(TITLE * width)
-    with sheet(target, (width, band + image.shape[0]), title) as figure:
+    with sheet(paper, (width, band + image.shape[0]), title) as figure:
         place_image(figure, image, 0, band)
 
 
@@ -103,13 +103,16 @@ def _number(count: int, one: str, many: str = "") -> str:
 
 
 def _draw_in_plane(
-    parts: list[tuple[BodyMesh, np.ndarray]], points: np.ndarray, target: Path, look: tuple[float, str, int]
+    parts: list[tuple[BodyMesh, np.ndarray]],
+    points: np.ndarray,
+    paper: BinaryIO,
+    look: tuple[float, str, int],
 ) -> None:
     explode, title, width = look
     border = 0.03 * float(np.ptp(points, axis=0).max())
     low, high = points.min(axis=0) - border, points.max(axis=0) + border
     height = float(np.clip(0.85 * (high - low)[1] / (high - low)[0] + 0.1, 0.3, 1.0))
-    with sheet(target, (width, round(height * width)), title, "constrained") as figure:
+    with sheet(paper, (width, round(height * width)), title, "constrained") as figure:
         axes = figure.subplots()
         for family, (mesh, partition) in enumerate(parts):
             _draw_plane_body(axes, mesh, partition, family, explode)

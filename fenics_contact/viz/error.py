@@ -15,7 +15,7 @@ from fenics_contact.viz.colours import ERROR_MAP
 from fenics_contact.viz.fields import moved
 from fenics_contact.viz.painting import paint
 from fenics_contact.viz.paints import Paints
-from fenics_contact.viz.sheet import png_path
+from fenics_contact.viz.picture import Picture, png_path
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.words import checked_range, checked_reach, headline, written
 
@@ -25,7 +25,7 @@ SPAN = 1e-4
 
 def plot_error(
     state: State,
-    path: str | Path,
+    path: str | Path | None = None,
     by_cell: Mapping[str, np.ndarray] | None = None,
     *,
     clim: tuple[float, float] | None = None,
@@ -34,7 +34,7 @@ def plot_error(
     title: str = "",
     units: Units | None = None,
     width: int = 1600,
-) -> Path:
+) -> Picture:
     """Draw each cell's part of the discretisation error, on a logarithmic scale. Collective.
 
     The squares of the cells' parts, relative to the energy norm √(uᵀK u) of the displacement, add up to the
@@ -44,7 +44,7 @@ def plot_error(
 
     Args:
         state: The state.
-        path: PNG file to write.
+        path: PNG file to write, None to write none.
         by_cell: Body name -> part of each cell relative to that norm, shape (n_cells,); estimated unless
             given, see `accuracy.discretisation_error`.
         clim: Range of the colours, positive; up to the largest part and down to a ten thousandth of it, or
@@ -56,7 +56,7 @@ def plot_error(
         width: Width of the picture in pixels.
 
     Returns:
-        The path.
+        The picture, which stands for its file where a path is needed.
 
     Raises:
         InvalidInputError: If parts do not fit the cells, or an option or the name of the file cannot be used.
@@ -73,8 +73,7 @@ def plot_error(
     norm = LogNorm(*(given or error_range(values)), clip=False)
     label, words = "part of a cell, relative to the energy norm of the displacement", headline(title, facts)
     paints = Paints(values, ERROR_MAP, norm, label, words, 1.0, reach, units or Units(), width)
-    paint(state, moved(state), paints, target, sections=sections)
-    return target
+    return paint(state, moved(state), paints, target, sections=sections)
 
 
 def error_range(values: Mapping[str, np.ndarray]) -> tuple[float, float]:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -63,7 +62,7 @@ def draw_in_plane(
     scene: Scene,
     bodies: Mapping[str, Moved],
     detail: tuple[np.ndarray, np.ndarray] | None,
-    target: Path,
+    paper: BinaryIO,
     paints: Paints,
 ) -> None:
     """Draw a field on the deformed bodies, and beside it the contact in true deformation.
@@ -72,7 +71,7 @@ def draw_in_plane(
         scene: Gives the obstacles.
         bodies: The bodies.
         detail: Corners of what is shown at a larger scale, or None.
-        target: PNG file to write.
+        paper: Where the picture goes.
         paints: The field.
     """
     parts = _parts(bodies, detail, paints.scale)
@@ -84,7 +83,7 @@ def draw_in_plane(
         height = 0.8 / sum(part.proportion for part in parts) + 0.13
     height = float(np.clip(height, 0.3, 1.0))
     size = paints.width, round(height * paints.width)
-    with sheet(target, size, paints.headline, "constrained") as figure:
+    with sheet(paper, size, paints.headline, "constrained") as figure:
         ratios = {"height_ratios": [0.84 / parts[0].proportion, 0.36]} if upright else None
         ratios = ratios or {"width_ratios": [part.proportion for part in parts]}
         shape = (len(parts), 1) if upright else (1, len(parts))

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -34,7 +33,7 @@ class _Detail:
 
 
 def draw_in_space(
-    scene: Scene, bodies: Mapping[str, Moved], spot: Spot | None, target: Path, paints: Paints
+    scene: Scene, bodies: Mapping[str, Moved], spot: Spot | None, paper: BinaryIO, paints: Paints
 ) -> None:
     """Draw a field on the deformed bodies, and below two sections through a contact in true deformation.
 
@@ -42,7 +41,7 @@ def draw_in_space(
         scene: Gives the obstacles.
         bodies: The bodies.
         spot: Where the sections cut, or None.
-        target: PNG file to write.
+        paper: Where the picture goes.
         paints: The field.
     """
     points = np.concatenate([body.deformed(paints.scale) for body in bodies.values()])
@@ -55,7 +54,7 @@ def draw_in_space(
     details = [] if spot is None else _sections(bodies, spot, view, paints)
     top, below = round(TITLE * paints.width), round((TITLE + GAP) * paints.width) + whole.shape[0]
     height = below + details[0].image.shape[0] if details else below
-    with sheet(target, (paints.width, height + top // 2), paints.headline) as figure:
+    with sheet(paper, (paints.width, height + top // 2), paints.headline) as figure:
         place_image(figure, whole, round(WIDE * paints.width - whole.shape[1]) // 2, top)
         _place_sections(figure, details, below, paints)
         box = (round((WIDE + 0.02) * paints.width), top, height - top)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -15,7 +15,8 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import GREY, PRESSURE_MAP
 from fenics_contact.viz.patch import ContactPatch, contact_patch, refined
 from fenics_contact.viz.patch_axes import label_axes
-from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet
+from fenics_contact.viz.picture import Picture, draw_picture, png_path
+from fenics_contact.viz.sheet import sheet
 from fenics_contact.viz.status import draw_status
 from fenics_contact.viz.trace import contact_trace
 from fenics_contact.viz.traction import TractionLook, draw_traction
@@ -25,7 +26,7 @@ from fenics_contact.viz.words import checked_range, checked_reach, headline, wri
 
 def plot_contact_pressure(
     state: State,
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     pair: int = 0,
     clim: tuple[float, float] | None = None,
@@ -33,7 +34,7 @@ def plot_contact_pressure(
     title: str = "",
     units: Units | None = None,
     width: int = 1600,
-) -> Path:
+) -> Picture:
     """Draw a contact pair's slave surface as its master sees it. Collective.
 
     Left the nodal pressure, right the status of the points with the direction in which those that slip move
@@ -42,7 +43,7 @@ def plot_contact_pressure(
 
     Args:
         state: The state.
-        path: PNG file to write.
+        path: PNG file to write, None to write none.
         pair: Number of the contact pair in the scene.
         clim: Range of the pressure, [force / length²]; from zero to the largest pressure unless given. Give
             two pictures the same range to compare them.
@@ -52,7 +53,7 @@ def plot_contact_pressure(
         width: Width of the picture in pixels.
 
     Returns:
-        The path.
+        The picture, which stands for its file where a path is needed.
 
     Raises:
         InvalidInputError: If the scene has no such pair, or a range or the name of the file cannot be used.
@@ -67,19 +68,23 @@ def plot_contact_pressure(
     given = None if clim is None else checked_range(clim)
     named = units or Units()
 
-    def draw() -> None:
+    def draw(paper: BinaryIO) -> None:
         if state.scene.dim == 2:
             look = TractionLook(given, reach, title, named, width)
-            draw_traction(contact_trace(state, pair), target, look)
+            draw_traction(contact_trace(state, pair), paper, look)
         else:
-            _draw(contact_patch(state, pair, reach), target, given, title, named, width)
+            _draw(contact_patch(state, pair, reach), paper, given, title, named, width)
 
-    draw_on_one_rank(state.torn.decomposition.comm, draw)
-    return target
+    return draw_picture(state.torn.decomposition.comm, target, draw)
 
 
 def _draw(
-    patch: ContactPatch, target: Path, clim: tuple[float, float] | None, title: str, units: Units, width: int
+    patch: ContactPatch,
+    paper: BinaryIO,
+    clim: tuple[float, float] | None,
+    title: str,
+    units: Units,
+    width: int,
 ) -> None:
     peak = float(patch.pressure.max())
     shown = clim or (0.0, peak or 1.0)
@@ -88,7 +93,7 @@ def _draw(
     )
     proportion = float((patch.high - patch.low)[1] / (patch.high - patch.low)[0])
     height = round((0.17 + 0.39 * proportion) * width)
-    with sheet(target, (width, height), headline(title, facts), "constrained") as figure:
+    with sheet(paper, (width, height), headline(title, facts), "constrained") as figure:
         left, right = figure.subplots(1, 2, sharex=True, sharey=True)
         _draw_pressure(left, patch, shown)
         label = f"contact pressure ({units.stress})"

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import os
-import secrets
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, BinaryIO
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.viz.colours import INK
+from fenics_contact.viz.picture import png_path, write_png
 from fenics_contact.viz.words import nice_number, written
-
-if TYPE_CHECKING:
-    from mpi4py import MPI
 
 #: Inches of every sheet's width: fonts and lines grow with the number of pixels.
 INCHES = 16.0
@@ -46,11 +42,14 @@ _STYLE = {
 
 
 @contextmanager
-def sheet(path: str | Path, size: tuple[int, int], title: str, layout: str = "none") -> Iterator[Any]:
+def sheet(
+    paper: str | Path | BinaryIO, size: tuple[int, int], title: str, layout: str = "none"
+) -> Iterator[Any]:
     """Open an empty figure and save it at the end, whole or not at all.
 
     Args:
-        path: PNG file; its folder is created. A file of that name is replaced when the new one is complete.
+        paper: PNG file to write, or a file opened for bytes. The folder of a path is created, and a file of
+            that name is replaced when the new one is complete.
         size: Width and height in pixels.
         title: Title above everything, in a band of height ``TITLE`` times the width.
         layout: "constrained" to let matplotlib find room for axes and labels, "none" to place them by hand.
@@ -61,7 +60,7 @@ def sheet(path: str | Path, size: tuple[int, int], title: str, layout: str = "no
     Raises:
         InvalidInputError: If the name does not end in ".png".
     """
-    target = png_path(path)
+    path = png_path(paper) if isinstance(paper, str | Path) else None
     dpi = size[0] / INCHES
     with mpl.rc_context({**mpl.rcParamsDefault, **_STYLE}):
         figure = Figure(figsize=(INCHES, size[1] / dpi), dpi=dpi, layout=layout)
@@ -73,28 +72,12 @@ def sheet(path: str | Path, size: tuple[int, int], title: str, layout: str = "no
             middle = 1 - TITLE / 2 * size[0] / size[1]
             figure.text(0.5, middle, title, fontsize=16, fontweight="bold", ha="center", va="center")
         yield figure
-        target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.png")
-        try:
-            figure.savefig(temporary, dpi=dpi, format="png")
-            os.replace(temporary, target)
-        finally:
-            temporary.unlink(missing_ok=True)
-
-
-def png_path(path: str | Path) -> Path:
-    """Return the path, refuse one that names no PNG file."""
-    target = Path(path)
-    if target.suffix != ".png":
-        raise InvalidInputError(f"pictures are PNG files, got the name {target.name!r}: let it end in '.png'")
-    return target
-
-
-def draw_on_one_rank(comm: MPI.Comm | None, draw: Callable[[], None]) -> None:
-    """Let rank 0 draw; if it fails, all ranks raise. Collective on ``comm`` if given."""
-    with nullcontext() if comm is None else together(comm):
-        if comm is None or comm.rank == 0:
-            draw()
+        content = BytesIO()
+        figure.savefig(content, dpi=dpi, format="png")
+    if path is not None:
+        write_png(path, content.getvalue())
+    elif not isinstance(paper, str | Path):
+        paper.write(content.getvalue())
 
 
 def place_image(figure: Any, image: np.ndarray, left: int, top: int, title: str = "") -> Any:

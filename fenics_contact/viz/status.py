@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from matplotlib.collections import PolyCollection
@@ -14,7 +14,8 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import INK, PALE
 from fenics_contact.viz.patch import ContactPatch, contact_patch
 from fenics_contact.viz.patch_axes import label_axes
-from fenics_contact.viz.sheet import draw_on_one_rank, png_path, sheet
+from fenics_contact.viz.picture import Picture, draw_picture, png_path
+from fenics_contact.viz.sheet import sheet
 from fenics_contact.viz.symbols import symbols_of
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.words import written
@@ -27,14 +28,14 @@ COLUMNS = 3
 
 def plot_contact_status(
     states: Mapping[str, State],
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     pair: int = 0,
     reach: float | None = None,
     title: str = "",
     units: Units | None = None,
     width: int = 1600,
-) -> Path:
+) -> Picture:
     """Draw where a contact pair is open, sticks and slips, in one map for each state. Collective.
 
     Arrows show how points that slip moved on the master in the last load step. The surface is seen from the
@@ -42,7 +43,7 @@ def plot_contact_status(
 
     Args:
         states: Name -> state of a scene in space, for instance after each load step.
-        path: PNG file to write.
+        path: PNG file to write, None to write none.
         pair: Number of the contact pair in the scenes.
         reach: How far a map reaches around the contact's middle, [length]; chosen unless given.
         title: Title.
@@ -50,7 +51,7 @@ def plot_contact_status(
         width: Width of the picture in pixels.
 
     Returns:
-        The path.
+        The picture, which stands for its file where a path is needed.
 
     Raises:
         InvalidInputError: If there is no state, one has no such pair, or one is plane.
@@ -67,21 +68,20 @@ def plot_contact_status(
             )
     comm = next(iter(states.values())).torn.decomposition.comm
 
-    def draw() -> None:
+    def draw(paper: BinaryIO) -> None:
         patches = {name: contact_patch(state, pair, reach) for name, state in states.items()}
-        _draw(patches, target, title or next(iter(patches.values())).name, units or Units(), width)
+        _draw(patches, paper, title or next(iter(patches.values())).name, units or Units(), width)
 
-    draw_on_one_rank(comm, draw)
-    return target
+    return draw_picture(comm, target, draw)
 
 
-def _draw(patches: Mapping[str, ContactPatch], target: Path, title: str, units: Units, width: int) -> None:
+def _draw(patches: Mapping[str, ContactPatch], paper: BinaryIO, title: str, units: Units, width: int) -> None:
     columns = min(COLUMNS, len(patches))
     rows = -(-len(patches) // columns)
     size = next(iter(patches.values()))
     proportion = float((size.high - size.low)[1] / (size.high - size.low)[0])
     height = round((0.09 + rows * (0.075 + 0.9 * proportion / columns)) * width)
-    with sheet(target, (width, height), title, "constrained") as figure:
+    with sheet(paper, (width, height), title, "constrained") as figure:
         panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
         for axes, (name, patch) in zip(panels, patches.items(), strict=False):
             draw_status(axes, patch, counted=False)

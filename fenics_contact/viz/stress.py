@@ -15,7 +15,7 @@ from fenics_contact.viz.fields import BodyFields, gather
 from fenics_contact.viz.obstacles import obstacles_of
 from fenics_contact.viz.painting import paint
 from fenics_contact.viz.paints import Paints
-from fenics_contact.viz.sheet import png_path
+from fenics_contact.viz.picture import Picture, png_path
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.words import checked_range, checked_reach, headline, nice_number, written
 
@@ -27,7 +27,7 @@ QUANTILE = 0.995
 
 def plot_stress(
     state: State,
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     clim: tuple[float, float] | None = None,
     scale: float | None = None,
@@ -37,7 +37,7 @@ def plot_stress(
     title: str = "",
     units: Units | None = None,
     width: int = 1600,
-) -> Path:
+) -> Picture:
     """Draw the von Mises stress on the deformed bodies. Collective.
 
     Below, two sections through the middle of the strongest contact, in true deformation: bodies whose
@@ -47,7 +47,7 @@ def plot_stress(
 
     Args:
         state: The state.
-        path: PNG file to write.
+        path: PNG file to write, None to write none.
         clim: Range of the colours, [force / length²]; from zero to the 99.5 % quantile unless given. Give two
             pictures the same range to compare them.
         scale: Factor of the displacement in the upper picture; chosen and stated unless given, 1 where there
@@ -60,7 +60,7 @@ def plot_stress(
         width: Width of the picture in pixels.
 
     Returns:
-        The path.
+        The picture, which stands for its file where a path is needed.
 
     Raises:
         InvalidInputError: If an option or the name of the file cannot be used.
@@ -84,8 +84,7 @@ def plot_stress(
     label, words = f"von Mises stress ({named.stress})", headline(title, facts)
     norm = Normalize(*shown)
     paints = Paints(values, STRESS_MAP, norm, label, words, factor, reach, named, width)
-    paint(state, bodies, paints, target, sections=sections)
-    return target
+    return paint(state, bodies, paints, target, sections=sections)
 
 
 def stress_range(bodies: Mapping[str, BodyFields]) -> tuple[float, float]:

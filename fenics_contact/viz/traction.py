@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
@@ -28,7 +27,7 @@ class TractionLook:
     width: int
 
 
-def draw_traction(trace: ContactTrace, target: Path, look: TractionLook) -> None:
+def draw_traction(trace: ContactTrace, paper: BinaryIO, look: TractionLook) -> None:
     """Draw the pressure above and, where friction acts, the tangential traction on the slave below."""
     units, rubs = look.units, trace.rubs
     facts = f"largest pressure {written(float(trace.pressure.max()))} {units.stress}, "
@@ -37,7 +36,7 @@ def draw_traction(trace: ContactTrace, target: Path, look: TractionLook) -> None
         facts += f", tangential force {written(trace.shear)} {units.force}/{units.length}"
     top = float(trace.pressure.max()) or 1.0
     height = round((0.62 if rubs else 0.4) * look.width)
-    with sheet(target, (look.width, height), headline(look.title, facts), "constrained") as figure:
+    with sheet(paper, (look.width, height), headline(look.title, facts), "constrained") as figure:
         rows = figure.subplots(2 if rubs else 1, 1, sharex=True, squeeze=False)[:, 0]
         _curve(rows[0], trace, trace.pressure, BLUE)
         _symbols(rows[0], trace, trace.pressure)

@@ -156,7 +156,7 @@ def test_files_and_pictures_show_quadratic_cells(tmp_path: Path) -> None:
             plot_contact_pressure(state, tmp_path / f"{name}_pressure.png"),
             plot_decomposition(scene, parts, tmp_path / f"{name}_parts.png", width=500),
         ):
-            assert picture.stat().st_size > 2000
+            assert Path(picture).stat().st_size > 2000
 
 
 def test_mean_gaps_between_quadratic_facets_are_refused() -> None:

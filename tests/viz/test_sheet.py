@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.viz.sheet import place_image, png_path, sheet
+from fenics_contact.viz.picture import png_path
+from fenics_contact.viz.sheet import place_image, sheet
 from tests.viz.states import pixels
 
 
@@ -26,7 +27,7 @@ def test_a_failing_drawing_leaves_the_old_picture_and_no_litter(tmp_path: Path) 
     path.write_bytes(b"old")
 
     with pytest.raises(ZeroDivisionError), sheet(path, (320, 200), "title") as figure:
-        figure.savefig = lambda file, **_: Path(file).write_bytes(b"half") and 1 / 0
+        figure.savefig = lambda file, **_: file.write(b"half") and 1 / 0
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
 

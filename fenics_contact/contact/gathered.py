@@ -1,0 +1,83 @@
+"""The fields of a state as plain arrays in the order of the bodies' meshes, the same on all ranks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from fenics_contact.contact.state import State
+
+
+@dataclass(frozen=True, eq=False)
+class GatheredFields:
+    """What happens in one body, replicated on all ranks.
+
+    Attributes:
+        points: Fields on nodes by their names: ``displacement``, (n_nodes, dim), [length], and what
+            `contact_fields` returns.
+        cells: Fields on cells: ``von_mises``, (n_cells,), [force / length²], and ``subdomain``, numbered over
+            all bodies, (n_cells,) int.
+    """
+
+    points: dict[str, np.ndarray]
+    cells: dict[str, np.ndarray]
+
+
+def gathered_fields(state: State, body: str) -> GatheredFields:
+    """Collect the fields of a body on every rank. Collective.
+
+    Args:
+        state: The state.
+        body: Name of the body.
+    """
+    decomposition = state.torn.decomposition
+    first = int(decomposition.tearing.subdomain_offset[decomposition.tearing.body_names.index(body)])
+    subdomain = np.asarray(decomposition.partitions[body], dtype=np.int32) + np.int32(first)
+    return GatheredFields(
+        {"displacement": state.gather_displacement(body), **contact_fields(state, body)},
+        {"von_mises": state.gather_von_mises(body), "subdomain": subdomain},
+    )
+
+
+def contact_fields(state: State, body: str) -> dict[str, np.ndarray]:
+    """Return what happens on a body's contact surfaces as fields on all its nodes.
+
+    Args:
+        state: The state.
+        body: Name of the body.
+
+    Returns:
+        ``contact_status``, (n_nodes,) int: the value of `Status`, −1 on nodes that are no contact points;
+        and, zero on those, ``contact_pressure``, (n_nodes,), [force / length²], ``contact_force`` on the
+        slave and ``contact_slip``, (n_nodes, 3), [force] and [length]. A node that belongs to several pairs
+        has their sum, and the status of the last.
+    """
+    contact, tearing = state.contact, state.torn.decomposition.tearing
+    start = int(tearing.node_offset[tearing.body_names.index(body)])
+    count = state.scene.bodies[body].mesh.n_nodes
+    nodes = contact.points.slave - start
+    mine = np.flatnonzero((nodes >= 0) & (nodes < count))
+    slip = np.einsum("na,nad->nd", contact.slip, contact.points.tangents)
+
+    def summed(values: np.ndarray) -> np.ndarray:
+        field = np.zeros((count, *values.shape[1:]))
+        np.add.at(field, nodes[mine], values[mine])
+        return field
+
+    status = np.full(count, -1, dtype=np.int32)
+    status[nodes[mine]] = contact.status[mine]
+    return {
+        "contact_status": status,
+        "contact_pressure": summed(contact.pressure),
+        "contact_force": summed(contact.force),
+        "contact_slip": summed(slip),
+    }
+
+
+def in_space(values: np.ndarray) -> np.ndarray:
+    """Give points and vectors of plane bodies, (n, 2), a third component that is zero; leave others alone."""
+    plane = values.ndim == 2 and values.shape[1] == 2
+    return np.pad(values, ((0, 0), (0, 1))) if plane else values

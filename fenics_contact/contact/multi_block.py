@@ -1,0 +1,57 @@
+"""A state as pyvista's MultiBlock: one block a body, the same on all ranks."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fenics_contact.contact.gathered import gathered_fields, in_space
+from fenics_contact.errors import InvalidInputError, MissingRequirementError, together
+
+if TYPE_CHECKING:
+    from fenics_contact.contact.state import State
+
+#: What VTK calls the types of cells; their nodes are in VTK's order.
+_VTK_NAMES = {
+    "hexahedron": "HEXAHEDRON",
+    "tetrahedron": "TETRA",
+    "quadrilateral": "QUAD",
+    "triangle": "TRIANGLE",
+    "hexahedron27": "TRIQUADRATIC_HEXAHEDRON",
+    "quadrilateral9": "BIQUADRATIC_QUAD",
+    "triangle6": "QUADRATIC_TRIANGLE",
+}
+
+
+def multi_block(state: State, deformed: float) -> Any:
+    """Return what `State.to_pyvista` promises. Collective."""
+    with together(state.torn.decomposition.comm):
+        pv = _pyvista()
+    if not np.isfinite(deformed):
+        raise InvalidInputError(
+            f"deformed must be finite, got {deformed}: give the factor of the displacement, such as 1"
+        )
+    blocks = pv.MultiBlock()
+    for name, body in state.scene.bodies.items():
+        fields = gathered_fields(state, name)
+        points = in_space(body.mesh.points + deformed * fields.points["displacement"])
+        cell_type = pv.CellType[_VTK_NAMES[body.mesh.cell_type]]
+        grid = pv.UnstructuredGrid({cell_type: body.mesh.cells}, points)
+        for key, values in fields.points.items():
+            grid.point_data[key] = in_space(values)
+        for key, values in fields.cells.items():
+            grid.cell_data[key] = values
+        blocks[name] = grid
+    return blocks
+
+
+def _pyvista() -> Any:
+    try:
+        import pyvista
+    except ImportError as error:
+        raise MissingRequirementError(
+            f"to_pyvista needs pyvista, got {error}: pip install 'fenics_contact[viz]'",
+            name="pyvista",
+        ) from error
+    return pyvista
