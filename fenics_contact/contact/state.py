@@ -18,6 +18,7 @@ from fenics_contact.contact.fields import (
     von_mises,
 )
 from fenics_contact.contact.result import ContactResult
+from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem, TornSystem
 from fenics_contact.feti.temperature import temperature_of
@@ -42,6 +43,7 @@ class State:
         energies: Energies of all bodies.
         seconds: Wall time of this rank by phase, of all work up to this state that shares its timer.
         known_errors: Errors that were found on the way, None if they were not needed; ask `errors`.
+        tolerance: What it was solved to, a relative residual or `Balanced`; None where no solver iterated.
     """
 
     system: DualSystem | DirectSystem
@@ -51,6 +53,7 @@ class State:
     energies: Energies
     seconds: Mapping[str, float]
     known_errors: StateErrors | None = field(default=None, repr=False)
+    tolerance: Tolerance = None
 
     @property
     def torn(self) -> TornSystem:
