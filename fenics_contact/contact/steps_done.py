@@ -47,6 +47,11 @@ class StepsDone:
             self._stored = self._written = int(found.pop("steps"))
             self._arrays = found
 
+    @property
+    def recalling(self) -> bool:
+        """Whether the last step was read from the file."""
+        return self._here <= self._stored
+
     def recalled(
         self,
         step: LoadStep,

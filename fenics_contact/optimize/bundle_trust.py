@@ -22,6 +22,7 @@ from fenics_contact.optimize.state import MethodState
 from fenics_contact.optimize.stopping import StoppingTest, stopping_test
 from fenics_contact.optimize.subproblem import Step, solve_step
 from fenics_contact.optimize.trust import Trial, Trust
+from fenics_contact.progress import Task
 
 Array = NDArray[np.float64]
 Callback = Callable[[Record, Array], None]
@@ -136,12 +137,25 @@ class BundleTrust:
         """
         progress = Progress(checkpoint, self, problem)
         state = progress.recalled()
+        with Task("optimisation", unit="evaluations", most=self.max_evaluations, measured="decrease") as task:
+            state, reason = self._run(problem, state, progress, callback, task)
+        return _finish(self, state, reason)
+
+    def _run(
+        self,
+        problem: Problem,
+        state: MethodState | None,
+        progress: Progress,
+        callback: Callback | None,
+        task: Task,
+    ) -> tuple[MethodState, Reason]:
+        """Go on from a state, or from the start, to the stop."""
         if state is None:
             state = _start(self, problem)
             progress.keep(state)
-            _tell(callback, state)
+            self._tell(callback, state, task)
         else:
-            _LOG.info("going on after %d evaluations", state.evaluations)
+            self._tell(None, state, task)
         reason: Reason | None = None
         while reason is None:
             try:
@@ -151,14 +165,22 @@ class BundleTrust:
                 reason = Reason.STEP_FAILED
             if reason is None:
                 progress.keep(state)
-                _tell(callback, state)
+                self._tell(callback, state, task)
         progress.keep(state, last=True)
-        return _finish(self, state, reason)
+        return state, reason
 
-
-def _tell(callback: Callback | None, state: MethodState) -> None:
-    if callback is not None:
-        callback(state.history[-1], state.centre.x.copy())
+    def _tell(self, callback: Callback | None, state: MethodState, task: Task) -> None:
+        record = state.history[-1]
+        predicted = record.predicted_decrease / (self.value_scale + abs(record.best))
+        task.step(
+            record.evaluations,
+            measure=predicted or None,
+            target=self.tolerance,
+            value=record.best,
+            words=f"{record.kind.value} step" if record.iteration else "",
+        )
+        if callback is not None:
+            callback(record, state.centre.x.copy())
 
 
 def _start(method: BundleTrust, problem: Problem) -> MethodState:
@@ -303,7 +325,6 @@ def _recorded(
         error=0.0 if found is None else found.error,
         note=note,
     )
-    _LOG.info("%s", record)
     return (*state.history, record)
 
 
