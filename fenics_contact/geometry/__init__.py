@@ -17,6 +17,7 @@ from fenics_contact.geometry.half_disc import half_disc
 from fenics_contact.geometry.hemisphere import half_cylinder, hemisphere
 from fenics_contact.geometry.link import DesignSurface, Link, chain_link
 from fenics_contact.geometry.mesh import BodyMesh
+from fenics_contact.geometry.meshio_import import from_meshio, read_mesh
 from fenics_contact.geometry.partition import (
     bisection_partition,
     box_partition,
@@ -71,6 +72,7 @@ __all__ = [
     "extrude",
     "from_dolfinx",
     "from_gmsh_model",
+    "from_meshio",
     "graph_partition",
     "half_cylinder",
     "half_disc",
@@ -81,6 +83,7 @@ __all__ = [
     "orient",
     "quadratic",
     "quadrature",
+    "read_mesh",
     "read_msh",
     "read_xdmf",
     "rectangle",

@@ -8,13 +8,18 @@ from typing import Any
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry.cell_types import cell_type_of
-from fenics_contact.geometry.faces import boundary_faces, cell_faces, match_faces
+from fenics_contact.geometry.faces import boundary_faces, cell_faces, corners_of, match_faces
 from fenics_contact.geometry.mesh import BodyMesh
-from fenics_contact.geometry.tagged_mesh import BodyParts, TaggedMesh, chosen_bodies, chosen_surfaces
+from fenics_contact.geometry.tagged_mesh import (
+    BodyParts,
+    SurfaceParts,
+    TaggedMesh,
+    chosen_bodies,
+    chosen_surfaces,
+)
 
-Blocks = Mapping[str, Sequence[np.ndarray]]
-"""Name of a surface to arrays of facets, (n, nodes of a facet)."""
+Facets = Mapping[str, SurfaceParts]
+"""Name of a surface to what makes it up."""
 
 
 def bodies_of(mesh: TaggedMesh, bodies: Any = None, surfaces: Any = None) -> dict[str, BodyMesh]:
@@ -50,6 +55,8 @@ def bodies_of(mesh: TaggedMesh, bodies: Any = None, surfaces: Any = None) -> dic
             )
         owner[kind][cells] = number
         result[name] = _body(mesh, name, mesh.cells[kind][cells], parts.regions, region, facets)
+    if surfaces is not None:
+        _check_nodes_make_facets(mesh, facets, result)
     return result
 
 
@@ -91,7 +98,7 @@ def _body(
     cells: np.ndarray,
     regions: Sequence[str] | None,
     region: np.ndarray,
-    facets: Blocks,
+    facets: Facets,
 ) -> BodyMesh:
     """Number the nodes of a body from zero and find the surfaces on its boundary."""
     nodes, local = np.unique(cells, return_inverse=True)
@@ -99,15 +106,20 @@ def _body(
     number = np.full(mesh.points.shape[0], -1, dtype=np.int64)
     number[nodes] = np.arange(nodes.size)
     boundary, _ = boundary_faces(local, mesh.dim)
+    corners = corners_of(boundary, mesh.dim)
     surfaces = {}
-    for surface, blocks in facets.items():
-        mine = [number[block] for block in blocks if block.shape[1] == boundary.shape[1]]
+    for surface, parts in facets.items():
+        found = [np.zeros(0, dtype=np.int64)]
+        mine = [number[block] for block in parts.facets if block.shape[1] == corners.shape[1]]
         mine = [block[(block >= 0).all(axis=1)] for block in mine]
         if mine and (candidates := np.concatenate(mine)).size:
-            found = match_faces(candidates, boundary)
-            _check_none_inside(mesh, name, surface, candidates[found < 0], local)
-            if np.any(found >= 0):
-                surfaces[surface] = boundary[np.unique(found[found >= 0])]
+            matches = match_faces(candidates, corners)
+            _check_none_inside(mesh, name, surface, candidates[matches < 0], local)
+            found.append(matches[matches >= 0])
+        for inside in parts.nodes:
+            found.append(np.flatnonzero(np.isin(nodes[corners], inside).all(axis=1)))
+        if (there := np.unique(np.concatenate(found))).size:
+            surfaces[surface] = boundary[there]
     named = {} if regions is None else {label: np.flatnonzero(region == n) for n, label in enumerate(regions)}
     try:
         return BodyMesh(mesh.points[nodes], local, surfaces, regions=named)
@@ -121,7 +133,9 @@ def _check_none_inside(
     """Refuse facets between two cells of one body; those that are none of its faces are another body's."""
     faces = cell_faces(cells, mesh.dim)
     inside = (
-        np.count_nonzero(match_faces(facets, faces.reshape(-1, faces.shape[2])) >= 0) if facets.size else 0
+        np.count_nonzero(match_faces(facets, corners_of(faces.reshape(-1, faces.shape[2]), mesh.dim)) >= 0)
+        if facets.size
+        else 0
     )
     if inside:
         raise InvalidInputError(
@@ -132,17 +146,28 @@ def _check_none_inside(
         )
 
 
-def _check_facets_belong(mesh: TaggedMesh, facets: Blocks) -> None:
+def _check_nodes_make_facets(mesh: TaggedMesh, facets: Facets, bodies: Mapping[str, BodyMesh]) -> None:
+    """Refuse a wanted surface that is a set of nodes, but not all nodes of any facet."""
+    for name, parts in facets.items():
+        if parts.nodes and not any(name in body.surfaces for body in bodies.values()):
+            count = sum(len(nodes) for nodes in parts.nodes)
+            raise InvalidInputError(
+                f"a set of nodes must hold all corners of some facets to be a surface, the {count} nodes of "
+                f"'{name}' of {mesh.source} hold those of none on the bodies {list(bodies)}: save the "
+                "facets, or all their nodes"
+            )
+
+
+def _check_facets_belong(mesh: TaggedMesh, surfaces: Facets) -> None:
     """Refuse facets that are the face of no cell."""
     known: dict[int, list[np.ndarray]] = {}
     for cells in mesh.cells.values():
         faces = cell_faces(cells, mesh.dim)
-        known.setdefault(cell_type_of(cells, mesh.dim).faces.shape[1], []).append(
-            faces.reshape(-1, faces.shape[2])
-        )
+        corners = corners_of(faces.reshape(-1, faces.shape[2]), mesh.dim)
+        known.setdefault(corners.shape[1], []).append(corners)
     joined = {columns: np.concatenate(blocks) for columns, blocks in known.items()}
-    for name, blocks in facets.items():
-        for block in blocks:
+    for name, parts in surfaces.items():
+        for block in parts.facets:
             faces = joined.get(block.shape[1], np.zeros((0, block.shape[1]), dtype=np.int64))
             lost = np.flatnonzero(match_faces(block, faces) < 0)
             if lost.size:

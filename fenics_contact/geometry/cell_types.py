@@ -214,7 +214,7 @@ QUADRATIC = (
 )
 """Why, and what to do."""
 QUADRATIC_FILE = (
-    "quadratic cells are not read from files: write the mesh with linear ones (gmsh: Mesh.ElementOrder = 1), "
+    "such quadratic cells are not read: write the mesh with linear ones (gmsh: Mesh.ElementOrder = 1), "
     "which `quadratic` makes quadratic where they are hexahedra or plane cells"
 )
 """What to do."""

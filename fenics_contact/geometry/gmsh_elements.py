@@ -9,12 +9,17 @@ from typing import Any
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry.cell_types import QUADRATIC_FILE
+from fenics_contact.geometry.cell_types import CELL_TYPES, QUADRATIC_FILE
 from fenics_contact.geometry.plane import flattened, turned_counter_clockwise
+from fenics_contact.geometry.quadratic_nodes import in_vtk_order
 from fenics_contact.geometry.tagged_mesh import Label, TaggedMesh
 
-_TYPES = {2: "triangle", 3: "quadrilateral", 4: "tetrahedron", 5: "hexahedron"}
+_TYPES = {
+    2: "triangle", 3: "quadrilateral", 4: "tetrahedron", 5: "hexahedron",
+    9: "triangle6", 10: "quadrilateral9", 12: "hexahedron27",
+}  # fmt: skip
 """gmsh's numbers of the cells that a body may have."""
+_INCOMPLETE = (16, 17)
 
 
 def tagged_mesh_of(gmsh: ModuleType, source: str) -> TaggedMesh:
@@ -29,7 +34,8 @@ def tagged_mesh_of(gmsh: ModuleType, source: str) -> TaggedMesh:
 
     Raises:
         InvalidInputError: If there are no cells, one has no physical group, or they are not linear triangles,
-            quadrilaterals, tetrahedra or hexahedra, plane ones in a plane.
+            quadrilaterals, tetrahedra or hexahedra, or complete quadratic ones other than tetrahedra, plane
+            ones in a plane.
     """
     elements = {dim: _elements(gmsh, dim, source) for dim in (3, 2)}
     dim = 3 if elements[3] else 2
@@ -45,7 +51,8 @@ def tagged_mesh_of(gmsh: ModuleType, source: str) -> TaggedMesh:
     row[tags[order].astype(np.int64)] = np.arange(tags.size)
     points = coordinates.reshape(-1, 3)[order]
     by_entity = {
-        tag: {kind: row[nodes] for kind, nodes in blocks.items()} for tag, blocks in elements[dim].items()
+        tag: {kind: _in_vtk_order(points, kind, row[nodes]) for kind, nodes in blocks.items()}
+        for tag, blocks in elements[dim].items()
     }
     if dim == 2:
         used = np.concatenate([rows.ravel() for blocks in by_entity.values() for rows in blocks.values()])
@@ -75,17 +82,22 @@ def _elements(gmsh: ModuleType, dim: int, source: str) -> dict[int, dict[str, np
     for _, entity in gmsh.model.getEntities(dim):
         types, _, nodes = gmsh.model.mesh.getElements(dim, entity)
         for number, tags in zip(types, nodes, strict=True):
-            name, _, order, vertices, *_ = gmsh.model.mesh.getElementProperties(number)
-            if order > 1:
-                raise InvalidInputError(f"{source} has cells of type '{name}': {QUADRATIC_FILE}")
+            name, _, order, nodes_each, *_ = gmsh.model.mesh.getElementProperties(number)
+            if order > 1 and number not in _TYPES:
+                remedy = "set Mesh.SecondOrderIncomplete = 0" if number in _INCOMPLETE else QUADRATIC_FILE
+                raise InvalidInputError(f"{source} has cells of type '{name}': {remedy}")
             if number not in _TYPES:
                 raise InvalidInputError(
                     f"cells must be tetrahedra or hexahedra (in two dimensions triangles or quadrilaterals), "
                     f"{source} has cells of type '{name}': mesh it without prisms and pyramids"
                 )
             blocks = found.setdefault(int(entity), {})
-            blocks[_TYPES[number]] = tags.astype(np.int64).reshape(-1, vertices)
+            blocks[_TYPES[number]] = tags.astype(np.int64).reshape(-1, nodes_each)
     return found
+
+
+def _in_vtk_order(points: np.ndarray, kind: str, cells: np.ndarray) -> np.ndarray:
+    return cells if CELL_TYPES[kind].order == 1 else in_vtk_order(points, cells)[1]
 
 
 def _groups(gmsh: ModuleType, dim: int, meshed: set[int], source: str) -> dict[Label, list[int]]:
@@ -135,15 +147,20 @@ def _facets(
     row: np.ndarray,
     elements: Mapping[int, Mapping[int, Mapping[str, np.ndarray]]],
 ) -> dict[Label, list[np.ndarray]]:
-    """Node rows of the facets of every physical group."""
+    """Node rows of the corners of the facets of every physical group."""
     facets: dict[Label, list[np.ndarray]] = {}
     for label, entities in _physical(gmsh, dim).items():
         blocks: list[Any] = []
         for entity in entities:
             if dim == 2:
-                blocks += elements[2].get(entity, {}).values()
+                there = elements[2].get(entity, {}).items()
+                blocks += [nodes[:, : len(CELL_TYPES[kind].edges)] for kind, nodes in there]
             else:
-                _, _, nodes = gmsh.model.mesh.getElements(dim, entity)
-                blocks += [tags.astype(np.int64).reshape(-1, 2) for tags in nodes]
+                types, _, nodes = gmsh.model.mesh.getElements(dim, entity)
+                each = [gmsh.model.mesh.getElementProperties(number)[3] for number in types]
+                blocks += [
+                    tags.astype(np.int64).reshape(-1, columns)[:, :2]
+                    for tags, columns in zip(nodes, each, strict=True)
+                ]
         facets[label] = [row[block] for block in blocks]
     return facets

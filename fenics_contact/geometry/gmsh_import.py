@@ -38,7 +38,7 @@ def read_msh(
     """Read bodies from a .msh file of any version.
 
     Every body gets nodes of its own; those that bodies share in the file are there once for each of them.
-    Plane meshes lose their constant z coordinate.
+    Plane meshes lose their constant z coordinate. Quadratic hexahedra and plane cells stay so.
 
     Example:
         ``read_msh("press.msh")`` makes a body of every physical volume. ``read_msh("press.msh",
@@ -59,8 +59,8 @@ def read_msh(
 
     Raises:
         InvalidInputError: If the file is missing or cannot be read, a group is not in it, a volume has no
-            group, cells are not linear, are prisms or pyramids, of several types in one body, flipped, or do
-            not hang together, a cell is in two bodies, or a surface lies inside a body.
+            group, cells are quadratic tetrahedra, prisms or pyramids, of several types in one body, flipped,
+            or do not hang together, a cell is in two bodies, or a surface lies inside a body.
         MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
 
     Note:

@@ -6,7 +6,7 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry.cell_types import cell_type_of
-from fenics_contact.geometry.faces import cell_faces, number_faces, start_at_smallest
+from fenics_contact.geometry.faces import cell_faces, corners_of, number_faces, start_at_smallest
 from fenics_contact.geometry.quality import jacobians
 
 FLAT = 1e-10
@@ -17,6 +17,13 @@ _MIRRORED = {
     "quadrilateral": [0, 3, 2, 1],
     "tetrahedron": [0, 2, 1, 3],
     "hexahedron": [4, 5, 6, 7, 0, 1, 2, 3],
+    "triangle6": [0, 2, 1, 5, 4, 3],
+    "quadrilateral9": [0, 3, 2, 1, 7, 6, 5, 4, 8],
+    "hexahedron27": [
+        *(4, 5, 6, 7, 0, 1, 2, 3),
+        *(12, 13, 14, 15, 8, 9, 10, 11, 16, 17, 18, 19),
+        *(20, 21, 22, 23, 25, 24, 26),
+    ],
 }
 """The same cell with its Jacobian's sign changed."""
 
@@ -51,7 +58,7 @@ def turned_counter_clockwise(points: np.ndarray, cells: np.ndarray) -> np.ndarra
 
     Args:
         points: Coordinates, (n_nodes, 2).
-        cells: Node numbers, (n_cells, 4 | 3).
+        cells: Node numbers, (n_cells, nodes of a cell).
 
     Returns:
         The cells; untouched if only some run clockwise, which is a mistake in the mesh.
@@ -66,7 +73,7 @@ def turned_right_handed(points: np.ndarray, cells: np.ndarray, source: str) -> n
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2).
-        cells: Node numbers, (n_cells, n_vertices).
+        cells: Node numbers, (n_cells, nodes of a cell).
         source: Where the mesh comes from, for the message.
 
     Returns:
@@ -79,7 +86,7 @@ def turned_right_handed(points: np.ndarray, cells: np.ndarray, source: str) -> n
     negative = jacobians(points, cells).max(axis=1) < 0.0
     turned = np.where(negative[:, None], cells[:, _MIRRORED[cell_type_of(cells, dim).name]], cells)
     faces = cell_faces(turned, dim)
-    flat = faces.reshape(-1, faces.shape[2])
+    flat = corners_of(faces.reshape(-1, faces.shape[2]), dim)
     numbers = number_faces(flat)
     order = np.argsort(numbers, kind="stable")
     one, other = order[:-1], order[1:]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,10 +21,12 @@ class TaggedMesh:
     Attributes:
         source: Where it comes from, for messages: ``"file 'beam.msh'"``.
         points: Coordinates, (n_nodes, 3 | 2).
-        cells: Cell type to node numbers in VTK order, (n_cells, n_vertices).
+        cells: Cell type to node numbers in VTK order, (n_cells, nodes of a cell).
         groups: Label to cell type to the numbers of its cells.
-        facets: Label to node numbers, one array for each number of nodes of a facet; in any order.
+        facets: Label to the corners of facets, arrays of (n, 4 | 3 | 2) node numbers; in any order.
         words: What its labels are called, for messages: ``"physical volume"``, ``"physical surface"``.
+        node_sets: Label to node numbers, in any order: the facets on the boundary of a body all of whose
+            corners are among them.
     """
 
     source: str
@@ -33,6 +35,7 @@ class TaggedMesh:
     groups: Mapping[Label, Mapping[str, np.ndarray]]
     facets: Mapping[Label, Sequence[np.ndarray]]
     words: tuple[str, str]
+    node_sets: Mapping[Label, np.ndarray] = field(default_factory=dict)
 
     @property
     def dim(self) -> int:
@@ -51,6 +54,19 @@ class BodyParts:
 
     labels: tuple[Label, ...]
     regions: tuple[str, ...] | None
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceParts:
+    """What makes up a surface.
+
+    Attributes:
+        facets: Corners of facets, arrays of (n, 4 | 3 | 2) node numbers.
+        nodes: Sets of node numbers.
+    """
+
+    facets: Sequence[np.ndarray]
+    nodes: Sequence[np.ndarray]
 
 
 def chosen_bodies(mesh: TaggedMesh, bodies: Any) -> dict[str, BodyParts]:
@@ -73,9 +89,11 @@ def chosen_bodies(mesh: TaggedMesh, bodies: Any) -> dict[str, BodyParts]:
         bodies = [bodies]
     if not isinstance(bodies, Mapping):
         bodies = {str(label): label for label in bodies}
-    chosen = {name: _parts(wanted) for name, wanted in bodies.items()}
-    for name, parts in chosen.items():
-        _check_known(parts.labels, mesh.groups, f"body '{name}'", mesh.words[0], mesh.source)
+    chosen = {}
+    for name, wanted in bodies.items():
+        parts = _parts(wanted)
+        labels = _known(parts.labels, mesh.groups, f"body '{name}'", mesh.words[0], mesh.source)
+        chosen[name] = BodyParts(labels, parts.regions)
     if not chosen:
         raise InvalidInputError(
             f"{mesh.source} must have a {mesh.words[0]} for a body, there is none: name what the bodies are"
@@ -83,26 +101,29 @@ def chosen_bodies(mesh: TaggedMesh, bodies: Any) -> dict[str, BodyParts]:
     return chosen
 
 
-def chosen_surfaces(mesh: TaggedMesh, surfaces: Any) -> dict[str, list[np.ndarray]]:
+def chosen_surfaces(mesh: TaggedMesh, surfaces: Any) -> dict[str, SurfaceParts]:
     """Resolve what the caller says about surfaces, in the same forms but without regions.
 
     Returns:
-        Name of the surface to blocks of facets.
+        Name of the surface to its facets and sets of nodes.
 
     Raises:
         InvalidInputError: If a label is not there.
     """
+    known = {**mesh.node_sets, **mesh.facets}
     if surfaces is None:
-        surfaces = list(mesh.facets)
+        surfaces = list(known)
     if isinstance(surfaces, (str, int)):
         surfaces = [surfaces]
     if not isinstance(surfaces, Mapping):
         surfaces = {str(label): label for label in surfaces}
     chosen = {}
     for name, wanted in surfaces.items():
-        labels = _parts(wanted).labels
-        _check_known(labels, mesh.facets, f"surface '{name}'", mesh.words[1], mesh.source)
-        chosen[name] = [block for label in labels for block in mesh.facets[label]]
+        labels = _known(_parts(wanted).labels, known, f"surface '{name}'", mesh.words[1], mesh.source)
+        chosen[name] = SurfaceParts(
+            [block for label in labels for block in mesh.facets.get(label, ())],
+            [mesh.node_sets[label] for label in labels if label not in mesh.facets],
+        )
     return chosen
 
 
@@ -114,12 +135,15 @@ def _parts(wanted: Any) -> BodyParts:
     return BodyParts(tuple(wanted), tuple(map(str, wanted)))
 
 
-def _check_known(
+def _known(
     labels: Iterable[Label], known: Mapping[Label, object], what: str, word: str, source: str
-) -> None:
+) -> tuple[Label, ...]:
+    """Return the labels as the mesh has them; a number may also be given as text."""
+    by_text = {str(label): label for label in known}
     for label in labels:
-        if not isinstance(label, Hashable) or label not in known:
+        if not isinstance(label, Hashable) or str(label) not in by_text:
             there = ", ".join(map(repr, known)) or "none at all"
             raise InvalidInputError(
                 f"{what} needs the {word} {label!r}, which {source} does not have: it has {there}"
             )
+    return tuple(by_text[str(label)] for label in labels)

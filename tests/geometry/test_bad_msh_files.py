@@ -15,9 +15,10 @@ from tests.geometry.msh_files import (
     PRISM,
     PYRAMID,
     QUADRILATERAL,
+    QUADRILATERAL_8,
     TETRAHEDRON,
+    TETRAHEDRON_10,
     TRIANGLE,
-    TRIANGLE_6,
     write_22,
 )
 
@@ -85,10 +86,26 @@ def test_duplicate_nodes_are_refused_with_their_body(tmp_path: Path) -> None:
         read_msh(path)
 
 
-def test_quadratic_cells_of_a_file_are_refused_with_what_to_do(tmp_path: Path) -> None:
-    points = [(0, 0, 0), (2, 0, 0), (0, 2, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
-    path = write_22(tmp_path / "q.msh", points, [(TRIANGLE_6, 1, range(6))], {(2, 1): "lug"})
-    message = r"'Triangle 6': quadratic cells are not read from files: .* Mesh\.ElementOrder = 1"
+@pytest.mark.parametrize(
+    ("kind", "points", "message"),
+    [
+        (
+            TETRAHEDRON_10,
+            [*SQUARE[:3], CUBE[4], *(5 * [(0.5, 0, 0)]), (0, 0, 0.5)],
+            r"'Tetrahedron 10': such quadratic cells are not read: .* Mesh\.ElementOrder = 1",
+        ),
+        (
+            QUADRILATERAL_8,
+            [*SQUARE, (0.5, 0, 0), (1, 0.5, 0), (0.5, 1, 0), (0, 0.5, 0)],
+            r"'Quadrilateral 8': set Mesh\.SecondOrderIncomplete = 0",
+        ),
+    ],
+)
+def test_quadratic_cells_without_a_counterpart_are_refused_with_what_to_do(
+    kind: int, points: list[tuple[float, ...]], message: str, tmp_path: Path
+) -> None:
+    dim = 3 if kind == TETRAHEDRON_10 else 2
+    path = write_22(tmp_path / "q.msh", points, [(kind, 1, range(len(points)))], {(dim, 1): "lug"})
     with pytest.raises(InvalidInputError, match=message):
         read_msh(path)
 
