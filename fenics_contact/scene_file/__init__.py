@@ -1,0 +1,27 @@
+"""Scenes as TOML files, checked line by line, and the same form as dictionaries of a program.
+
+`read_scene_file` reads and checks, `SceneFile` builds the scene, its load steps and its shape optimisation;
+`json_schema` is for editors. Of mistakes a `SceneFileError` lists all, each with line, key, what is allowed
+and what was given.
+"""
+
+from fenics_contact.scene_file.document import Document
+from fenics_contact.scene_file.expression import Expression, VectorExpression
+from fenics_contact.scene_file.mistakes import Mistake, SceneFileError
+from fenics_contact.scene_file.reading import SceneFile, read_scene_file
+from fenics_contact.scene_file.schema import json_schema
+from fenics_contact.scene_file.source import Source
+from fenics_contact.scene_file.tasks import ShapeTask
+
+__all__ = [
+    "Document",
+    "Expression",
+    "Mistake",
+    "SceneFile",
+    "SceneFileError",
+    "ShapeTask",
+    "Source",
+    "VectorExpression",
+    "json_schema",
+    "read_scene_file",
+]

@@ -1,0 +1,141 @@
+"""From a checked scene file to meshes, bodies and a scene; what cannot be built leads back to its key."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.scene import Body, Material, Scene
+from fenics_contact.scene_file.document import Document
+from fenics_contact.scene_file.expression import Expression, VectorExpression
+from fenics_contact.scene_file.mistakes import Mistake, SceneFileError
+from fenics_contact.scene_file.names import Reference, surface_parts
+from fenics_contact.scene_file.places import Path, written
+from fenics_contact.scene_file.placing import Shaped
+from fenics_contact.scene_file.source import Source
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+
+class Builder:
+    """Builds the parts one after the other and collects what is wrong with them.
+
+    Every rank meets the same errors: what reads files or runs gmsh agrees by itself.
+    """
+
+    def __init__(self, source: Source, document: Document, comm: MPI.Comm) -> None:
+        """Begin with nothing built.
+
+        Args:
+            source: Where the document comes from.
+            document: The checked file.
+            comm: Communicator on which meshes are built.
+        """
+        self._source, self._document, self._comm = source, document, comm
+        self._mistakes: list[Mistake] = []
+
+    def bodies(self) -> tuple[dict[str, Body], dict[str, Shaped]]:
+        """Return the bodies, and what is known of their shapes. Collective.
+
+        Raises:
+            SceneFileError: Naming every mesh, material and body that cannot be built.
+        """
+        shapes: dict[str, Mapping[str, Shaped]] = {}
+        for name, mesh in self._document.meshes.items():
+            with self._at("meshes", name):
+                shapes[name] = mesh.build(self._source.folder, self._comm)
+        materials: dict[str, Material] = {}
+        for name, part in self._document.materials.items():
+            with self._at("materials", name):
+                materials[name] = part.build(self._source.folder)
+        self._check()
+        chosen, found = {}, {}
+        for name, body in self._document.bodies.items():
+            with self._at("bodies", name):
+                chosen[name] = self._part_of(name, body, shapes[body.mesh])
+                made_of: Any = body.material
+                if isinstance(made_of, str):
+                    found[name] = Body(chosen[name].mesh, materials[made_of])
+                else:
+                    by_region = {region: materials[part] for region, part in made_of.items()}
+                    found[name] = Body(chosen[name].mesh, by_region)
+        self._check()
+        return found, chosen
+
+    def _part_of(self, name: str, body: Any, shapes: Mapping[str, Shaped]) -> Shaped:
+        if body.part is None and len(shapes) == 1:
+            return next(iter(shapes.values()))
+        path: Path = ("bodies", name, "part") if body.part is not None else ("bodies", name)
+        parts = [part for part in shapes if part]
+        if body.part in shapes:
+            return shapes[body.part]
+        if body.part is None:
+            words = f"{written(path)} must have 'part', one of {parts}: the mesh {body.mesh!r} has several bodies"
+            raise SceneFileError(self._source.name, [self._source.mistake(path, words)])
+        wrong = Reference(path, body.part, f"a body of the mesh {body.mesh!r}")
+        raise SceneFileError(self._source.name, [wrong.wrong(self._source, parts)])
+
+    def scene(self, bodies: Mapping[str, Body]) -> Scene:
+        """Return the scene of the bodies.
+
+        Raises:
+            SceneFileError: Naming every support, load and pair that does not suit the bodies.
+        """
+        self._check_surfaces(bodies)
+        document, dim = self._document, next(iter(bodies.values())).mesh.dim
+        empty = Scene(bodies)
+        built: dict[str, list[Any]] = {}
+        for key in ("supports", "loads", "contacts", "ties"):
+            built[key] = []
+            for number, part in enumerate(getattr(document, key)):
+                with self._at(key, number):
+                    one = part.build(dim) if key == "supports" else part.build()
+                    _check_coordinates(one, dim)
+                    replace(empty, **{key: (one,)})  # refuses what does not suit the bodies
+                    built[key].append(one)
+        self._check()
+        return Scene(bodies, **built)
+
+    def _check_surfaces(self, bodies: Mapping[str, Body]) -> None:
+        for path, part in surface_parts(self._document):
+            surfaces = bodies[part.body].mesh.surfaces
+            if part.surface not in surfaces:
+                one = Reference((*path, "surface"), part.surface, f"a surface of the body {part.body!r}")
+                self._mistakes.append(one.wrong(self._source, sorted(surfaces)))
+        self._check()
+
+    @contextmanager
+    def _at(self, *path: str | int) -> Iterator[None]:
+        """Collect an error of the block as a mistake at a key."""
+        try:
+            yield
+        except SceneFileError as error:
+            self._mistakes.extend(error.mistakes)
+        except InvalidInputError as error:
+            self._mistakes.append(located(self._source, path, error))
+
+    def _check(self) -> None:
+        if self._mistakes:
+            raise SceneFileError(self._source.name, self._mistakes)
+
+
+def located(source: Source, path: Path, error: InvalidInputError) -> Mistake:
+    """Return an error of what was built from a key as a mistake there."""
+    return source.mistake(path, f"{written(path)}: {error}")
+
+
+def _check_coordinates(part: Any, dim: int) -> None:
+    """Refuse formulas in z where bodies lie in the plane."""
+    if dim == 3:
+        return
+    value = getattr(part, "value", None)
+    entries = value.components if isinstance(value, VectorExpression) else value
+    for entry in entries if isinstance(entries, tuple) else (entries,):
+        if isinstance(entry, Expression) and "z" in entry.names:
+            raise InvalidInputError(
+                f"the formula {entry.text!r} depends on z, but the bodies lie in the plane: use x and y"
+            )

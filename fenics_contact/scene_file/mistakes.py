@@ -1,0 +1,67 @@
+"""Mistakes in scene files: where they are, what is allowed, what was given."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.scene_file.places import Path
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """One mistake.
+
+    Attributes:
+        path: Keys that lead to it.
+        line: Line of the file, from 1; 0 where there is none.
+        place: How the message names the place: "line 12", "--set solver.tolerance", "" for a dictionary.
+        words: What is needed, what was given, what to do.
+    """
+
+    path: Path
+    line: int
+    place: str
+    words: str
+
+    def __str__(self) -> str:
+        """Return place and words."""
+        return f"{self.place}: {self.words}" if self.place else self.words
+
+
+class SceneFileError(InvalidInputError):
+    """A scene file cannot be used; all mistakes that were found are listed.
+
+    Attributes:
+        mistakes: The mistakes in the order of their lines.
+    """
+
+    def __init__(self, name: str, mistakes: Iterable[Mistake] | str = ()) -> None:
+        """Put the mistakes into words.
+
+        Args:
+            name: Name of the file; or the whole message where mistakes are left out.
+            mistakes: The mistakes.
+        """
+        found = () if isinstance(mistakes, str) else tuple(sorted(mistakes, key=lambda mistake: mistake.line))
+        self.mistakes: tuple[Mistake, ...] = found
+        if not found:
+            super().__init__(name)
+        elif len(found) == 1:
+            super().__init__(f"{name}, {found[0]}" if found[0].place else f"{name}: {found[0]}")
+        else:
+            lines = "".join(f"\n  {mistake}" for mistake in found)
+            super().__init__(f"{name} has {len(found)} mistakes:{lines}")
+
+
+def suggestion(given: str, allowed: Iterable[str]) -> str:
+    """Return "did you mean ...? " where a name that is allowed is close to the one given, else nothing."""
+    close = get_close_matches(given, list(allowed), n=1, cutoff=0.6)
+    return f"did you mean {close[0]!r}? " if close else ""
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return names in quotes, one after the other; "none" for no name."""
+    return ", ".join(repr(name) for name in names) or "none"

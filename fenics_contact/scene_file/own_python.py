@@ -1,0 +1,48 @@
+"""Names from a Python file of the user's own: "file.py:Name"."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any
+
+from fenics_contact.errors import InvalidInputError
+
+
+def is_reference(text: object) -> bool:
+    """Tell whether a text has the form "file.py:Name"."""
+    file, colon, name = text.rpartition(":") if isinstance(text, str) else ("", "", "")
+    return bool(colon) and file.endswith(".py") and name.isidentifier()
+
+
+def load(reference: str, folder: Path) -> Any:
+    """Return what a Python file calls by a name; the file is run.
+
+    Args:
+        reference: "file.py:Name".
+        folder: Folder to which the file is relative.
+
+    Raises:
+        InvalidInputError: If there is no such file, it cannot be run or does not define the name.
+    """
+    file, _, name = reference.rpartition(":")
+    path = folder / file
+    if not path.is_file():
+        raise InvalidInputError(f"there must be a Python file '{path}', there is none: correct the path")
+    module_name = f"_fenics_contact_scene_{path.stem}"
+    spec = importlib.util.spec_from_file_location(module_name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[module_name] = module  # dataclasses of the file look themselves up there
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise InvalidInputError(
+            f"the Python file '{path}' must run without errors, it raised {type(error).__name__}: {error}"
+        ) from error
+    if not hasattr(module, name):
+        known = sorted(key for key, value in vars(module).items() if getattr(value, "__module__", "") == module_name)
+        raise InvalidInputError(f"'{path}' must define {name!r}, it defines {known}: use one of them")
+    return getattr(module, name)

@@ -1,0 +1,69 @@
+"""Keys of a scene file as paths, and as text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
+
+import tomlkit
+import tomlkit.items
+
+#: Keys and positions from the top of the file: ("contacts", 0, "friction").
+Path: TypeAlias = tuple[str | int, ...]
+
+#: Longest value that a message repeats.
+LONGEST = 60
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def written(path: Path) -> str:
+    """Return a path as `--set` takes it: ``contacts.0.friction``."""
+    return ".".join(
+        str(part) if isinstance(part, int) or _BARE.fullmatch(part) else f'"{part}"' for part in path
+    )
+
+
+def as_toml(value: Any) -> str:
+    """Return a value as a scene file would have it, shortened where it is long."""
+    if isinstance(value, Mapping):
+        text = f"a table with {', '.join(map(str, value))}" if value else "an empty table"
+    elif value is None:
+        text = "nothing"
+    else:
+        try:
+            text = tomlkit.item(value).as_string()
+        except (TypeError, ValueError):
+            text = repr(value)
+    text = " ".join(text.split())
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
+
+
+def value_at(data: Any, path: Path) -> Any:
+    """Return what stands at a path; None where there is nothing."""
+    for part in path:
+        try:
+            data = data[part]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return data
+
+
+def replaced(data: Any, path: Path, value: Any) -> Any:
+    """Return a copy of the data with another value at a path.
+
+    Raises:
+        KeyError: If a list on the way has no such entry, or something on the way has no keys.
+    """
+    if not path:
+        return value
+    first, rest = path[0], path[1:]
+    if isinstance(data, Mapping):
+        return {**data, str(first): replaced(data.get(str(first), {}), rest, value)}
+    if isinstance(data, Sequence) and not isinstance(data, str):
+        if not str(first).isdecimal() or int(first) >= len(data):
+            raise KeyError(f"{first} of {len(data)} entries, numbered from 0")
+        changed = list(data)
+        changed[int(first)] = replaced(data[int(first)], rest, value)
+        return changed
+    raise KeyError(f"{first}, but there is {as_toml(data)}")

@@ -1,0 +1,92 @@
+"""Where a mesh is put: scaled, turned, moved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydantic import Field
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry import BodyMesh, DesignSurface, quadratic
+from fenics_contact.scene_file.values import Part, Triple, Vector
+
+
+@dataclass(frozen=True, eq=False)
+class Shaped:
+    """A mesh, and what is known of its shape.
+
+    Attributes:
+        mesh: The mesh.
+        crown: The smooth surface that a design may move, of chain links.
+        round_: Surfaces that are round -> (centre, directions across which they are round, radius), for
+            quadratic cells.
+    """
+
+    mesh: BodyMesh
+    crown: DesignSurface | None = None
+    round_: tuple[tuple[str, tuple[float, ...], tuple[int, ...], float], ...] = ()
+
+    def refined(self) -> Shaped:
+        """Return the shape with quadratic cells, bent onto what is round."""
+        onto = {name: _bend(centre, across, radius) for name, centre, across, radius in self.round_}
+        return replace(self, mesh=quadratic(self.mesh, onto))
+
+    def placed(self, rotation: np.ndarray, translation: np.ndarray, scale: float) -> Shaped:
+        """Return the shape scaled and turned about the origin, then moved."""
+        mesh = self.mesh.moved(scale * self.mesh.points @ rotation.T + translation)
+        crown = self.crown
+        if crown is not None:
+            crown = replace(crown, directions=crown.directions @ rotation.T)
+        return Shaped(mesh, crown)
+
+
+class Placed(Part):
+    """Keys that every mesh may have."""
+
+    quadratic: bool = Field(False, description="cells of second order (not for tetrahedra)")
+    scale: float = Field(1.0, gt=0, description="factor on all coordinates, about the origin, applied first")
+    axis: Triple = Field((0.0, 0.0, 1.0), description="axis through the origin about which the mesh is turned")
+    degrees: float = Field(0.0, description="angle by which the mesh is turned about `axis`, in degrees")
+    translate: Vector | None = Field(None, description="displacement of the mesh, applied last, [length]")
+
+    def arranged(self, shape: Shaped) -> Shaped:
+        """Return a shape as the keys ask for it.
+
+        Raises:
+            InvalidInputError: If its cells have no quadratic counterpart, or a vector does not fit.
+        """
+        if self.quadratic:
+            shape = shape.refined()
+        dim = shape.mesh.dim
+        move = np.zeros(dim) if self.translate is None else np.array(self.translate)
+        if len(move) != dim:
+            raise InvalidInputError(
+                f"translate must have {dim} entries like the mesh, got {list(move)}: give {dim} numbers"
+            )
+        if self.degrees == 0.0 and self.scale == 1.0 and not move.any():
+            return shape
+        return shape.placed(_rotation(self.axis, self.degrees)[:dim, :dim], move, self.scale)
+
+
+def _rotation(axis: tuple[float, ...], degrees: float) -> np.ndarray:
+    """Return the rotation matrix (Rodrigues), (3, 3)."""
+    length = float(np.linalg.norm(axis))
+    if length == 0.0:
+        raise InvalidInputError(f"axis must not be zero, got {list(axis)}: (0, 0, 1) turns about z")
+    a, angle = np.array(axis) / length, np.radians(degrees)
+    cross = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+    rotation = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
+    return np.asarray(np.round(rotation, 15))  # quarter turns are exact
+
+
+def _bend(centre: tuple[float, ...], across: tuple[int, ...], radius: float):  # type: ignore[no-untyped-def]
+    """Return the map of points to the nearest point of a sphere or cylinder."""
+
+    def place(points: np.ndarray) -> np.ndarray:
+        moved, axes = points.copy(), list(across)
+        arm = points[:, axes] - np.array(centre)[axes]
+        moved[:, axes] = np.array(centre)[axes] + radius * arm / np.linalg.norm(arm, axis=1)[:, None]
+        return moved
+
+    return place

@@ -1,0 +1,205 @@
+"""Read a scene file: what it says, as objects that scripts use."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fenics_contact.checkpoint import Checkpoint
+from fenics_contact.contact import LoadSequence, State, find_state
+from fenics_contact.contact.equilibrium import decomposed
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.scene import LoadStep, Scene
+from fenics_contact.scene_file.building import Builder, located
+from fenics_contact.scene_file.document import Document
+from fenics_contact.scene_file.mistakes import SceneFileError
+from fenics_contact.scene_file.names import wrong_names
+from fenics_contact.scene_file.places import Path as Keys
+from fenics_contact.scene_file.placing import Shaped
+from fenics_contact.scene_file.source import Source, parse
+from fenics_contact.scene_file.steps import load_steps
+from fenics_contact.scene_file.tasks import ShapeTask, shape_task
+from fenics_contact.scene_file.validation import validated
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+
+@dataclass(frozen=True, eq=False)
+class SceneFile:
+    """A scene file that was read and checked. Meshes are built when they are first asked for.
+
+    Attributes:
+        source: Where it comes from.
+        document: What it says, part by part.
+        comm: Communicator on which it was read, and on which everything is built.
+    """
+
+    source: Source
+    document: Document
+    comm: MPI.Comm
+
+    @property
+    def name(self) -> str:
+        """The file's name without its ending; "scene" for a dictionary."""
+        return Path(self.source.name).stem if self.source.text else "scene"
+
+    @property
+    def title(self) -> str:
+        """Title of pictures and tables."""
+        return self.document.title or self.name.replace("_", " ").capitalize()
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the results, relative to where the program runs."""
+        return Path(self.document.output.folder or f"output/{self.name}")
+
+    @cached_property
+    def _built(self) -> tuple[Scene, dict[str, Shaped]]:
+        builder = Builder(self.source, self.document, self.comm)
+        bodies, shapes = builder.bodies()
+        return builder.scene(bodies), shapes
+
+    @property
+    def scene(self) -> Scene:
+        """The scene. Collective on first use.
+
+        Raises:
+            SceneFileError: Naming every mesh, body, support, load or pair that cannot be built, with its line.
+        """
+        return self._built[0]
+
+    @cached_property
+    def steps(self) -> tuple[LoadStep, ...]:
+        """All load steps; empty where everything acts at once. Collective on first use."""
+        document = self.document
+        with self._at("steps"):
+            return load_steps(document.steps, document.supports, document.loads, self.scene.dim)
+
+    @cached_property
+    def partitions(self) -> dict[str, np.ndarray]:
+        """Body name -> subdomain of every cell. Collective on first use."""
+        scene = self.scene
+        with self._at("solver", "subdomains"), together(self.comm):
+            return self.document.solver.cut(scene, self.comm.size)
+
+    def solve(self) -> State:
+        """Find the equilibrium, of the last load step where there are some. Collective.
+
+        Raises:
+            InfeasibleError: If nothing holds some body against its load.
+            ConvergenceError: If the solver does not reach its tolerance.
+        """
+        if self.steps:
+            sequence = self.sequence()
+            return [sequence.advance(step) for step in self.steps][-1]
+        solver, scene = self.document.solver, self.scene
+        decomposition, timer = decomposed(scene, self.partitions, self.comm)
+        return find_state(
+            scene,
+            decomposition,
+            solver=solver.chosen(scene, self.partitions),
+            tolerance=solver.accuracy(),
+            timer=timer,
+        )
+
+    def sequence(self, checkpoint: Checkpoint | None = None) -> LoadSequence:
+        """Return the history of the scene before its first load step. Collective.
+
+        Args:
+            checkpoint: File from which an interrupted history goes on, or None.
+        """
+        solver, scene = self.document.solver, self.scene
+        return LoadSequence(
+            scene,
+            self.partitions,
+            self.comm,
+            solver=solver.chosen(scene, self.partitions),
+            tolerance=solver.accuracy(),
+            checkpoint=checkpoint,
+        )
+
+    def shape_task(self) -> ShapeTask:
+        """Return the shape optimisation that the file describes. Collective.
+
+        Raises:
+            SceneFileError: If it describes none, or it cannot be posed.
+        """
+        if self.document.design is None:
+            words = "an optimisation needs [design] with [[design.surfaces]], got none: add them, or solve the state"
+            raise SceneFileError(self.source.name, [self.source.mistake((), words)])
+        with self._at("design"):
+            scene, shapes = self._built
+            return shape_task(self.source, self.document, scene, self.partitions, shapes, self.comm)
+
+    def _at(self, *keys: str | int) -> _Located:
+        return _Located(self.source, keys)
+
+
+@dataclass(frozen=True)
+class _Located:
+    """Leads errors of a block back to a key."""
+
+    source: Source
+    keys: Keys
+
+    def __enter__(self) -> None:
+        """Begin."""
+
+    def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
+        if isinstance(error, InvalidInputError) and not isinstance(error, SceneFileError):
+            raise SceneFileError(self.source.name, [located(self.source, self.keys, error)]) from error
+
+
+def read_scene_file(
+    scene: str | Path | Mapping[str, Any], comm: MPI.Comm, *, overrides: Sequence[str] = ()
+) -> SceneFile:
+    """Read and check a scene file, or a dictionary of the same form. Collective on ``comm``.
+
+    Rank 0 reads, all ranks receive the text and meet the same mistakes.
+
+    Args:
+        scene: A TOML file, or what one would hold.
+        comm: Communicator on which meshes will be built and states found.
+        overrides: Other values for some keys, ``"contacts.0.friction.coefficient=0.2"``.
+
+    Returns:
+        The file, checked as far as no mesh need be built.
+
+    Raises:
+        SceneFileError: Naming all mistakes, each with line, key, what is allowed and what was given.
+
+    Example:
+        >>> file = read_scene_file("two_blocks.toml", MPI.COMM_WORLD)  # doctest: +SKIP
+        >>> state = file.solve()  # doctest: +SKIP
+    """
+    source = _source(scene, comm).with_overrides(overrides)
+    document = validated(source)
+    wrong = wrong_names(source, document)
+    if wrong:
+        raise SceneFileError(source.name, wrong)
+    return SceneFile(source, document, comm)
+
+
+def _source(scene: str | Path | Mapping[str, Any], comm: MPI.Comm) -> Source:
+    if isinstance(scene, Mapping):
+        return Source("the scene", Path(), scene)
+    path, text = Path(scene), ""
+    with together(comm):
+        if comm.rank == 0:
+            text = _text_of(path)
+    return parse(comm.bcast(text), path.name, path.parent)
+
+
+def _text_of(path: Path) -> str:
+    if not path.is_file():
+        raise InvalidInputError(f"there must be a scene file '{path}', there is none: correct the path")
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidInputError(f"the scene file '{path}' must be readable UTF-8 text: {error}") from error

@@ -1,0 +1,153 @@
+"""The text of a scene file: what it holds, and on which line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+from typing import Any
+
+import tomlkit
+import tomlkit.exceptions
+import tomlkit.items
+
+from fenics_contact.scene_file.mistakes import Mistake, SceneFileError
+from fenics_contact.scene_file.places import Path, replaced, value_at, written
+
+_MARK = "\u241f"  # stands in no file
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """Where a scene comes from.
+
+    Attributes:
+        name: How messages call it.
+        folder: Folder to which files that it names are relative.
+        data: What it holds, overrides included.
+        text: The file's text, "" for a scene that came as a dictionary.
+        overrides: Keys that were given elsewhere -> how.
+    """
+
+    name: str
+    folder: FilePath
+    data: Mapping[str, Any]
+    text: str = ""
+    overrides: Mapping[Path, str] = field(default_factory=dict)
+
+    def place(self, path: Path) -> tuple[int, str]:
+        """Return the line of a key, 0 where there is none, and how messages name the place."""
+        for given, words in self.overrides.items():
+            if path[: len(given)] == given:
+                return 0, words
+        line = line_of(self.text, path) if self.text else 0
+        return (line, f"line {line}") if line else (0, "")
+
+    def mistake(self, path: Path, words: str) -> Mistake:
+        """Return a mistake at a key."""
+        line, place = self.place(path)
+        return Mistake(path, line, place, words)
+
+    def with_overrides(self, overrides: Sequence[str]) -> Source:
+        """Return the source with other values for some keys.
+
+        Args:
+            overrides: ``KEY=VALUE``, such as ``contacts.0.friction.coefficient=0.2``; a value that is no TOML
+                is a text.
+
+        Raises:
+            SceneFileError: If one has another form or its key leads nowhere.
+        """
+        data, places = dict(self.data), dict(self.overrides)
+        for override in overrides:
+            try:
+                path, value = _parsed(override)
+                path = _resolved(data, path)
+                data = replaced(data, path, value)
+            except (KeyError, tomlkit.exceptions.TOMLKitError, ValueError) as error:
+                reason = error.args[0] if error.args else error
+                words = (
+                    "must be KEY=VALUE with a key such as contacts.0.friction.coefficient, got "
+                    f"{override!r}: {reason}"
+                )
+                raise SceneFileError(self.name, [Mistake((), 0, "--set", words)]) from error
+            places[path] = f"--set {written(path)}"
+        return Source(self.name, self.folder, data, self.text, places)
+
+
+def parse(text: str, name: str, folder: FilePath) -> Source:
+    """Read the text of a scene file.
+
+    Raises:
+        SceneFileError: If it is no TOML, with the line.
+    """
+    try:
+        data = tomlkit.parse(text).unwrap()
+    except tomlkit.exceptions.ParseError as error:
+        reason = str(error).partition(" at line ")[0]
+        line = min(error.line, text.count("\n") + 1)
+        content = text.splitlines()[line - 1].strip() if text.splitlines() else ""
+        words = f"must be TOML, got {content!r}: {reason}"
+        raise SceneFileError(name, [Mistake((), line, f"line {line}", words)]) from error
+    return Source(name, folder, data, text)
+
+
+def line_of(text: str, path: Path) -> int:
+    """Return the line, from 1, on which a key or table of a TOML text begins; 0 where it is not there.
+
+    A key is marked in a copy of the document, whose text first differs there.
+    """
+    document = tomlkit.parse(text)
+    while path:
+        if value_at(document, path) is not None:
+            break
+        path = path[:-1]
+    if not path:
+        return 0
+    try:
+        marked = _marked(document, path)
+    except (tomlkit.exceptions.TOMLKitError, KeyError, TypeError, ValueError, IndexError):
+        return line_of(text, path[:-1])
+    differing = (at for at, (one, other) in enumerate(zip(text, marked, strict=False)) if one != other)
+    place = next(differing, min(len(text), len(marked)))
+    return text.count("\n", 0, place) + 1
+
+
+def _marked(document: Any, path: Path) -> str:
+    """Return the text with a mark at a key, or at the head of a table."""
+    parent = value_at(document, path[:-1])
+    item = parent[path[-1]]
+    if isinstance(item, tomlkit.items.AoT):
+        return _marked(document, (*path, 0))
+    if isinstance(item, tomlkit.items.Table):
+        if item.is_super_table():  # has no head of its own
+            return _marked(document, (*path, next(iter(item))))
+        item.comment(_MARK)
+    else:
+        parent[path[-1]] = _MARK
+    return tomlkit.dumps(document)
+
+
+def _parsed(override: str) -> tuple[Path, Any]:
+    key, equals, value = override.partition("=")
+    if not equals:
+        raise ValueError("there is no =")
+    path: list[str] = []
+    inner: Any = tomlkit.parse(f"{key} = {_MARK!r}").unwrap()
+    while isinstance(inner, Mapping):
+        ((part, inner),) = inner.items()
+        path.append(part)
+    try:
+        return tuple(path), tomlkit.parse(f"x = {value}").unwrap()["x"]
+    except tomlkit.exceptions.ParseError:
+        return tuple(path), value.strip()
+
+
+def _resolved(data: Any, path: Path) -> Path:
+    """Return a path with numbers for the entries of lists."""
+    found: list[str | int] = []
+    for part in path:
+        numbered = isinstance(data, Sequence) and not isinstance(data, str) and str(part).isdecimal()
+        found.append(int(part) if numbered else part)
+        data = value_at(data, (found[-1],))
+    return tuple(found)

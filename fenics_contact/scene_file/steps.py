@@ -1,0 +1,90 @@
+"""Load steps, many at once: values go from where they are to where a step takes them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import Field, PlainValidator, WithJsonSchema
+
+from fenics_contact.scene import LoadStep
+from fenics_contact.scene_file.expression import between
+from fenics_contact.scene_file.values import FREE, Components, Part, Scalar, VectorOrFormulas, is_number, needs
+
+if TYPE_CHECKING:
+    from fenics_contact.scene_file.loads import AnyLoad
+    from fenics_contact.scene_file.supports import SupportPart
+
+
+def _load_value(value: Any) -> Any:
+    if isinstance(value, list):
+        if len(value) in (2, 3) and all(isinstance(entry, str) or is_number(entry) for entry in value):
+            return tuple(value)
+    elif isinstance(value, str) or is_number(value):
+        return value
+    raise needs("a number or a formula, or two or three of them in brackets, like the load's own value")
+
+
+_LOAD = {"anyOf": [{"type": "number"}, {"type": "string"}, {"type": "array", "minItems": 2, "maxItems": 3}]}
+
+
+class StepPart(Part):
+    """One load step or several: values go linearly from those before to those given here."""
+
+    name: str = Field("step", description="what it does, for records")
+    count: int = Field(1, ge=1, description="number of load steps in which the values are reached")
+    supports: dict[str, Components] = Field(
+        default_factory=dict, description="name of a support -> its value at the end"
+    )
+    loads: dict[str, Annotated[Any, PlainValidator(_load_value), WithJsonSchema(_LOAD)]] = Field(
+        default_factory=dict, description="name of a load -> its value at the end"
+    )
+
+
+def load_steps(
+    steps: Sequence[StepPart], supports: Sequence[SupportPart], loads: Sequence[AnyLoad], dim: int
+) -> tuple[LoadStep, ...]:
+    """Return all load steps, in their order.
+
+    A support or load that a step does not name keeps its value; one that it names goes linearly from the
+    value before, which is its own before the first step, to the one given.
+
+    Args:
+        steps: The steps of the file.
+        supports: All supports.
+        loads: All loads.
+        dim: Dimension of the bodies.
+    """
+    held: dict[str, Any] = {part.name: part.value or (0.0,) * dim for part in supports if part.name}
+    acting: dict[str, Any] = {part.name: part.size for part in loads if part.name}
+    found = []
+    for step in steps:
+        for number in range(1, step.count + 1):
+            share = number / step.count
+            supported = {**held, **_on_the_way(held, step.supports, share)}
+            loaded = {**acting, **_on_the_way(acting, step.loads, share)}
+            name = step.name if step.count == 1 else f"{step.name} {number}/{step.count}"
+            found.append(
+                LoadStep(
+                    name,
+                    loads=tuple(part.build(loaded.get(part.name or "")) for part in loads),
+                    supports=tuple(part.build(dim, supported.get(part.name or "")) for part in supports),
+                )
+            )
+        held.update(step.supports)
+        acting.update(step.loads)
+    return tuple(found)
+
+
+def _on_the_way(before: Mapping[str, Any], after: Mapping[str, Any], share: float) -> dict[str, Any]:
+    return {name: way(before[name], value, share) for name, value in after.items()}
+
+
+def way(start: Any, end: Any, share: float) -> Any:
+    """Return the value, numbers or formulas, on the way from ``start`` to ``end``."""
+    if isinstance(end, tuple):
+        return tuple(way(one, other, share) for one, other in zip(start, end, strict=True))
+    return FREE if FREE in (start, end) else between(start, end, share)
+
+
+__all__ = ["Scalar", "StepPart", "VectorOrFormulas", "load_steps", "way"]

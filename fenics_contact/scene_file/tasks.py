@@ -1,0 +1,172 @@
+"""From the [design] of a scene file to a shape problem and its minimisation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fenics_contact.checkpoint import Checkpoint
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.optimize import BundleTrust, LinearConstraints, Result, minimize
+from fenics_contact.optimize.bundle_trust import Callback
+from fenics_contact.qp import FaceNewton
+from fenics_contact.scene import Scene
+from fenics_contact.scene_file.design import TOTAL_POTENTIAL, DesignPart, VolumeConstraint
+from fenics_contact.scene_file.design_surfaces import design_surface
+from fenics_contact.scene_file.document import Document
+from fenics_contact.scene_file.own_python import load
+from fenics_contact.scene_file.placing import Shaped
+from fenics_contact.scene_file.source import Source
+from fenics_contact.shape import AdaptiveTolerance, Objective, ShapeProblem, SurfaceDesign, TotalPotential
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeTask:
+    """A shape optimisation, ready to be run.
+
+    Attributes:
+        problem: J(α) with its subgradient.
+        start: Design variables at the start, [length].
+        bounds: Least and largest values of the variables, [length].
+        constraints: Linear constraints, None for none.
+        method: The optimiser.
+    """
+
+    problem: ShapeProblem
+    start: np.ndarray
+    bounds: tuple[np.ndarray, np.ndarray]
+    constraints: LinearConstraints | None
+    method: BundleTrust
+
+    def minimize(self, *, callback: Callback | None = None, checkpoint: Checkpoint | None = None) -> Result:
+        """Run it. Collective; a stop before the tolerance is met is told by the result's reason.
+
+        Args:
+            callback: Called after every evaluation, see `fenics_contact.optimize.minimize`.
+            checkpoint: File from which an interrupted run goes on, or None.
+        """
+        return minimize(
+            self.problem,
+            self.start,
+            self.method,
+            bounds=self.bounds,
+            constraints=self.constraints,
+            callback=callback,
+            checkpoint=checkpoint,
+        )
+
+
+def shape_task(
+    source: Source,
+    document: Document,
+    scene: Scene,
+    partitions: Mapping[str, np.ndarray],
+    shapes: Mapping[str, Shaped],
+    comm: MPI.Comm,
+) -> ShapeTask:
+    """Pose the optimisation of a scene file. Collective.
+
+    Args:
+        source: Where the document comes from.
+        document: The file; it has a design.
+        scene: Its scene.
+        partitions: Body name -> subdomain of every cell.
+        shapes: Body name -> what is known of its shape.
+        comm: Communicator.
+
+    Raises:
+        InvalidInputError: If a surface cannot be designed or numbers do not fit the number of variables.
+    """
+    design = document.design
+    assert design is not None
+    moving = tuple(
+        SurfaceDesign(
+            part.body, design_surface(shapes[part.body], part.surface, part.body), part.net, part.transition
+        )
+        for part in design.surfaces
+    )
+    problem = ShapeProblem(
+        scene,
+        partitions,
+        moving,
+        _objective(design.objective, source),
+        comm,
+        solver=_solver(document, scene, partitions),
+        tolerance=_tolerance(document, design),
+    )
+    lower, upper = (
+        np.concatenate([np.full(move.size, getattr(part, side)) for move, part in _paired(moving, design)])
+        for side in ("lower", "upper")
+    )
+    start = np.zeros(problem.size) if design.start is None else _fitting("start", design.start, problem.size)
+    method = BundleTrust(
+        tolerance=design.tolerance,
+        max_iterations=design.max_iterations,
+        max_evaluations=design.max_evaluations,
+        raise_on_failure=False,
+    )
+    return ShapeTask(problem, start, (lower, upper), _constraints(design, problem, start), method)
+
+
+def _paired(moving: tuple[SurfaceDesign, ...], design: DesignPart) -> Any:
+    return zip(moving, design.surfaces, strict=True)
+
+
+def _solver(document: Document, scene: Scene, partitions: Mapping[str, np.ndarray]) -> Any:
+    return document.solver.chosen(scene, partitions) or FaceNewton()
+
+
+def _tolerance(document: Document, design: DesignPart) -> float | AdaptiveTolerance | None:
+    if design.adaptive:
+        return AdaptiveTolerance()
+    given = document.solver.tolerance
+    return given if isinstance(given, float) else None
+
+
+def _objective(name: str, source: Source) -> Objective:
+    if name == TOTAL_POTENTIAL:
+        return TotalPotential()
+    found: Any = load(name, source.folder)
+    missing = [part for part in ("value", "partials") if not hasattr(found, part)]
+    if missing or isinstance(found, type):
+        raise InvalidInputError(
+            f"objective {name!r} must be an object with value and partials, got {found!r}: see "
+            "fenics_contact.shape.Objective, and give an instance, not a class"
+        )
+    objective: Objective = found
+    return objective
+
+
+def _constraints(design: DesignPart, problem: ShapeProblem, start: np.ndarray) -> LinearConstraints | None:
+    rows: list[np.ndarray] = []
+    limits: list[float] = []
+    for part in design.constraints:
+        if isinstance(part, VolumeConstraint):
+            volume, gradient = problem.volume(start)
+            # V(α) ≈ V + V'·(α − start)
+            offset = float(gradient @ start)
+            if part.at_least is not None:
+                rows.append(-gradient)
+                limits.append((1.0 - part.at_least) * volume - offset)
+            if part.at_most is not None:
+                rows.append(gradient)
+                limits.append((part.at_most - 1.0) * volume + offset)
+        else:
+            rows.append(_fitting("coefficients", part.coefficients, problem.size))
+            limits.append(part.at_most)
+    return LinearConstraints(np.array(rows), np.array(limits)) if rows else None
+
+
+def _fitting(name: str, values: tuple[float, ...], size: int) -> np.ndarray:
+    if len(values) != size:
+        raise InvalidInputError(
+            f"{name} must have {size} entries, one for each design variable, got {len(values)}: the nets of "
+            "design.surfaces have so many control points"
+        )
+    return np.array(values)
