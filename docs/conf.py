@@ -44,7 +44,7 @@ include_patterns = [
     "docs/**",
     "benchmarks/*.md",
     "demos/demo_*.py",
-    "notebooks/*",
+    "notebooks/[0-9]*",
     "CHANGELOG.md",
     "CONTRIBUTING.md",
 ]

@@ -56,9 +56,8 @@ def demos(root: Path) -> list[Path]:
 
 def notebooks(root: Path) -> list[Path]:
     """Return the notebooks, executed ones where there are."""
-    found = {
-        path.stem: path for pattern in ("*.py", "*.ipynb") for path in (root / "notebooks").glob(pattern)
-    }
+    patterns = ("[0-9]*.py", "[0-9]*.ipynb")
+    found = {path.stem: path for pattern in patterns for path in (root / "notebooks").glob(pattern)}
     return [found[name] for name in sorted(found)]
 
 
