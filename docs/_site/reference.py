@@ -7,6 +7,7 @@ import importlib
 import inspect
 import pkgutil
 from collections.abc import Iterator
+from enum import Enum
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -21,6 +22,7 @@ from sphinx.pycode import ModuleAnalyzer
 from sphinx.util.docutils import SphinxDirective
 
 import fenics_contact
+from _site import docstrings, signatures
 
 PACKAGE = fenics_contact.__name__
 #: As a user meets them; rooms that are not named here come last.
@@ -30,9 +32,9 @@ ORDER = (
 ).split()
 #: Names that the reference uses and does not describe: other libraries', and the standard library's.
 OUTSIDE = [
-    ("py:.*", r"(numpy|np|scipy|sp|mpi4py|MPI|PETSc|petsc4py|dolfinx|ufl|pyvista|matplotlib)\b.*"),
+    ("py:.*", r"(numpy|np|scipy|sp|mpi4py|MPI|PETSc|petsc4py|dolfinx|ufl|pyvista|matplotlib|npt)\b.*"),
     ("py:.*", r"(abc|collections|enum|pathlib|typing)\..*|Path"),
-    ("py:.*", "ArrayLike|ndarray|dtype|generic|bool_|float64|int64"),
+    ("py:.*", "FilePath|NDArray|ndarray|dtype|generic|bool_|float64|int64"),
 ]
 
 
@@ -69,8 +71,6 @@ def kind_of(value: Any) -> str:
     return "function" if inspect.isroutine(value) else "data"
 
 
-#: Sphinx calls what has no priority at 500.
-AFTER_NAPOLEON = 600
 #: A constant's value is shown if it is not longer, in characters.
 LONGEST_VALUE = 100
 HEADINGS = {"class": "Classes", "function": "Functions", "data": "Constants and types", "exception": "Errors"}
@@ -124,7 +124,9 @@ def described(module: ModuleType, name: str, kind: str) -> str:
     Autodoc finds the comment above a constant only in the module that defines it, not where a room offers it.
     """
     if kind != "data":
-        return f".. auto{kind}:: {module.__name__}.{name}\n\n"
+        value = getattr(module, name)
+        members = "   :undoc-members:\n" if inspect.isclass(value) and issubclass(value, Enum) else ""
+        return f".. auto{kind}:: {module.__name__}.{name}\n{members}\n"
     text, value = constant(module, name)
     lines = [f".. py:data:: {module.__name__}.{name}"]
     lines += [f"   :value: {value}"] if value else []
@@ -258,28 +260,10 @@ def private_names() -> frozenset[str]:
     return frozenset(names - {""})
 
 
-def types_beside_names(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
-    """Move the type of each attribute, which napoleon puts below its text, beside its name."""
-    here = 0
-    for number, line in enumerate(list(lines)):
-        if line.startswith(".. attribute:: "):
-            here = number
-        elif line.startswith("   :type: ") and lines[here].startswith(".. attribute:: "):
-            lines[here] += f"\n{shortened(line)}"
-            lines[number] = ""
-    lines[:] = "\n".join(lines).splitlines()
-
-
-def shortened(line: str) -> str:
-    """Write NumPy's types without its name, and its union of all that can become an array as it is known."""
-    if "_SupportsArray" in line:
-        return "   :type: ArrayLike" + (" | None" if line.endswith("None") else "")
-    return line.replace("numpy.", "")
-
-
 def setup(app: Sphinx) -> dict[str, Any]:
     """Connect to Sphinx."""
     app.add_directive("rooms", Rooms)
     app.connect("missing-reference", resolve)
-    app.connect("autodoc-process-docstring", types_beside_names, priority=AFTER_NAPOLEON)
+    docstrings.connect(app)
+    signatures.connect(app)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
