@@ -34,7 +34,7 @@ ORDER = (
 OUTSIDE = [
     ("py:.*", r"(numpy|np|scipy|sp|mpi4py|MPI|PETSc|petsc4py|dolfinx|ufl|pyvista|matplotlib|npt)\b.*"),
     ("py:.*", r"(abc|collections|enum|pathlib|typing)\..*|Path"),
-    ("py:.*", "FilePath|NDArray|ndarray|dtype|generic|bool_|float64|int64"),
+    ("py:.*", "ArrayLike|FilePath|NDArray|ndarray|dtype|generic|bool_|float64|int64"),
 ]
 
 
