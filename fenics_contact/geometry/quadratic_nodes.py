@@ -8,7 +8,6 @@ shape functions have them: the geometry stays, the displacements become richer.
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from fenics_contact.geometry.cell_types import (
     HEXAHEDRON,
@@ -56,6 +55,8 @@ def in_vtk_order(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.
 
 def _ordered(points: np.ndarray, cells: np.ndarray, kind: CellType) -> np.ndarray:
     """Find the order in which all cells together have their nodes nearest to where VTK expects them."""
+    from scipy.optimize import linear_sum_assignment  # loads what few runs need
+
     corners = len(kind.edges)
     sample = cells[:: max(1, len(cells) // _ENOUGH)]
     linear = shape_values(_LINEAR[kind.name], kind.nodes[corners : cells.shape[1]])

@@ -6,6 +6,7 @@ from fenics_contact.checkpoint import Checkpoint, CheckpointError
 from fenics_contact.errors import InvalidDesignError
 from fenics_contact.optimize.bundle_trust import BundleTrust
 from fenics_contact.optimize.constraints import Bounds, LinearConstraints, nearest_feasible
+from fenics_contact.optimize.for_scipy import ForScipy, Visit
 from fenics_contact.optimize.minimization import minimize
 from fenics_contact.optimize.objective import Inexact
 from fenics_contact.optimize.problem import Problem, pose
@@ -18,6 +19,7 @@ __all__ = [
     "BundleTrust",
     "Checkpoint",
     "CheckpointError",
+    "ForScipy",
     "Inexact",
     "InvalidDesignError",
     "Kind",
@@ -29,6 +31,7 @@ __all__ = [
     "Result",
     "Resumable",
     "SubproblemError",
+    "Visit",
     "minimize",
     "nearest_feasible",
     "pose",

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.optimize.quadratic_program import QuadraticProgram, solve
+
+if TYPE_CHECKING:
+    import scipy.optimize
 
 Array = NDArray[np.float64]
 
@@ -39,6 +43,17 @@ class Bounds:
     lower: ArrayLike
     upper: ArrayLike
 
+    def to_scipy(self, *, keep_feasible: bool = False) -> scipy.optimize.Bounds:
+        """Return the box as SciPy has it.
+
+        Args:
+            keep_feasible: Whether a method of SciPy that looks at it may never leave the box.
+        """
+        from scipy.optimize import Bounds as ScipyBounds
+
+        lower, upper = np.array(self.lower, dtype=float), np.array(self.upper, dtype=float)
+        return ScipyBounds(lower, upper, keep_feasible)
+
 
 @dataclass(frozen=True)
 class LinearConstraints:
@@ -57,6 +72,17 @@ class LinearConstraints:
     limit: ArrayLike
     equality_matrix: ArrayLike | None = None
     equality_value: ArrayLike | None = None
+
+    def to_scipy(self) -> list[scipy.optimize.LinearConstraint]:
+        """Return SciPy's constraints −∞ ≤ A x ≤ b and e ≤ E x ≤ e, those of the two that have rows.
+
+        Raises:
+            InvalidInputError: If a shape does not fit.
+        """
+        from scipy.optimize import LinearConstraint
+
+        n = np.shape(self.matrix)[-1] if np.ndim(self.matrix) else 0
+        return [LinearConstraint(*rows) for rows in ranges(feasible_set(n, None, self))]
 
 
 @dataclass(frozen=True)
@@ -172,6 +198,15 @@ def _unit_rows(rows: Array, distance: Array) -> tuple[Array, Array]:
 def _residual(matrix: Array, limit: Array, x: Array) -> tuple[Array, Array]:
     size = np.abs(matrix) @ np.abs(x) + np.abs(limit)
     return matrix @ x - limit, _FEASIBILITY * np.where(size > 0.0, size, 1.0)
+
+
+def ranges(allowed: FeasibleSet) -> list[tuple[Array, Array, Array]]:
+    """Return the rows as low ≤ matrix x ≤ high, inequalities and equalities apart, neither without rows."""
+    sides = [
+        (allowed.matrix, np.full(len(allowed.limit), -np.inf), allowed.limit),
+        (allowed.equality_matrix, allowed.equality_value, allowed.equality_value),
+    ]
+    return [side for side in sides if len(side[0])]
 
 
 def feasible_set(

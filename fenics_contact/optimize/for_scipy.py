@@ -1,0 +1,232 @@
+"""The problem in the words of scipy.optimize: scaled, guarded against designs that do not exist, counted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fenics_contact.errors import InvalidDesignError, InvalidInputError
+from fenics_contact.optimize.constraints import Bounds, LinearConstraints, ranges
+from fenics_contact.optimize.objective import Evaluation, Fun, evaluate
+from fenics_contact.optimize.problem import pose
+
+if TYPE_CHECKING:
+    import scipy.optimize
+
+Array = NDArray[np.float64]
+
+_WITHOUT_DERIVATIVE = ("cobyla", "cobyqa", "nelder-mead", "powell")
+_WITHOUT_BOUNDS = ("cobyla",)  # before SciPy 1.11; as constraints, every version takes them
+_CONSTRAINED = ("cobyla", "cobyqa", "slsqp", "trust-constr")
+_TINY = float(np.finfo(float).tiny)
+_SLOPE = 10.0  # of the wall around designs that do not exist, in scaled values over scaled variables
+
+
+@dataclass(frozen=True)
+class Visit:
+    """One evaluation.
+
+    Attributes:
+        x: Design, shape (n,), in the caller's variables.
+        value: J there; nan where it does not exist.
+        violation: Distance by which x leaves the feasible set, in scaled variables; 0 inside.
+        note: Why J does not exist; empty where it does.
+    """
+
+    x: Array
+    value: float
+    violation: float
+    note: str = ""
+
+
+class ForScipy:
+    r"""min J(x) over a box and linear constraints, for `scipy.optimize.minimize`.
+
+    SciPy's methods see z = x / scale and J / (1 + \|J(x0)\|), so that their default tolerances mean
+    something. SciPy knows no design that does not exist: where J raises `InvalidDesignError` they see a wall
+    that rises away from the best design met so far, which turns line searches back.
+
+    Replicated on the ranks of a communicator, with a ``fun`` that returns the same bits on all of them, as
+    `ShapeProblem` does, the iterates are the same on all of them.
+
+    Attributes:
+        visits: All evaluations, oldest first.
+
+    Example:
+        >>> import numpy as np
+        >>> import scipy.optimize
+        >>> def bowl(x):
+        ...     return float(x @ x), 2.0 * x
+        >>> task = ForScipy(bowl, [3.0, -1.0], bounds=([1.0, -4.0], [5.0, 4.0]))
+        >>> found = scipy.optimize.minimize(**task.arguments("SLSQP"))
+        >>> bool(found.success), (task.best.x.round(6) + 0.0).tolist(), round(task.best.value, 6)
+        (True, [1.0, 0.0], 1.0)
+    """
+
+    def __init__(
+        self,
+        fun: Fun,
+        x0: ArrayLike,
+        *,
+        bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
+        constraints: LinearConstraints | None = None,
+        scale: ArrayLike | None = None,
+        value: Callable[[Array], float] | None = None,
+        invalid: float | None = None,
+    ) -> None:
+        """Check the problem.
+
+        Args:
+            fun: Returns J(x) and one subgradient; raises `InvalidDesignError` where there is none.
+            x0: Feasible starting point, shape (n,).
+            bounds: Box, or a pair (lower, upper), or None.
+            constraints: Linear constraints, or None.
+            scale: Size of each variable, as for `minimize`.
+            value: J(x) alone, where that is cheaper (`ShapeProblem.value_of`), for methods that take no
+                derivative.
+            invalid: What methods see where J does not exist, ``inf`` for instance; None for the wall.
+
+        Raises:
+            InvalidInputError: If a shape does not fit or x0 is not feasible.
+        """
+        self._problem = pose(fun, x0, bounds, constraints, scale)
+        self._value, self._invalid = value, invalid
+        self._unit = 1.0
+        self.visits: list[Visit] = []
+
+    visits: list[Visit]
+
+    @property
+    def best(self) -> Visit:
+        """The feasible design with the smallest value that was met."""
+        return self.best_within(1e-9)
+
+    def best_within(self, violation: float) -> Visit:
+        """Return the design with the smallest value among those that violate the constraints by no more.
+
+        Args:
+            violation: Largest distance to the feasible set, in scaled variables.
+
+        Raises:
+            InvalidInputError: If there is none.
+        """
+        candidates = [visit for visit in self.visits if not visit.note and visit.violation <= violation]
+        if not candidates:
+            raise InvalidInputError(
+                f"none of {len(self.visits)} designs that were evaluated is feasible within {violation:g}: "
+                "let the method run, or allow more with best_within(violation)"
+            )
+        return min(candidates, key=lambda visit: visit.value)
+
+    @property
+    def evaluations(self) -> int:
+        """Number of designs that were evaluated, failed ones included."""
+        return len(self.visits)
+
+    def design(self, z: ArrayLike) -> Array:
+        """Return x for what SciPy calls x."""
+        return np.asarray(z, dtype=float) * self._problem.scale
+
+    def objective_value(self, scaled: float) -> float:
+        """Return J for what SciPy calls fun."""
+        return float(scaled) * self._unit
+
+    def arguments(self, method: str) -> dict[str, Any]:
+        """Return the arguments of `scipy.optimize.minimize` for a method by its SciPy name.
+
+        Raises:
+            InvalidInputError: If the method cannot keep the constraints.
+        """
+        name, allowed = method.lower(), self._problem.allowed
+        if (len(allowed.matrix) or len(allowed.equality_matrix)) and name not in _CONSTRAINED:
+            raise InvalidInputError(
+                f"a problem with linear constraints needs a method that keeps them, got {method!r}: use "
+                "SLSQP, trust-constr or COBYLA"
+            )
+        found: dict[str, Any] = {"x0": self._problem.start / self._problem.scale, "method": method}
+        if name in _WITHOUT_DERIVATIVE:
+            found["fun"] = self.value_alone
+        else:
+            found.update(fun=self, jac=True)
+        box, rows = self._box(keep_feasible=name == "trust-constr"), self._rows(name in _WITHOUT_BOUNDS)
+        if box is not None and name not in _WITHOUT_BOUNDS:
+            found["bounds"] = box
+        if rows:
+            found["constraints"] = rows
+        return found
+
+    def __call__(self, z: ArrayLike) -> tuple[float, Array]:
+        """Return scaled value and subgradient at a point in SciPy's variables."""
+        x = self.design(z)
+        try:
+            found = evaluate(self._problem.fun, x, self.evaluations + 1)
+        except InvalidDesignError as error:
+            return self._refused(x, error)
+        self._keep(x, found.value)
+        return found.value / self._unit, self._problem.scale * found.subgradient / self._unit
+
+    def value_alone(self, z: ArrayLike) -> float:
+        """Return the scaled value at a point in SciPy's variables."""
+        if self._value is None:
+            return self(z)[0]
+        x = self.design(z)
+        try:
+            value = Evaluation(x, float(self._value(x.copy())), x).value
+        except InvalidDesignError as error:
+            return self._refused(x, error)[0]
+        self._keep(x, value)
+        return value / self._unit
+
+    def _keep(self, x: Array, value: float, note: str = "") -> None:
+        if not self.visits:
+            self._unit = 1.0 + abs(value)
+        self.visits.append(Visit(x.copy(), value, self._violation(x), note))
+
+    def _violation(self, x: Array) -> float:
+        near = self._problem.allowed.around(x, self._problem.scale)
+        return float(max(-near.room.min(initial=0.0), np.abs(near.miss).max(initial=0.0), 0.0))
+
+    def _refused(self, x: Array, error: InvalidDesignError) -> tuple[float, Array]:
+        """Count a design that does not exist, and return what methods see there."""
+        valid = [visit for visit in self.visits if not visit.note]
+        if not valid:
+            raise error
+        self._keep(x, np.nan, str(error) or "invalid design")
+        if self._invalid is not None:
+            return float(self._invalid), np.zeros(x.size)
+        lowest = min(valid, key=lambda visit: visit.value)
+        away = (x - lowest.x) / self._problem.scale
+        distance = float(np.linalg.norm(away))
+        top = max(visit.value for visit in valid) / self._unit
+        # Curved, so that the methods that estimate curvature find some.
+        slope = _SLOPE * (1.0 + distance)
+        return top + _SLOPE * (1.0 + 0.5 * distance) * distance, slope * away / max(distance, _TINY)
+
+    def _box(self, *, keep_feasible: bool) -> scipy.optimize.Bounds | None:
+        allowed, scale = self._problem.allowed, self._problem.scale
+        if not (np.isfinite(allowed.lower).any() or np.isfinite(allowed.upper).any()):
+            return None
+        from scipy.optimize import Bounds as ScipyBounds
+
+        return ScipyBounds(allowed.lower / scale, allowed.upper / scale, keep_feasible)
+
+    def _rows(self, with_box: bool) -> list[scipy.optimize.LinearConstraint]:
+        """All rows in scaled variables, those of the box too where it is asked for."""
+        allowed, scale = self._problem.allowed, self._problem.scale
+        rows = ranges(allowed)
+        if with_box:
+            rows.append((np.eye(scale.size), allowed.lower, allowed.upper))
+        return [_linear_constraint(matrix * scale, below, above) for matrix, below, above in rows]
+
+
+def _linear_constraint(matrix: Array, below: Array, above: Array) -> scipy.optimize.LinearConstraint:
+    """Return below ≤ matrix z ≤ above with rows of length one."""
+    from scipy.optimize import LinearConstraint
+
+    length = np.linalg.norm(matrix, axis=1)
+    length = np.where(length > 0.0, length, 1.0)
+    return LinearConstraint(matrix / length[:, None], below / length, above / length)
