@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.checkpoint import Checkpoint
+from fenics_contact.checkpoint import Checkpoint, safe_point, telling_what_is_kept
 from fenics_contact.contact.equilibrium import decomposed, find_state
 from fenics_contact.contact.state import State
 from fenics_contact.contact.steps_done import StepsDone
@@ -86,15 +86,27 @@ class LoadSequence:
             self._task.begin(self._number)
         self._task.step(self._number, words=step.name)
         try:
-            state = self._advanced(step)
+            self._may_stop()
+            with telling_what_is_kept(self._left, self._comm):
+                state = self._advanced(step)
+            self._number += 1
+            self._may_stop()
         except BaseException:
             self._task.end(failed=True)
             raise
-        self._number += 1
         self._task.step(self._number, timed=not self._done.recalling)
         if self._count in (None, self._number):
             self._task.end()
         return state
+
+    def _may_stop(self) -> None:
+        """Stop between two steps if a signal asks for it. Collective."""
+        safe_point(lambda: self._done.kept(self._number, self._count), self._done.write, self._comm)
+
+    def _left(self) -> str:
+        """Write what can be written in the middle of a step, and say what is kept."""
+        self._done.write_rest()
+        return self._done.kept(self._number, self._count)
 
     def _advanced(self, step: LoadStep) -> State:
         scene = step.applied_to(self.scene)

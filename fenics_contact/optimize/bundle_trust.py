@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,17 +14,15 @@ from fenics_contact.optimize.bundle import Bundle
 from fenics_contact.optimize.inexactness import Demand, again, demand
 from fenics_contact.optimize.objective import Accuracy, Evaluation, can_be_inexact, evaluate
 from fenics_contact.optimize.problem import Problem
-from fenics_contact.optimize.progress import Progress
+from fenics_contact.optimize.progress import Callback, Progress
 from fenics_contact.optimize.quadratic_program import SubproblemError
 from fenics_contact.optimize.result import Kind, NotConvergedError, Reason, Record, Result
 from fenics_contact.optimize.state import MethodState
 from fenics_contact.optimize.stopping import StoppingTest, stopping_test
 from fenics_contact.optimize.subproblem import Step, solve_step
 from fenics_contact.optimize.trust import Trial, Trust
-from fenics_contact.progress import Task
 
 Array = NDArray[np.float64]
-Callback = Callable[[Record, Array], None]
 
 _LOG = logging.getLogger(__name__)
 
@@ -135,27 +132,18 @@ class BundleTrust:
             InvalidInputError: If the checkpoint cannot be gone on from.
             CheckpointError: If the checkpoint cannot be written.
         """
-        progress = Progress(checkpoint, self, problem)
-        state = progress.recalled()
-        with Task("optimisation", unit="evaluations", most=self.max_evaluations, measured="decrease") as task:
-            state, reason = self._run(problem, state, progress, callback, task)
+        progress = Progress(checkpoint, self, problem, callback)
+        with progress.told() as task:
+            state, reason = self._run(problem, progress)
+            task.outcome = reason.name.lower().replace("_", " ")
         return _finish(self, state, reason)
 
-    def _run(
-        self,
-        problem: Problem,
-        state: MethodState | None,
-        progress: Progress,
-        callback: Callback | None,
-        task: Task,
-    ) -> tuple[MethodState, Reason]:
-        """Go on from a state, or from the start, to the stop."""
+    def _run(self, problem: Problem, progress: Progress) -> tuple[MethodState, Reason]:
+        """Go on from where an earlier run was, or from the start, to the stop."""
+        state = progress.recalled()
         if state is None:
             state = _start(self, problem)
-            progress.keep(state)
-            self._tell(callback, state, task)
-        else:
-            self._tell(None, state, task)
+            progress.evaluated(state)
         reason: Reason | None = None
         while reason is None:
             try:
@@ -164,23 +152,9 @@ class BundleTrust:
                 _LOG.warning("%s", error)
                 reason = Reason.STEP_FAILED
             if reason is None:
-                progress.keep(state)
-                self._tell(callback, state, task)
+                progress.evaluated(state)
         progress.keep(state, last=True)
         return state, reason
-
-    def _tell(self, callback: Callback | None, state: MethodState, task: Task) -> None:
-        record = state.history[-1]
-        predicted = record.predicted_decrease / (self.value_scale + abs(record.best))
-        task.step(
-            record.evaluations,
-            measure=predicted or None,
-            target=self.tolerance,
-            value=record.best,
-            words=f"{record.kind.value} step" if record.iteration else "",
-        )
-        if callback is not None:
-            callback(record, state.centre.x.copy())
 
 
 def _start(method: BundleTrust, problem: Problem) -> MethodState:

@@ -33,6 +33,7 @@ class Event:
         target: How small.
         measured: What the measure is.
         value: Best value so far, of an optimisation.
+        left: How long the work itself expects to take still, [s].
         words: What else there is to say, for readers.
         timed: Whether the time since the last step tells how long others take.
     """
@@ -48,6 +49,7 @@ class Event:
     target: float | None = None
     measured: str = "residual"
     value: float | None = None
+    left: float | None = None
     words: str = ""
     timed: bool = True
 

@@ -19,6 +19,7 @@ class Task:
 
     Attributes:
         what: Name of the work.
+        outcome: What is told when it ends.
 
     Example:
         >>> with Task("load steps", total=2) as task:
@@ -46,7 +47,7 @@ class Task:
             target: What the measure of the steps must fall to.
             measured: What that measure is.
         """
-        self.what = what
+        self.what, self.outcome = what, ""
         self._known: dict[str, Any] = {
             "unit": unit, "total": total, "most": most, "target": target, "measured": measured
         }  # fmt: skip
@@ -68,6 +69,7 @@ class Task:
         measure: float | None = None,
         target: float | None = None,
         value: float | None = None,
+        left: float | None = None,
         words: str = "",
         timed: bool = True,
     ) -> None:
@@ -78,13 +80,21 @@ class Task:
             measure: What must become small; None if it is not known now.
             target: What it must fall to, where that has changed.
             value: Best value so far.
+            left: How long the rest will take, [s], where the work knows better than the time of its steps.
             words: What else there is to say.
             timed: Whether the time since the last step tells how long others take.
         """
         if _LOGGER.isEnabledFor(logging.DEBUG):
             known = {} if target is None else {"target": target}
             self._tell(
-                Kind.STEP, number=number, measure=measure, value=value, words=words, timed=timed, **known
+                Kind.STEP,
+                number=number,
+                measure=measure,
+                value=value,
+                left=left,
+                words=words,
+                timed=timed,
+                **known,
             )
 
     def end(self, *, failed: bool = False, words: str = "") -> None:
@@ -106,7 +116,7 @@ class Task:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End, as a failure where an exception passes."""
-        self.end(failed=kind is not None)
+        self.end(failed=kind is not None, words=self.outcome)
 
     def _tell(self, kind: Kind, **found: Any) -> None:
         event = Event(task=id(self), what=self.what, kind=kind, **{**self._known, **found})

@@ -19,7 +19,8 @@ from fenics_contact.progress.tracker import Tracker, Work, summary
 
 #: How often the bars are drawn, [1/s]: rank 0 draws while others compute.
 RATE = 4
-BAR = 12
+#: Least columns of names and bars.
+NAME, BAR = 14, 12
 
 
 class Terminal(Presenter):
@@ -52,6 +53,7 @@ class Terminal(Presenter):
         """Draw from now on; what the program prints and logs appears above the bars."""
         before = {id(stream): name for name in ("stdout", "stderr") if (stream := getattr(sys, name))}
         self._live.start()
+        self._console.show_cursor(True)  # a run that is killed could not bring it back
         for handler in _stream_handlers():
             name = before.get(id(handler.stream))
             if name is not None:
@@ -70,14 +72,14 @@ class Terminal(Presenter):
 
     def finished(self, work: Work) -> None:
         """Leave a line above the bars."""
-        self._console.print(summary(work), overflow="ignore", no_wrap=True, crop=False)
+        self._console.out(summary(work), highlight=False)
 
     def _drawn(self) -> RenderableType:
         rows = self._tracker.rows(time.time())
         if not rows:
             return Text("", end="")
         table = Table.grid(
-            Column(no_wrap=True),
+            Column(no_wrap=True, min_width=NAME),
             Column(no_wrap=True),
             Column(no_wrap=True, overflow="ellipsis", ratio=1),
             Column(no_wrap=True, justify="right"),

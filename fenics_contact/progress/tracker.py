@@ -63,6 +63,8 @@ class Work:
     def left(self, moment: float) -> Left | None:
         """Return how long it will still take, None where nobody knows."""
         event, done = self.event, self.event.number or 0
+        if event.left is not None:
+            return Left(max(event.left - (moment - self.stepped), 0.0))
         if event.total is not None:
             return self._for_pieces(event.total - done, moment)
         if event.target is not None:
@@ -170,6 +172,8 @@ def _row(work: Work, moment: float) -> Row:
 
 def summary(work: Work) -> str:
     """Return one line about work that is over."""
-    failed = "failed" if work.event.kind is Kind.FAILED else ""
-    name, details = work.event.what, joined(failed, work.event.details)
-    return f"{name}: {joined(details, duration(work.stepped - work.begun))}"
+    event = work.event
+    if event.measure is not None and event.target is not None and event.measure > event.target:
+        event = replace(event, measure=None)  # of the last step: it is over for another reason
+    failed = "failed" if event.kind is Kind.FAILED else ""
+    return f"{event.what}: {joined(failed, event.details, duration(work.stepped - work.begun))}"

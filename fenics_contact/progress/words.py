@@ -11,7 +11,7 @@ def duration(seconds: float | None) -> str:
     """
     if seconds is None:
         return "?"
-    if seconds < 0.95:
+    if 0.05 <= seconds < 0.95:
         return f"{seconds:.1f} s"
     if seconds < 90.0:
         return f"{seconds:.0f} s"

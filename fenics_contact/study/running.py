@@ -11,6 +11,7 @@ from time import perf_counter
 from typing import Any, TextIO
 
 from fenics_contact.io import versions
+from fenics_contact.progress import shown
 from fenics_contact.study.launching import Record, Task, launcher, measure
 from fenics_contact.study.parameters import Parameters, Sweep
 from fenics_contact.study.progress import Progress, described
@@ -71,7 +72,8 @@ def run_study(
         MissingRequirementError: If several ranks are asked for and there is no mpirun.
     """
     plan = prepare(scene, runs, sweep=sweep, settings=settings)
-    measure_all(plan, stream)
+    with shown(stream=stream):
+        measure_all(plan)
     return collected(plan)
 
 
@@ -123,12 +125,11 @@ def _repeats(task: Task, store: Store, most: int) -> list[Record]:
     return [record for record in found if record is not None] if found[0] is not None else []
 
 
-def measure_all(plan: StudyPlan, stream: TextIO | None = None) -> None:
+def measure_all(plan: StudyPlan) -> None:
     """Measure what is missing.
 
     Args:
         plan: The study.
-        stream: Where progress is told; stderr by default.
     """
     launcher(plan.settings.ranks)  # refuses ranks that cannot be started
     # A run is repeated only after all others were measured: load that lasts a while hits no run alone.
@@ -140,7 +141,7 @@ def measure_all(plan: StudyPlan, stream: TextIO | None = None) -> None:
             _warm_up(wanted, min(task.parameters.size for task in plan.tasks))
         title = plan.study.title
         words = title if repeat == 0 else f"{title}, repeat {repeat + 1}"
-        with Progress([task.parameters for task in wanted], words, stream) as progress:
+        with Progress([task.parameters for task in wanted], words) as progress:
             for task in wanted:
                 progress.begin(task.parameters)
                 _measure(task, plan.store, repeat, progress)
