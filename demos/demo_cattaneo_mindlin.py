@@ -20,7 +20,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import Status, solve_steps
 from fenics_contact.geometry import BodyMesh, rectangle_lattice
-from fenics_contact.io import write_json, write_vtu
+from fenics_contact.io import ResultSeries, write_result
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -157,15 +157,17 @@ plot_contact_pressure(last, output / "contact.png", title="Sheared cylinders")
 plot_stress(last, output / "stress.png", scale=1.0, title="Sheared cylinders")
 
 # ## Files for ParaView
+#
+# The steps one after the other: open `shear.pvd`.
 
-for number, state in enumerate(states.values()):
-    write_vtu(state, output, f"step_{number}")
+series = ResultSeries(output, "shear", comm)
+for number, (name, state) in enumerate(states.items()):
+    series.add(state, number, name)
 
 # ## Result
 
 error = max(abs(measured / exact - 1) for _, measured, exact in found.values())
 record = {
-    "ranks": comm.size,
     "normal_force": force,
     "half_width": half_width,
     "peak_pressure": peak,
@@ -174,7 +176,7 @@ record = {
     "stick_half_width_theory": [values[2] for values in found.values()],
     "largest_error": error,
 }
-write_json(output / "result.json", record, comm=comm)
+write_result(last, output, more=record)
 
 # Every rank has the same numbers; one prints them.
 

@@ -22,7 +22,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
 from fenics_contact.geometry import box_lattice, hemisphere
-from fenics_contact.io import write_json, write_vtu
+from fenics_contact.io import write_result, write_vtu
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -104,8 +104,8 @@ for name, state in states.items():
         "a": measured,
     }
 
-record = {"ranks": comm.size, "peak_pressure": found["mortar"]["peak"], "radius": found["mortar"]["a"]}
-write_json(output / "result.json", record, comm=comm)
+record = {"peak_pressure": found["mortar"]["peak"], "radius": found["mortar"]["a"]}
+write_result(states["mortar"], output, more=record)
 
 if comm.rank == 0:
     ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"

@@ -26,7 +26,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
 from fenics_contact.geometry import box_lattice
-from fenics_contact.io import write_json, write_vtu
+from fenics_contact.io import write_result, write_vtu
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -133,8 +133,8 @@ turned = np.degrees(np.arccos(abs(axes[:, 1] @ fibre[:2])))
 # The forces of both models, point by point.
 
 difference = np.abs(force - compared.contact.normal_force).max() / force.max()
-record = {"ranks": comm.size, "force": force.sum(), "half_axes": [long, short], "angle": turned}
-write_json(output / "result.json", record, comm=comm)
+record = {"force": force.sum(), "half_axes": [long, short], "angle": turned}
+write_result(state, output, more=record)
 
 if comm.rank == 0:
     ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"

@@ -22,7 +22,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import Status, solve_steps
 from fenics_contact.geometry import block
-from fenics_contact.io import write_json, write_vtu
+from fenics_contact.io import ResultSeries, write_result
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -105,16 +105,18 @@ plot_contact_status(maps, output / "status.png", title="Stick and slip on the fl
 plot_stress(states[6], output / "stress.png", title="Sheared block")
 
 # ## Files for ParaView
+#
+# All steps as a film: `history.pvd` opens them together, with the shifts as labels.
 
-for number in chosen:
-    write_vtu(states[number], output, f"step_{number:02d}")
+series = ResultSeries(output, "history", comm)
+for number, state in enumerate(states):
+    series.add(state, number, steps[number].name)
 
 # ## Result
 #
 # Where all points slide, the shear force is $\mu N$, but for what points at the edges also slip sideways.
 
 record = {
-    "ranks": comm.size,
     "friction_coefficient": friction_coefficient,
     "shift": path,
     "shear_force": shear,
@@ -123,7 +125,7 @@ record = {
     "plateau_over_bound": plateau,
     "dissipated_energy": work,
 }
-write_json(output / "result.json", record, comm=comm)
+write_result(states[-1], output, more=record)
 
 # Every rank has the same numbers; one prints them.
 
