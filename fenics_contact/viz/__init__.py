@@ -7,11 +7,13 @@ given.
 """
 
 from fenics_contact.viz._libraries import check_libraries
+from fenics_contact.viz.browser import InteractiveScene
 from fenics_contact.viz.control_net import plot_control_net
 from fenics_contact.viz.convergence import plot_convergence
 from fenics_contact.viz.curves import plot_curves
 from fenics_contact.viz.decomposition import plot_decomposition
 from fenics_contact.viz.error import plot_error
+from fenics_contact.viz.interactive import interactive
 from fenics_contact.viz.picture import Picture
 from fenics_contact.viz.pressure import plot_contact_pressure
 from fenics_contact.viz.renderer import check_renderer
@@ -20,10 +22,12 @@ from fenics_contact.viz.stress import plot_stress
 from fenics_contact.viz.units import Units
 
 __all__ = [
+    "InteractiveScene",
     "Picture",
     "Units",
     "check_libraries",
     "check_renderer",
+    "interactive",
     "plot_contact_pressure",
     "plot_contact_status",
     "plot_control_net",
