@@ -125,12 +125,23 @@ def described(module: ModuleType, name: str, kind: str) -> str:
     """
     if kind != "data":
         value = getattr(module, name)
-        members = "   :undoc-members:\n" if inspect.isclass(value) and issubclass(value, Enum) else ""
-        return f".. auto{kind}:: {module.__name__}.{name}\n{members}\n"
+        return f".. auto{kind}:: {module.__name__}.{name}\n{extra_members(value)}\n"
     text, value = constant(module, name)
     lines = [f".. py:data:: {module.__name__}.{name}"]
     lines += [f"   :value: {value}"] if value else []
     return "\n".join([*lines, "", *(f"   {line}" for line in text), "", ""])
+
+
+def extra_members(value: Any) -> str:
+    """Return autodoc's options for members that it would leave out: of enumerations, and of private bases."""
+    if not inspect.isclass(value):
+        return ""
+    if issubclass(value, Enum):
+        return "   :undoc-members:\n"
+    private = [
+        base for base in value.__mro__[1:] if base.__module__.startswith(PACKAGE) and base.__name__[0] == "_"
+    ]
+    return "   :inherited-members:\n" if private else ""
 
 
 def constant(module: ModuleType, name: str) -> tuple[list[str], str]:

@@ -44,6 +44,12 @@ class State:
         seconds: Wall time of this rank by phase, of all work up to this state that shares its timer.
         known_errors: Errors that were found on the way, None if they were not needed; ask `errors`.
         tolerance: What it was solved to, a relative residual or `Balanced`; None where no solver iterated.
+
+    Example:
+        >>> state = solve_scene(scene, None, comm)  # doctest: +SKIP
+        >>> state.displacement["block"]  # a dolfinx Function on the block's own mesh  # doctest: +SKIP
+        >>> state.contact.count(Status.SLIP)  # doctest: +SKIP
+        >>> print(state.errors)  # doctest: +SKIP
     """
 
     system: DualSystem | DirectSystem
