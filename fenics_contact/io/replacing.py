@@ -7,6 +7,7 @@ removes what such writers have left.
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import re
@@ -37,8 +38,8 @@ class OutputError(FenicsContactError, OSError):
 def replacing(*targets: Path) -> Iterator[tuple[Path, ...]]:
     """Hand out paths to write to, and put what was written in the targets' place at the end.
 
-    If the block raises, the targets stay as they were. Each file is replaced at once; several are replaced
-    one after the other in the order given, so one that names others belongs last.
+    If the block raises, the targets stay as they were. Each file is replaced at once. Of several the last
+    must be one that names the others: it is there only while all the others are.
 
     Args:
         *targets: Files (or folders) to write, all in one folder, which is created.
@@ -140,10 +141,18 @@ def remove_abandoned(folder: Path) -> None:
 
 
 def replace_all(written: Sequence[Path], folder: Path) -> None:
-    """Move complete files or folders into a folder, one after the other; each survives a loss of power."""
+    """Move complete files or folders into a folder, one after the other; each survives a loss of power.
+
+    The last of several names the others. The old one goes first, so that none ever names files of which some
+    are older than others.
+    """
     for path in written:
         for part in (*path.rglob("*"), path) if path.is_dir() else (path,):
             synchronise(part)
+        if path.is_file() and (folder / path.name).is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), path.name)
+    if len(written) > 1:
+        (folder / written[-1].name).unlink(missing_ok=True)
     for path in written:
         target = folder / path.name
         if path.is_dir() and target.is_dir():  # unlike a file, it cannot be replaced at once

@@ -81,7 +81,7 @@ class ResultSeries:
         self._name, self._comm, self._formats = name, comm, tuple(formats)
         self._inherited: list[Member] = comm.bcast(inherited)
         self._added: list[Member] = []
-        self._grids: dict[tuple[Path, Member], ET.Element] = {}
+        self._grids: dict[tuple[str, Member], ET.Element] = {}
 
     path: Path
 
@@ -114,7 +114,7 @@ class ResultSeries:
             OutputError: If a file cannot be written; the members before are as they were.
         """
         value = _checked(value, label)
-        number = self._make_room(value)
+        number = self._make_room(value, state.scene.body_names)
         stem, folder = stem_of(self._name, number), self.path.with_suffix("")
         write_vtu(state, folder, stem, cell_fields=cell_fields)
         if "xdmf" in self._formats:
@@ -122,7 +122,9 @@ class ResultSeries:
         if "vtx" in self._formats:
             write_vtx(state, folder, stem, value=value)
         self._added.append(Member(value, number, label))
-        self._write_indices(state.scene.body_names)
+        with together(self._comm):
+            if self._comm.rank == 0:
+                self._write_indices(state.scene.body_names)
         return self.path
 
     def follow(self, problem: ShapeProblem) -> Callable[[Record, np.ndarray], None]:
@@ -144,7 +146,7 @@ class ResultSeries:
 
         return add
 
-    def _make_room(self, value: float) -> int:
+    def _make_room(self, value: float, bodies: Sequence[str]) -> int:
         """Take out the members that a value replaces and return the number of the new one. Collective."""
         before = self.members
         later = [] if self._added else [member for member in self._inherited if member.value >= value]
@@ -157,39 +159,37 @@ class ResultSeries:
             if self._comm.rank == 0 and self.path.parent.is_dir():
                 remove_abandoned(self.path.parent)
                 if gone:  # first what names the files, then the files
-                    self._write_collection()
+                    self._write_indices(bodies)
                 if not self._added:
                     self._remove_unnamed()
         if equal:
             return equal[0].number
         return 1 + max((member.number for member in self.members), default=-1)
 
-    def _write_collection(self) -> None:
+    def _write_indices(self, bodies: Sequence[str]) -> None:
+        """Write what names the files of all members, the PVD file last."""
+        for body, target in file_of_each(bodies, self.path.parent, self._name, ".xdmf").items():
+            if "xdmf" in self._formats or target.exists():
+                self._write_temporal(body, target, bodies)
+        if not self.members:  # readers know no series without members
+            self.path.unlink(missing_ok=True)
+            return
         with replacing(self.path) as (temporary,):
             temporary.write_text(collection(self._name, self.members), encoding="utf-8")
 
-    def _write_indices(self, bodies: Sequence[str]) -> None:
-        """Write what names the files of all members, the PVD file last. Collective."""
-        with together(self._comm):
-            if self._comm.rank == 0:
-                if "xdmf" in self._formats:
-                    self._write_temporal(bodies)
-                self._write_collection()
-
-    def _write_temporal(self, bodies: Sequence[str]) -> None:
-        folder = self.path.with_suffix("")
-        whole = file_of_each(bodies, self.path.parent, self._name, ".xdmf")
+    def _write_temporal(self, body: str, target: Path, bodies: Sequence[str]) -> None:
+        folder, grids = self.path.with_suffix(""), []
         for member in self.members:
-            parts = file_of_each(bodies, folder, stem_of(self._name, member.number), ".xdmf")
-            for body, part in parts.items():
-                if (whole[body], member) not in self._grids and part.exists():
-                    grid = grid_of(part, f"{folder.name}/", member.value)
-                    self._grids[whole[body], member] = grid
-        with replacing(*whole.values()) as temporaries:
-            for (body, target), temporary in zip(whole.items(), temporaries, strict=True):
-                found = [self._grids.get((target, member)) for member in self.members]
-                grids = [grid for grid in found if grid is not None]
+            part = file_of_each(bodies, folder, stem_of(self._name, member.number), ".xdmf")[body]
+            if (body, member) not in self._grids and part.exists():
+                self._grids[body, member] = grid_of(part, f"{folder.name}/", member.value)
+            if (body, member) in self._grids:
+                grids.append(self._grids[body, member])
+        if grids:
+            with replacing(target) as (temporary,):
                 temporary.write_text(temporal(body, grids), encoding="utf-8")
+        else:
+            target.unlink(missing_ok=True)
 
     def _remove_unnamed(self) -> None:
         """Remove the files of members that are no longer, or that a killed run did not complete."""

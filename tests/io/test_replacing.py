@@ -156,3 +156,36 @@ def test_a_folder_is_replaced_by_a_folder(tmp_path: Path) -> None:
             (path / "deep" / "data").write_text(content)
     assert (tmp_path / "a.bp" / "deep" / "data").read_text() == "new"
     assert hidden(tmp_path) == []
+
+
+def test_a_file_that_names_others_is_away_while_they_are_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names, replace = ("a", "b", "index"), os.replace
+    for name in names:
+        (tmp_path / name).write_text("old")
+    there: list[bool] = []
+
+    def watched(source: Path, target: Path) -> None:
+        there.append((tmp_path / "index").exists())
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", watched)
+    with replacing(*(tmp_path / name for name in names)) as paths:
+        for path in paths:
+            path.write_text("new")
+    assert there == [False, False, False]
+    assert [(tmp_path / name).read_text() for name in names] == ["new"] * 3
+
+
+def test_a_folder_in_the_place_of_one_of_several_files_is_found_before_any_is_replaced(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "a").write_text("old")
+    (tmp_path / "b").mkdir()
+    (tmp_path / "index").write_text("old")
+    targets = [tmp_path / name for name in ("a", "b", "index")]
+    with pytest.raises(OutputError, match="Is a directory"), replacing(*targets) as paths:
+        for path in paths:
+            path.write_text("new")
+    assert [(tmp_path / name).read_text() for name in ("a", "index")] == ["old", "old"]

@@ -130,6 +130,17 @@ def test_a_resumed_series_goes_on_and_forgets_what_came_later(tmp_path: Path) ->
     assert [member.value for member in resumed.members] == [0, 1, 2, 3, 3.5, 4]
 
 
+def test_a_new_run_replaces_the_series_of_another_one_in_all_formats(tmp_path: Path) -> None:
+    earlier = a_series(tmp_path, formats=("xdmf",))
+    for value in range(3):
+        earlier.add(history()[value], value)
+    told = a_series(tmp_path)
+    told.add(history()[1], 0)
+    assert list(displacements(told.path)) == [0]
+    assert not (tmp_path / "run_block.xdmf").exists(), "it would name files that are gone"
+    assert {path.name for path in (tmp_path / "run").iterdir()} == {"run_0000.vtm", "run_0000_block.vtu"}
+
+
 def test_files_of_a_member_that_was_not_completed_are_removed_by_the_next_run(tmp_path: Path) -> None:
     a_series(tmp_path).add(history()[0], 0)
     (tmp_path / "run" / "run_0007_block.vtu").write_text("half")
