@@ -127,7 +127,7 @@ def described(module: ModuleType, name: str, kind: str) -> str:
         value = getattr(module, name)
         return f".. auto{kind}:: {module.__name__}.{name}\n{extra_members(value)}\n"
     text, value = constant(module, name)
-    lines = [f".. py:data:: {module.__name__}.{name}"]
+    lines = [f".. py:data:: {name}", f"   :module: {module.__name__}"]
     lines += [f"   :value: {value}"] if value else []
     return "\n".join([*lines, "", *(f"   {line}" for line in text), "", ""])
 

@@ -34,10 +34,11 @@ class Site:
 
 @dataclass
 class Page(HTMLParser):
-    """Links, pictures and ids of one page."""
+    """Links, pictures, ids and classes of one page."""
 
     links: list[str] = field(default_factory=list)
     ids: set[str] = field(default_factory=set)
+    classes: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         super().__init__()
@@ -48,6 +49,8 @@ class Page(HTMLParser):
                 self.links.append(value)
             elif value and name == "id":
                 self.ids.add(value)
+            elif value and name == "class":
+                self.classes += value.split()
 
 
 def page_of(path: Path) -> Page:
