@@ -166,11 +166,11 @@ def _check_petsc(requirement: Requirement, petsc: Any) -> None:
     found = requirement.version() or "one"
     if petsc.ScalarType(0).dtype.kind != "f":
         raise requirement.error(f"{found} with complex numbers, where real ones are needed")
-    if not (_factors(petsc, "cholmod") or _factors(petsc, "mumps")):
+    if not (factors(petsc, "cholmod") or factors(petsc, "mumps")):
         raise requirement.error(f"{found} with neither CHOLMOD nor MUMPS, where one is needed")
 
 
-def _factors(petsc: Any, package: str) -> bool:
+def factors(petsc: Any, package: str) -> bool:
     """Try a package on a matrix of one entry: ``hasExternalPackage`` is wrong on some builds."""
     matrix = petsc.Mat().createAIJ((1, 1), nnz=1, comm=petsc.COMM_SELF)
     matrix.setValue(0, 0, 1.0)

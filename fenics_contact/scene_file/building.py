@@ -74,7 +74,9 @@ class Builder:
         if body.part in shapes:
             return shapes[body.part]
         if body.part is None:
-            words = f"{written(path)} must have 'part', one of {parts}: the mesh {body.mesh!r} has several bodies"
+            words = (
+                f"{written(path)} must have 'part', one of {parts}: the mesh {body.mesh!r} has several bodies"
+            )
             raise SceneFileError(self._source.name, [self._source.mistake(path, words)])
         wrong = Reference(path, body.part, f"a body of the mesh {body.mesh!r}")
         raise SceneFileError(self._source.name, [wrong.wrong(self._source, parts)])
@@ -95,7 +97,7 @@ class Builder:
                 with self._at(key, number):
                     one = part.build(dim) if key == "supports" else part.build()
                     _check_coordinates(one, dim)
-                    replace(empty, **{key: (one,)})  # refuses what does not suit the bodies
+                    _refuse(empty, {key: (one,)})
                     built[key].append(one)
         self._check()
         return Scene(bodies, **built)
@@ -126,6 +128,11 @@ class Builder:
 def located(source: Source, path: Path, error: InvalidInputError) -> Mistake:
     """Return an error of what was built from a key as a mistake there."""
     return source.mistake(path, f"{written(path)}: {error}")
+
+
+def _refuse(empty: Scene, part: dict[str, Any]) -> None:
+    """Refuse a part that does not suit the bodies of a scene."""
+    replace(empty, **part)
 
 
 def _check_coordinates(part: Any, dim: int) -> None:

@@ -67,8 +67,8 @@ class Distance(Part):
 
     obstacle: Literal["distance"]
     formula: Scalar = Field(
-        description="signed distance, negative inside, as a formula in x, y, z whose gradient has length one, "
-        "[length]"
+        description="signed distance, negative inside, as a formula in x, y, z whose gradient has length "
+        "one, [length]"
     )
 
     def build(self) -> RigidObstacle:
@@ -139,7 +139,9 @@ DISCRETISATION = "node: every slave node stays out of its master facet; mortar: 
 class ContactPart(Part):
     """Two surfaces that may touch, or a surface and a rigid obstacle."""
 
-    slave: SurfaceOfBody = Field(description="surface whose nodes carry the contact forces: the finer or softer")
+    slave: SurfaceOfBody = Field(
+        description="surface whose nodes carry the contact forces: the finer or softer"
+    )
     master: Master = Field(description="surface of another body, or a rigid obstacle")
     friction: AnyFriction | None = Field(None, description="law of friction, none by default")
     discretisation: Literal["node", "mortar"] = Field("node", description=DISCRETISATION)

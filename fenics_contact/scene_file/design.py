@@ -80,5 +80,6 @@ class DesignPart(Part):
     max_iterations: int = Field(100, ge=0, description="most serious steps")
     max_evaluations: int = Field(500, ge=1, description="most evaluations of the objective")
     adaptive: bool = Field(
-        False, description="solve states no more accurately than the optimiser needs; else to solver.tolerance"
+        False,
+        description="solve states no more accurately than the optimiser needs; else to solver.tolerance",
     )

@@ -26,9 +26,9 @@ def design_surface(shape: Shaped, surface: str, body: str) -> DesignSurface:
     found = None if facets is None or shape.mesh.dim != 3 else _flat(shape.mesh, facets)
     if found is None:
         raise InvalidInputError(
-            f"a design needs the surface 'contact' of a chain link or a flat side of a block, got {surface!r} of "
-            f"{body!r}, which has {sorted(shape.mesh.surfaces)}: for other surfaces write a DesignSurface in "
-            "Python"
+            f"a design needs the surface 'contact' of a chain link or a flat side of a block, got "
+            f"{surface!r} of {body!r}, which has {sorted(shape.mesh.surfaces)}: for other surfaces write a "
+            "DesignSurface in Python"
         )
     return found
 

@@ -22,7 +22,7 @@ class Document(Part):
     """A scene of fenics_contact: bodies that may touch, what holds and loads them, how it is solved."""
 
     title: str = Field("", description="title of pictures and tables")
-    units: UnitNames = Field(default_factory=UnitNames, description="names of the units, for labels")
+    units: UnitNames = Field(UnitNames(), description="names of the units, for labels")
     meshes: dict[str, Mesh] = Field(min_length=1, description="meshes by name: shapes, or files")
     materials: dict[str, AnyMaterial] = Field(min_length=1, description="materials by name")
     bodies: dict[str, BodyPart] = Field(min_length=1, description="bodies by name")
@@ -30,7 +30,9 @@ class Document(Part):
     loads: list[AnyLoad] = Field(default_factory=list, description="forces and changes of temperature")
     contacts: list[ContactPart] = Field(default_factory=list, description="pairs that may touch")
     ties: list[TiePart] = Field(default_factory=list, description="pairs that stay together")
-    steps: list[StepPart] = Field(default_factory=list, description="load steps; without them all acts at once")
-    solver: SolverPart = Field(default_factory=SolverPart, description="how it is solved")
-    output: OutputPart = Field(default_factory=OutputPart, description="what is written, and where")
+    steps: list[StepPart] = Field(
+        default_factory=list, description="load steps; without them all acts at once"
+    )
+    solver: SolverPart = Field(SolverPart(), description="how it is solved")
+    output: OutputPart = Field(OutputPart(), description="what is written, and where")
     design: DesignPart | None = Field(None, description="a shape optimisation, for `fenics-contact optimize`")

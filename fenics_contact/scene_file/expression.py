@@ -107,8 +107,8 @@ class Expression:
         missing = self.names - set(values)
         if missing:
             raise InvalidInputError(
-                f"the formula {self.text!r} depends on {', '.join(sorted(missing))}, but the bodies lie in the "
-                "plane: use x and y"
+                f"the formula {self.text!r} depends on {', '.join(sorted(missing))}, but the bodies lie in "
+                "the plane: use x and y"
             )
         with np.errstate(all="ignore"):  # whoever uses the values refuses those that are not finite
             found = _value(self._tree, {**CONSTANTS, **values})

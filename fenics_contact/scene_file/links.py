@@ -28,7 +28,9 @@ class _Links(Placed):
         _DEFAULT.thickness, gt=0, description="size of the wire in the plane of the ring, [length]"
     )
     width: float = Field(_DEFAULT.width, gt=0, description="size of the wire across the ring, [length]")
-    roundness: float = Field(_DEFAULT.roundness, gt=0, le=1, description="1 for a round wire, less for a flatter")
+    roundness: float = Field(
+        _DEFAULT.roundness, gt=0, le=1, description="1 for a round wire, less for a flatter"
+    )
     n_around: int = Field(_DEFAULT.n_around, ge=12, description="cells around the ring, a multiple of 6")
     n_a: int = Field(_DEFAULT.n_a, ge=1, description="cells through the thickness")
     n_b: int = Field(_DEFAULT.n_b, ge=2, description="cells across the width")

@@ -22,7 +22,7 @@ class _Load(Part):
     @property
     def size(self) -> LoadValue:
         """What load steps change."""
-        return getattr(self, "value")  # type: ignore[no-any-return]  # noqa: B009
+        return getattr(self, "value")  # type: ignore[no-any-return]
 
 
 class TractionLoad(_Load):

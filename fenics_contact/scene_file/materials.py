@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -24,12 +24,14 @@ class IsotropicMaterial(Part):
         "isotropic", description="isotropic for bodies in space, the others for plane bodies"
     )
     young_modulus: float = Field(gt=0, description="Young's modulus E, [force / length²]")
-    poisson_ratio: float = Field(gt=-1, lt=0.5, description="Poisson's ratio ν, dimensionless")
+    poisson_ratio: float = Field(
+        gt=-1, lt=0.5, description="Poisson's ratio ν, between -1 and 0.5, dimensionless"
+    )
     thermal_expansion: float | None = Field(None, description=_EXPANSION)
 
     def build(self, folder: Path) -> Material:
         """Return the material."""
-        classes = {
+        classes: dict[str, Callable[..., Material]] = {
             "isotropic": scene.IsotropicElasticity,
             "plane_strain": scene.PlaneStrain,
             "plane_stress": scene.PlaneStress,

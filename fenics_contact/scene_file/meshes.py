@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 SolidCell: TypeAlias = Literal["hexahedron", "tetrahedron"]
 PlaneCell: TypeAlias = Literal["quadrilateral", "triangle"]
 _GRADING = (
-    "logarithm of the ratio of the largest to the smallest cell along each axis; positive: small cells at the "
-    "lower corner, negative: at the upper one, 0: equal cells"
+    "logarithm of the ratio of the largest to the smallest cell along each axis; positive: small cells at "
+    "the lower corner, negative: at the upper one, 0: equal cells"
 )
 
 
@@ -109,7 +109,9 @@ class HemisphereMesh(_Hertz):
         """Return the half ball."""
         mesh = geometry.hemisphere(self.radius, self.n, symmetry=self.symmetry, grading=self.grading)
         centre = (0.0, 0.0, self.radius)
-        return Shaped(mesh, None, tuple((name, centre, (0, 1, 2), self.radius) for name in ("contact", "side")))
+        return Shaped(
+            mesh, None, tuple((name, centre, (0, 1, 2), self.radius) for name in ("contact", "side"))
+        )
 
 
 class HalfCylinderMesh(_Hertz):
@@ -180,9 +182,14 @@ class BoltMesh(_Single):
         """Return the bolt."""
         return Shaped(
             geometry.bolt(
-                self.shank, self.head, self.grip, self.head_height, self.n,
-                n_radial=self.n_radial, layers=self.layers,
-            )  # fmt: skip
+                self.shank,
+                self.head,
+                self.grip,
+                self.head_height,
+                self.n,
+                n_radial=self.n_radial,
+                layers=self.layers,
+            )
         )
 
 

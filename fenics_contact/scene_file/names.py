@@ -31,9 +31,7 @@ class Reference:
     def wrong(self, source: Source, known: Iterable[str]) -> Mistake:
         """Return the mistake of a name that is not known."""
         names = list(known)
-        words = (
-            f"{written(self.path)} must be {self.what}, one of {listed(names)}, got {as_toml(self.given)}"
-        )
+        words = f"{written(self.path)} must be {self.what}, one of {listed(names)}, got {as_toml(self.given)}"
         meant = suggestion(self.given, names).rstrip()
         return source.mistake(self.path, f"{words}: {meant}" if meant else words)
 
@@ -124,7 +122,7 @@ def _unlike(source: Source, document: Document) -> Iterator[Mistake]:
                 path, own = ("steps", number, key, name), values[key][name]
                 if own is not None and _form(own) != _form(value):
                     words = (
-                        f"{written(path)} must have the form of the value of {name!r}, {as_toml(_plain(own))}, "
+                        f"{written(path)} must have the form of {name!r} itself, {as_toml(_plain(own))}, "
                         f"with the same components free, got {as_toml(_plain(value))}"
                     )
                     yield source.mistake(path, words)

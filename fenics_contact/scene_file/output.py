@@ -12,18 +12,25 @@ FileKind: TypeAlias = Literal["vtu", "vtx", "xdmf"]
 PictureKind: TypeAlias = Literal["stress", "pressure", "status", "decomposition", "error"]
 
 
+def _vtu() -> list[FileKind]:
+    return ["vtu"]
+
+
+def _stress() -> list[PictureKind]:
+    return ["stress"]
+
+
 class OutputPart(Part):
     """What is written, and where."""
 
     folder: str | None = Field(
-        None, description="folder of the results, relative to where the command runs (output/NAME of the file)"
+        default=None,
+        description="folder of the results, relative to where the command runs (output/NAME of the file)",
     )
     files: list[FileKind] = Field(
-        default_factory=lambda: ["vtu"], description="files of fields, for ParaView; vtx needs ADIOS2"
+        default_factory=_vtu, description="files of fields, for ParaView; vtx needs ADIOS2"
     )
-    pictures: list[PictureKind] = Field(
-        default_factory=lambda: ["stress"], description="pictures as PNG files"
-    )
+    pictures: list[PictureKind] = Field(default_factory=_stress, description="pictures as PNG files")
     checkpoint: bool = Field(
-        True, description="keep a file from which interrupted load steps or optimisations go on"
+        default=True, description="keep a file from which interrupted load steps or optimisations go on"
     )

@@ -43,6 +43,8 @@ def load(reference: str, folder: Path) -> Any:
             f"the Python file '{path}' must run without errors, it raised {type(error).__name__}: {error}"
         ) from error
     if not hasattr(module, name):
-        known = sorted(key for key, value in vars(module).items() if getattr(value, "__module__", "") == module_name)
+        known = sorted(
+            key for key, value in vars(module).items() if getattr(value, "__module__", "") == module_name
+        )
         raise InvalidInputError(f"'{path}' must define {name!r}, it defines {known}: use one of them")
     return getattr(module, name)

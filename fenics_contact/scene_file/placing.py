@@ -46,7 +46,9 @@ class Placed(Part):
 
     quadratic: bool = Field(False, description="cells of second order (not for tetrahedra)")
     scale: float = Field(1.0, gt=0, description="factor on all coordinates, about the origin, applied first")
-    axis: Triple = Field((0.0, 0.0, 1.0), description="axis through the origin about which the mesh is turned")
+    axis: Triple = Field(
+        (0.0, 0.0, 1.0), description="axis through the origin about which the mesh is turned"
+    )
     degrees: float = Field(0.0, description="angle by which the mesh is turned about `axis`, in degrees")
     translate: Vector | None = Field(None, description="displacement of the mesh, applied last, [length]")
 

@@ -70,7 +70,7 @@ class SceneFile:
         """The scene. Collective on first use.
 
         Raises:
-            SceneFileError: Naming every mesh, body, support, load or pair that cannot be built, with its line.
+            SceneFileError: Naming every mesh, body, support, load or pair that cannot be built.
         """
         return self._built[0]
 
@@ -124,15 +124,26 @@ class SceneFile:
             checkpoint=checkpoint,
         )
 
+    def require_design(self) -> None:
+        """Refuse a file without an optimisation.
+
+        Raises:
+            SceneFileError: If it describes none.
+        """
+        if self.document.design is None:
+            words = (
+                "an optimisation needs [design] with [[design.surfaces]], got none: add them, or find the "
+                "state with `fenics-contact run`"
+            )
+            raise SceneFileError(self.source.name, [self.source.mistake((), words)])
+
     def shape_task(self) -> ShapeTask:
         """Return the shape optimisation that the file describes. Collective.
 
         Raises:
             SceneFileError: If it describes none, or it cannot be posed.
         """
-        if self.document.design is None:
-            words = "an optimisation needs [design] with [[design.surfaces]], got none: add them, or solve the state"
-            raise SceneFileError(self.source.name, [self.source.mistake((), words)])
+        self.require_design()
         with self._at("design"):
             scene, shapes = self._built
             return shape_task(self.source, self.document, scene, self.partitions, shapes, self.comm)

@@ -44,30 +44,35 @@ def _subdomains(value: Any) -> Any:
     if isinstance(value, Mapping) and value and all(map(_is_cut, value.values())):
         return {name: tuple(cut) if isinstance(cut, list) else cut for name, cut in value.items()}
     raise needs(
-        '"auto", a positive integer, three integers in brackets (boxes of a structured mesh; two in the plane), '
-        "or a table: body = integer or boxes"
+        '"auto", a positive integer, three integers in brackets (boxes of a structured mesh; two in the '
+        "plane), or a table: body = integer or boxes"
     )
 
 
 _COUNT: dict[str, Any] = {"type": "integer", "minimum": 1}
 _CUT: dict[str, Any] = {"anyOf": [_COUNT, {"type": "array", "items": _COUNT, "minItems": 2, "maxItems": 3}]}
 _CUTS = {"anyOf": [{"const": "auto"}, *_CUT["anyOf"], {"type": "object", "additionalProperties": _CUT}]}
-_TOLERANCE = {"anyOf": [{"const": BALANCED}, {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}]}
+_TOLERANCE = {
+    "anyOf": [{"const": BALANCED}, {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}]
+}
 
 
 class SolverPart(Part):
     """How the scene is solved; everything has a default."""
 
     method: Literal["auto", "face_newton", "smalse", "projected_cg"] = Field(
-        "auto", description="dual solver; auto takes the one that suits the scene"
+        default="auto", description="dual solver; auto takes the one that suits the scene"
     )
     tolerance: Annotated[float | str, PlainValidator(_tolerance), WithJsonSchema(_TOLERANCE)] = Field(
-        BALANCED,
+        default=BALANCED,
         description="largest relative residual, or balanced: as accurate as the mesh deserves",
     )
-    max_products: int | None = Field(None, ge=1, description="give up after that many products with F")
+    max_products: int | None = Field(
+        default=None, ge=1, description="give up after that many products with F"
+    )
     subdomains: Annotated[Any, PlainValidator(_subdomains), WithJsonSchema(_CUTS)] = Field(
-        "auto", description="subdomains of every body, or by body: a number, or boxes of a structured mesh"
+        default="auto",
+        description="subdomains of every body, or by body: a number, or boxes of a structured mesh",
     )
 
     def accuracy(self) -> Tolerance:

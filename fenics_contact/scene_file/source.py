@@ -12,8 +12,9 @@ import tomlkit.exceptions
 import tomlkit.items
 
 from fenics_contact.scene_file.mistakes import Mistake, SceneFileError
-from fenics_contact.scene_file.places import Path, replaced, value_at, written
+from fenics_contact.scene_file.places import Path, replaced, value_at
 
+_OPEN = "; a bracket or quote may be open on a line before"
 _MARK = "\u241f"  # stands in no file
 
 
@@ -71,7 +72,7 @@ class Source:
                     f"{override!r}: {reason}"
                 )
                 raise SceneFileError(self.name, [Mistake((), 0, "--set", words)]) from error
-            places[path] = f"--set {written(path)}"
+            places[path] = "--set"
         return Source(self.name, self.folder, data, self.text, places)
 
 
@@ -87,7 +88,7 @@ def parse(text: str, name: str, folder: FilePath) -> Source:
         reason = str(error).partition(" at line ")[0]
         line = min(error.line, text.count("\n") + 1)
         content = text.splitlines()[line - 1].strip() if text.splitlines() else ""
-        words = f"must be TOML, got {content!r}: {reason}"
+        words = f"must be TOML, got {content!r}: {reason}{_OPEN if 'nexpected' in reason else ''}"
         raise SceneFileError(name, [Mistake((), line, f"line {line}", words)]) from error
     return Source(name, folder, data, text)
 

@@ -9,7 +9,15 @@ from pydantic import Field, PlainValidator, WithJsonSchema
 
 from fenics_contact.scene import LoadStep
 from fenics_contact.scene_file.expression import between
-from fenics_contact.scene_file.values import FREE, Components, Part, Scalar, VectorOrFormulas, is_number, needs
+from fenics_contact.scene_file.values import (
+    FREE,
+    Components,
+    Part,
+    Scalar,
+    VectorOrFormulas,
+    is_number,
+    needs,
+)
 
 if TYPE_CHECKING:
     from fenics_contact.scene_file.loads import AnyLoad

@@ -17,8 +17,8 @@ class SupportPart(Part):
     surface: str = Field(description="name of its surface")
     value: Components | None = Field(
         None,
-        description=f'displacement along x, y and z (x, y of a plane body), [length]: a number, "{FREE}", or a '
-        "formula in x, y, z in quotes; zero in all directions by default",
+        description=f'displacement along x, y and z (x, y of a plane body), [length]: a number, "{FREE}", or '
+        "a formula in x, y, z in quotes; zero in all directions by default",
     )
 
     def build(self, dim: int, value: tuple[float | str, ...] | None = None) -> Support:

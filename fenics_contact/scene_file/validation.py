@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import Tag, ValidationError
@@ -45,8 +45,20 @@ def validated(source: Source) -> Document:
     try:
         return Document.model_validate(source.data)
     except ValidationError as error:
-        mistakes = [_mistake(source, each) for each in error.errors()]
+        mistakes = [_mistake(source, each) for each in _told_once(error.errors())]
         raise SceneFileError(source.name, mistakes) from None
+
+
+def _told_once(errors: Sequence[Any]) -> list[Any]:
+    """Leave out keys that are missing only because they are misspelt."""
+    misspelt = [tuple(error["loc"]) for error in errors if error["type"] == "extra_forbidden"]
+
+    def explained(error: Any) -> bool:
+        *table, key = error["loc"]
+        near = [given for *where, given in misspelt if where == table]
+        return error["type"] == "missing" and any(suggestion(str(given), [key]) for given in near)
+
+    return [error for error in errors if not explained(error)]
 
 
 def _mistake(source: Source, error: Any) -> Mistake:
@@ -91,7 +103,9 @@ def _unknown(path: Path, table: type[Part] | None) -> str:
 def _wrong_choice(source: Source, path: Path, key: str, *allowed: str) -> Mistake:
     table = value_at(source.data, path)
     if not isinstance(table, Mapping):
-        words = f"{written(path)} must be a table with {key!r}, one of {listed(allowed)}, got {as_toml(table)}"
+        words = (
+            f"{written(path)} must be a table with {key!r}, one of {listed(allowed)}, got {as_toml(table)}"
+        )
         return source.mistake(path, words)
     if key not in table:
         words = f"{written(path)} must have {key!r}, one of {listed(allowed)}, got only {', '.join(table)}"
@@ -118,7 +132,7 @@ def _field(location: tuple[str | int, ...]) -> tuple[type[Part] | None, FieldInf
             table = kind if _is_part(kind) else table
             continue
         plain = members[0][1] if members else None
-        if _is_part(plain):
+        if plain is not None and _is_part(plain):
             table, field = plain, plain.model_fields.get(str(part))
             kind = None if field is None else field.annotation
         else:

@@ -124,9 +124,7 @@ def _vector(value: Any) -> tuple[float | str, ...]:
 def _components(value: Any) -> tuple[float | str, ...]:
     """Check what a support prescribes."""
     if not isinstance(value, list | tuple) or len(value) not in _COUNTS:
-        raise needs(
-            f"three numbers, formulas or '{FREE}' in brackets, for x, y and z (two for a plane body)"
-        )
+        raise needs(f"three numbers, formulas or '{FREE}' in brackets, for x, y and z (two for a plane body)")
     return tuple(FREE if entry == FREE else _scalar(entry) for entry in value)
 
 

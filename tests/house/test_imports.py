@@ -24,9 +24,13 @@ FLOORS = [
     {"optimize"},
 ]
 FLOOR = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
-BESIDE = {"viz", "io", "study"}
-#: On top of everything: the study of accuracy draws and writes.
-ABOVE = {"study": {"viz", "io"}, "__main__": {"viz", "io", "study"}}
+BESIDE = {"viz", "io", "study", "scene_file"}
+#: On top of everything: the study of accuracy draws and writes, the command line does all that there is.
+ABOVE = {
+    "study": {"viz", "io"},
+    "cli": {"viz", "io", "study", "scene_file"},
+    "__main__": {"cli"},
+}
 #: Rooms that are tested with small dense matrices, and what they never meet.
 WITHOUT_FENICS = {
     "qp": {"dolfinx", "ufl", "basix", "ffcx", "gmsh"},
@@ -115,6 +119,9 @@ def test_imports_point_down() -> None:
         ("viz", "import fenics_contact.io"),
         ("viz", "import fenics_contact.study"),
         ("io", "from fenics_contact.study import run_study"),
+        ("scene_file", "from fenics_contact.viz import Units"),
+        ("io", "from fenics_contact.scene_file import read_scene_file"),
+        ("study", "from fenics_contact.cli import main"),
     ],
 )
 def test_an_import_that_does_not_point_down_is_found(room: str, line: str, tmp_path: Path) -> None:
@@ -128,7 +135,9 @@ def test_an_import_that_does_not_point_down_is_found(room: str, line: str, tmp_p
         ("feti", "from . import rows\nfrom .rows import gap\nfrom ..qp import minimise"),
         ("viz", "from fenics_contact.contact import State"),
         ("study", "def draw():\n    from fenics_contact.viz.sheet import sheet"),
-        ("__main__", "from fenics_contact.study import command"),
+        ("__main__", "from fenics_contact import cli"),
+        ("cli", "from fenics_contact.study.scenes import find_study"),
+        ("scene_file", "from fenics_contact.shape import ShapeProblem"),
         ("qp", "import numpy"),
     ],
 )

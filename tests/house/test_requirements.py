@@ -170,7 +170,7 @@ def test_a_petsc_without_sparse_factorisation_is_refused(loading: Callable[[str,
 
 def test_a_package_that_petsc_does_not_have_is_recognised() -> None:
     real = import_module("petsc4py.PETSc")
-    assert not _requirements._factors(real, "nonsense")
+    assert not _requirements.factors(real, "nonsense")
 
 
 def test_a_missing_gmsh_is_named_only_when_a_geometry_needs_it(without: Callable[[str], None]) -> None:

@@ -1,0 +1,160 @@
+"""`fenics-contact accuracy`: measure what accuracy costs in time."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import typer
+from typer.core import TyperCommand
+
+from fenics_contact.cli import accuracy_options as options
+from fenics_contact.cli.desk import desk_of
+from fenics_contact.cli.endings import Terminated
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.study.overview import write_overview
+from fenics_contact.study.parameters import Sweep, Tolerance
+from fenics_contact.study.report import write_report
+from fenics_contact.study.running import Settings, StudyPlan, collected, measure_all, prepare
+from fenics_contact.study.scenes import find_study
+
+ABOUT = (
+    f"Measure what accuracy costs in time. SCENE is one of {options.NAMES}, or a Python file that defines "
+    "`study`, a fenics_contact.study.StudyScene. Results, table, figures and advice are written to a folder; "
+    "what was measured already is not measured again. Runs have processes of their own: ask for ranks with "
+    "--ranks."
+)
+#: Options that take any number of values: --sizes 2 3 4. An option without a value stands for none.
+LISTS = ("--sizes", "--tolerances", "--cells", "--discretisations", "--fixed-points", "--subdomains")
+
+
+class _Lists(TyperCommand):
+    """A command with options that take any number of values."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Repeat such options for each of their values."""
+        return super().parse_args(ctx, spread(args))
+
+
+def spread(arguments: Sequence[str]) -> list[str]:
+    """Return arguments with ``--sizes 2 3`` as ``--sizes 2 --sizes 3``."""
+    found: list[str] = []
+    option, pending = "", False
+    for argument in arguments:
+        if argument.startswith("-") and argument != "-":
+            found += [option, options.NOTHING] if pending else []
+            option, pending = (argument, True) if argument in LISTS else ("", False)
+            found += [] if option else [argument]
+        elif option:
+            found += [option, argument]
+            pending = False
+        else:
+            found.append(argument)
+    return [*found, option, options.NOTHING] if pending else found
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command to the program."""
+    words = "measure what accuracy costs in time"
+    app.command("accuracy", cls=_Lists, help=ABOUT, short_help=words)(accuracy)
+
+
+@dataclass(frozen=True)
+class Varied:
+    """What the options say about the runs; None where they say nothing."""
+
+    sizes: tuple[int, ...] | None
+    tolerances: tuple[Tolerance, ...] | None
+    cells: tuple[str, ...] | None
+    discretisations: tuple[str, ...] | None
+    fixed_points: tuple[float, ...] | None
+    subdomains: tuple[int, ...] | None
+
+
+def accuracy(
+    context: typer.Context,
+    scene: options.SceneArgument,
+    quick: options.QuickOption = False,
+    output: options.OutputOption = None,
+    runs: options.RunsOption = None,
+    ranks: options.RanksOption = "1",
+    repeats: options.RepeatsOption = None,
+    limit: options.LimitOption = "600",
+    report: options.ReportOption = False,
+    no_figures: options.NoFiguresOption = False,
+    page: options.PageOption = False,
+    sizes: options.SizesOption = None,
+    tolerances: options.TolerancesOption = None,
+    cells: options.CellsOption = None,
+    discretisations: options.DiscretisationsOption = None,
+    fixed_points: options.FixedPointsOption = None,
+    subdomains: options.SubdomainsOption = None,
+) -> None:
+    """Measure what accuracy costs in time."""
+    desk = desk_of(context)
+    if desk.comm.size > 1:
+        raise InvalidInputError(
+            f"a study starts its own ranks, got mpirun with {desk.comm.size}: run it without mpirun and "
+            f"give --ranks {desk.comm.size}"
+        )
+    logging.getLogger("fenics_contact").setLevel(logging.INFO)
+    study = find_study(scene)
+    given = (sizes, tolerances, cells, discretisations, fixed_points, subdomains)
+    sweep = sweep_from(Varied(*map(_given, given)), study.quick if quick else study.sweep)
+    folder = output or Path("output") / "studies" / study.name
+    settings = Settings(ranks, repeats or (1 if quick else 3), limit)
+    plan = prepare(scene, runs or folder / "runs", sweep=sweep, settings=settings)
+    status = 0 if report else _measure(plan)
+    words = _report(plan, folder, figures=not no_figures)
+    if page:
+        write_overview(folder.parent)
+    desk.say("\n".join([*words, f"results in {folder}/"]))
+    if status:
+        raise typer.Exit(status)
+
+
+def _given(values: Sequence[Any] | None) -> Any:
+    """Return the values of an option, nothing where it was given without one, None where it was not given."""
+    if not values:
+        return None
+    return tuple(value for value in values if value not in (None, options.NOTHING))
+
+
+def _report(plan: StudyPlan, folder: Path, *, figures: bool) -> Sequence[str]:
+    results = collected(plan)
+    if not results.good:
+        reasons = "".join(f"\n  {run.failed}" for run in results.runs[:3])
+        raise InvalidInputError(
+            f"a report needs runs that have an answer, {folder} has none of this code and these options: "
+            f"run the study without --report, or mend what failed{reasons}"
+        )
+    return write_report(folder, results, figures=figures)
+
+
+def _measure(plan: StudyPlan) -> int:
+    """Measure; return 0, or the exit code of an interrupted program."""
+    try:
+        measure_all(plan)
+    except (KeyboardInterrupt, Terminated) as stop:
+        sys.stderr.write("interrupted: what is done is kept, and the same command goes on from there\n")
+        return 143 if isinstance(stop, Terminated) else 130
+    return 0
+
+
+def sweep_from(varied: Varied, sweep: Sweep) -> Sweep:
+    """Return the runs that the options ask for, the scene's where they say nothing.
+
+    Raises:
+        InvalidInputError: If a cell type is unknown.
+    """
+    given: dict[str, Any] = {name: value for name, value in vars(varied).items() if value is not None}
+    chosen = replace(sweep, **given)
+    if varied.sizes and sweep.base.size not in chosen.sizes:
+        # The base is one of the meshes: around it one setting at a time is varied.
+        chosen = replace(chosen, base=replace(sweep.base, size=chosen.sizes[(len(chosen.sizes) - 1) // 2]))
+    chosen.runs()  # refuses what no scene knows
+    return chosen

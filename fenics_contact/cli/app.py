@@ -1,0 +1,110 @@
+"""The program: all commands under one name."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import logging
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from fenics_contact.cli import accuracy, demos, info, optimize, run, schema, view
+from fenics_contact.cli.desk import Desk
+from fenics_contact.cli.endings import EPILOG, terminable, told
+from fenics_contact.io import versions
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+PROGRAM = "fenics-contact"
+#: What the command-line library raises for options that do not exist, whatever it calls its own modules.
+UsageProblem: type[Exception] = next(
+    kind
+    for kind in typer.BadParameter.__mro__
+    if issubclass(kind, Exception) and kind.__name__ == "ClickException"
+)
+
+
+class Program(TyperGroup):
+    """All commands; what they raise becomes a sentence and an exit code."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command that the arguments name."""
+        try:
+            with terminable():
+                return super().invoke(ctx)
+        except (typer.Exit, typer.Abort, UsageProblem):
+            raise
+        except BaseException as error:
+            if isinstance(error, SystemExit):
+                raise
+            raise typer.Exit(int(told(error, ctx.obj.comm))) from None
+
+
+app = typer.Typer(
+    name=PROGRAM,
+    cls=Program,
+    help="Contact mechanics with friction and contact shape optimisation on FEniCSx. Every command also runs "
+    "under mpirun.",
+    epilog=EPILOG,
+    no_args_is_help=False,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for module in (run, optimize, demos, view, accuracy, info, schema):
+    module.add_to(app)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        sys.stdout.write(f"fenics_contact {versions()['fenics_contact']}\n")
+        raise typer.Exit()
+
+
+@app.callback()
+def program(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Say the version and end.")
+    ] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Also say what the solvers do, on stderr.")
+    ] = False,
+) -> None:
+    """Prepare logging."""
+    if verbose:
+        logging.getLogger("fenics_contact").setLevel(logging.INFO)
+
+
+def main(comm: MPI.Comm, arguments: Sequence[str] | None = None) -> int:
+    """Run the command that the arguments name; return the exit code, the same on every rank.
+
+    Args:
+        comm: All ranks of the program.
+        arguments: The command line, without the program's name; that of the process unless given.
+    """
+    _log_to_stderr(comm)
+    command = typer.main.get_command(app)
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    # Ranks above 0 have nothing to say: neither help nor what demos might print.
+    silence = contextlib.nullcontext() if comm.rank == 0 else contextlib.redirect_stdout(io.StringIO())
+    with silence:
+        try:
+            code = command.main(given, prog_name=PROGRAM, standalone_mode=False, obj=Desk(comm))
+        except UsageProblem as problem:
+            if comm.rank == 0:
+                problem.show(sys.stderr)  # type: ignore[attr-defined]
+            return int(problem.exit_code)  # type: ignore[attr-defined]
+    return code if isinstance(code, int) else 0
+
+
+def _log_to_stderr(comm: MPI.Comm) -> None:
+    """Send warnings of rank 0 to stderr; other ranks meet the same."""
+    handler = logging.StreamHandler(sys.stderr) if comm.rank == 0 else logging.NullHandler()
+    handler.setFormatter(logging.Formatter("%(message)s"))
+    logging.basicConfig(level=logging.WARNING, handlers=[handler])

@@ -1,0 +1,153 @@
+"""Files of fields, looked at and drawn by pyvista."""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError, MissingRequirementError
+from fenics_contact.scene_file.mistakes import suggestion
+
+FIELD_FILES = (".vtu", ".vtm", ".pvd")
+
+
+def newest_member(path: Path) -> Path:
+    """Return the last file that a .pvd file names; any other file itself.
+
+    Raises:
+        InvalidInputError: If a .pvd file names none or cannot be read.
+    """
+    if path.suffix != ".pvd":
+        return path
+    try:
+        entries = ET.parse(path).getroot().iter("DataSet")
+        times = [(float(entry.get("timestep", 0)), entry.get("file", "")) for entry in entries]
+    except (ET.ParseError, ValueError) as error:
+        raise InvalidInputError(f"'{path}' must be a whole .pvd file, got {error}: write it again") from error
+    if not times:
+        raise InvalidInputError(f"'{path}' must name at least one file of fields, it names none")
+    last = max(time for time, _ in times)
+    files = [file for time, file in times if time == last]
+    return path.parent / files[0]
+
+
+def _blocks(path: Path) -> dict[str, Any]:
+    """Read the meshes of a file by name."""
+    try:
+        import pyvista
+    except ImportError as error:
+        raise MissingRequirementError(
+            "files of fields are read with pyvista, found none: pip install 'fenics_contact[viz]'",
+            name="pyvista",
+        ) from error
+    member = newest_member(path)
+    if not member.is_file():
+        raise InvalidInputError(f"a file of fields must exist, '{member}' does not: write the result again")
+    data = pyvista.read(member)
+    if isinstance(data, pyvista.MultiBlock):
+        return {str(name): data[name] for name in data.keys()}
+    return {member.stem: data}
+
+
+def fields_in(path: Path) -> dict[str, str]:
+    """Return name -> range of every field of a file, vectors by their length."""
+    found: dict[str, list[tuple[float, float]]] = {}
+    for block in _blocks(path).values():
+        for data in (block.point_data, block.cell_data):
+            for name in data:
+                values = np.asarray(data[name], dtype=float)
+                size = np.linalg.norm(values, axis=1) if values.ndim == 2 else values
+                found.setdefault(name, []).append((float(np.nanmin(size)), float(np.nanmax(size))))
+    return {
+        name: f"{min(low for low, _ in ranges):.5g} to {max(high for _, high in ranges):.5g}"
+        for name, ranges in found.items()
+    }
+
+
+def draw(path: Path, save: Path | None, look: tuple[str, float], *, window: bool) -> str:
+    """Draw a field on the deformed bodies: to a PNG file, or in a window where there is a display.
+
+    Args:
+        path: The file.
+        save: PNG file, or None.
+        look: Name of the field, factor of the displacement.
+        window: Whether a window is wanted.
+
+    Returns:
+        What was done, in words.
+
+    Raises:
+        InvalidInputError: If the file has no such field.
+        MissingRequirementError: If this machine cannot render.
+    """
+    display = bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    if save is None and not (window and display):
+        return "no window without a display; --save picture.png draws the fields to a file"
+    if save is not None and save.suffix != ".png":
+        raise InvalidInputError(f"a picture must be a PNG file, got {save.name!r}: let it end in '.png'")
+    from fenics_contact.viz import check_renderer
+
+    check_renderer()
+    plotter = _plotter(path, look, off_screen=save is not None)
+    if save is None:
+        plotter.show()
+        return "window closed"
+    save.parent.mkdir(parents=True, exist_ok=True)
+    plotter.screenshot(str(save))
+    plotter.close()
+    return f"picture in {save}"
+
+
+def _plotter(path: Path, look: tuple[str, float], *, off_screen: bool) -> Any:
+    import pyvista
+
+    from fenics_contact.viz.colours import STRESS_MAP
+
+    field, scale = look
+    blocks = _blocks(path)
+    names = sorted({name for block in blocks.values() for name in block.array_names})
+    if field not in names:
+        raise InvalidInputError(
+            f"--field must be one of {names}, got {field!r}: {suggestion(field, names)}choose one of them"
+        )
+    plotter = pyvista.Plotter(off_screen=off_screen, window_size=(1600, 1000))
+    clim = _range(blocks, field)
+    for block in blocks.values():
+        moved = block.copy()
+        if "displacement" in moved.point_data:
+            moved.points = moved.points + scale * np.asarray(moved.point_data["displacement"])
+        if field in moved.array_names:
+            bar = {"title": f"{_WORDS.get(field, field.replace('_', ' '))}\n", **_BAR}
+            plotter.add_mesh(
+                moved, scalars=field, clim=clim, cmap=STRESS_MAP, ambient=0.3, scalar_bar_args=bar,
+                show_edges=True, edge_opacity=0.2,
+            )  # fmt: skip
+        else:
+            plotter.add_mesh(moved, color="lightgrey")
+    plotter.background_color = "white"
+    flat = all(np.ptp(block.points[:, 2]) == 0 for block in blocks.values())
+    plotter.view_xy() if flat else plotter.view_isometric()
+    plotter.camera.SetWindowCenter(0.15, 0.0)  # room for the bar on the right
+    return plotter
+
+
+_WORDS = {"von_mises": "von Mises stress"}
+#: The colours end at this quantile.
+QUANTILE = 0.995
+#: Colour bar on the right, clear of the bodies.
+_BAR = {
+    "vertical": True, "position_x": 0.88, "position_y": 0.2, "height": 0.6, "width": 0.05, "n_labels": 5,
+    "fmt": "%.4g", "title_font_size": 28, "label_font_size": 24, "color": "black",
+}  # fmt: skip
+
+
+def _range(blocks: dict[str, Any], field: str) -> tuple[float, float]:
+    """Return the range of the colours: all values but the largest few, which would leave one shade."""
+    found = [np.asarray(block[field], dtype=float) for block in blocks.values() if field in block.array_names]
+    sizes = [np.linalg.norm(values, axis=1) if values.ndim == 2 else values for values in found]
+    values = np.concatenate([size.ravel() for size in sizes])
+    return float(np.nanmin(values)), float(np.nanquantile(values, QUANTILE))

@@ -1,0 +1,35 @@
+"""What an interrupted run leaves, and how it goes on."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from fenics_contact.checkpoint import Checkpoint
+from fenics_contact.cli.desk import Desk
+from fenics_contact.cli.endings import Terminated
+from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError
+
+
+@contextmanager
+def going_on(desk: Desk, checkpoint: Checkpoint | None) -> Iterator[None]:
+    """Say how a run goes on that does not come to its end."""
+    if checkpoint is None:
+        yield
+        return
+    path = Path(checkpoint.path)
+    found = path.exists() and checkpoint.resume is not False
+    if found:
+        desk.say(f"going on from {path} (--fresh starts anew)")
+    try:
+        yield
+    except InvalidInputError as error:
+        if found:
+            raise InvalidInputError(f"{error} (with --fresh the run starts anew)") from error
+        raise
+    except (KeyboardInterrupt, Terminated, ConvergenceError, InfeasibleError):
+        if desk.comm.rank == 0 and path.exists():
+            sys.stderr.write(f"what is done is kept in {path}; the same command goes on from there\n")
+        raise

@@ -1,0 +1,134 @@
+"""`fenics-contact optimize`: the shape optimisation that a scene file describes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import typer
+
+from fenics_contact.cli.desk import Desk, desk_of, facts
+from fenics_contact.cli.endings import Ending
+from fenics_contact.cli.going_on import going_on
+from fenics_contact.cli.options import (
+    DryOption,
+    OutputOption,
+    PicturesOption,
+    ResumeOption,
+    SceneArgument,
+    SetOption,
+    ToleranceOption,
+    checkpoint_of,
+    read,
+)
+from fenics_contact.cli.pictures import can_draw, draw_state
+from fenics_contact.cli.plans import show_outputs, show_plan
+from fenics_contact.cli.tables import pairs
+from fenics_contact.io import ResultSeries, write_optimisation_result
+from fenics_contact.optimize import Result
+from fenics_contact.progress import shown
+from fenics_contact.scene_file import SceneFile, ShapeTask
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command to the program."""
+    app.command("optimize", short_help="optimise the contact shape of a scene file")(optimize)
+
+
+def optimize(
+    context: typer.Context,
+    scene: SceneArgument,
+    output: OutputOption = None,
+    tolerance: ToleranceOption = None,
+    settings: SetOption = None,
+    pictures: PicturesOption = True,
+    resume: ResumeOption = None,
+    dry_run: DryOption = False,
+) -> None:
+    """Optimise the contact shape that the [design] of a scene file describes."""
+    desk = desk_of(context)
+    with shown(desk.comm):
+        file = read(desk, scene, output, tolerance, settings)
+        file.require_design()
+        show_plan(desk, file, sensitivity=True)
+        desk.say()
+        if dry_run:
+            show_outputs(desk, file, draws=pictures)
+            return
+        task = file.shape_task()
+        desk.say(f"{task.problem.size} design variables, objective {file.document.design.objective}")  # type: ignore[union-attr]
+        result = _minimised(desk, file, task, resume)
+        desk.show(facts(_facts(file, task, result)))
+        drawn = _draw(desk, file, task, result) if pictures and can_draw(desk) else []
+    names = ", ".join(["result.json", *_films(file), *(path.name for path in drawn)])
+    desk.say(f"results in {file.folder}/: {names}")
+    if not result.reason.success:
+        desk.say(f"not converged: {result.reason.value}")
+        raise typer.Exit(int(Ending.NOT_CONVERGED))
+
+
+def _films(file: SceneFile) -> list[str]:
+    return ["designs.pvd"] if file.document.output.files else []
+
+
+def _minimised(desk: Desk, file: SceneFile, task: ShapeTask, resume: bool | None) -> Result:
+    """Run the optimisation and write its files. Collective."""
+    checkpoint = checkpoint_of(file, resume)
+    kinds = file.document.output.files
+    series = ResultSeries(file.folder, "designs", desk.comm, formats=kinds) if kinds else None
+    follow = None if series is None else series.follow(task.problem)
+    with going_on(desk, checkpoint):
+        result = task.minimize(callback=follow, checkpoint=checkpoint)
+    more = {"scene_file": file.source.name, "title": file.title}
+    write_optimisation_result(result, task.problem, file.folder, more=more)
+    # A run that stopped at a limit goes on from its checkpoint with a larger one.
+    if checkpoint is not None and result.reason.success and desk.comm.rank == 0:
+        Path(checkpoint.path).unlink(missing_ok=True)
+    return result
+
+
+def _facts(file: SceneFile, task: ShapeTask, result: Result) -> dict[str, str]:
+    problem = task.problem
+    before, after, units = problem.first, problem.best, file.document.units
+    assert before is not None
+    assert after is not None
+    drop = (before.value - after.value) / abs(before.value) * 100 if before.value else 0.0
+    rows = {
+        "objective before": f"{before.value:.9g}",
+        "objective after": f"{after.value:.9g}",
+        "drop": f"{drop:.3f} %",
+        "iterations": f"{result.iterations}, {result.evaluations} evaluations",
+        "work": f"{problem.products} products with F",
+        "stopped because": result.reason.value,
+    }
+    for name, point in (("before", before), ("after", after)):
+        for number, words in enumerate(pairs(point.state, units)):
+            rows[f"contact {number} {name}"] = words
+    volume, start = problem.volume(result.x)[0], problem.volume(task.start)[0]
+    rows["volume"] = f"{volume / start:.6f} of that at the start"
+    rows["seconds"] = ", ".join(f"{name} {spent:.2f}" for name, spent in problem.seconds.items())
+    return rows
+
+
+def _draw(desk: Desk, file: SceneFile, task: ShapeTask, result: Result) -> list[Path]:
+    """Draw the states before and after, the control net and the history. Collective."""
+    from fenics_contact.viz import plot_control_net, plot_convergence
+
+    problem, drawn = task.problem, []
+    for name, point in (("before", problem.first), ("after", problem.best)):
+        assert point is not None
+        drawn += draw_state(desk, file, {name: point.state}, f"_{name}")
+    moved, at = problem.points_of(result.x), 0
+    for number, design in enumerate(problem.designs):
+        points, part = file.scene.bodies[design.body].mesh.points, result.x[at : at + design.size]
+        nets: Any = tuple(design.control_points(points, alpha) for alpha in (np.zeros(design.size), part))
+        path = file.folder / ("control_net.png" if number == 0 else f"control_net_{number + 1}.png")
+        plot_control_net(design.surface, (points, moved[design.body]), nets, path, comm=desk.comm)
+        drawn.append(path)
+        at += design.size
+    values = [record.value for record in result.history]
+    kinds = [record.kind.value for record in result.history]
+    path = file.folder / "convergence.png"
+    plot_convergence(values, kinds, path, title=file.title, comm=desk.comm)
+    return [*drawn, path]

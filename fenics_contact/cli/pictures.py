@@ -1,0 +1,105 @@
+"""Pictures of a run, where the libraries for them are there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fenics_contact.cli.desk import Desk
+from fenics_contact.contact import State
+from fenics_contact.errors import InvalidInputError, MissingRequirementError, agree
+from fenics_contact.scene_file import SceneFile
+
+if TYPE_CHECKING:
+    from fenics_contact.viz import Units
+
+
+def can_draw(desk: Desk) -> bool:
+    """Tell whether pictures can be drawn; say what is missing where not. Collective."""
+    error: Exception | None = None
+    try:
+        from fenics_contact.viz import check_renderer
+
+        if desk.comm.rank == 0:
+            check_renderer()
+    except MissingRequirementError as missing:
+        error = missing
+    try:
+        agree(desk.comm, error)
+    except MissingRequirementError as missing:
+        desk.say(f"no pictures: {missing}")
+        return False
+    return True
+
+
+def units_of(file: SceneFile) -> Units:
+    """Return the names of units as pictures take them."""
+    from fenics_contact.viz import Units
+
+    names = file.document.units
+    return Units(length=names.length, force=names.force, stress=names.stress)
+
+
+def draw_state(desk: Desk, file: SceneFile, states: Mapping[str, State], suffix: str = "") -> list[Path]:
+    """Draw the pictures that a file asks for. Collective.
+
+    Args:
+        desk: Where to say what was left out.
+        file: The scene file.
+        states: Name -> state; the last one is drawn, all of them in maps of the status.
+        suffix: What the files' names end with, before ".png".
+
+    Returns:
+        The pictures that were drawn.
+    """
+    state, drawn = list(states.values())[-1], []
+    for kind in file.document.output.pictures:
+        path = file.folder / f"{kind}{suffix}.png"
+        try:
+            _DRAWN[kind](file, states, state, path)
+        except InvalidInputError as error:
+            desk.say(f"no picture {path.name}: {error}")
+        else:
+            drawn.append(path)
+    return drawn
+
+
+def _stress(file: SceneFile, states: Any, state: State, path: Path) -> None:
+    from fenics_contact.viz import plot_stress
+
+    plot_stress(state, path, title=file.title, units=units_of(file))
+
+
+def _pressure(file: SceneFile, states: Any, state: State, path: Path) -> None:
+    from fenics_contact.viz import plot_contact_pressure
+
+    plot_contact_pressure(state, path, title=file.title, units=units_of(file))
+
+
+def _status(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:
+    from fenics_contact.viz import plot_contact_status
+
+    plot_contact_status(states, path, title=file.title, units=units_of(file))
+
+
+def _decomposition(file: SceneFile, states: Any, state: State, path: Path) -> None:
+    from fenics_contact.viz import plot_decomposition
+
+    plot_decomposition(file.scene, file.partitions, path, comm=file.comm)
+
+
+def _error(file: SceneFile, states: Any, state: State, path: Path) -> None:
+    from fenics_contact.viz import plot_error
+
+    parts = {body: state.errors.by_cell(body) for body in state.scene.bodies}
+    plot_error(state, path, parts, title=file.title, units=units_of(file))
+
+
+_DRAWN: dict[str, Callable[[SceneFile, Any, State, Path], None]] = {
+    "stress": _stress,
+    "pressure": _pressure,
+    "status": _status,
+    "decomposition": _decomposition,
+    "error": _error,
+}

@@ -1,0 +1,25 @@
+"""What will be built and written, before it is."""
+
+from __future__ import annotations
+
+from fenics_contact.cli.desk import Desk, facts
+from fenics_contact.scene_file import SceneFile
+
+
+def show_plan(desk: Desk, file: SceneFile, *, sensitivity: bool = False) -> None:
+    """Print what a scene calls for. Collective."""
+    plan = file.scene.plan(file.partitions, sensitivity=sensitivity)
+    rows = {line[:15].strip(): line[16:] for line in str(plan).splitlines()}
+    if file.steps and not sensitivity:
+        rows["load steps"] = str(len(file.steps))
+    desk.say(f"{file.title}: {file.source.name} on {desk.ranks}")
+    desk.show(facts(rows))
+
+
+def show_outputs(desk: Desk, file: SceneFile, *, draws: bool) -> None:
+    """Say what a run would write."""
+    output = file.document.output
+    pictures = f", pictures of {', '.join(output.pictures)}" if draws and output.pictures else ""
+    kinds = f", {', '.join(output.files)} files" if output.files else ""
+    desk.say(f"would write to {file.folder}/: result.json{kinds}{pictures}")
+    desk.say("nothing was solved (--dry-run)")

@@ -1,0 +1,144 @@
+"""`fenics-contact run`: find the equilibrium of a scene file, or go through its load steps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import typer
+
+from fenics_contact.checkpoint import Checkpoint
+from fenics_contact.cli.desk import Desk, desk_of, facts
+from fenics_contact.cli.going_on import going_on
+from fenics_contact.cli.options import (
+    DryOption,
+    OutputOption,
+    PicturesOption,
+    ResumeOption,
+    SceneArgument,
+    SetOption,
+    ToleranceOption,
+    checkpoint_of,
+    read,
+)
+from fenics_contact.cli.pictures import can_draw, draw_state
+from fenics_contact.cli.plans import show_outputs, show_plan
+from fenics_contact.cli.tables import state_facts, step_row, step_table
+from fenics_contact.contact import State
+from fenics_contact.io import ResultSeries, write_result, write_vtu, write_vtx, write_xdmf
+from fenics_contact.progress import shown
+from fenics_contact.scene_file import SceneFile
+
+#: Load steps of which maps of the status are drawn, at most.
+MAPS = 6
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command to the program."""
+    app.command("run", short_help="solve a scene file, or go through its load steps")(run)
+
+
+def run(
+    context: typer.Context,
+    scene: SceneArgument,
+    output: OutputOption = None,
+    tolerance: ToleranceOption = None,
+    settings: SetOption = None,
+    pictures: PicturesOption = True,
+    resume: ResumeOption = None,
+    dry_run: DryOption = False,
+) -> None:
+    """Find the equilibrium of a scene file, or go through its load steps."""
+    desk = desk_of(context)
+    with shown(desk.comm):
+        file = read(desk, scene, output, tolerance, settings)
+        show_plan(desk, file)
+        desk.say()
+        if dry_run:
+            show_outputs(desk, file, draws=pictures)
+            return
+        states = _through_steps(desk, file, resume) if file.steps else _at_once(desk, file)
+        drawn = draw_state(desk, file, states) if pictures and _wanted(file) and can_draw(desk) else []
+    names = ", ".join(["result.json", *_files(file), *(path.name for path in drawn)])
+    desk.say(f"results in {file.folder}/: {names}")
+
+
+def _files(file: SceneFile) -> list[str]:
+    """Return the names of files of fields that are to be opened."""
+    kinds = file.document.output.files
+    if file.steps:
+        return ["history.pvd"] if kinds else []
+    return ["state.vtm"] if "vtu" in kinds else []
+
+
+def _wanted(file: SceneFile) -> bool:
+    return bool(file.document.output.pictures)
+
+
+def _at_once(desk: Desk, file: SceneFile) -> dict[str, State]:
+    """Solve a scene without load steps and write its files. Collective."""
+    state, kinds = file.solve(), file.document.output.files
+    desk.show(facts(state_facts(state, file.document.units)))
+    if "vtu" in kinds:
+        write_vtu(state, file.folder)
+    if "xdmf" in kinds:
+        write_xdmf(state, file.folder / "state.xdmf")
+    if "vtx" in kinds:
+        write_vtx(state, file.folder)
+    write_result(state, file.folder, more=_origin(file))
+    return {file.title: state}
+
+
+def _through_steps(desk: Desk, file: SceneFile, resume: bool | None) -> dict[str, State]:
+    """Go through all load steps and write every one. Collective.
+
+    Returns:
+        Some of the states by name, the last one among them.
+    """
+    checkpoint = checkpoint_of(file, resume)
+    rows, kept = [], {}
+    chosen = set(np.unique(np.linspace(0, len(file.steps) - 1, MAPS).round().astype(int)))
+    with going_on(desk, checkpoint):
+        sequence = file.sequence(checkpoint)
+        series = ResultSeries(file.folder, "history", desk.comm, formats=file.document.output.files)
+        for number, step in enumerate(file.steps):
+            state = sequence.advance(step)
+            if file.document.output.files:
+                series.add(state, number, step.name)
+            rows.append(step_row(number, step.name, state))
+            if number in chosen:
+                kept[f"{number}: {step.name}"] = state
+        sequence.finish()
+    desk.show(step_table(rows, file))
+    desk.show(facts(state_facts(state, file.document.units), f"{file.title}: after the last step"))
+    write_result(state, file.folder, more={**_origin(file), "steps": _steps(rows)})
+    _done(desk, checkpoint)
+    return kept
+
+
+def _done(desk: Desk, checkpoint: Checkpoint | None) -> None:
+    """Remove the checkpoint of a run that is complete: the next one starts anew."""
+    if checkpoint is not None and desk.comm.rank == 0:
+        Path(checkpoint.path).unlink(missing_ok=True)
+
+
+def _origin(file: SceneFile) -> dict[str, Any]:
+    units = file.document.units
+    return {
+        "scene_file": file.source.name,
+        "title": file.title,
+        "unit_names": {"length": units.length, "force": units.force, "stress": units.stress},
+    }
+
+
+def _steps(rows: list[tuple[str, ...]]) -> dict[str, list[Any]]:
+    names = (
+        "number", "name", "iterations", "products", "open", "stick", "slip", "normal_force", "friction_force",
+        "peak_pressure",
+    )  # fmt: skip
+    kinds = (int, str, int, int, int, int, int, float, float, float)
+    return {
+        name: [kind(row[column]) for row in rows]
+        for column, (name, kind) in enumerate(zip(names, kinds, strict=True))
+    }

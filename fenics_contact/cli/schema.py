@@ -1,0 +1,38 @@
+"""`fenics-contact schema`: the JSON schema of scene files, for editors."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fenics_contact.cli.desk import desk_of
+from fenics_contact.io import write_json
+from fenics_contact.scene_file import json_schema
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command to the program."""
+    app.command("schema", short_help="JSON schema of scene files, for editors")(schema)
+
+
+def schema(
+    context: typer.Context,
+    file: Annotated[
+        Path | None,
+        typer.Argument(metavar="FILE", help="File to write; stdout unless given.", show_default=False),
+    ] = None,
+) -> None:
+    """Write the JSON schema of scene files, with which editors complete and check them.
+
+    A scene file whose first line is "#:schema scene_file.schema.json" is checked while it is written, by
+    taplo or the extension Even Better TOML.
+    """
+    desk = desk_of(context)
+    if file is None:
+        desk.say(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+        return
+    write_json(file, json_schema(), comm=desk.comm)
+    desk.say(f"schema of scene files in {file}")

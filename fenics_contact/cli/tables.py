@@ -1,0 +1,101 @@
+"""Tables of what came out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich import box
+from rich.table import Table
+
+from fenics_contact.contact import State, Status
+from fenics_contact.scene_file import SceneFile
+
+if TYPE_CHECKING:
+    from fenics_contact.scene_file.units import UnitNames
+
+
+def state_facts(state: State, units: UnitNames) -> dict[str, str]:
+    """Return what is worth knowing of a state, in words. Collective where it is balanced."""
+    counts, energy = state.counts, f"{units.force} {units.length}"
+    rows = {
+        "unknowns": f"{counts['torn_unknowns']} in {counts['subdomains']} subdomains",
+        "work": f"{counts['solver_steps']} steps, {counts['f_products']} products with F",
+        "residuals": f"natural {state.solution.natural_residual:.1e}, gluing "
+        f"{state.solution.gluing_residual:.1e}",
+        "strain energy": f"{state.energies.strain:.6g} {energy}",
+        "total potential": f"{state.energies.total_potential:.6g} {energy}",
+        "displacement": f"up to {_largest_displacement(state):.4g} {units.length}",
+    }
+    for number, words in enumerate(pairs(state, units)):
+        rows[f"contact {number}"] = words
+    if state.known_errors is not None:
+        for line in str(state.known_errors).splitlines():
+            name, _, value = line.partition(" ")
+            rows[f"error, {name}"] = value.strip()
+    rows["seconds"] = ", ".join(f"{name} {spent:.2f}" for name, spent in state.seconds.items())
+    return rows
+
+
+def pairs(state: State, units: UnitNames) -> list[str]:
+    """Return what happens at each contact pair."""
+    contact, found = state.contact, []
+    for number in range(len(state.scene.contacts)):
+        mine = contact.on_pair(number)
+        force = np.linalg.norm(contact.force[mine].sum(axis=0))
+        pressure = contact.pressure[mine].max(initial=0.0)
+        kinds = ", ".join(
+            f"{int(np.count_nonzero(contact.status[mine] == status))} {status.name.lower()}"
+            for status in Status
+        )
+        found.append(
+            f"{len(mine)} points: {kinds}; force {force:.6g} {units.force}, pressure up to {pressure:.5g} "
+            f"{units.stress}"
+        )
+    return found
+
+
+def step_row(number: int, name: str, state: State) -> tuple[str, ...]:
+    """Return a row of `step_table`."""
+    contact, counts = state.contact, state.counts
+    return (
+        str(number),
+        name,
+        str(counts["solver_steps"]),
+        str(counts["f_products"]),
+        *(str(contact.count(status)) for status in Status),
+        f"{contact.normal_force.sum():.6g}",
+        f"{_resultant(state):.6g}",
+        f"{contact.pressure.max(initial=0.0):.5g}",
+    )
+
+
+def step_table(rows: Sequence[tuple[str, ...]], file: SceneFile) -> Table:
+    """Return one row for every load step."""
+    units = file.document.units
+    table = Table(
+        title=f"{file.title}: load steps", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False
+    )
+    table.add_column("", justify="right")
+    table.add_column("step", no_wrap=True)
+    for name in (
+        "iterations", "products", "open", "stick", "slip", f"normal force\n({units.force})",
+        f"friction\n({units.force})", f"largest pressure\n({units.stress})",
+    ):  # fmt: skip
+        table.add_column(name, justify="right")
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def _resultant(state: State) -> float:
+    """Return the size of the sum of all friction forces, [force]."""
+    contact = state.contact
+    tangential = contact.force - contact.normal_force[:, None] * contact.points.normal
+    return float(np.linalg.norm(tangential.sum(axis=0)))
+
+
+def _largest_displacement(state: State) -> float:
+    moved = [np.linalg.norm(state.gather_displacement(name), axis=1).max() for name in state.scene.bodies]
+    return float(max(moved))

@@ -1,0 +1,120 @@
+"""`fenics-contact view`: numbers and a picture of a result."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from fenics_contact.cli.desk import Desk, desk_of, facts
+from fenics_contact.cli.field_files import FIELD_FILES, draw, fields_in, newest_member
+from fenics_contact.errors import InvalidInputError, MissingRequirementError, together
+from fenics_contact.io import read_result
+
+#: Entries of a result that are shown, in this order; others are long.
+SHOWN = (
+    "kind", "written", "ranks", "solver", "counts", "residuals", "energies", "errors", "seconds", "contact",
+    "optimisation", "more",
+)  # fmt: skip
+#: Longest list that is written out.
+LONGEST = 8
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the command to the program."""
+    app.command("view", short_help="numbers and a picture of a result")(view)
+
+
+def view(
+    context: typer.Context,
+    result: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RESULT",
+            help="A folder of results, a result.json, or a .vtu, .vtm or .pvd file.",
+            show_default=False,
+        ),
+    ],
+    save: Annotated[
+        Path | None, typer.Option("--save", help="PNG file to draw to.", show_default=False)
+    ] = None,
+    field: Annotated[str, typer.Option("--field", help="What the colours show.")] = "von_mises",
+    scale: Annotated[float, typer.Option("--scale", help="Factor of the displacement.")] = 1.0,
+    window: Annotated[
+        bool, typer.Option("--window/--no-window", help="Open a window where there is a display.")
+    ] = True,
+) -> None:
+    """Show what is in a result: its numbers, its fields, and a picture.
+
+    With a display a window opens that can be turned; --save writes a PNG file instead. Without a display
+    nothing opens.
+    """
+    desk = desk_of(context)
+    with together(desk.comm):
+        if desk.comm.rank == 0:
+            _view(desk, result, save, (field, scale), window=window)
+
+
+def _view(desk: Desk, result: Path, save: Path | None, look: tuple[str, float], *, window: bool) -> None:
+    if not result.exists():
+        raise InvalidInputError(
+            f"a result needs a folder or file that exists, got '{result}': correct the path"
+        )
+    if result.suffix in FIELD_FILES:
+        fields: Path | None = result
+    else:
+        record = read_result(result)
+        show_record(desk, record)
+        folder = result if result.is_dir() else result.parent
+        fields = _fields_of(folder)
+        pictures = sorted(path.name for path in folder.glob("*.png"))
+        if pictures:
+            desk.say(f"pictures in {folder}/: {', '.join(pictures)}")
+    if fields is None:
+        desk.say("no .vtm or .pvd file of fields is there to draw")
+        return
+    desk.show(facts(fields_in(fields), f"fields of {newest_member(fields).name}"))
+    try:
+        desk.say(draw(fields, save, look, window=window))
+    except MissingRequirementError as missing:
+        if save is not None:
+            raise
+        desk.say(f"no picture: {missing}")
+
+
+def _fields_of(folder: Path) -> Path | None:
+    found = [*sorted(folder.glob("*.pvd")), *sorted(folder.glob("*.vtm"))]
+    return found[0] if found else None
+
+
+def show_record(desk: Desk, record: dict[str, Any]) -> None:
+    """Print the entries of a result."""
+    for name in SHOWN:
+        value = record.get(name)
+        if value in (None, {}, []):
+            continue
+        if isinstance(value, dict):
+            desk.show(facts(dict(_flat(value)), name))
+            desk.say()
+        elif isinstance(value, list):
+            for number, part in enumerate(value):
+                desk.show(facts(dict(_flat(part)), f"{name} {number}"))
+            desk.say()
+        else:
+            desk.show(facts({name: value}))
+
+
+def _flat(value: Any, name: str = "") -> list[tuple[str, str]]:
+    """Return the parts of a nested entry by dotted name."""
+    if isinstance(value, dict):
+        parts = [_flat(part, f"{name}.{key}" if name else str(key)) for key, part in value.items()]
+        return [row for rows in parts for row in rows]
+    if isinstance(value, list):
+        shown = ", ".join(_number(part) for part in value[:LONGEST])
+        return [(name, f"{shown}, ... ({len(value)} in all)" if len(value) > LONGEST else shown)]
+    return [(name, _number(value))]
+
+
+def _number(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
