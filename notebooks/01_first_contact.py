@@ -25,11 +25,10 @@
 # %% [markdown]
 # ## Three conditions
 #
-# Inside each block the displacement $u$ [mm] obeys linear elasticity: the stress
-# $\sigma = \lambda\, \mathrm{tr}(\varepsilon)\, I + 2 G\, \varepsilon$ [N/mm²] balances the loads, with the
-# strain $\varepsilon = \tfrac12 (\nabla u + \nabla u^T)$. Where the blocks can touch, three conditions join
-# in. Let $g$ [mm] be the gap after deformation, $p$ [N/mm²] the contact pressure and $\tau$ [N/mm²] the
-# friction traction:
+# Inside each block the displacement $u$ [mm] obeys linear elasticity: the stress $\sigma = \lambda\,
+# \mathrm{tr}(\varepsilon)\, I + 2 G\, \varepsilon$ [N/mm²] balances the loads, with the strain $\varepsilon
+# = \tfrac12 (\nabla u + \nabla u^T)$. Where the blocks can touch, three conditions join in. Let $g$ [mm] be
+# the gap after deformation, $p$ [N/mm²] the contact pressure and $\tau$ [N/mm²] the friction traction:
 #
 # $$ g \ge 0, \qquad p \ge 0, \qquad g\, p = 0. $$
 #
@@ -38,8 +37,8 @@
 #
 # $$ \|\tau\| \le \mu\, p, \qquad \|\tau\| = \mu\, p \ \text{ against the motion where it slips}. $$
 #
-# These are inequalities: which points touch and which of them slip is part of the answer. That makes contact
-# nonlinear even if nothing else is.
+# These are inequalities: which points touch and which of them slip is part of the answer. That makes
+# contact nonlinear even if nothing else is.
 
 # %% [markdown]
 # ## Units
@@ -135,13 +134,13 @@ plot_contact_pressure(state, title="Under the tower", width=1200)
 
 # %% [markdown]
 # *Left the pressure: nothing on the side that lifts, most at the far edge. Right the status: open (no
-# contact), stick, and slip with arrows that show where the points slide to. In the middle it sticks; near the
-# edges, where the blocks bulge differently, it slips by less than a micrometre.*
+# contact), stick, and slip with arrows that show where the points slide to. In the middle it sticks; near
+# the edges, where the blocks bulge differently, it slips by less than a micrometre.*
 #
 # ## Is it right?
 #
-# A sheet of paper knows the resultants. The table must push back with exactly the load, 16 kN upwards and
-# 3 kN sideways. And the moment tells where the pressure's resultant acts: the push at the height $h$ = 30 mm
+# A sheet of paper knows the resultants. The table must push back with exactly the load, 16 kN upwards and 3
+# kN sideways. And the moment tells where the pressure's resultant acts: the push at the height $h$ = 30 mm
 # moves it by $e = F_x h / F_z$ from the middle.
 
 # %%
@@ -157,8 +156,8 @@ assert np.allclose(total, (-3000.0, 0.0, 16000.0), atol=1e-6)
 assert abs(resultant - 10.0 - e) < 1e-8
 
 # %% [markdown]
-# Engineers know the *middle third*: as long as the resultant stays within the middle third of the base,
-# $e \le L/6$ = 3.3 mm, nothing lifts. Here $e$ = 5.6 mm. If the pressure were distributed linearly, the
+# Engineers know the *middle third*: as long as the resultant stays within the middle third of the base, $e
+# \le L/6$ = 3.3 mm, nothing lifts. Here $e$ = 5.6 mm. If the pressure were distributed linearly, the
 # contact would be $3 (L/2 - e)$ = 13.1 mm long. It is not linear, as the pictures show, but the estimate is
 # not bad:
 
@@ -172,8 +171,8 @@ assert np.all(contact.normal_force[closed] > 0)
 
 # %% [markdown]
 # The state also knows how far off it is itself, in energy norm: what the solver left, what is missing to
-# Coulomb's law, and what the mesh cannot represent. The last is much the largest, mostly because of the sharp
-# edges; the solver stops when its own error no longer matters beside it.
+# Coulomb's law, and what the mesh cannot represent. The last is much the largest, mostly because of the
+# sharp edges; the solver stops when its own error no longer matters beside it.
 
 # %%
 print(state.errors)
@@ -181,8 +180,8 @@ print(state.errors)
 # %% [markdown]
 # ## To look at it elsewhere
 #
-# A file for [ParaView](https://www.paraview.org), with displacement, stress and all contact fields; open the
-# `.vtm`, it names the others.
+# A file for [ParaView](https://www.paraview.org), with displacement, stress and all contact fields; open
+# the `.vtm`, it names the others.
 
 # %%
 from fenics_contact.io import write_vtu
