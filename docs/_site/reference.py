@@ -32,9 +32,12 @@ ORDER = (
 ).split()
 #: Names that the reference uses and does not describe: other libraries', and the standard library's.
 OUTSIDE = [
-    ("py:.*", r"(numpy|np|scipy|sp|mpi4py|MPI|PETSc|petsc4py|dolfinx|ufl|pyvista|matplotlib|npt)\b.*"),
+    (
+        "py:.*",
+        r"(numpy|np|scipy|sp|mpi4py|MPI|PETSc|petsc4py|dolfinx|ufl|pyvista|matplotlib|npt|rich|typer|pydantic|tomlkit)\b.*",
+    ),
     ("py:.*", r"(abc|collections|enum|pathlib|typing)\..*|Path"),
-    ("py:.*", "ArrayLike|FilePath|NDArray|ndarray|dtype|generic|bool_|float64|int64"),
+    ("py:.*", "ArrayLike|Console|Table|FilePath|NDArray|ndarray|dtype|generic|bool_|float64|int64"),
 ]
 
 

@@ -80,7 +80,10 @@ def thumbnail(path: Path, root: Path) -> str | None:
     links = re.findall(r"!\[[^\]]*\]\(([^)]+\.png)\)", prose(path))
     name = path.stem.removeprefix("demo_")
     bodies = [root / "docs" / "pictures" / f"{name}_{kind}.png" for kind in BODIES]
-    shown = [*filter(Path.exists, bodies), *((path.parent / link).resolve() for link in links)]
+    shown = [
+        *filter(Path.exists, bodies),
+        *filter(Path.exists, ((path.parent / link).resolve() for link in links)),
+    ]
     return f"/{shown[0].relative_to(root)}" if shown else None
 
 
