@@ -25,14 +25,19 @@ def html(site: Site, page: str) -> Page:
     return site.pages[site.folder / f"{page}.html"]
 
 
+def inventory(site: Site) -> dict[str, set[str]]:
+    """Return what can be linked to, names by kind."""
+    data = InventoryFile.loads((site.folder / "objects.inv").read_bytes(), uri="").data
+    return {kind: set(names) for kind, names in data.items()}
+
+
 def test_it_builds_without_a_warning(site: Site) -> None:
     assert site.log == ""
     assert site.returncode == 0
 
 
 def test_every_public_name_is_in_the_reference(site: Site) -> None:
-    inventory = InventoryFile.loads((site.folder / "objects.inv").read_bytes(), uri="").data
-    described = {name for kind, names in inventory.items() if kind.startswith("py:") for name in names}
+    described = {name for kind, names in inventory(site).items() if kind.startswith("py:") for name in names}
     assert len(reference.rooms()) > 10
     wanted = {place for room in reference.rooms() for place in reference.homes(room).values()}
     assert len(wanted) > 150
@@ -78,6 +83,13 @@ def test_every_notebook_is_a_page(site: Site) -> None:
     assert sources
     for source in sources:
         assert f"../notebooks/{source.stem}.html" in html(site, "docs/notebooks").links
+
+
+def test_the_glossary_explains_the_terms_of_the_field(site: Site) -> None:
+    terms = {name.lower() for name in inventory(site)["std:term"]}
+    wanted = {"slave", "master", "gap", "active set", "multiplier", "coarse problem", "Total FETI", "mortar"}
+    wanted |= {"Tresca friction", "Coulomb friction", "Clarke subgradient", "adjoint", "bundle", "subdomain"}
+    assert {term.lower() for term in wanted} - terms == set()
 
 
 def test_equations_are_drawn_without_the_network_where_debian_has_mathjax(site: Site) -> None:
