@@ -29,6 +29,11 @@ class Checkpoint:
             it.
         comm: Communicator on which the run is replicated: rank 0 reads and writes. Only a function that does
             not know its communicator needs it.
+
+    Example:
+        >>> kept = Checkpoint("output/run.npz", every=5)
+        >>> states = solve_steps(scene, steps, None, comm, checkpoint=kept)  # doctest: +SKIP
+        >>> result = minimize(problem, start, bounds=(-1.0, 1.0), checkpoint=kept)  # doctest: +SKIP
     """
 
     path: str | Path

@@ -37,7 +37,7 @@ class Energies:
 
     @property
     def primal(self) -> float:
-        """Functional that the displacement minimises at given slip bounds: total potential plus friction."""
+        """Functional that the displacement minimises at given slip bounds, total potential plus friction."""
         return self.total_potential + self.friction
 
 
