@@ -44,7 +44,10 @@ FLOORS = [
     [Room("accuracy", "error estimates and certificates", "model")],
     [Room("contact", "scene → state: friction laws, load steps", "model", "4")],
     [Room("shape", "design → mesh → adjoint → subgradient", "model", "5")],
-    [Room("optimize", "bundle trust method: NumPy alone", "numbers", "6")],
+    [
+        Room("optimize", "bundle trust method: NumPy alone", "numbers", "6"),
+        Room("outer", "plain functions for other tools", "model"),
+    ],
 ]
 BESIDE = [
     Room("viz", "pictures", "beside"),

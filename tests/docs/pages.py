@@ -57,6 +57,11 @@ def snippets_of(text: str) -> list[Snippet]:
     return found
 
 
+def fences_of(text: str, language: str) -> list[str]:
+    """Return what stands in the fences of a language."""
+    return [fence[2] for fence in _FENCE.finditer(text) if fence[1] == language]
+
+
 def agrees(printed: str, page: str) -> bool:
     """Tell whether a page shows what was printed: words as they are, numbers to `TOLERANCE`.
 

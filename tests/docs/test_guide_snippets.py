@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import io
+import tomllib
 from pathlib import Path
 
 import pytest
+from mpi4py import MPI
 
-from tests.docs.pages import DOCS, GUIDE, ROOT, Snippet, agrees, snippets_of
+from fenics_contact.scene_file import read_scene_file
+from tests.docs.pages import DOCS, GUIDE, ROOT, Snippet, agrees, fences_of, snippets_of
 
 #: Pages that every test run executes; the others take longer together.
 QUICK = {"first_scene"}
@@ -84,3 +87,10 @@ def test_output_is_that_of_the_fence_right_behind() -> None:
 )
 def test_a_page_agrees_with_what_was_printed(printed: str, page: str, same: bool) -> None:
     assert agrees(printed, page) is same
+
+
+def test_the_scene_file_of_the_guide_is_read() -> None:
+    (text,) = fences_of((GUIDE / "command_line.md").read_text(), "toml")
+    file = read_scene_file(tomllib.loads(text), MPI.COMM_SELF)
+    assert file.title == "Pad on a floor"
+    assert len(file.steps) == 4
