@@ -98,8 +98,8 @@ def box(room: Room, x: float, y: float, width: float, height: float = HEIGHT) ->
     fill, line = FILL[room.kind]
     parts = [
         f'<g data-room="{room.name}" data-y="{y:g}">',
-        f'<rect x="{x:g}" y="{y:g}" width="{width:g}" height="{height:g}" rx="6" fill="{fill}" stroke="{line}" '
-        'stroke-width="1.4"/>',
+        f'<rect x="{x:g}" y="{y:g}" width="{width:g}" height="{height:g}" rx="6" fill="{fill}" '
+        f'stroke="{line}" stroke-width="1.4"/>',
         text(x + 14, y + 19, room.name, 14.5, font_weight="bold", fill="#1c262b"),
         text(x + 14, y + 35.5, room.purpose, 11.5, fill="#455a64"),
     ]
@@ -127,14 +127,16 @@ def picture() -> str:
         '<defs><marker id="tip" viewBox="0 0 10 10" refX="8" refY="5" markerWidth="7" markerHeight="7" '
         'orient="auto-start-reverse"><path d="M0 0 10 5 0 10z" fill="#78909c"/></marker></defs>',
         text(LEFT, 32, "fenics_contact", 20, font_weight="bold", fill="#1c262b"),
-        text(LEFT, 52, "Imports point down. Rooms on one floor do not know each other.", 12.5, fill="#455a64"),
+        text(
+            LEFT, 52, "Imports point down. Rooms on one floor do not know each other.", 12.5, fill="#455a64"
+        ),
         *(box(room, LEFT, top_row + index * STEP, WIDTH) for index, room in enumerate(TOP)),
     ]
     for level, rooms in enumerate(reversed(FLOORS)):
         parts += row(rooms, LEFT, first + level * STEP, WIDTH)
     parts.append(
-        f'<line x1="{LEFT - 16}" y1="{top_row + 4}" x2="{LEFT - 16}" y2="{bottom + HEIGHT - 4}" stroke="#78909c" '
-        'stroke-width="1.6" marker-end="url(#tip)"/>'
+        f'<line x1="{LEFT - 16}" y1="{top_row + 4}" x2="{LEFT - 16}" y2="{bottom + HEIGHT - 4}" '
+        'stroke="#78909c" stroke-width="1.6" marker-end="url(#tip)"/>'
     )
     for index, room in enumerate(BESIDE):
         parts.append(box(room, ASIDE, first + index * STEP, ASIDE_WIDTH))
@@ -163,7 +165,8 @@ def legend(y: float) -> list[str]:
         fill, line = FILL[kind]
         place = y + 18 * index
         parts.append(
-            f'<rect x="{ASIDE}" y="{place - 10:g}" width="16" height="12" rx="3" fill="{fill}" stroke="{line}"/>'
+            f'<rect x="{ASIDE}" y="{place - 10:g}" width="16" height="12" rx="3" fill="{fill}" '
+            f'stroke="{line}"/>'
         )
         parts.append(text(ASIDE + 26, place, words, 11, fill="#455a64"))
     return parts

@@ -7,15 +7,23 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from fenics_contact.checkpoint import Checkpoint
+from fenics_contact.checkpoint import Checkpoint, interruptible
 from fenics_contact.cli.desk import Desk
-from fenics_contact.cli.endings import Terminated
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError
 
 
 @contextmanager
 def going_on(desk: Desk, checkpoint: Checkpoint | None) -> Iterator[None]:
-    """Say how a run goes on that does not come to its end."""
+    """Let signals stop the block where it can go on, and say how a run goes on that did not come to its end.
+
+    Collective.
+    """
+    with interruptible(desk.comm), _telling(desk, checkpoint):
+        yield
+
+
+@contextmanager
+def _telling(desk: Desk, checkpoint: Checkpoint | None) -> Iterator[None]:
     if checkpoint is None:
         yield
         return
@@ -29,7 +37,7 @@ def going_on(desk: Desk, checkpoint: Checkpoint | None) -> Iterator[None]:
         if found:
             raise InvalidInputError(f"{error} (with --fresh the run starts anew)") from error
         raise
-    except (KeyboardInterrupt, Terminated, ConvergenceError, InfeasibleError):
+    except (ConvergenceError, InfeasibleError):
         if desk.comm.rank == 0 and path.exists():
             sys.stderr.write(f"what is done is kept in {path}; the same command goes on from there\n")
         raise

@@ -22,6 +22,7 @@ from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem, TornSystem
 from fenics_contact.feti.temperature import temperature_of
+from fenics_contact.progress import Task
 from fenics_contact.qp import DualSolution
 from fenics_contact.scene import Scene
 
@@ -101,9 +102,10 @@ class State:
             return self.known_errors
         from fenics_contact.accuracy import discretisation_error, solver_errors, state_errors
 
-        solver = solver_errors(self.system, self.solution)
-        estimate = discretisation_error(self.torn, self.torn_displacement)
-        return state_errors(solver, estimate, self.energies.norm)
+        with Task("errors"):
+            solver = solver_errors(self.system, self.solution)
+            estimate = discretisation_error(self.torn, self.torn_displacement)
+            return state_errors(solver, estimate, self.energies.norm)
 
     @cached_property
     def contact_places(self) -> np.ndarray:

@@ -50,8 +50,8 @@ class Coulomb:
 class Tresca:
     """Friction with a slip bound that does not depend on the pressure.
 
-    Not on whether there is any, either: it also acts on points across an open gap, as in the classical problem
-    with given friction. Use it where surfaces are known to touch.
+    Not on whether there is any, either: it also acts on points across an open gap, as in the classical
+    problem with given friction. Use it where surfaces are known to touch.
 
     Attributes:
         traction: Bound on the tangential traction, ≥ 0, [force / length²].

@@ -78,6 +78,15 @@ class MeshFile(Placed):
         None, description="groups of facets that are surfaces; or surface to group or groups (all)"
     )
 
+    labels: str | None = Field(
+        None,
+        description="not for .msh and .xdmf: sets, blocks, pieces, or cell data that say which cells belong "
+        "together",
+    )
+    corners_only: bool = Field(
+        False, description="drop all nodes but the corners of quadratic cells (not for .msh and .xdmf)"
+    )
+
     def build(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:
         """Read the file on rank 0. Collective.
 
@@ -88,15 +97,15 @@ class MeshFile(Placed):
 
     def _read(self, folder: Path, comm: MPI.Comm) -> Mapping[str, BodyMesh]:
         path = folder / self.file
+        if path.suffix in (".msh", ".xdmf") and (self.labels is not None or self.corners_only):
+            raise InvalidInputError(
+                f"labels and corners_only are for other formats than .msh and .xdmf, got {self.file!r}: "
+                "choose groups with bodies and surfaces"
+            )
         if path.suffix == ".msh":
             return geometry.read_msh(path, self.bodies, self.surfaces, comm=comm)
         if path.suffix == ".xdmf":
             return geometry.read_xdmf(path, self.bodies, self.surfaces, comm=comm)
-        reader = getattr(geometry, "read_mesh", None)
-        if reader is None:
-            raise InvalidInputError(
-                f"a mesh file must end in .msh or .xdmf, got {self.file!r}: convert it, for instance with "
-                "`meshio convert`"
-            )
-        found: Mapping[str, BodyMesh] = reader(path, self.bodies, self.surfaces, comm=comm)
-        return found
+        return geometry.read_mesh(
+            path, self.bodies, self.surfaces, labels=self.labels, corners_only=self.corners_only, comm=comm
+        )

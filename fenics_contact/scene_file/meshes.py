@@ -32,7 +32,7 @@ def _ticks(low: float, high: float, count: int, grading: float) -> np.ndarray:
     if grading == 0.0:
         return np.linspace(low, high, count + 1)
     share = graded(count, abs(grading))
-    return low + (high - low) * (share if grading > 0 else 1.0 - share[::-1])
+    return low + (high - low) * share if grading > 0 else high - (high - low) * share[::-1]
 
 
 class _Single(Placed):

@@ -122,6 +122,7 @@ class SceneFile:
             solver=solver.chosen(scene, self.partitions),
             tolerance=solver.accuracy(),
             checkpoint=checkpoint,
+            count=len(self.steps),
         )
 
     def require_design(self) -> None:

@@ -9,13 +9,12 @@ from typing import Any
 
 import tomlkit
 import tomlkit.exceptions
-import tomlkit.items
 
+from fenics_contact.scene_file.lines import line_of
 from fenics_contact.scene_file.mistakes import Mistake, SceneFileError
 from fenics_contact.scene_file.places import Path, replaced, value_at
 
 _OPEN = "; a bracket or quote may be open on a line before"
-_MARK = "\u241f"  # stands in no file
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,48 +92,12 @@ def parse(text: str, name: str, folder: FilePath) -> Source:
     return Source(name, folder, data, text)
 
 
-def line_of(text: str, path: Path) -> int:
-    """Return the line, from 1, on which a key or table of a TOML text begins; 0 where it is not there.
-
-    A key is marked in a copy of the document, whose text first differs there.
-    """
-    document = tomlkit.parse(text)
-    while path:
-        if value_at(document, path) is not None:
-            break
-        path = path[:-1]
-    if not path:
-        return 0
-    try:
-        marked = _marked(document, path)
-    except (tomlkit.exceptions.TOMLKitError, KeyError, TypeError, ValueError, IndexError):
-        return line_of(text, path[:-1])
-    differing = (at for at, (one, other) in enumerate(zip(text, marked, strict=False)) if one != other)
-    place = next(differing, min(len(text), len(marked)))
-    return text.count("\n", 0, place) + 1
-
-
-def _marked(document: Any, path: Path) -> str:
-    """Return the text with a mark at a key, or at the head of a table."""
-    parent = value_at(document, path[:-1])
-    item = parent[path[-1]]
-    if isinstance(item, tomlkit.items.AoT):
-        return _marked(document, (*path, 0))
-    if isinstance(item, tomlkit.items.Table):
-        if item.is_super_table():  # has no head of its own
-            return _marked(document, (*path, next(iter(item))))
-        item.comment(_MARK)
-    else:
-        parent[path[-1]] = _MARK
-    return tomlkit.dumps(document)
-
-
 def _parsed(override: str) -> tuple[Path, Any]:
     key, equals, value = override.partition("=")
     if not equals:
         raise ValueError("there is no =")
     path: list[str] = []
-    inner: Any = tomlkit.parse(f"{key} = {_MARK!r}").unwrap()
+    inner: Any = tomlkit.parse(f"{key} = ''").unwrap()
     while isinstance(inner, Mapping):
         ((part, inner),) = inner.items()
         path.append(part)

@@ -11,7 +11,7 @@ import numpy as np
 from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.optimize import BundleTrust, LinearConstraints, Result, minimize
-from fenics_contact.optimize.bundle_trust import Callback
+from fenics_contact.optimize.progress import Callback
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import Scene
 from fenics_contact.scene_file.design import TOTAL_POTENTIAL, DesignPart, VolumeConstraint

@@ -96,7 +96,12 @@ def _equal(have: str, wanted: str) -> bool:
 
 
 def links_of(text: str) -> list[str]:
-    """Return the targets of a page's links and pictures, those to other hosts and headings left out."""
-    prose = _FENCE.sub("", text)
-    targets = [target.partition("#")[0] for target in _LINK.findall(prose)]
-    return [target for target in targets if target and not re.match(r"[a-z]+:", target)]
+    """Return the targets of a page's links and pictures, those to other hosts left out."""
+    targets = _LINK.findall(_FENCE.sub("", text))
+    return [target for target in targets if not re.match(r"[a-z]+:", target)]
+
+
+def anchors_of(text: str) -> set[str]:
+    """Return what links call the headings of a page."""
+    headings = re.findall(r"^#+ (.*)$", _FENCE.sub("", text), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in headings}

@@ -1,0 +1,74 @@
+"""The example scene files have the states that the same scenes have in Python, on one rank and on two."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.scene_file import SceneFileError, read_scene_file
+from tests.conftest import ROOT
+from tests.scene_file.compared import compare_states, two_blocks
+
+SCRIPT = Path(__file__).with_name("compared.py")
+SCENES = ROOT / "demos" / "scenes"
+
+
+def test_two_blocks_are_those_of_python() -> None:
+    assert compare_states("two_blocks", two_blocks, MPI.COMM_SELF) == 1
+
+
+def test_two_blocks_are_those_of_python_on_two_ranks(mpirun: Callable[..., str]) -> None:
+    assert mpirun(SCRIPT, 2, "two_blocks") == "same 1\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize(("name", "count"), [("sheared_block", 10), ("hertz", 1), ("chain_links", 3)])
+def test_an_example_is_that_of_python(name: str, count: int, ranks: int, mpirun: Callable[..., str]) -> None:
+    assert mpirun(SCRIPT, ranks, name, timeout=300.0) == f"same {count}\n"
+
+
+def test_a_side_of_a_block_can_be_designed() -> None:
+    design = {
+        "surfaces": [{"body": "upper", "surface": "z0", "net": [2, 2], "lower": -0.01, "upper": 0.01}],
+        "constraints": [
+            {"kind": "volume", "at_least": 0.99, "at_most": 1.5},
+            {"kind": "linear", "coefficients": [1, 1, 1, 1], "at_most": 0.01},
+        ],
+    }
+    data = read_scene_file(SCENES / "two_blocks.toml", MPI.COMM_SELF).source.data
+    task = read_scene_file({**data, "design": design}, MPI.COMM_SELF).shape_task()
+    assert task.problem.size == 4
+    moved = task.problem.points_of(np.full(4, 0.01))["upper"]
+    bottom = task.problem.designs[0].surface.nodes
+    np.testing.assert_allclose(moved[bottom, 2], 1.0 - 0.01, atol=1e-12)  # added material: downwards
+    assert task.constraints is not None
+    matrix, limit = np.asarray(task.constraints.matrix), np.asarray(task.constraints.limit)
+    volume, gradient = task.problem.volume(task.start)
+    assert volume == pytest.approx(4.0)
+    np.testing.assert_allclose(matrix, [-gradient, gradient, np.ones(4)])
+    np.testing.assert_allclose(limit, [0.01 * volume, 0.5 * volume, 0.01])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"surface": "z7"}, "a design needs the surface 'contact' of a chain link or a flat side of a block"),
+        ({"net": [9, 9]}, "a net of \\(9, 9\\) control points needs at least as many nodes each way"),
+        ({"body": "uper"}, 'design.surfaces.0.body must be a body, one of .*, got "uper"'),
+    ],
+)
+def test_a_design_that_cannot_be_is_named(change: dict[str, object], message: str) -> None:
+    surface = {"body": "upper", "surface": "z0", "net": [2, 2], "lower": -0.01, "upper": 0.01, **change}
+    data = read_scene_file(SCENES / "two_blocks.toml", MPI.COMM_SELF).source.data
+    with pytest.raises(SceneFileError, match=message):
+        read_scene_file({**data, "design": {"surfaces": [surface]}}, MPI.COMM_SELF).shape_task()
+
+
+def test_a_file_without_a_design_cannot_be_optimised() -> None:
+    with pytest.raises(SceneFileError, match=r"two_blocks.toml: an optimisation needs \[design\] with"):
+        read_scene_file(SCENES / "two_blocks.toml", MPI.COMM_SELF).shape_task()

@@ -1,0 +1,249 @@
+"""What the tables of a scene file become."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact import scene
+from fenics_contact.geometry import block, chain, half_disc, hemisphere, read_msh, rectangle
+from fenics_contact.geometry.ring import LinkShape
+from fenics_contact.scene_file import Expression, SceneFile, SceneFileError, VectorExpression, read_scene_file
+from tests.conftest import ROOT
+
+SELF = MPI.COMM_SELF
+BLOCK = {"shape": "block", "lower": [0, 0, 0], "upper": [2, 1, 1], "counts": [4, 2, 2]}
+STEEL = {"young_modulus": 2.1e5, "poisson_ratio": 0.3, "thermal_expansion": 1.2e-5}
+FLOOR = {"obstacle": "plane", "point": [0, 0, 0], "normal": [0, 0, 1]}
+
+
+def file_of(*, mesh: dict[str, Any] = BLOCK, material: dict[str, Any] = STEEL, **more: Any) -> SceneFile:
+    """A scene of one body "a"."""
+    body = {"mesh": "m", "material": "s", **more.pop("body", {})}
+    return read_scene_file(
+        {"meshes": {"m": mesh}, "materials": {"s": material}, "bodies": {"a": body}, **more}, SELF
+    )
+
+
+def mesh_of(**mesh: Any) -> Any:
+    plane = mesh["shape"] in ("rectangle", "half_disc")
+    material = {**STEEL, "model": "plane_strain"} if plane else STEEL
+    return file_of(mesh=mesh, material=material).scene.bodies["a"].mesh
+
+
+def test_shapes_are_those_of_the_package() -> None:
+    found = mesh_of(shape="hemisphere", radius=2.0, n=3, symmetry="x")
+    np.testing.assert_array_equal(found.points, hemisphere(2.0, 3, symmetry="x").points)
+    found = mesh_of(shape="half_disc", radius=2.0, n=3)
+    np.testing.assert_array_equal(found.points, half_disc(2.0, 3).points)
+    found = mesh_of(shape="rectangle", lower=[0, 0], upper=[1, 2], counts=[2, 3], cell="triangle")
+    np.testing.assert_array_equal(found.cells, rectangle((0, 0), (1, 2), (2, 3), "triangle").cells)
+
+
+def test_a_grading_makes_cells_small_at_one_end() -> None:
+    found = mesh_of(**{**BLOCK, "counts": [4, 4, 4], "grading": [2.0, -2.0, 0.0]})
+    x, y, z = (np.diff(np.unique(found.points[:, axis].round(12))) for axis in range(3))
+    assert np.all(np.diff(x) > 0)
+    np.testing.assert_allclose(x / 2, y[::-1])
+    np.testing.assert_allclose(z, 0.25)
+
+
+def test_quadratic_cells_are_bent_onto_the_ball() -> None:
+    found = mesh_of(shape="hemisphere", radius=2.0, n=3, quadratic=True)
+    assert found.order == 2
+    nodes = np.unique(found.surfaces["contact"])
+    np.testing.assert_allclose(np.linalg.norm(found.points[nodes] - (0, 0, 2.0), axis=1), 2.0)
+
+
+def test_a_mesh_is_scaled_then_turned_then_moved() -> None:
+    found = mesh_of(**BLOCK, scale=2.0, axis=[0, 0, 3], degrees=90.0, translate=[1, 0, 0])
+    x, y, z = block((0, 0, 0), (2, 1, 1), (4, 2, 2)).points.T
+    np.testing.assert_allclose(found.points, np.column_stack([1 - 2 * y, 2 * x, 2 * z]))
+
+
+def test_the_parts_of_a_chain_are_its_links() -> None:
+    mesh = {"shape": "chain", "links": 3, "n_around": 24, "n_a": 2, "n_b": 6}
+    file = file_of(mesh=mesh, body={"part": "2"})
+    links = chain([LinkShape(n_around=24, n_a=2, n_b=6)] * 3).links
+    np.testing.assert_array_equal(file.scene.bodies["a"].mesh.points, links[1].mesh.points)
+    with pytest.raises(SceneFileError, match=r"bodies.a must have 'part', one of \['1', '2', '3'\]"):
+        _ = file_of(mesh=mesh).scene
+
+
+def test_bodies_come_from_mesh_files() -> None:
+    data = ROOT / "tests" / "data" / "two_boxes_41.msh"
+    known = read_msh(data)
+    name = sorted(known)[0]
+    found = file_of(mesh={"file": str(data)}, body={"part": name}).scene.bodies["a"].mesh
+    np.testing.assert_array_equal(found.points, known[name].points)
+    with pytest.raises(SceneFileError, match="must be a body of the mesh 'm', one of"):
+        _ = file_of(mesh={"file": str(data)}, body={"part": "nothing"}).scene
+    with pytest.raises(SceneFileError, match="labels and corners_only are for other formats than"):
+        _ = file_of(mesh={"file": str(data), "labels": "sets"}).scene
+
+
+@pytest.mark.parametrize(
+    ("given", "built"),
+    [
+        (STEEL, scene.IsotropicElasticity(2.1e5, 0.3, 1.2e-5)),
+        (
+            {
+                "model": "orthotropic", "young_moduli": [3, 2, 1], "poisson_ratios": [0.1, 0.2, 0.3],
+                "shear_moduli": [1, 1, 1], "axis_1": [0, 2, 0], "axis_2": [-1, 1, 0],
+            },
+            scene.OrthotropicElasticity(
+                (3, 2, 1), (0.1, 0.2, 0.3), (1, 1, 1), scene.material_axes((0, 1, 0), (-1, 0, 0))
+            ),
+        ),
+    ],
+    ids=["isotropic", "orthotropic"],
+)  # fmt: skip
+def test_materials_are_those_of_the_package(given: dict[str, Any], built: scene.Material) -> None:
+    assert file_of(material=given).scene.bodies["a"].material == built
+
+
+OWN = """
+from dataclasses import dataclass
+from fenics_contact.scene import IsotropicElasticity
+
+@dataclass(frozen=True)
+class Soft(IsotropicElasticity):
+    layers: tuple[float, ...] = ()
+"""
+
+
+def test_a_material_of_ones_own_comes_from_a_python_file(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(OWN)
+    parameters = "{ young_modulus = 2.0, poisson_ratio = 0.1, layers = [1.0, 2.0] }"
+    text = f"""
+meshes.m = {{ shape = "block", lower = [0, 0, 0], upper = [1, 1, 1], counts = [1, 1, 1] }}
+materials.s = {{ model = "own.py:Soft", parameters = {parameters} }}
+bodies.a = {{ mesh = "m", material = "s" }}
+"""
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    material: Any = read_scene_file(path, SELF).scene.bodies["a"].material
+    assert (type(material).__name__, material.young_modulus, material.layers) == ("Soft", 2.0, (1.0, 2.0))
+    for old, new, message in (
+        ("own.py:Soft", "own.py:Hard", r"materials.s: '.*own.py' must define 'Hard', it defines \['Soft'\]"),
+        ("layers =", "sheets =", "materials.s: parameters must be what 'own.py:Soft' takes"),
+    ):
+        path.write_text(text.replace(old, new))
+        with pytest.raises(SceneFileError, match=message):
+            _ = read_scene_file(path, SELF).scene
+    (tmp_path / "own.py").write_text("1 / 0")
+    path.write_text(text)
+    with pytest.raises(SceneFileError, match="must run without errors, it raised ZeroDivisionError"):
+        _ = read_scene_file(path, SELF).scene
+
+
+def test_loads_and_supports_are_those_of_the_package() -> None:
+    loads = [
+        {"kind": "traction", "body": "a", "surface": "z1", "value": ["x", 0, 1.5]},
+        {"kind": "total_force", "body": "a", "surface": "z1", "value": [1, 2, 3]},
+        {"kind": "pressure", "body": "a", "surface": "x1", "value": "2 * z"},
+        {"kind": "body_force", "body": "a", "value": [0, 0, -1]},
+        {"kind": "gravity", "body": "a", "density": 2.0, "acceleration": [0, 0, -10]},
+        {"kind": "thermal", "body": "a", "value": 50},
+    ]
+    supports = [
+        {"body": "a", "surface": "z0"},
+        {"body": "a", "surface": "x0", "value": ["0.1 * y", "free", 0.5]},
+    ]
+    found = file_of(loads=loads, supports=supports).scene
+    assert list(found.loads) == [
+        scene.Traction("a", "z1", VectorExpression((Expression("x"), 0.0, 1.5))),
+        scene.TotalForce("a", "z1", (1.0, 2.0, 3.0)),
+        scene.Pressure("a", "x1", Expression("2 * z")),
+        scene.BodyForce("a", (0.0, 0.0, -1.0)),
+        scene.gravity("a", 2.0, (0, 0, -10)),
+        scene.ThermalStrain("a", 50.0),
+    ]
+    assert list(found.supports) == [
+        scene.Support("a", "z0"),
+        scene.Support("a", "x0", (Expression("0.1 * y"), None, 0.5)),
+    ]
+
+
+def test_obstacles_and_laws_of_friction_are_those_of_the_package() -> None:
+    masters = [
+        FLOOR,
+        {"obstacle": "sphere", "centre": [0, 0, -9], "radius": 9, "hollow": False},
+        {"obstacle": "cylinder", "point": [0, 0, -9], "axis": [1, 0, 0], "radius": 9},
+        {"obstacle": "distance", "formula": "z"},
+    ]
+    laws: list[dict[str, Any]] = [
+        {"law": "none"}, {"law": "coulomb", "coefficient": 0.2}, {"law": "tresca", "traction": 3},
+        {"law": "none"},
+    ]  # fmt: skip
+    contacts = [
+        {"slave": {"body": "a", "surface": "z0"}, "master": master, "friction": law}
+        for master, law in zip(masters, laws, strict=True)
+    ]
+    found = file_of(contacts=contacts).scene.contacts
+    assert [pair.friction for pair in found] == [None, scene.Coulomb(0.2), scene.Tresca(3.0), None]
+    assert [pair.master for pair in found] == [
+        scene.RigidPlane((0, 0, 0), (0, 0, 1)),
+        scene.RigidSphere((0, 0, -9), 9.0),
+        scene.RigidCylinder((0, 0, -9), (1, 0, 0), 9.0),
+        scene.DistanceObstacle(Expression("z")),
+    ]
+
+
+def test_a_formula_in_z_is_refused_for_plane_bodies() -> None:
+    file = file_of(
+        mesh={"shape": "rectangle", "lower": [0, 0], "upper": [1, 1], "counts": [1, 1]},
+        material={**STEEL, "model": "plane_stress"},
+        loads=[{"kind": "pressure", "body": "a", "surface": "y1", "value": "z"}],
+    )
+    with pytest.raises(
+        SceneFileError, match=r"loads\.0: the formula 'z' depends on z, but the bodies lie in"
+    ):
+        _ = file.scene
+
+
+def test_subdomains_are_boxes_or_a_number_of_parts() -> None:
+    cut = file_of(solver={"subdomains": [2, 1, 1]}).partitions["a"]
+    assert (cut.max() + 1, np.bincount(cut).tolist()) == (2, [8, 8])
+    assert file_of(solver={"subdomains": {"a": 3}}).partitions["a"].max() + 1 == 3
+    with pytest.raises(SceneFileError, match=r"solver.subdomains: boxes\[0\] must be at most the 4 layers"):
+        _ = file_of(solver={"subdomains": [9, 1, 1]}).partitions
+
+
+def test_steps_go_from_value_to_value() -> None:
+    supports = [
+        {"name": "top", "body": "a", "surface": "z1", "value": [0, "free", -1]},
+        {"body": "a", "surface": "z0"},
+    ]
+    loads = [{"name": "push", "kind": "pressure", "body": "a", "surface": "x1", "value": "x"}]
+    steps: list[dict[str, Any]] = [
+        {"name": "press"},
+        {"name": "shift", "count": 2, "supports": {"top": [3, "free", -1]}},
+        {"name": "push", "count": 2, "loads": {"push": "3 * x"}},
+    ]
+    found = file_of(supports=supports, loads=loads, steps=steps).steps
+    assert [step.name for step in found] == ["press", "shift 1/2", "shift 2/2", "push 1/2", "push 2/2"]
+    assert [step.supports[0].value for step in found if step.supports] == [
+        (0.0, None, -1.0), (1.5, None, -1.0), (3.0, None, -1.0), (3.0, None, -1.0), (3.0, None, -1.0),
+    ]  # fmt: skip
+    assert all(step.supports and step.supports[1].value == (0.0, 0.0, 0.0) for step in found)
+    pushed = [step.loads[0].value(np.array([[2.0, 0, 0]])) for step in found if step.loads]  # type: ignore[operator,union-attr]
+    np.testing.assert_allclose(np.ravel(pushed), [2, 2, 2, 4, 6])
+
+
+def test_steps_must_keep_what_is_free() -> None:
+    supports = [{"name": "top", "body": "a", "surface": "z1", "value": [0, "free", -1]}]
+    with pytest.raises(
+        SceneFileError, match=r"steps.0.supports.top must have the form of 'top' itself, \[0.0, "
+    ):
+        file_of(supports=supports, steps=[{"supports": {"top": [0, 0, 0]}}])
+
+
+def test_two_supports_cannot_have_one_name() -> None:
+    twice = [{"name": "top", "body": "a", "surface": surface} for surface in ("z0", "z1")]
+    with pytest.raises(SceneFileError, match=r'supports\.1\.name must be a name of its own, got "top" twice'):
+        file_of(supports=twice)
