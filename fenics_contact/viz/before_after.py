@@ -16,7 +16,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.shape import DesignPoint
 from fenics_contact.viz.colours import BLUE, GREY, ORANGE, PRESSURE_MAP
 from fenics_contact.viz.patch import contact_patch
-from fenics_contact.viz.patch_axes import label_axes
+from fenics_contact.viz.patch_axes import label_axes, label_axis
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.pressure import draw_pressure
 from fenics_contact.viz.profile import Profile, profiles
@@ -124,22 +124,31 @@ def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> N
     high = np.maximum(patches[0].high, patches[1].high)
     shown = look.clim or (0.0, max(float(patch.pressure.max()) for patch in patches) or 1.0)
     found = profiles(first, best, look.reach)
-    tall = [float((high - low)[1] / (high - low)[0]), *(_proportion(profile) for profile in found)]
-    height = 0.14 + 0.42 * tall[0] + 0.45 * max(tall[1:])
-    with sheet(paper, (look.width, round(height * look.width)), look.headline, "constrained") as figure:
-        panels = figure.subplots(2, 2, gridspec_kw={"height_ratios": [tall[0], max(tall[1:])]})
-        for axes, patch, word in zip(panels[0], patches, ("before", "after"), strict=True):
+    # Sections are equally high and together as wide as the picture, but not too high.
+    tall = [0.4 * float((high - low)[1] / (high - low)[0]) + 0.08]
+    tall.append(min(0.8 / sum(1 / _proportion(profile) for profile in found), 0.45) + 0.11)
+    size = look.width, round((sum(tall) + 0.03) * look.width)
+    with sheet(paper, size, look.headline, "constrained") as figure:
+        upper, lower = figure.subfigures(2, 1, height_ratios=tall)
+        panels = upper.subplots(1, 2)
+        for axes, patch, word in zip(panels, patches, ("before", "after"), strict=True):
             draw_pressure(axes, patch, shown)
             axes.set_title(f"{word}: pressure on {patch.name}")
             label_axes(axes, replace(patch, low=low, high=high), look.units)
         extend = "max" if max(float(patch.pressure.max()) for patch in patches) > shown[1] else "neither"
         key = ScalarMappable(Normalize(*shown), PRESSURE_MAP)
         words = f"contact pressure ({look.units.stress})"
-        figure.colorbar(key, ax=panels[0].tolist(), label=words, extend=extend)
-        factor = min(profile.factor for profile in found)
-        for axes, profile in zip(panels[1], found, strict=True):
-            _draw_profile(axes, profile, factor, look.units)
-        figure.legend(*panels[1, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+        upper.colorbar(key, ax=panels.tolist(), label=words, extend=extend)
+        _draw_sections(lower, found, look.units)
+
+
+def _draw_sections(figure: Any, found: list[Profile], units: Units) -> None:
+    ratios = {"width_ratios": [1 / _proportion(profile) for profile in found]}
+    panels = figure.subplots(1, len(found), gridspec_kw=ratios)
+    factor = min(profile.factor for profile in found)
+    for axes, profile in zip(panels, found, strict=True):
+        _draw_profile(axes, profile, factor, units)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
 
 
 def _draw_in_plane(first: State, best: State, paper: BinaryIO, look: _Look) -> None:
@@ -156,14 +165,15 @@ def _draw_in_plane(first: State, best: State, paper: BinaryIO, look: _Look) -> N
             left.plot(places, pressure, line, color=colour, lw=2.2, label=word)
         windows = [trace.window(look.reach) for trace in traces]
         left.set_xlim(min(window[0] for window in windows), max(window[1] for window in windows))
-        left.set_ylim(*(look.clim or (0.0, 1.08 * max(float(t.pressure.max()) for t in traces) or 1.0)))
+        top = max(float(trace.pressure.max()) for trace in traces) or 1.0
+        left.set_ylim(*(look.clim or (-0.03 * top, 1.08 * top)))
         left.set_xlabel(f"{traces[0].axis} ({look.units.length})")
         left.set_ylabel(f"contact pressure ({look.units.stress})")
         left.set_title(f"pressure on {traces[0].name}")
         left.grid(color=GREY, alpha=0.25)
         left.legend(loc="upper right")
         _draw_profile(right, profile, profile.factor, look.units)
-        right.legend(loc="upper right", frameon=True, framealpha=0.85, edgecolor="none")
+        right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
 
 
 def _proportion(profile: Profile) -> float:
@@ -182,12 +192,12 @@ def _draw_profile(axes: Any, profile: Profile, factor: float, units: Units) -> N
             # The name at the outline's end that is farthest from the picture's middle: there is room.
             middle = (profile.low + profile.high) / 2
             place = inside.reshape(-1, 2)[np.argmax(np.abs(inside.reshape(-1, 2) - middle).sum(axis=1))]
-            towards = 0.85 * place + 0.15 * middle
+            towards = 0.75 * place + 0.25 * middle
             axes.text(*towards, name, color=BLUE, ha="center", va="center")
     axes.set_aspect("equal")
     axes.set_xlim(profile.low[0], profile.high[0])
     axes.set_ylim(profile.low[1], profile.high[1])
     for axis, label, word in zip((axes.xaxis, axes.yaxis), profile.axes, ("right", "up"), strict=True):
-        axis.set_label_text(f"{label or word} ({units.length})")
+        label_axis(axis, label, word, units)
     largest = f"{written(profile.largest, 2)} {units.length}"
     axes.set_title(f"{profile.title}; moved by up to {largest}")

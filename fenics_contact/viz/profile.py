@@ -17,6 +17,8 @@ from fenics_contact.viz.words import nice_number
 
 #: Fraction of the picture's size that the largest movement appears to have.
 VISIBLE = 0.06
+#: Room around the bodies, relative to their size.
+BORDER = 0.08
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,11 @@ def _plane_profile(
     assert window is not None, "no force acts on the contact"
     edges = {name: boundary_faces(body.mesh.linear.cells, 2)[0] for name, body in first.scene.bodies.items()}
     before = {name: points[name][edges[name]] for name in points}
-    return Profile("outlines", ("x", "y"), before, {n: moves[n][edges[n]] for n in points}, *window)
+    everything = np.concatenate(list(points.values()))
+    border = BORDER * float(np.ptp(everything, axis=0).max())
+    low = np.maximum(window[0], everything.min(axis=0) - border)
+    high = np.minimum(window[1], everything.max(axis=0) + border)
+    return Profile("outlines", ("x", "y"), before, {n: moves[n][edges[n]] for n in points}, low, high)
 
 
 def _cut(
