@@ -56,6 +56,7 @@ test-hard: $(prepare) ## Run the hard cases; writes docs/hard_cases.md
 
 docs: $(prepare) ## Build the documentation; output/docs/index.html
 	$(launch) 1 $(python) -m sphinx -W --keep-going -q -c docs -d output/docs-doctrees . output/docs
+	@echo "Open output/docs/index.html in a browser"
 
 study-optimisation: $(prepare) ## Measure what state tolerances do to an optimisation; docs/studies/
 	$(python) -m benchmarks.optimisation_tolerance $(if $(filter quick,$(BENCH)),--quick)

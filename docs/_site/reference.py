@@ -27,7 +27,7 @@ from _site import docstrings, signatures
 PACKAGE = fenics_contact.__name__
 #: As a user meets them; rooms that are not named here come last.
 ORDER = (
-    "geometry scene contact accuracy shape optimize viz io progress study scene_file cli "
+    "geometry scene contact accuracy shape optimize viz io progress study scene_file cli outer "
     "qp feti checkpoint linalg timing errors"
 ).split()
 #: Names that the reference uses and does not describe: other libraries', and the standard library's.
@@ -196,6 +196,7 @@ class Rooms(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """Make the nodes."""
+        self.env.note_reread()  # a room may be new
         rows = [f"* - [{room}](/docs/reference/{room}.md)\n  - {purpose(room)}" for room in rooms()]
         contents = [f"{room} </docs/reference/{room}>" for room in rooms()]
         table = ["```{list-table}", ":class: autosummary", ":widths: auto", "", *rows, "```", ""]

@@ -114,8 +114,7 @@ class Cards(SphinxDirective):
         """Make the nodes."""
         root = Path(self.env.srcdir)
         paths = demos(root) if self.name == "demo-cards" else notebooks(root)
-        for path in paths:
-            self.env.note_dependency(str(path))
+        self.env.note_reread()  # one may be new, or have another title
         return self.parse_text_to_nodes(cards(paths, root) + "\n" + hidden_contents(paths, root))
 
 

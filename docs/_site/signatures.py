@@ -56,7 +56,7 @@ def annotations(obj: Any) -> dict[str, str]:
     return {
         name: plain(text)
         for base in reversed(obj.__mro__)
-        for name, text in vars(base).get("__annotations__", {}).items()
+        for name, text in inspect.get_annotations(base).items()
         if isinstance(text, str)
     }
 

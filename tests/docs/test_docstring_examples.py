@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import fenics_contact
+from fenics_contact import errors
 from fenics_contact.contact import LoadSequence, State
 from fenics_contact.io import ResultSeries
 from fenics_contact.optimize import Result
@@ -56,12 +57,10 @@ def modules() -> Iterator[ModuleType]:
 
 
 def public_names() -> dict[str, Any]:
-    rooms = [
-        importlib.import_module(f"fenics_contact.{info.name}")
-        for info in pkgutil.iter_modules(fenics_contact.__path__)
-        if info.ispkg
-    ]
-    return {name: getattr(room, name) for room in rooms for name in getattr(room, "__all__", ())}
+    packages = [info.name for info in pkgutil.iter_modules(fenics_contact.__path__) if info.ispkg]
+    rooms = [importlib.import_module(f"fenics_contact.{package}") for package in packages]
+    offered = {name: getattr(room, name) for room in rooms for name in getattr(room, "__all__", ())}
+    return {**vars(errors), **offered}
 
 
 def examples() -> list[doctest.DocTest]:
@@ -104,7 +103,7 @@ def unknown_names(code: str, globs: dict[str, Any]) -> list[str]:
     names = [node for node in nodes if isinstance(node, ast.Name)]
     made = {node.id for node in names if isinstance(node.ctx, ast.Store)}
     made |= {node.arg for node in nodes if isinstance(node, ast.arg)}
-    made |= {node.name for node in nodes if isinstance(node, ast.FunctionDef)}
+    made |= {str(node.name) for node in nodes if isinstance(node, ast.FunctionDef | ast.ExceptHandler)}
     known = {*made, *GIVEN, *globs, *dir(builtins)}
     wrong = {node.id for node in names if node.id not in known}
     for node in nodes:
