@@ -220,3 +220,5 @@ assert record["volume_final"] > volume * (1 - 1e-4)
 # - `tolerance=AdaptiveTolerance()` in `ShapeProblem` (from `fenics_contact.shape`): states are solved no more
 #   accurately than the optimiser needs, which saves a third of the products.
 # - A finer net, or `LinkShape(cell="tetrahedron")`.
+# - `interactive(after.state, "contact_pressure", path=output / "pressure.html")` (from `fenics_contact.viz`): a
+#   page on which the mouse turns the links; `after.state.to_pyvista()` for pictures of your own.

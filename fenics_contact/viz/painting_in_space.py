@@ -96,7 +96,7 @@ def _sections(bodies: Mapping[str, Moved], spot: Spot, main: View, paints: Paint
     frames = [section_frame(view, spot, points, paints.reach) for view in views]
     # All are equally high and together as wide as the picture, but not higher than half of that.
     proportions = [float(frame.size[0] / frame.size[1]) for frame in frames]
-    height = paints.width * min((WIDE - GAP) / sum(proportions), 0.4)
+    height = paints.width * min((WIDE - 2 * GAP) / sum(proportions), 0.4)
     details = []
     for view, frame, proportion in zip(views, frames, proportions, strict=True):
         layers = section_layers(bodies, scalars, view, spot.centre, paints.of_surfaces)
