@@ -184,13 +184,9 @@ def _draw_profile(axes: Any, profile: Profile, factor: float, units: Units) -> N
         words = ("before", f"after, movement × {factor:g}") if not number else (None, None)
         axes.add_collection(LineCollection(lines, colors=GREY, linewidths=3.5, label=words[0]))
         axes.add_collection(LineCollection(after, colors=ORANGE, linewidths=1.6, label=words[1]))
-        inside = lines[np.all((lines > profile.low) & (lines < profile.high), axis=(1, 2))]
-        if len(inside):
-            # The name at the outline's end that is farthest from the picture's middle: there is room.
-            middle = (profile.low + profile.high) / 2
-            place = inside.reshape(-1, 2)[np.argmax(np.abs(inside.reshape(-1, 2) - middle).sum(axis=1))]
-            towards = 0.75 * place + 0.25 * middle
-            axes.text(*towards, name, color=BLUE, ha="center", va="center")
+        place = profile.place_in(name)
+        if place is not None:
+            axes.text(*place, name, color=BLUE, ha="center", va="center")
     axes.set_aspect("equal")
     axes.set_xlim(profile.low[0], profile.high[0])
     axes.set_ylim(profile.low[1], profile.high[1])

@@ -80,8 +80,9 @@ def _body_layer(name: str, body: Moved, paints: Paints) -> Layer:
         mesh.cell_data["shown"] = shown[cells]
     edges = {"show_edges": True, "edge_color": INK, "edge_opacity": 0.12, "line_width": 1}
     shading = {
-        "ambient": 0.6,
-        "diffuse": 0.42,
+        # So much light from all sides that colours of faces in shade can be found on the bar.
+        "ambient": 0.75,
+        "diffuse": 0.28,
         "smooth_shading": True,
         "split_sharp_edges": True,
         "feature_angle": 50,
