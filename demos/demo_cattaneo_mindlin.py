@@ -140,8 +140,10 @@ for name, (ratio, _, _) in found.items():
     curves[f"q, Q = {ratio:.2f} μP"] = (place[order], traction[order])
     known[f"theory, {ratio:.2f}"] = (x, theory(x, ratio))
 
-# Symbols are nodes, lines are theory. Of one step also what each point does, and the stress around the
-# contact.
+# Symbols are nodes, lines are theory. Of one step also what each point does and which way it slips, and the
+# stress around the contact.
+#
+# ![Pressure, traction and slip](../docs/pictures/cattaneo_mindlin_contact.png)
 
 plot_curves(
     curves,

@@ -133,7 +133,10 @@ with timer.phase("pictures"):
         plot_stress(point.state, output / f"stress_{name}.png", clim=(0, 1500), reach=12.0, title=title)
         plot_contact_pressure(point.state, output / f"pressure_{name}.png", clim=(0, peak), title=title)
 
-# The control points, and the surface that they move.
+# The control points and the surface that they move, how the first state was found, and what the new shape
+# does to contact and outlines.
+#
+# ![Contact pressure and outlines before and after](../docs/pictures/chain_links_before_after.png)
 
 mesh = links.first.mesh
 moved = problem.points_of(result.x)["link 1"]
@@ -209,3 +212,5 @@ assert record["volume_final"] > volume * (1 - 1e-4)
 # - `tolerance=AdaptiveTolerance()` in `ShapeProblem` (from `fenics_contact.shape`): states are solved no more
 #   accurately than the optimiser needs, which saves a third of the products.
 # - A finer net, or `LinkShape(cell="tetrahedron")`.
+# - `interactive(after.state, "contact_pressure", path=output / "pressure.html")` (from `fenics_contact.viz`):
+#   a page on which the mouse turns the links; `after.state.to_pyvista()` for pictures of your own.

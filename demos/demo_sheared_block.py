@@ -100,7 +100,9 @@ plot_curves(
 
 chosen = [0, 2, 4, 6, 10, 14]
 names = ["pressed", "forth", "forth", "all slides", "back", "back"]
-maps = {f"{name}, {steps[k].name}": states[k] for name, k in zip(names, chosen, strict=True)}
+maps = {
+    f"{name}, {steps[k].name.replace('-', '−')}": states[k] for name, k in zip(names, chosen, strict=True)
+}
 plot_contact_status(maps, output / "status.png", title="Stick and slip on the floor")
 plot_stress(states[6], output / "stress.png", title="Sheared block")
 
