@@ -48,6 +48,8 @@ class Task:
             measured: What that measure is.
         """
         self.what, self.outcome = what, ""
+        # Work of which steps are known or a limit shows from its beginning that none is done.
+        self._first = None if total is None and most is None else 0
         self._known: dict[str, Any] = {
             "unit": unit, "total": total, "most": most, "target": target, "measured": measured
         }  # fmt: skip
@@ -109,7 +111,7 @@ class Task:
 
     def __enter__(self) -> Task:
         """Begin."""
-        self.begin()
+        self.begin(self._first)
         return self
 
     def __exit__(

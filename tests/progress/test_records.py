@@ -72,7 +72,7 @@ def test_records_come_from_one_logger_at_level_debug_with_text_and_numbers() -> 
         task.step(1, words="pull")
     assert {(record.name, record.levelno) for record in collector.records} == {(LOGGER_NAME, logging.DEBUG)}
     assert [record.getMessage() for record in collector.records] == [
-        "load steps: begins",
+        "load steps: begins, 0 of 2",
         "load steps: 1 of 2, pull",
         "load steps: done",
     ]
