@@ -99,15 +99,18 @@ class Task:
                 **known,
             )
 
-    def end(self, *, failed: bool = False, words: str = "") -> None:
+    def end(self, error: BaseException | None = None, words: str = "") -> None:
         """Say that the work is over.
 
         Args:
-            failed: Whether it ended without its result.
+            error: What it ended with instead of its result: a failure, or Ctrl-C and the like.
             words: What else there is to say.
         """
         if _LOGGER.isEnabledFor(logging.DEBUG):
-            self._tell(Kind.FAILED if failed else Kind.END, words=words)
+            kind = Kind.END
+            if error is not None:
+                kind = Kind.FAILED if isinstance(error, Exception) else Kind.STOPPED
+            self._tell(kind, words=words)
 
     def __enter__(self) -> Task:
         """Begin."""
@@ -118,7 +121,7 @@ class Task:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End, as a failure where an exception passes."""
-        self.end(failed=kind is not None, words=self.outcome)
+        self.end(error, words=self.outcome)
 
     def _tell(self, kind: Kind, **found: Any) -> None:
         event = Event(task=id(self), what=self.what, kind=kind, **{**self._known, **found})

@@ -99,6 +99,13 @@ def test_a_failure_is_told_and_passes() -> None:
     assert [event.kind for event in collector.events] == [Kind.BEGIN, Kind.FAILED]
 
 
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, SystemExit])
+def test_what_is_interrupted_has_not_failed(stop: type[BaseException]) -> None:
+    with heard() as collector, pytest.raises(stop), Task("factor"):
+        raise stop
+    assert [str(event) for event in collector.events] == ["factor: begins", "factor: stopped"]
+
+
 def test_phases_of_a_timer_are_told() -> None:
     timer = PhaseTimer()
     with heard() as collector, timer.phase("mesh"):
