@@ -207,7 +207,8 @@ assert record["volume_final"] > volume * (1 - 1e-4)
 # - `Coulomb(0.1)`: most of the contact slips.
 # - Another objective, for example the largest contact force: see `fenics_contact.shape.ContactForces`.
 # - `checkpoint=Checkpoint(output / "run.npz")` in `minimize` (from `fenics_contact.optimize`): a run that is
-#   interrupted goes on from there when it is started again.
+#   interrupted goes on from there when it is started again. Within `with interruptible(comm):` (from
+#   `fenics_contact.checkpoint`) Ctrl-C lets the evaluation under way come to its end first.
 # - `tolerance=AdaptiveTolerance()` in `ShapeProblem` (from `fenics_contact.shape`): states are solved no more
 #   accurately than the optimiser needs, which saves a third of the products.
 # - A finer net, or `LinkShape(cell="tetrahedron")`.
