@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from fenics_contact.errors import FenicsContactError, InvalidInputError
-from fenics_contact.progress import shown
 from fenics_contact.study.overview import write_overview
 from fenics_contact.study.parameters import BALANCED, DISCRETISATIONS, Sweep, Tolerance
 from fenics_contact.study.report import write_report
@@ -83,8 +82,7 @@ def _measure(plan: StudyPlan) -> int:
     """Measure; return 0, or the exit status of an interrupted program."""
     before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the running process ends, too
     try:
-        with shown():
-            measure_all(plan)
+        measure_all(plan)
     except (KeyboardInterrupt, SystemExit) as stop:
         sys.stderr.write("interrupted: what is done is kept, and the same command goes on from there\n")
         return 143 if isinstance(stop, SystemExit) else 130
