@@ -22,6 +22,7 @@ from mpi4py import MPI
 from fenics_contact.contact import LoadSequence, Status
 from fenics_contact.geometry import block, bolt, drilled_plate
 from fenics_contact.io import ResultSeries, write_result
+from fenics_contact.progress import shown
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,
@@ -112,19 +113,22 @@ if comm.rank == 0:
 # the half. Sticking and sliding points are counted between the plates. A residual of 1e-5 is far below the
 # percent that we look for.
 
-steps = LoadSequence(scene, None, comm, solver=FaceNewton(tolerance=1e-5))
-series = ResultSeries(output, "pulling", comm)
 moved, pulled, clamped, counts = [0.0, 0.02, 0.04, 0.06, 0.08, 0.11], [], [], []
-for displacement in moved:
-    state = steps.advance(LoadStep(f"end at {displacement} mm", supports=supports(displacement)))
-    series.add(state, displacement)
-    contact = state.contact
-    between = np.concatenate([contact.on_pair(0), contact.on_pair(1)])
-    pulled.append(-2 * contact.force[between, 0].sum())
-    clamped.append(2 * contact.normal_force[contact.on_pair(2)].sum())
-    counts.append([int(np.sum(contact.status[between] == kind)) for kind in (Status.STICK, Status.SLIP)])
-    if displacement == 0.0:
-        plot_contact_pressure(state, output / "pressure_tightened.png", title="Plate under the upper strap")
+steps = LoadSequence(scene, None, comm, solver=FaceNewton(tolerance=1e-5), count=len(moved))
+series = ResultSeries(output, "pulling", comm)
+with shown(comm):
+    for displacement in moved:
+        state = steps.advance(LoadStep(f"end at {displacement} mm", supports=supports(displacement)))
+        series.add(state, displacement)
+        contact = state.contact
+        between = np.concatenate([contact.on_pair(0), contact.on_pair(1)])
+        pulled.append(-2 * contact.force[between, 0].sum())
+        clamped.append(2 * contact.normal_force[contact.on_pair(2)].sum())
+        counts.append([int(np.sum(contact.status[between] == kind)) for kind in (Status.STICK, Status.SLIP)])
+        if displacement == 0.0:
+            plot_contact_pressure(
+                state, output / "pressure_tightened.png", title="Plate under the upper strap"
+            )
 
 # ![Load over displacement](../docs/pictures/bolted_joint_curve.png)
 #

@@ -21,6 +21,7 @@ from mpi4py import MPI
 from fenics_contact.contact import Status, solve_steps
 from fenics_contact.geometry import BodyMesh, rectangle_lattice
 from fenics_contact.io import ResultSeries, write_result
+from fenics_contact.progress import shown
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -85,7 +86,8 @@ steps = [
     LoadStep(name, supports=[base, Support("upper", "y1", (shift, -0.00205))])
     for name, shift in shifts.items()
 ]
-states = dict(zip(shifts, solve_steps(scene, steps, None, comm, tolerance=1e-6), strict=True))
+with shown(comm):
+    states = dict(zip(shifts, solve_steps(scene, steps, None, comm, tolerance=1e-6), strict=True))
 
 # ## Theory for measured forces
 #

@@ -26,6 +26,7 @@ from fenics_contact.contact import Status
 from fenics_contact.geometry import LinkShape, box_partition, two_links
 from fenics_contact.io import ResultSeries, write_optimisation_result, write_vtu, write_xdmf
 from fenics_contact.optimize import BundleTrust, LinearConstraints, minimize
+from fenics_contact.progress import shown
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -109,14 +110,15 @@ keep_volume = LinearConstraints(-volume_gradient[None, :], [0.0])
 # Every better design becomes a member of a series: ParaView plays `designs.pvd` as a film.
 
 series = ResultSeries(output, "designs", comm)
-result = minimize(
-    problem,
-    start,
-    BundleTrust(tolerance=1e-4),
-    bounds=(np.full(problem.size, -0.25), np.full(problem.size, 0.25)),
-    constraints=keep_volume,
-    callback=series.follow(problem),
-)
+with shown(comm):
+    result = minimize(
+        problem,
+        start,
+        BundleTrust(tolerance=1e-4),
+        bounds=(np.full(problem.size, -0.25), np.full(problem.size, 0.25)),
+        constraints=keep_volume,
+        callback=series.follow(problem),
+    )
 before, after = problem.first, problem.best
 assert np.array_equal(after.alpha, result.x)
 
@@ -126,7 +128,7 @@ assert np.array_equal(after.alpha, result.x)
 
 points = {"before": before, "after": after}
 peak = max(float(point.state.contact.pressure.max()) for point in points.values())
-with timer.phase("pictures"):
+with shown(comm), timer.phase("pictures"):
     plot_decomposition(scene, partitions, output / "decomposition.png", comm=comm)
     for name, point in points.items():
         title = name.capitalize()
@@ -143,7 +145,7 @@ moved = problem.points_of(result.x)["link 1"]
 nets = tuple(design.control_points(mesh.points, alpha) for alpha in (start, result.x))
 values = [record.value for record in result.history]
 kinds = [record.kind.value for record in result.history]
-with timer.phase("pictures"):
+with shown(comm), timer.phase("pictures"):
     plot_control_net(links.first.crown, (mesh.points, moved), nets, output / "control_net.png", comm=comm)
     plot_convergence(values, kinds, output / "convergence.png", label="total potential (N mm)", comm=comm)
     plot_residuals(before.state.solution.history, output / "residuals.png", title="First state", comm=comm)
@@ -208,7 +210,8 @@ assert record["volume_final"] > volume * (1 - 1e-4)
 # - `Coulomb(0.1)`: most of the contact slips.
 # - Another objective, for example the largest contact force: see `fenics_contact.shape.ContactForces`.
 # - `checkpoint=Checkpoint(output / "run.npz")` in `minimize` (from `fenics_contact.optimize`): a run that is
-#   interrupted goes on from there when it is started again.
+#   interrupted goes on from there when it is started again. Within `with interruptible(comm):` (from
+#   `fenics_contact.checkpoint`) Ctrl-C lets the evaluation under way come to its end first.
 # - `tolerance=AdaptiveTolerance()` in `ShapeProblem` (from `fenics_contact.shape`): states are solved no more
 #   accurately than the optimiser needs, which saves a third of the products.
 # - A finer net, or `LinkShape(cell="tetrahedron")`.

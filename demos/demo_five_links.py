@@ -22,6 +22,7 @@ from mpi4py import MPI
 from fenics_contact.contact import Status, solve_scene
 from fenics_contact.geometry import LinkShape, chain
 from fenics_contact.io import write_result, write_vtu
+from fenics_contact.progress import shown
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -76,7 +77,8 @@ if comm.rank == 0:
 # nothing resists.
 
 partitions = scene.partition(comm.size)
-state = solve_scene(scene, partitions, comm, tolerance=1e-6)
+with shown(comm):
+    state = solve_scene(scene, partitions, comm, tolerance=1e-6)
 
 # ## Result
 #

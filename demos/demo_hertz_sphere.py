@@ -23,6 +23,7 @@ from mpi4py import MPI
 from fenics_contact.contact import solve_scene
 from fenics_contact.geometry import box_lattice, hemisphere
 from fenics_contact.io import write_result, write_vtu
+from fenics_contact.progress import shown
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -83,7 +84,8 @@ def scene(discretisation):
 if comm.rank == 0:
     print(scene("mortar").plan(ranks=comm.size))
 
-states = {name: solve_scene(scene(name), None, comm, tolerance=1e-6) for name in ("mortar", "node")}
+with shown(comm):
+    states = {name: solve_scene(scene(name), None, comm, tolerance=1e-6) for name in ("mortar", "node")}
 
 # ## Result
 #

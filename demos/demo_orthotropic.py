@@ -27,6 +27,7 @@ from mpi4py import MPI
 from fenics_contact.contact import solve_scene
 from fenics_contact.geometry import box_lattice
 from fenics_contact.io import write_result, write_vtu
+from fenics_contact.progress import shown
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -115,8 +116,9 @@ def block_of(material):
 if comm.rank == 0:
     print(block_of(wood).plan(ranks=comm.size))
 
-state = solve_scene(block_of(wood), None, comm, tolerance=1e-6)
-compared = solve_scene(block_of(reference), None, comm, tolerance=1e-6)
+with shown(comm):
+    state = solve_scene(block_of(wood), None, comm, tolerance=1e-6)
+    compared = solve_scene(block_of(reference), None, comm, tolerance=1e-6)
 
 # ## Result
 #

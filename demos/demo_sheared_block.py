@@ -23,6 +23,7 @@ from mpi4py import MPI
 from fenics_contact.contact import Status, solve_steps
 from fenics_contact.geometry import block
 from fenics_contact.io import ResultSeries, write_result
+from fenics_contact.progress import shown
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -61,7 +62,8 @@ path = np.concatenate([forth, back[1:], -back[1:]])  # mm
 steps = [
     LoadStep(f"{shift:+.2f} mm", supports=[Support("block", "z1", (shift, 0.0, -0.5))]) for shift in path
 ]
-states = solve_steps(scene, steps, None, comm, tolerance=1e-6)
+with shown(comm):
+    states = solve_steps(scene, steps, None, comm, tolerance=1e-6)
 
 # ## Shear force
 #

@@ -24,6 +24,7 @@ from mpi4py import MPI
 from fenics_contact.contact import solve_steps
 from fenics_contact.geometry import BodyMesh
 from fenics_contact.io import ResultSeries, write_result
+from fenics_contact.progress import shown
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -97,7 +98,8 @@ cooling = 60.0  # K
 angles = np.concatenate([np.linspace(0.0, 0.016, 9), np.linspace(0.016, -0.008, 13)[1:]])  # rad
 shrunk = [ThermalStrain("hub", -cooling)]
 steps = [LoadStep(f"{angle:g}", loads=shrunk, supports=held(angle)) for angle in angles]
-states = solve_steps(scene, steps, None, comm, tolerance=1e-6)
+with shown(comm):
+    states = solve_steps(scene, steps, None, comm, tolerance=1e-6)
 
 # ## Lamé
 #

@@ -10,7 +10,7 @@ from fenics_contact.checkpoint.interruption import (
     safe_point,
     telling_what_is_kept,
 )
-from fenics_contact.checkpoint.whole_file import CheckpointError, synchronise, write_whole
+from fenics_contact.checkpoint.whole_file import CheckpointError, put_whole, synchronise, write_whole
 
 __all__ = [
     "Checkpoint",
@@ -20,6 +20,7 @@ __all__ = [
     "described",
     "differences",
     "interruptible",
+    "put_whole",
     "read_archive",
     "safe_point",
     "synchronise",

@@ -16,7 +16,6 @@ from fenics_contact.cli import accuracy_options as options
 from fenics_contact.cli.desk import desk_of
 from fenics_contact.cli.endings import Terminated
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.progress import shown
 from fenics_contact.study.overview import write_overview
 from fenics_contact.study.parameters import Sweep, Tolerance
 from fenics_contact.study.report import write_report
@@ -139,8 +138,7 @@ def _report(plan: StudyPlan, folder: Path, *, figures: bool) -> Sequence[str]:
 def _measure(plan: StudyPlan) -> int:
     """Measure; return 0, or the exit code of an interrupted program."""
     try:
-        with shown():
-            measure_all(plan)
+        measure_all(plan)
     except (KeyboardInterrupt, Terminated) as stop:
         sys.stderr.write("interrupted: what is done is kept, and the same command goes on from there\n")
         return 143 if isinstance(stop, Terminated) else 130

@@ -97,8 +97,8 @@ class LoadSequence:
                 state = self._advanced(step)
             self._number += 1
             self._may_stop()
-        except BaseException:
-            self._task.end(failed=True)
+        except BaseException as error:
+            self._task.end(error)
             raise
         self._task.step(self._number, timed=not self._done.recalling)
         if self._count in (None, self._number):

@@ -15,6 +15,7 @@ class Kind(Enum):
     STEP = "step"
     END = "done"
     FAILED = "failed"
+    STOPPED = "stopped"
 
 
 @dataclass(frozen=True)

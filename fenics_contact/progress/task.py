@@ -48,6 +48,8 @@ class Task:
             measured: What that measure is.
         """
         self.what, self.outcome = what, ""
+        # Work of which steps are known or a limit shows from its beginning that none is done.
+        self._first = None if total is None and most is None else 0
         self._known: dict[str, Any] = {
             "unit": unit, "total": total, "most": most, "target": target, "measured": measured
         }  # fmt: skip
@@ -97,26 +99,29 @@ class Task:
                 **known,
             )
 
-    def end(self, *, failed: bool = False, words: str = "") -> None:
+    def end(self, error: BaseException | None = None, words: str = "") -> None:
         """Say that the work is over.
 
         Args:
-            failed: Whether it ended without its result.
+            error: What it ended with instead of its result: a failure, or Ctrl-C and the like.
             words: What else there is to say.
         """
         if _LOGGER.isEnabledFor(logging.DEBUG):
-            self._tell(Kind.FAILED if failed else Kind.END, words=words)
+            kind = Kind.END
+            if error is not None:
+                kind = Kind.FAILED if isinstance(error, Exception) else Kind.STOPPED
+            self._tell(kind, words=words)
 
     def __enter__(self) -> Task:
         """Begin."""
-        self.begin()
+        self.begin(self._first)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End, as a failure where an exception passes."""
-        self.end(failed=kind is not None, words=self.outcome)
+        self.end(error, words=self.outcome)
 
     def _tell(self, kind: Kind, **found: Any) -> None:
         event = Event(task=id(self), what=self.what, kind=kind, **{**self._known, **found})

@@ -20,7 +20,7 @@ from fenics_contact.progress.tracker import Tracker, Work, summary
 #: How often the bars are drawn, [1/s]: rank 0 draws while others compute.
 RATE = 4
 #: Least columns of names and bars.
-NAME, BAR = 14, 12
+NAME, BAR = 16, 12
 
 
 class Terminal(Presenter):
@@ -80,7 +80,7 @@ class Terminal(Presenter):
             return Text("", end="")
         table = Table.grid(
             Column(no_wrap=True, min_width=NAME),
-            Column(no_wrap=True),
+            Column(no_wrap=True, min_width=BAR),
             Column(no_wrap=True, overflow="ellipsis", ratio=1),
             Column(no_wrap=True, justify="right"),
             Column(no_wrap=True, justify="right"),

@@ -178,5 +178,5 @@ def summary(work: Work) -> str:
     event = work.event
     if event.measure is not None and event.target is not None and event.measure > event.target:
         event = replace(event, measure=None)  # of the last step: it is over for another reason
-    failed = "failed" if event.kind is Kind.FAILED else ""
-    return f"{event.what}: {joined(failed, event.details, duration(work.stepped - work.begun))}"
+    ending = "" if event.kind is Kind.END else event.kind.value
+    return f"{event.what}: {joined(ending, event.details, duration(work.stepped - work.begun))}"

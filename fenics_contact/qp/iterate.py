@@ -52,7 +52,7 @@ class Start:
     def reached(self, step: SolverStep) -> None:
         """Tell whoever listens what a step of the solver has reached."""
         if self.task is not None:
-            self.task.step(step.products, measure=step.residuals.worst, words=step.method)
+            self.task.step(step.products, measure=step.residuals.worst)
 
 
 def iterate_at(

@@ -63,7 +63,7 @@ class Progress:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End."""
-        self._task.end(failed=kind is not None)
+        self._task.end(error)
 
     def begin(self, parameters: Parameters) -> None:
         """Say which run begins."""

@@ -72,8 +72,7 @@ def run_study(
         MissingRequirementError: If several ranks are asked for and there is no mpirun.
     """
     plan = prepare(scene, runs, sweep=sweep, settings=settings)
-    with shown(stream=stream):
-        measure_all(plan)
+    measure_all(plan, stream)
     return collected(plan)
 
 
@@ -125,11 +124,12 @@ def _repeats(task: Task, store: Store, most: int) -> list[Record]:
     return [record for record in found if record is not None] if found[0] is not None else []
 
 
-def measure_all(plan: StudyPlan) -> None:
+def measure_all(plan: StudyPlan, stream: TextIO | None = None) -> None:
     """Measure what is missing.
 
     Args:
         plan: The study.
+        stream: Where progress is told; stderr by default.
     """
     launcher(plan.settings.ranks)  # refuses ranks that cannot be started
     # A run is repeated only after all others were measured: load that lasts a while hits no run alone.
@@ -141,7 +141,7 @@ def measure_all(plan: StudyPlan) -> None:
             _warm_up(wanted, min(task.parameters.size for task in plan.tasks))
         title = plan.study.title
         words = title if repeat == 0 else f"{title}, repeat {repeat + 1}"
-        with Progress([task.parameters for task in wanted], words) as progress:
+        with shown(stream=stream), Progress([task.parameters for task in wanted], words) as progress:
             for task in wanted:
                 progress.begin(task.parameters)
                 _measure(task, plan.store, repeat, progress)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.colors import Normalize
 
+from fenics_contact.checkpoint import put_whole
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError, MissingRequirementError, together
 from fenics_contact.viz.browser import InteractiveScene, captioned, exported, html_path, see_in_perspective
@@ -18,7 +19,7 @@ from fenics_contact.viz.interactive_layers import CONTENTS, Subject
 from fenics_contact.viz.obstacles import obstacle_layers
 from fenics_contact.viz.painting import paint
 from fenics_contact.viz.paints import Paints
-from fenics_contact.viz.picture import Picture, write_file
+from fenics_contact.viz.picture import Picture
 from fenics_contact.viz.pressure import plot_contact_pressure
 from fenics_contact.viz.stage import staged
 from fenics_contact.viz.stress import plot_stress
@@ -77,7 +78,7 @@ def interactive(
         if comm.rank == 0:
             page, missing = _page(subject, field, title)
             if page is not None and target is not None:
-                write_file(target, page.encode())
+                put_whole(target, page.encode())
     missing = comm.bcast(missing)
     if missing is None:
         return InteractiveScene(page, target)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import secrets
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, field
@@ -11,6 +9,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from fenics_contact.checkpoint import put_whole
 from fenics_contact.errors import InvalidInputError, together
 
 if TYPE_CHECKING:
@@ -91,7 +90,7 @@ def draw_picture(comm: MPI.Comm | None, path: Path | None, draw: Callable[[Binar
             draw(paper)
             png = paper.getvalue()
             if path is not None:
-                write_file(path, png)
+                put_whole(path, png)
     return Picture(png, path)
 
 
@@ -102,14 +101,3 @@ def written_path(path: Path | None, remedy: str) -> str:
             f"this needs the file of a picture, but the picture was not written: give the {remedy}"
         )
     return str(path)
-
-
-def write_file(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all; its folder is created, a file of that name is replaced."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
-    try:
-        temporary.write_bytes(content)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)

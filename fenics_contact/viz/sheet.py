@@ -13,8 +13,9 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from fenics_contact.checkpoint import put_whole
 from fenics_contact.viz.colours import INK
-from fenics_contact.viz.picture import png_path, write_file
+from fenics_contact.viz.picture import png_path
 from fenics_contact.viz.words import nice_number, written
 
 #: Inches of every sheet's width: fonts and lines grow with the number of pixels.
@@ -78,7 +79,7 @@ def sheet(
         content = BytesIO()
         figure.savefig(content, dpi=dpi, format="png")
     if path is not None:
-        write_file(path, content.getvalue())
+        put_whole(path, content.getvalue())
     elif not isinstance(paper, str | Path):
         paper.write(content.getvalue())
 

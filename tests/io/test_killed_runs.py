@@ -171,6 +171,7 @@ def test_a_run_killed_at_random_moments_goes_on_to_the_same_answer(
         assert len(hidden(tmp_path)) <= 2
     else:
         assert ended(kind, tmp_path)
+    sys.stdout.write(f"{kind}: killed {kills} times at random moments\n")
     assert kills > 2
     assert_same(kind, tmp_path, uninterrupted[kind], 1e-9)
 

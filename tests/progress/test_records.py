@@ -72,7 +72,7 @@ def test_records_come_from_one_logger_at_level_debug_with_text_and_numbers() -> 
         task.step(1, words="pull")
     assert {(record.name, record.levelno) for record in collector.records} == {(LOGGER_NAME, logging.DEBUG)}
     assert [record.getMessage() for record in collector.records] == [
-        "load steps: begins",
+        "load steps: begins, 0 of 2",
         "load steps: 1 of 2, pull",
         "load steps: done",
     ]
@@ -97,6 +97,13 @@ def test_a_failure_is_told_and_passes() -> None:
     with heard() as collector, pytest.raises(ZeroDivisionError), Task("factor"):
         1 / 0
     assert [event.kind for event in collector.events] == [Kind.BEGIN, Kind.FAILED]
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, SystemExit])
+def test_what_is_interrupted_has_not_failed(stop: type[BaseException]) -> None:
+    with heard() as collector, pytest.raises(stop), Task("factor"):
+        raise stop
+    assert [str(event) for event in collector.events] == ["factor: begins", "factor: stopped"]
 
 
 def test_phases_of_a_timer_are_told() -> None:

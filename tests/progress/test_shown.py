@@ -90,7 +90,10 @@ def test_nobody_sees_anything_where_logging_is_not_configured(
 def test_those_who_listen_to_everything_still_do(clock: Clock, caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.DEBUG), shown(stream=io.StringIO(), interval=1e9):
         work(clock, pause=0.0)
-    assert [record.message for record in caplog.records][:2] == ["load steps: begins", "load steps: 1 of 5"]
+    assert [record.message for record in caplog.records][:2] == [
+        "load steps: begins, 0 of 5",
+        "load steps: 1 of 5",
+    ]
 
 
 def test_own_handlers_of_the_logger_hear_no_more_than_before(clock: Clock) -> None:

@@ -13,7 +13,7 @@ from IPython.core.formatters import DisplayFormatter
 from fenics_contact import viz
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz import Picture, plot_curves
-from fenics_contact.viz.picture import SHOWN_WIDTH, write_file
+from fenics_contact.viz.picture import SHOWN_WIDTH
 
 LINE: dict[str, Any] = {"series": {"line": ([0.0, 1.0], [0.0, 2.0])}, "xlabel": "x (mm)", "ylabel": "y (N)"}
 
@@ -59,7 +59,7 @@ def test_a_picture_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: p
 
     monkeypatch.setattr(os, "replace", fail)
     with pytest.raises(OSError, match="disk full"):
-        write_file(path, b"new")
+        plot_curves(**LINE, path=path, width=400)
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
 
