@@ -82,9 +82,8 @@ class Progress:
         self._forecast.learn(parameters, seconds)
         number, left = self._count - len(self._left), self._forecast.seconds(self._left)
         self._task.step(number, left=left)
-        logger.info(
-            "%d/%d %s: %s, %s left", number, self._count, described(parameters), words, duration(left)
-        )
+        rest = f", {duration(left)} left" if self._left else ""
+        logger.info("%d/%d %s: %s%s", number, self._count, described(parameters), words, rest)
 
 
 def described(parameters: Parameters) -> str:
