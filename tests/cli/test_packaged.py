@@ -44,20 +44,13 @@ def test_an_installed_command_finds_its_demos(tmp_path: Path) -> None:
         return answer.stdout
 
     source = tmp_path / "source"
-    run("git", "-C", ROOT, "worktree", "list")  # a checkout: what is not tracked must not be in the wheel
-    run("git", "clone", "-q", "--no-hardlinks", ROOT, source)
-    run(
-        sys.executable,
-        "-m",
-        "pip",
-        "wheel",
-        "-q",
-        "--no-deps",
-        "--no-build-isolation",
-        "-w",
-        tmp_path,
-        source,
-    )
+    run("git", "clone", "-q", "--no-hardlinks", ROOT, source)  # what is not tracked must not be in the wheel
+    try:
+        run(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", tmp_path, source)
+    except AssertionError as error:
+        if "No matching distribution found for setuptools" in str(error):
+            pytest.skip("the build needs setuptools from a package index, which cannot be reached")
+        raise
     (wheel,) = tmp_path.glob("*.whl")
     names = zipfile.ZipFile(wheel).namelist()
     assert "fenics_contact/demos/demo_hertz_sphere.py" in names
