@@ -2,6 +2,7 @@
 #     make demo PYTHON=/path/to/python
 
 DEMO ?= chain_links
+NOTEBOOKS ?=
 SIZE ?=
 NP ?= 1
 BENCH ?= full
@@ -20,13 +21,14 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demos test test-slow test-hard benchmark studies study-optimisation lint setup
+.PHONY: help demo demos notebooks test test-slow test-hard docs benchmark studies study-optimisation lint setup
 
 help: ## Show this list
 	@echo "Targets:"
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 20
 	@echo "Settings:"
 	@echo "  DEMO=hertz_sphere    which demo (chain_links); all are in demos/"
+	@echo "  NOTEBOOKS=\"01 04\"    which notebooks (all)"
 	@echo "  SIZE=small|paper     size of the chain links (paper)"
 	@echo "  NP=2                 MPI ranks of a demo (1)"
 	@echo "  STUDIES=hertz        which studies (all three); NP ranks each"
@@ -40,6 +42,9 @@ demo: $(prepare) ## Optimise the contact shape of two chain links, or run DEMO=.
 demos: $(prepare) ## Run every demo
 	for demo in demos/demo_*.py; do $(launch) $(NP) $(python) $$demo || exit 1; done
 
+notebooks: $(prepare) ## Run the notebooks and store what they show, or NOTEBOOKS="01 04"; pages in output/notebooks/
+	$(launch) 1 $(python) notebooks/execute.py $(NOTEBOOKS)
+
 test: lint ## Check style and types, run the quick tests
 	$(launch) 1 $(python) -m pytest -n $(JOBS) -m "not slow and not hard"
 
@@ -48,6 +53,10 @@ test-slow: $(prepare) ## Run the tests that take long
 
 test-hard: $(prepare) ## Run the hard cases; writes docs/hard_cases.md
 	$(launch) 1 $(python) -m pytest tests/hard -m hard --hard-table docs/hard_cases.md
+
+docs: $(prepare) ## Build the documentation; output/docs/index.html
+	$(launch) 1 $(python) -m sphinx -W --keep-going -q -c docs -d output/docs-doctrees . output/docs
+	@echo "Open output/docs/index.html in a browser"
 
 study-optimisation: $(prepare) ## Measure what state tolerances do to an optimisation; docs/studies/
 	$(python) -m benchmarks.optimisation_tolerance $(if $(filter quick,$(BENCH)),--quick)

@@ -39,10 +39,12 @@ from fenics_contact.scene import (
 from fenics_contact.shape import ShapeProblem, SurfaceDesign, TotalPotential
 from fenics_contact.timing import PhaseTimer
 from fenics_contact.viz import (
+    plot_before_after,
     plot_contact_pressure,
     plot_control_net,
     plot_convergence,
     plot_decomposition,
+    plot_residuals,
     plot_stress,
 )
 
@@ -140,7 +142,9 @@ values = [record.value for record in result.history]
 kinds = [record.kind.value for record in result.history]
 with timer.phase("pictures"):
     plot_control_net(links.first.crown, (mesh.points, moved), nets, output / "control_net.png", comm=comm)
-    plot_convergence(values, kinds, output / "convergence.png", label="total potential [N mm]", comm=comm)
+    plot_convergence(values, kinds, output / "convergence.png", label="total potential (N mm)", comm=comm)
+    plot_residuals(before.state.solution.history, output / "residuals.png", title="First state", comm=comm)
+    plot_before_after(before, after, output / "before_after.png", label="total potential (N mm)")
 
 # ## Files for ParaView
 

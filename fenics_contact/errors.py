@@ -80,6 +80,17 @@ def together(comm: MPI.Comm) -> Iterator[None]:
     """Run a block that makes no collective calls, then raise on all ranks if it failed on one.
 
     Collective on ``comm``, which the block itself must not use.
+
+    Args:
+        comm: Communicator whose ranks must stay together.
+
+    Raises:
+        Exception: What the block raised on this rank, or as in `agree` what it raised on another.
+
+    Example:
+        >>> with together(comm):  # doctest: +SKIP
+        ...     if comm.rank == 0:
+        ...         text = path.read_text()
     """
     error: Exception | None = None
     try:

@@ -25,7 +25,7 @@ class Certificate:
     """Bounds of the algebraic error of a state in energy norm, [√(force · length)].
 
     Attributes:
-        bound: Upper bound of |u − u*|_K, infinite where no admissible pair was found.
+        bound: Upper bound of ‖u − u⋆‖, infinite where no admissible pair was found.
         moved: The part of it by which the multiplier was moved to be admissible.
         gap: J(v) − θ(λ) of the admissible pair, [force · length].
         known: The admissible multiplier and its statuses.
@@ -47,9 +47,10 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
 
         J(v) − θ(λ) = ½ wᵀK w + Σ λ_N (c − B v)_N + Σ (Ψ‖s‖ − τ·s),   s the slip of v,
 
-    a sum of parts none of which is negative, and J(v) − θ(λ) ≥ ½|v − u*|² + ½|u − u*|² in energy norm. As
-    ||w| − |u − u*|| ≤ |v − u*|, |u − u*| is at most (|w| + √(4 gap − |w|²))/2. What moved the multiplier of
-    the solution into the cone, δ, counts with its own energy δᵀF δ.
+    a sum of parts none of which is negative, and J(v) − θ(λ) ≥ ½‖v − u⋆‖² + ½‖u − u⋆‖² in energy norm,
+    u⋆ being the solution. As the difference of ‖w‖ and ‖u − u⋆‖ is at most ‖v − u⋆‖, ‖u − u⋆‖ is at most
+    (‖w‖ + √(4 gap − ‖w‖²))/2. What moved the multiplier of the solution into the cone, δ, counts with its own
+    energy δᵀF δ.
 
     The way w is that of the preconditioner, and the bound is as close as this is good: mostly within a factor
     of two of the error, for nearly incompressible bodies and thin plates of one of ten to thirty.

@@ -17,7 +17,7 @@ from fenics_contact.qp import DualSolution
 
 @dataclass(frozen=True, eq=False)
 class StateErrors:
-    """Errors of a state in energy norm, relative to that of the displacement, |u| = √(uᵀK u).
+    """Errors of a state in energy norm, relative to that of the displacement, ‖u‖ = √(uᵀK u).
 
     Attributes:
         algebraic: Upper bound of the error of the solver, by duality; with Coulomb's law that to the
@@ -25,7 +25,7 @@ class StateErrors:
         friction: Estimate of the error by these slip bounds, see `friction_error`; zero without Coulomb's
             law.
         discretisation: Estimate of the error of the mesh, see `discretisation_error`.
-        norm: |u|, [√(force · length)].
+        norm: ‖u‖, [√(force · length)].
         by_body: Body name -> its part of `discretisation`; the sum of squares is its square.
 
     Example:

@@ -1,4 +1,28 @@
-"""Arrays by name in a file of NumPy's .npz format, with what it holds and of which problem it is."""
+"""Arrays by name in a file of NumPy's .npz format, with what it holds and of which problem it is.
+
+The format is a zip archive with one .npy file an array, which `numpy.load` reads with ``allow_pickle=False``,
+as libraries for other languages do. NumPy is there wherever this package is. The arrays are those of the
+whole problem, whatever number of ranks it ran on. HDF5 would need h5py, built for the MPI and the HDF5 of
+dolfinx, which Debian's FEniCSx does without, and save nothing: a file that must be whole is written anew.
+
+| array | what it is |
+|---|---|
+| ``_format``, ``_version`` | "fenics_contact checkpoint", 1 |
+| ``_kind`` | "load history" or "minimisation by the bundle trust method" |
+| ``_fingerprint`` | JSON text: parts of the problem by name with their descriptions, see `described` |
+| ``_digest`` | SHA-256, hexadecimal, of all other arrays in the order of their names: of each the text \
+"NAME TYPE SHAPE " as NumPy prints type and shape, then its bytes in C order |
+
+A load history has ``steps``, the number of steps done, and for each, numbered from 000000, ``NUMBER.step``
+(JSON text that describes it), ``NUMBER.multiplier`` (λ of all rows, [force]), ``NUMBER.origin`` (from where
+slip is measured, [length]) and ``NUMBER.motion`` (coefficients of the rigid motions); a state that was found
+without multipliers has the description alone.
+
+A minimisation has ``centre.*`` (best point ``x``, ``value``, ``subgradient``), ``bundle.*``, ``trust.*`` and
+``first_t`` (where the method stands), ``history.*`` (a list for each attribute of a `Record` of the
+optimiser) and ``fun.*``, what the function remembers: of a shape problem the states of the first, best and
+last design, and the one to start from.
+"""
 
 from __future__ import annotations
 

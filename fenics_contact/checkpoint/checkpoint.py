@@ -23,11 +23,17 @@ class Checkpoint:
 
     Attributes:
         path: The file, in NumPy's .npz format; its folder is created.
-        every: Evaluations or load steps between two writes; the end of the run is written in any case.
+        every: Evaluations or load steps between two writes; the end of the run is written in any case. Each
+            write is of all steps so far: for hundreds of them on fine meshes do it less often.
         resume: None goes on from the file where there is one, True wants one, False starts anew and replaces
             it.
         comm: Communicator on which the run is replicated: rank 0 reads and writes. Only a function that does
             not know its communicator needs it.
+
+    Example:
+        >>> kept = Checkpoint("output/run.npz", every=5)
+        >>> states = solve_steps(scene, steps, None, comm, checkpoint=kept)  # doctest: +SKIP
+        >>> result = minimize(problem, start, bounds=(-1.0, 1.0), checkpoint=kept)  # doctest: +SKIP
     """
 
     path: str | Path
@@ -56,8 +62,11 @@ class Checkpoint:
         with together(comm):
             if comm.rank == 0 and (self.resume or path.exists()):
                 found = read_archive(path, kind, fingerprint)
-        answer: Arrays | None = comm.bcast(found)
-        return answer
+        names = comm.bcast(None if found is None else list(found))
+        if names is None:
+            return None
+        # One by one: a message of MPI holds 2 GB, a long history more.
+        return {name: comm.bcast(None if found is None else found[name]) for name in names}
 
     def write(
         self, kind: str, fingerprint: Mapping[str, str], arrays: Mapping[str, Any], comm: MPI.Comm | None

@@ -30,7 +30,7 @@ def described(value: Any, name: str) -> dict[str, str]:
 
     Example:
         >>> described({"length": 2.0}, "beam")
-        {"beam['length']": '2.0'}
+        {'beam': '1 entries', "beam['length']": '2.0'}
     """
     found: dict[str, str] = {}
     _describe(value, name, found, ())

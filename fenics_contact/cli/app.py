@@ -45,6 +45,7 @@ class Program(TyperGroup):
             raise typer.Exit(int(told(error, ctx.obj.comm))) from None
 
 
+#: The commands, a typer application.
 app = typer.Typer(
     name=PROGRAM,
     cls=Program,

@@ -112,7 +112,11 @@ class Rounds:
         system, products = self._system, self._system.products - self._before
         with self._timer.phase("solve"):
             self.last = solve(system, solver, start)
-        self.history += [replace(step, products=step.products + products) for step in self.last.history]
+        outer = self.history[-1].outer + 1 if self.history else 0
+        self.history += [
+            replace(step, products=step.products + products, outer=step.outer + outer)
+            for step in self.last.history
+        ]
         with self._timer.phase("state"):
             self.displacement = system.displacement(self.last.multiplier, self.last.alpha)
         with self._timer.phase("errors"):

@@ -143,8 +143,9 @@ def _judged(solution: DualSolution, law: SlipLaw) -> DualSolution:
 
 def _continued(history: Sequence[SolverStep], steps: Sequence[SolverStep], products: int) -> list[SolverStep]:
     """Append the steps of another Tresca problem, numbers and products counted on."""
+    outer = history[-1].outer + 1 if history else 0
     counted = (
-        replace(step, iteration=number, products=products + step.products)
+        replace(step, iteration=number, products=products + step.products, outer=outer)
         for number, step in enumerate(steps, len(history))
     )
     return [*history, *counted]

@@ -37,8 +37,13 @@ class Energies:
 
     @property
     def primal(self) -> float:
-        """Functional that the displacement minimises at given slip bounds: total potential plus friction."""
+        """Functional that the displacement minimises at given slip bounds, total potential plus friction."""
         return self.total_potential + self.friction
+
+    def __str__(self) -> str:
+        """List the energies, one a line."""
+        told = ("strain", "load", "friction", "total_potential", "primal", "dual")
+        return "\n".join(f"{name.replace('_', ' '):16s}{getattr(self, name):14.6e}" for name in told)
 
 
 def compute_energies(

@@ -10,8 +10,9 @@ import scipy.sparse as sp
 from fenics_contact.errors import ConvergenceError, InfeasibleError, together
 from fenics_contact.feti import ContactPoints, TornSystem
 from fenics_contact.feti.dual import BALANCED
-from fenics_contact.scene import rigid_body_modes
-from fenics_contact.scene.held import resisted_motions
+from fenics_contact.feti.subdomain import common_kernel
+from fenics_contact.scene import Body, rigid_body_modes
+from fenics_contact.scene.held import RANK_TOLERANCE, resisted_motions
 
 #: A load that needs more of the friction than all but this part is at its limit: how far the body slides is
 #: left to rounding.
@@ -26,10 +27,11 @@ SMALL = 1e-9
 def check_held(torn: TornSystem) -> None:
     """Refuse a scene in which some body can move away under the load. Collective.
 
-    Asks whether support reactions and admissible contact forces (pressing, inside the friction cone or
-    disc) exist that balance the load on every body. If not, the dual problem is infeasible: there is a
-    rigid motion that nothing resists and along which the load does work. If friction must be used up for it
-    to the last part of `MARGIN`, forces exist, but any slide along that motion is an answer.
+    Asks whether support reactions, what the material itself resists (an elastic bed) and admissible contact
+    forces (pressing, inside the friction cone or disc) exist that balance the load on every body. If not,
+    the dual problem is infeasible: there is a rigid motion that nothing resists and along which the load does
+    work. If friction must be used up for it to the last part of `MARGIN`, forces exist, but any slide along
+    that motion is an answer.
 
     Args:
         torn: Gives scene, contact points and loads; its matrices are not used.
@@ -70,13 +72,15 @@ class _RigidBody:
         tearing = torn.decomposition.tearing
         self.name = tearing.body_names[index]
         self._nodes = slice(int(tearing.node_offset[index]), int(tearing.node_offset[index + 1]))
-        self._modes = rigid_body_modes(torn.scene.bodies[self.name].mesh.points)
-        #: Wrenches that supports can exert in both directions, shape (n_modes, n), orthonormal columns.
-        self.support = resisted_motions(self._modes, torn.decomposition.fixed[self._nodes])
+        body = torn.scene.bodies[self.name]
+        self._modes = rigid_body_modes(body.mesh.points)
+        supports = resisted_motions(self._modes, torn.decomposition.fixed[self._nodes])
+        #: Wrenches that supports and material can exert in both directions, shape (n_modes, n).
+        self.support = _both(supports, _resisted_by_material(body, self._modes))
 
     @property
     def held(self) -> bool:
-        """Whether supports alone resist every motion."""
+        """Whether supports and material alone resist every motion."""
         return self.support.shape[1] == self.support.shape[0]
 
     def contact_wrenches(self, torn: TornSystem) -> sp.csr_matrix:
@@ -109,6 +113,26 @@ class _RigidBody:
         jump = points.jump[:, self._nodes]
         moved = jump @ self._modes.reshape(self._modes.shape[0], -1)
         return np.asarray(moved).reshape(points.count, *self._modes.shape[1:])
+
+
+def _resisted_by_material(body: Body, modes: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis of the rigid motions that cost energy, shape (n_modes, n)."""
+    count = modes.shape[2]
+    flat = modes.reshape(-1, count)
+    kernel = common_kernel(body.materials, body.mesh.points).reshape(len(flat), -1)
+    if kernel.shape[1] == count:
+        return np.zeros((count, 0))
+    free, _ = np.linalg.qr(np.linalg.lstsq(flat, kernel, rcond=None)[0])
+    basis, _, _ = np.linalg.svd(np.identity(count) - free @ free.T)
+    return np.asarray(basis[:, : count - kernel.shape[1]])
+
+
+def _both(supports: np.ndarray, material: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis of what is resisted by either."""
+    if not material.shape[1]:
+        return supports
+    basis, size, _ = np.linalg.svd(np.hstack([supports, material]), full_matrices=False)
+    return np.asarray(basis[:, size > RANK_TOLERANCE])
 
 
 def _unresisted_motion(

@@ -13,8 +13,11 @@ from fenics_contact.feti import ContactPoints
 class Status(IntEnum):
     """What a contact point does."""
 
+    #: It does not touch and carries no force.
     OPEN = 0
+    #: It touches, and friction holds it: ‖τ‖ ≤ Ψ without slip.
     STICK = 1
+    #: It touches and slides: ‖τ‖ = Ψ against the slip, or there is no friction.
     SLIP = 2
 
 

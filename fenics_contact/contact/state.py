@@ -22,6 +22,7 @@ from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem, TornSystem
 from fenics_contact.feti.temperature import temperature_of
+from fenics_contact.progress import Task
 from fenics_contact.qp import DualSolution
 from fenics_contact.scene import Scene
 
@@ -44,6 +45,12 @@ class State:
         seconds: Wall time of this rank by phase, of all work up to this state that shares its timer.
         known_errors: Errors that were found on the way, None if they were not needed; ask `errors`.
         tolerance: What it was solved to, a relative residual or `Balanced`; None where no solver iterated.
+
+    Example:
+        >>> state = solve_scene(scene, None, comm)  # doctest: +SKIP
+        >>> state.displacement["block"]  # a dolfinx Function on the block's own mesh  # doctest: +SKIP
+        >>> state.contact.count(Status.SLIP)  # doctest: +SKIP
+        >>> print(state.errors)  # doctest: +SKIP
     """
 
     system: DualSystem | DirectSystem
@@ -57,7 +64,7 @@ class State:
 
     @property
     def torn(self) -> TornSystem:
-        """The torn system: subdomains, rows, contact points."""
+        """The torn system, that is subdomains, rows and contact points."""
         return self.system.torn
 
     @property
@@ -95,9 +102,16 @@ class State:
             return self.known_errors
         from fenics_contact.accuracy import discretisation_error, solver_errors, state_errors
 
-        solver = solver_errors(self.system, self.solution)
-        estimate = discretisation_error(self.torn, self.torn_displacement)
-        return state_errors(solver, estimate, self.energies.norm)
+        with Task("errors"):
+            solver = solver_errors(self.system, self.solution)
+            estimate = discretisation_error(self.torn, self.torn_displacement)
+            return state_errors(solver, estimate, self.energies.norm)
+
+    @cached_property
+    def contact_places(self) -> np.ndarray:
+        """Where the slave nodes of the contact points are before deformation, shape (n, dim), [length]."""
+        places = np.concatenate([body.mesh.points for body in self.scene.bodies.values()])
+        return np.asarray(places[self.contact.points.slave])
 
     @cached_property
     def displacement(self) -> dict[str, Any]:
@@ -156,7 +170,7 @@ class State:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Sizes and work: torn unknowns, multipliers by kind, products, steps."""
+        """Sizes and work, such as torn unknowns, multipliers by kind, products, steps."""
         torn = self.torn
         return {
             "torn_unknowns": torn.decomposition.torn_unknowns,

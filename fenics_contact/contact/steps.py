@@ -31,6 +31,12 @@ class LoadSequence:
         scene: The scene with the loads of the last step.
         state: State after the last step, None before the first.
 
+    Example:
+        >>> steps = LoadSequence(scene, None, comm)  # doctest: +SKIP
+        >>> for push in (0.0, 0.1, 0.2, 0.0):  # doctest: +SKIP
+        ...     supports = [Support("block", "z1", (push, 0.0, -0.01))]
+        ...     state = steps.advance(LoadStep(f"pushed by {push} mm", supports=supports))
+
     References:
         P. Wriggers, Computational Contact Mechanics, 2nd ed., Springer 2006, section 5.2.
     """

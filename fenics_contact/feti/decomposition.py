@@ -82,7 +82,8 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
         if tearing.n_subdomains < comm.size:
             raise InvalidInputError(
                 f"every rank needs a subdomain, but {comm.size} ranks share {tearing.n_subdomains} "
-                "subdomains: run on fewer ranks or cut the bodies finer"
+                f"subdomains: partition with scene.partition({comm.size}), cut the bodies finer, or run on "
+                "fewer ranks"
             )
     with together(comm):
         meshes = tuple(

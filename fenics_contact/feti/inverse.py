@@ -20,8 +20,11 @@ from fenics_contact.linalg.cost_model import prefers_explicit
 class LocalKind(Enum):
     """How subdomains are kept."""
 
+    #: Whichever of the two is expected to take less time in all.
     AUTOMATIC = "automatic"
+    #: As sparse factors: little set-up and memory, slower products.
     IMPLICIT = "implicit"
+    #: As dense matrices on the interface: more set-up and memory, faster products.
     EXPLICIT = "explicit"
 
 

@@ -60,7 +60,7 @@ def _coefficients(subdomain: Subdomain, modes: np.ndarray) -> np.ndarray | None:
 
     None if the subdomain has others.
     """
-    wanted = modes[subdomain.mesh.nodes].reshape(-1, modes.shape[-1])
+    wanted = modes[subdomain.mesh.nodes].reshape(subdomain.mesh.size, modes.shape[-1])
     found = np.linalg.lstsq(subdomain.kernel, wanted, rcond=None)[0]
     error = np.abs(subdomain.kernel @ found - wanted).max(initial=0.0)
     return found if error <= SPANNED * np.abs(wanted).max(initial=0.0) else None

@@ -34,6 +34,11 @@ def block(
 
     Raises:
         InvalidInputError: If the box has no volume, a count is not positive or the cell type is unknown.
+
+    Example:
+        >>> mesh = block((0, 0, 0), (2, 1, 1), (4, 2, 2))
+        >>> mesh.n_cells, sorted(mesh.surfaces)
+        (16, ['x0', 'x1', 'y0', 'y1', 'z0', 'z1'])
     """
     low, high = np.asarray(lower, dtype=np.float64), np.asarray(upper, dtype=np.float64)
     if low.shape != (3,) or high.shape != (3,) or not np.all(high > low):
@@ -53,6 +58,9 @@ def box_lattice(ticks: Sequence[np.ndarray], cell: str = "hexahedron") -> BodyMe
 
     Returns:
         As `block`.
+
+    Raises:
+        InvalidInputError: If coordinates do not ascend or the cell type is unknown.
     """
     check_cell_type(cell)
     points = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -49,6 +49,14 @@ class BodyMesh:
         InvalidInputError: If an array has the wrong shape or type, a coordinate is not finite, a node
             number is out of range or unused, a cell is inverted, nodes coincide, a facet is not an outward
             boundary face, or the regions overlap or leave out a cell.
+
+    Example:
+        A square of two triangles, whose lower edge is named.
+
+        >>> corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+        >>> mesh = BodyMesh(corners, [[0, 1, 2], [0, 2, 3]], {"bottom": [[0, 1]]})
+        >>> mesh.dim, mesh.n_nodes, mesh.volume
+        (2, 4, 1.0)
     """
 
     points: np.ndarray

@@ -83,7 +83,7 @@ class LinkShape:
 
     @property
     def volume(self) -> float:
-        """Volume of the smooth link: section times length of the centre line (Pappus)."""
+        """Volume of the smooth link, section times length of the centre line (Pappus)."""
         return self.section.area * (2.0 * np.pi * self.centre_radius + 2.0 * self.straight)
 
     @property

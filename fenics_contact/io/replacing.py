@@ -60,7 +60,12 @@ def replacing(*targets: Path) -> Iterator[tuple[Path, ...]]:
 
 
 def replacing_together(
-    comm: MPI.Comm, targets: Sequence[Path], write: Callable[[Path], None], repair: Callable[[Path], None]
+    comm: MPI.Comm,
+    targets: Sequence[Path],
+    write: Callable[[Path], None],
+    *,
+    size: int,
+    repair: Callable[[Path], None] | None = None,
 ) -> None:
     """Let all ranks write the same files, and put them in their place when all are done. Collective.
 
@@ -68,12 +73,17 @@ def replacing_together(
         comm: Communicator.
         targets: Files to write, all in one folder, which is created; in the order in which they are replaced.
         write: Takes the hidden folder and writes files of the targets' names into it. Collective.
+        size: About how many bytes that takes: less room is refused beforehand, as the libraries that write in
+            parallel end the whole run when they meet a full disk.
         repair: Takes the hidden folder on rank 0 before the files are moved.
 
     Raises:
         OutputError: On all ranks, if the disk is full or the folder cannot be written to.
     """
     with _on_first_rank(comm, targets[0]) as hidden:
+        with together(comm):
+            if comm.rank == 0:
+                _require_room(targets, size)
         error: Exception | None = None
         try:
             write(hidden)
@@ -85,10 +95,18 @@ def replacing_together(
         with together(comm):
             if comm.rank == 0:
                 try:
-                    repair(hidden)
+                    if repair is not None:
+                        repair(hidden)
                     replace_all([hidden / target.name for target in targets], targets[0].parent)
                 except OSError as caught:
                     raise _output_error(targets, caught) from caught
+
+
+def _require_room(targets: Sequence[Path], size: int) -> None:
+    free = shutil.disk_usage(targets[0].parent).free
+    if free < size:
+        reason = f"{os.strerror(errno.ENOSPC)}: {size} bytes are needed, {free} are free"
+        raise _output_error(targets, OSError(errno.ENOSPC, reason))
 
 
 @contextmanager

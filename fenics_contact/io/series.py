@@ -194,9 +194,12 @@ class ResultSeries:
     def _remove_unnamed(self) -> None:
         """Remove the files of members that are no longer, or that a killed run did not complete."""
         folder = self.path.with_suffix("")
+        if not folder.is_dir():
+            return
         named = {member.number for member in self.members}
         pattern = re.compile(rf"{re.escape(self._name)}_(\d{{4,}})(_.*)?\.(vtm|vtu|xdmf|h5|bp)")
-        for path in folder.glob(f"{self._name}_*"):
+        # What names other files goes before them.
+        for path in sorted(folder.iterdir(), key=lambda path: path.suffix not in (".vtm", ".xdmf")):
             match = pattern.fullmatch(path.name)
             if match and int(match.group(1)) not in named:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()

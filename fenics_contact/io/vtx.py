@@ -10,6 +10,7 @@ from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.io.names import checked_name, file_of_each
 from fenics_contact.io.replacing import replacing_together
+from fenics_contact.io.xdmf import parallel_size
 
 
 def write_vtx(
@@ -43,7 +44,8 @@ def write_vtx(
         pair = [target.with_name(f"{target.name}_{field.name}.bp") for field in fields]
         for path, field, cellwise in zip(pair, fields, (False, True), strict=True):
             write = partial(_write, path.name, field, value, cellwise)
-            replacing_together(comm, [path], write, lambda hidden: None)
+            size = 8 * parallel_size(field.function_space.mesh)  # a discontinuous field has its own nodes
+            replacing_together(comm, [path], write, size=size)
         written[body] = (pair[0], pair[1])
     return written
 

@@ -47,13 +47,13 @@ class BundleTrust:
     and, where that plane says little, shortens t. For a convex J no feasible point within the
     distance r is lower than J(x) by more than σ + r‖z‖: the certificate.
 
-    | it stops when | reason |
-    |---|---|
-    | w ≤ ε (s + \|J\|) at the present t and at the first one, and σ + r‖z‖ ≤ 10 ε (s + \|J\|) | CONVERGED |
-    | σ + r‖z‖ ≤ ε (s + \|J\|) | STATIONARY |
-    | ``max_iterations``, ``max_evaluations`` are spent | ITERATION_LIMIT, EVALUATION_LIMIT |
-    | t or the radius is 0 for practical purposes | NO_DESCENT, INVALID_DESIGNS |
-    | the quadratic programme cannot be solved | STEP_FAILED |
+    It stops, with a `Reason`,
+
+    * CONVERGED where w ≤ ε (s + \|J\|) at the present t and the first one and σ + r‖z‖ ≤ 10 ε (s + \|J\|),
+    * STATIONARY where σ + r‖z‖ ≤ ε (s + \|J\|),
+    * ITERATION_LIMIT, EVALUATION_LIMIT where ``max_iterations`` or ``max_evaluations`` are spent,
+    * NO_DESCENT, INVALID_DESIGNS where t or the radius is 0 for practical purposes,
+    * STEP_FAILED where the quadratic programme cannot be solved,
 
     with ε ``tolerance``, s ``value_scale`` and r the length of the first step, or of the present one where
     that is longer. On the published convex test functions the error of J at the stop is below ε (s + \|J\|);

@@ -66,6 +66,13 @@ class LinearConstraints:
         limit: b, shape (m,), finite.
         equality_matrix: E, shape (r, n), or None.
         equality_value: e, shape (r,), or None.
+
+    Example:
+        No more than 1 in the sum of three variables, and the first two alike.
+
+        >>> constraints = LinearConstraints([[1, 1, 1]], [1.0], [[1, -1, 0]], [0.0])
+        >>> nearest_feasible([2.0, 0.0, 0.0], (0.0, 5.0), constraints).round(3).tolist()
+        [0.5, 0.5, 0.0]
     """
 
     matrix: ArrayLike

@@ -39,7 +39,8 @@ def minimize(
         constraints: Linear constraints, or None.
         scale: Size of each variable, shape (n,) or a number. None takes the widths of the box where it is
             bounded on all sides, so choose bounds that mean something; else 1.
-        callback: Called after every evaluation with its record and the best point so far.
+        callback: Called after every evaluation with its record and the best point so far, and before the
+            checkpoint is written: a run that died in between tells the record again when it goes on.
         checkpoint: File that is written after evaluations and from which an interrupted run goes on with the
             iterates that it would have had; None keeps nothing. Limits and tolerance may be changed between.
 

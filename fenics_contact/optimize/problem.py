@@ -40,7 +40,14 @@ def pose(
     constraints: LinearConstraints | None = None,
     scale: ArrayLike | None = None,
 ) -> Problem:
-    """Check a problem and choose its scales; see `minimize` for the arguments.
+    """Check a problem and choose its scales.
+
+    Args:
+        fun: As for `minimize`.
+        x0: As for `minimize`, shape (n,).
+        bounds: As for `minimize`.
+        constraints: As for `minimize`.
+        scale: As for `minimize`.
 
     Returns:
         The checked problem; the caller's arrays are copied.

@@ -121,16 +121,18 @@ class Progress:
             yield task
 
     def evaluated(self, state: MethodState) -> None:
-        """Keep a state, tell it, and stop here if a signal asks for it. Collective.
+        """Tell a state, keep it, and stop here if a signal asks for it. Collective.
+
+        It is kept after the callback: what that writes is there for every evaluation that is kept.
 
         Raises:
             CheckpointError: If it cannot be written; the file is then what it was.
             Interrupted: If a signal was heard, see `fenics_contact.checkpoint.interruptible`.
         """
-        self.keep(state)
         self._tell(state)
         if self._callback is not None:
             self._callback(state.history[-1], state.centre.x.copy())
+        self.keep(state)
         safe_point(self._kept, lambda: self.keep(state, last=True), self.comm)
 
     def _tell(self, state: MethodState, *, timed: bool = True) -> None:

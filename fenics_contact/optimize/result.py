@@ -48,12 +48,17 @@ class Reason(Enum):
 
 
 class Kind(Enum):
-    """What became of a trial point; REFINED is the centre, evaluated again with a smaller error."""
+    """What became of a trial point."""
 
+    #: The first point.
     START = "start"
+    #: It lowers the objective enough and became the centre.
     SERIOUS = "serious"
+    #: It does not: its plane was added to the bundle.
     NULL = "null"
+    #: The objective does not exist there.
     REJECTED = "rejected"
+    #: The centre, evaluated again with a smaller error.
     REFINED = "refined"
 
 

@@ -33,7 +33,10 @@ class Work:
     falling: Falling = field(default_factory=Falling)
 
     def take(self, event: Event, moment: float) -> None:
-        """Take a step."""
+        """Take a step, or the end."""
+        if event.kind is not Kind.STEP:
+            self.event, self.stepped = replace(self.event, kind=event.kind, words=event.words), moment
+            return
         before, done = self.event.number or 0, event.number or 0
         if event.timed and done > before:
             self.counted.add((moment - self.stepped) / (done - before))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from fenics_contact.errors import ConvergenceError
@@ -18,6 +19,8 @@ from fenics_contact.qp.solution import DualSolution, SolverStep
 UNBALANCED = 1e-6
 #: A residual above this after all steps is no answer by any measure.
 HARDLY = 1e-2
+#: Steps in which nothing sticks, one after the other: a single one happens on the way to states that stick.
+SLIDING = 5
 
 
 @dataclass(frozen=True)
@@ -133,7 +136,7 @@ class FaceNewton:
             f"and {len(history)} steps: {last}; the best was {best.residuals.worst:.1e}, {newton.stall()}, "
             f"and {rescues} rescues did not help"
         )
-        if last.slip > 0 and last.stick == 0 and best.residuals.worst > HARDLY:
+        if slides(history) and best.residuals.worst > HARDLY:
             return (
                 f"{reached}: all {last.slip} discs slip, and friction may not suffice for any equilibrium; "
                 f"raise the friction, lower the load, add a support, or raise {spent}"
@@ -142,6 +145,12 @@ class FaceNewton:
             f"{reached}: raise {spent}, start from the solution of a neighbouring load, loosen the tolerance "
             "if the best residual is near it, or use a FixedPoint of SMALSE"
         )
+
+
+def slides(history: Sequence[SolverStep]) -> bool:
+    """Tell whether all discs slip, and have done so for a while."""
+    late = history[-max(SLIDING, len(history) // 4) :]
+    return bool(late) and all(step.slip > 0 and step.stick == 0 for step in late)
 
 
 def _sound(problem: DualProblem, best: Iterate, first: Iterate) -> Iterate:

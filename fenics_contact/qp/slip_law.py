@@ -48,7 +48,7 @@ class Tresca:
 
     @property
     def growth(self) -> Vector:
-        """Zero: the bounds are given."""
+        """Zero, as the bounds are given."""
         return np.zeros_like(self.slip_bound)
 
     def feasible(self, multiplier: Vector) -> FeasibleSet:

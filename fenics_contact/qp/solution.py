@@ -22,6 +22,8 @@ class SolverStep:
         stick: Sticking discs.
         slip: Slipping discs.
         note: What the solver decided, in words; empty for an ordinary step.
+        outer: Which of several solves it belongs to, from 0: a Tresca problem of the Coulomb fixed point, or
+            a round with a smaller tolerance.
     """
 
     method: str
@@ -32,6 +34,7 @@ class SolverStep:
     stick: int
     slip: int
     note: str = ""
+    outer: int = 0
 
     def __str__(self) -> str:
         """Return one readable line."""

@@ -32,7 +32,12 @@ class DualSolver(Protocol):
         """Return the solver with another tolerance."""
 
     def run(self, problem: DualProblem, law: SlipLaw, start: Start) -> DualSolution:
-        """Solve from ``start`` or raise `ConvergenceError`. Collective."""
+        """Solve from ``start``. Collective.
+
+        Raises:
+            InfeasibleError: If the problem has no equilibrium.
+            ConvergenceError: If the tolerance was not met; carries the history.
+        """
 
 
 def solve(

@@ -25,7 +25,12 @@ class Traction:
     Attributes:
         body: Name of the body.
         surface: Name of its surface.
-        value: Force a reference area, [force / length²] (in the plane: a unit of thickness).
+        value: Force a reference area, [force / length²] (in the plane: a unit of thickness); a function gets
+            points, shape (n, dim), and returns the traction there, shape (n, dim).
+
+    Example:
+        >>> even = Traction("block", "z1", (200.0, 0.0, -500.0))  # N/mm²
+        >>> rising = Traction("block", "z1", lambda x: -10.0 * x[:, :1] * (0.0, 0.0, 1.0))
     """
 
     body: str
@@ -124,8 +129,11 @@ class ThermalStrain:
         return self.temperature_change
 
 
+#: What acts on a surface.
 SurfaceLoad = Traction | TotalForce | Pressure
+#: What acts in the volume of a body.
 VolumeLoad = BodyForce | ThermalStrain
+#: All that loads a scene.
 Load = SurfaceLoad | VolumeLoad
 
 

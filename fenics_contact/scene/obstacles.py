@@ -156,7 +156,7 @@ class RigidCylinder(_Round):
 
     @property
     def dim(self) -> int:
-        """Dimension of the space that it lies in: 3."""
+        """Dimension of the space that it lies in, 3."""
         return 3
 
     def _arm(self, points: np.ndarray) -> np.ndarray:

@@ -10,12 +10,18 @@ import numpy as np
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene.obstacles import RigidObstacle
 
+#: Where the contact conditions are asked: at the slave's nodes, or weighted by its shape functions (mortar).
 Discretisation: TypeAlias = Literal["node", "mortar"]
 
 
 @dataclass(frozen=True)
 class Surface:
-    """A named surface of a named body."""
+    """A named surface of a named body.
+
+    Attributes:
+        body: Name of the body in the scene.
+        name: Name of the surface in the body's mesh.
+    """
 
     body: str
     name: str
@@ -44,6 +50,9 @@ class Coulomb:
 class Tresca:
     """Friction with a slip bound that does not depend on the pressure.
 
+    Not on whether there is any, either: it also acts on points across an open gap, as in the classical
+    problem with given friction. Use it where surfaces are known to touch.
+
     Attributes:
         traction: Bound on the tangential traction, ≥ 0, [force / length²].
     """
@@ -59,6 +68,7 @@ class Tresca:
             )
 
 
+#: A law of friction, or none.
 Friction: TypeAlias = Coulomb | Tresca | None
 
 
@@ -74,6 +84,14 @@ class ContactPair:
             and what shape derivatives know. ``"mortar"`` keeps weighted means of the gap positive (dual
             basis, integration over the common segments of both meshes): passes the contact patch test on
             meshes that do not match. Nodes are kept off a rigid obstacle one by one, whatever is given.
+
+    Raises:
+        InvalidInputError: If a body shall touch itself, or the discretisation is unknown.
+
+    Example:
+        >>> pair = ContactPair(Surface("punch", "bottom"), Surface("block", "z1"), Coulomb(0.3), "mortar")
+        >>> pair.has_friction
+        True
     """
 
     slave: Surface

@@ -29,6 +29,24 @@ class Scene:
         loads: Forces.
         contacts: Pairs of surfaces that may touch.
         ties: Pairs of surfaces that stay together.
+
+    Raises:
+        InvalidInputError: If a part names a body or a surface that is not there, does not suit the body's
+            dimension or material, or a load is none of the package's.
+
+    Example:
+        >>> from fenics_contact.geometry import block
+        >>> from fenics_contact.scene import Coulomb, IsotropicElasticity, RigidPlane, Traction
+        >>> steel = IsotropicElasticity(2.1e5, 0.3)  # N/mm²
+        >>> floor = RigidPlane((0, 0, 0), (0, 0, 1))
+        >>> scene = Scene(
+        ...     bodies={"block": Body(block((0, 0, 0), (2, 1, 1), (4, 2, 2)), steel)},  # mm
+        ...     supports=[Support("block", "x0")],
+        ...     loads=[Traction("block", "z1", (0.0, 0.0, -500.0))],  # N/mm²
+        ...     contacts=[ContactPair(Surface("block", "z0"), floor, Coulomb(0.3))],
+        ... )
+        >>> [effect.name.value for effect in scene.effects()]
+        ['elasticity', 'prescribed displacement', 'surface load', 'contact', 'Coulomb friction']
     """
 
     bodies: Mapping[str, Body]

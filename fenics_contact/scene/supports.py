@@ -22,6 +22,14 @@ class Support:
         surface: Name of its surface.
         value: Displacement [length] for x, y, z (for x, y on a plane body). None leaves a component free; a
             function gets points, shape (n, dim), and returns the component there, shape (n,).
+
+    Raises:
+        InvalidInputError: If nothing is prescribed, or something that is no finite number and no function.
+
+    Example:
+        >>> clamped = Support("block", "x0")
+        >>> roller = Support("block", "z0", (None, None, 0.0))
+        >>> pushed = Support("block", "x1", (0.5, None, None))  # mm
     """
 
     body: str

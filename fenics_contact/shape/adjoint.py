@@ -76,7 +76,8 @@ def solve_adjoint(
     if transposed is None:
         raise ConvergenceError(
             "the adjoint needs a contact face that holds every body, but from this state some body can slide "
-            "without resistance: choose WeakChoice.HELD, or a design away from this one"
+            "without resistance: refine the contact until more points hold it, add a support, choose "
+            "WeakChoice.HELD where points are weakly active, or take a design away from this one"
         )
     flexed = system.inverse(partials.by_displacement)
     right = linearised.moving.T @ (factor * (system.jump(flexed) - partials.by_multiplier))

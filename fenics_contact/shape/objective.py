@@ -163,6 +163,14 @@ class ContactForces:
     Attributes:
         function: Takes the contact result; returns φ, ∂φ/∂λ_N of shape (n,) and ∂φ/∂τ of shape (n, 2), the
             latter in the points' tangents. Invariant under rotation of the tangents if it is to be smooth.
+
+    Example:
+        >>> def largest(contact):
+        ...     k = int(contact.normal_force.argmax())
+        ...     by_normal = np.zeros(len(contact.normal_force))
+        ...     by_normal[k] = 1.0
+        ...     return contact.normal_force[k], by_normal, np.zeros((len(by_normal), 2))
+        >>> objective = ContactForces(largest)
     """
 
     function: ForceFunction
@@ -172,7 +180,11 @@ class ContactForces:
         return float(self.function(state.contact)[0])
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
-        """Place the user's derivatives on the contact rows."""
+        """Place the user's derivatives on the contact rows.
+
+        Raises:
+            InvalidInputError: If the function returns derivatives of another shape.
+        """
         system, torn = state.dual, state.torn
         value, normal, tangential = self.function(state.contact)
         count = torn.points.count

@@ -45,13 +45,14 @@ class ShapeProblem:
 
     Attributes:
         designs: The moving surfaces; α is their variables one after the other.
-        first: The design evaluated first; after a run was resumed, built again when it is first asked for, by
-            all ranks together.
-        best: The design with the smallest objective so far, likewise.
-        last: The design evaluated last.
-        seconds: Wall time of this rank by phase, over all evaluations.
         products: F-products of states and adjoints so far.
         evaluations: Number of designs evaluated.
+
+    Example:
+        >>> designs = SurfaceDesign("link1", links.first.crown, net=(7, 4))  # doctest: +SKIP
+        >>> problem = ShapeProblem(scene, partitions, designs, TotalPotential(), comm)  # doctest: +SKIP
+        >>> value, subgradient = problem(np.zeros(problem.size))  # doctest: +SKIP
+        >>> result = minimize(problem, np.zeros(problem.size), bounds=(-1.0, 1.0))  # doctest: +SKIP
     """
 
     def __init__(
@@ -115,7 +116,7 @@ class ShapeProblem:
 
     @property
     def first(self) -> DesignPoint | None:
-        """The design evaluated first. Collective after a run was resumed."""
+        """The design evaluated first. Collective after a run was resumed, for it is built again then."""
         return self._memory.point("first")
 
     @property
@@ -167,7 +168,17 @@ class ShapeProblem:
         return point.value, point.gradient
 
     def points_of(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the coordinates of the designed bodies, body name -> (n_nodes, 3), [length]. Collective."""
+        """Return the coordinates of the designed bodies. Collective.
+
+        Args:
+            alpha: Design variables, shape (size,), [length].
+
+        Returns:
+            Body name -> coordinates, shape (n_nodes, 3), [length].
+
+        Raises:
+            InvalidInputError: If alpha has another shape or is not finite.
+        """
         alpha = np.asarray(alpha, dtype=float)
         if alpha.shape != (self.size,):
             raise InvalidInputError(

@@ -1,6 +1,6 @@
 """What accuracy costs in time: runs of one scene with other meshes, tolerances and discretisations.
 
-`run_study` measures, `write_report` concludes; `python -m fenics_contact accuracy SCENE` does both. A scene
+`run_study` measures, `write_report` concludes; ``python -m fenics_contact accuracy SCENE`` does both. A scene
 of one's own is a Python file that defines ``study``, a `StudyScene`.
 """
 

@@ -54,9 +54,7 @@ class Outcome:
 
     def slave_points(self) -> np.ndarray:
         """Return where the contact points lie before the load, shape (n, dim), [length]."""
-        bodies = self.problem.scene.bodies.values()
-        points = np.concatenate([body.mesh.points for body in bodies])
-        return np.asarray(points[self.state.contact.points.slave])
+        return self.state.contact_places
 
 
 #: A number, or several that are judged together by their Euclidean norm.

@@ -13,7 +13,7 @@ from fenics_contact.study.waste import waste
 
 
 def write_report(folder: str | Path, results: Results, *, figures: bool = True) -> list[str]:
-    """Write `study.json`, `table.md` and the figures of a study, also of one that is not complete.
+    """Write ``study.json``, ``table.md`` and the figures of a study, also of one that is not complete.
 
     Args:
         folder: Where to; created.

@@ -106,7 +106,7 @@ def read_study(folder: str | Path) -> Results:
     """Read the results of a study.
 
     Args:
-        folder: Folder of a study, or its `study.json`.
+        folder: Folder of a study, or its ``study.json``.
 
     Raises:
         InvalidInputError: If there is none, or it cannot be read.

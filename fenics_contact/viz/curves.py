@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Curve: TypeAlias = tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]
 
 #: Colours and symbols of the series, told apart without colours too.
-_LOOKS = (
+LOOKS = (
     (BLUE, "o"),
     (ORANGE, "^"),
     (GREEN, "s"),
@@ -120,7 +120,7 @@ def _draw_reference(axes: Any, curves: Mapping[str, tuple[np.ndarray, np.ndarray
 
 def _draw_series(axes: Any, curves: Mapping[str, tuple[np.ndarray, np.ndarray]], connected: bool) -> None:
     for number, (name, (x, y)) in enumerate(curves.items()):
-        colour, symbol = _LOOKS[number % len(_LOOKS)]
+        colour, symbol = LOOKS[number % len(LOOKS)]
         few = len(x) <= MOST_SYMBOLS
         line = "-" if connected or not few else "none"
         axes.plot(

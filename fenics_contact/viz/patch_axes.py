@@ -25,8 +25,20 @@ def label_axes(axes: Any, patch: ContactPatch, units: Units, *, from_slave: bool
     axes.set_ylim(patch.low[1], patch.high[1])
     for axis, direction, word in ((axes.xaxis, patch.view.right, "right"), (axes.yaxis, patch.view.up, "up")):
         name = axis_label(direction)
-        axis.set_label_text(f"{name.strip('−') or word} ({units.length})")
-        if name.startswith("−"):
-            if from_slave and axis is axes.xaxis:
-                axes.set_xlim(patch.high[0], patch.low[0])
-            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{0 - value:g}".replace("-", "−")))
+        label_axis(axis, name, word, units)
+        if name.startswith("−") and from_slave and axis is axes.xaxis:
+            axes.set_xlim(patch.high[0], patch.low[0])
+
+
+def label_axis(axis: Any, name: str, word: str, units: Units) -> None:
+    """Name an axis; one that runs backwards counts backwards.
+
+    Args:
+        axis: matplotlib's axis.
+        name: What `axis_label` returns: "x", "−x" or "".
+        word: Name of an axis that runs along no coordinate.
+        units: Names of the units.
+    """
+    axis.set_label_text(f"{name.strip('−') or word} ({units.length})")
+    if name.startswith("−"):
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{0 - value:g}".replace("-", "−")))

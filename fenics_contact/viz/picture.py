@@ -49,12 +49,7 @@ class Picture:
         Raises:
             InvalidInputError: If the picture was written to no file.
         """
-        if self.path is None:
-            raise InvalidInputError(
-                "this needs the file of a picture, but the picture was not written: give the plot_ function "
-                "a path, such as 'stress.png'"
-            )
-        return str(self.path)
+        return written_path(self.path, "plot_ function a path, such as 'stress.png'")
 
     def __str__(self) -> str:
         """Return the path of the file, or say that there is none."""
@@ -96,16 +91,25 @@ def draw_picture(comm: MPI.Comm | None, path: Path | None, draw: Callable[[Binar
             draw(paper)
             png = paper.getvalue()
             if path is not None:
-                write_png(path, png)
+                write_file(path, png)
     return Picture(png, path)
 
 
-def write_png(path: Path, png: bytes) -> None:
-    """Write a picture whole or not at all; its folder is created, a file of that name is replaced."""
+def written_path(path: Path | None, remedy: str) -> str:
+    """Return the path of a picture's file, refuse one that was not written."""
+    if path is None:
+        raise InvalidInputError(
+            f"this needs the file of a picture, but the picture was not written: give the {remedy}"
+        )
+    return str(path)
+
+
+def write_file(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all; its folder is created, a file of that name is replaced."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.png")
+    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
     try:
-        temporary.write_bytes(png)
+        temporary.write_bytes(content)
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)

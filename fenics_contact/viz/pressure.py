@@ -95,7 +95,7 @@ def _draw(
     height = round((0.17 + 0.39 * proportion) * width)
     with sheet(paper, (width, height), headline(title, facts), "constrained") as figure:
         left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-        _draw_pressure(left, patch, shown)
+        draw_pressure(left, patch, shown)
         label = f"contact pressure ({units.stress})"
         extend = "max" if peak > shown[1] else "neither"
         figure.colorbar(ScalarMappable(Normalize(*shown), PRESSURE_MAP), ax=left, label=label, extend=extend)
@@ -106,7 +106,8 @@ def _draw(
         figure.legend(handles, labels, loc="outside lower right", ncols=3, handletextpad=0.2)
 
 
-def _draw_pressure(axes: Any, patch: ContactPatch, clim: tuple[float, float]) -> None:
+def draw_pressure(axes: Any, patch: ContactPatch, clim: tuple[float, float]) -> None:
+    """Draw the pressure on facets laid flat."""
     mesh, values = refined(patch)
     axes.tripcolor(mesh, values, shading="gouraud", cmap=PRESSURE_MAP, vmin=clim[0], vmax=clim[1])
     outlines = {"facecolors": "none", "edgecolors": GREY, "linewidths": 0.5}

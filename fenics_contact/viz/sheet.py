@@ -14,7 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from fenics_contact.viz.colours import INK
-from fenics_contact.viz.picture import png_path, write_png
+from fenics_contact.viz.picture import png_path, write_file
 from fenics_contact.viz.words import nice_number, written
 
 #: Inches of every sheet's width: fonts and lines grow with the number of pixels.
@@ -75,7 +75,7 @@ def sheet(
         content = BytesIO()
         figure.savefig(content, dpi=dpi, format="png")
     if path is not None:
-        write_png(path, content.getvalue())
+        write_file(path, content.getvalue())
     elif not isinstance(paper, str | Path):
         paper.write(content.getvalue())
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -68,11 +69,32 @@ def render(layers: Iterable[Layer], view: View, frame: Frame, width: int) -> np.
     Raises:
         MissingRequirementError: If this machine cannot render.
     """
-    check_renderer()
     height = max(2, round(width * float(frame.size[1] / frame.size[0])))
-    window = [SUPERSAMPLING * width, SUPERSAMPLING * height]
+    with staged(layers, view, frame, (SUPERSAMPLING * width, SUPERSAMPLING * height)) as plotter:
+        image = plotter.screenshot(None, return_img=True)
+    blocks = np.asarray(image)[..., :3].reshape(height, SUPERSAMPLING, width, SUPERSAMPLING, 3)
+    return np.asarray(blocks.mean(axis=(1, 3)).round(), dtype=np.uint8)
+
+
+@contextmanager
+def staged(layers: Iterable[Layer], view: View, frame: Frame, size: tuple[int, int]) -> Iterator[Any]:
+    """Set meshes, lamp and camera up, and take them down at the end.
+
+    Args:
+        layers: What to draw.
+        view: From which side.
+        frame: Which part.
+        size: Width and height in pixels.
+
+    Yields:
+        A ``pyvista.Plotter``.
+
+    Raises:
+        MissingRequirementError: If this machine cannot render.
+    """
+    check_renderer()
     theme = pv.themes.DocumentTheme()
-    plotter = pv.Plotter(off_screen=True, window_size=window, theme=theme, lighting="none")
+    plotter = pv.Plotter(off_screen=True, window_size=list(size), theme=theme, lighting="none")
     try:
         plotter.background_color = "white"
         # One lamp above the viewer's left shoulder: colours keep their brightness on all that is seen.
@@ -82,11 +104,9 @@ def render(layers: Iterable[Layer], view: View, frame: Frame, width: int) -> np.
             plotter.add_mesh(layer.mesh, **{"show_scalar_bar": False, "reset_camera": False, **layer.options})
             middle = np.asarray(layer.mesh.center)
         _aim(plotter, view, frame, middle)
-        image = plotter.screenshot(None, return_img=True)
+        yield plotter
     finally:
         plotter.close()
-    blocks = np.asarray(image)[..., :3].reshape(height, SUPERSAMPLING, width, SUPERSAMPLING, 3)
-    return np.asarray(blocks.mean(axis=(1, 3)).round(), dtype=np.uint8)
 
 
 def _aim(plotter: Any, view: View, frame: Frame, middle: np.ndarray) -> None:

@@ -65,6 +65,10 @@ def plot_stress(
     Raises:
         InvalidInputError: If an option or the name of the file cannot be used.
         MissingRequirementError: If this machine cannot render.
+
+    Example:
+        >>> plot_stress(state, "output/stress.png", clim=(0, 400), scale=50)  # doctest: +SKIP
+        >>> plot_stress(state)  # in a notebook  # doctest: +SKIP
     """
     target = png_path(path)
     if scale is not None and not np.isfinite(scale):

@@ -2,7 +2,7 @@
 
 Rank RANK sends the signal to itself in the middle of a solve, once three steps or evaluations are done.
 SIGNAL ``none`` lets the run come to its end; ``wait`` says "now" and goes on slowly, to be stopped from
-outside. ``plain`` leaves Ctrl-C to Python, ``seldom`` writes every second time alone.
+outside. ``plain`` leaves Ctrl-C to Python, ``seldom`` writes every fourth time alone.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ if __name__ == "__main__":
         logger.setLevel(logging.DEBUG)
         logger.propagate = False
         logger.addHandler(Stopper(what, name, 2 if "twice" in more else 1))
-    checkpoint = None if path == "-" else Checkpoint(Path(path), every=2 if "seldom" in more else 1)
+    checkpoint = None if path == "-" else Checkpoint(Path(path), every=4 if "seldom" in more else 1)
     with nullcontext() if "plain" in more else interruptible(MPI.COMM_WORLD):
         found = run(checkpoint)
     if MPI.COMM_WORLD.rank == 0:

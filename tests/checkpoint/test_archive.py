@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from fenics_contact.checkpoint import Checkpoint, archive, read_archive, write_archive
 from fenics_contact.errors import InvalidInputError
+from tests.contact.step_cases import sequence, shears
 
 PROBLEM = {"size": "3", "bounds": "a box"}
 ARRAYS = {"x": np.linspace(0.0, 1.0, 40), "names": np.array(["start", "serious"])}
@@ -31,6 +34,29 @@ def test_the_file_is_an_ordinary_one_of_numpy(path: Path) -> None:
     with np.load(path, allow_pickle=False) as members:
         assert str(members["_format"]) == "fenics_contact checkpoint"
         assert members["x"].tolist() == ARRAYS["x"].tolist()
+
+
+def test_the_digest_is_what_its_description_says(path: Path) -> None:
+    digest = hashlib.sha256()
+    with np.load(path, allow_pickle=False) as members:
+        assert "_digest" in members.files
+        for name in sorted(set(members.files) - {"_digest"}):
+            digest.update(f"{name} {members[name].dtype.str} {members[name].shape} ".encode())
+            digest.update(members[name].tobytes())
+        assert str(members["_digest"]) == digest.hexdigest()
+
+
+def test_the_arrays_of_a_load_history_have_the_names_that_are_described(tmp_path: Path) -> None:
+    steps = sequence(Checkpoint(tmp_path / "run.npz"), MPI.COMM_SELF)
+    for step in shears((0.0, 0.006)):
+        steps.advance(step)
+    with np.load(tmp_path / "run.npz") as members:
+        assert set(members.files) == {
+            *("_format", "_version", "_kind", "_fingerprint", "_digest", "steps"),
+            *(f"00000{k}.{part}" for k in (0, 1) for part in ("step", "multiplier", "origin", "motion")),
+        }
+        assert str(members["_kind"]) == "load history"
+        assert members["000001.multiplier"].any()
 
 
 def test_a_file_cut_anywhere_is_refused(path: Path) -> None:

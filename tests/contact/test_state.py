@@ -36,6 +36,9 @@ def test_the_primal_energy_is_the_dual_energy_and_contains_the_friction(scene) -
     assert energies.primal == energies.total_potential + energies.friction
     lengths = np.linalg.norm(state.contact.slip, axis=1)
     assert energies.friction == pytest.approx(state.contact.slip_bound @ lengths, rel=1e-12)
+    told = dict(line.rsplit(maxsplit=1) for line in str(energies).splitlines())
+    assert float(told["total potential"]) == pytest.approx(energies.total_potential, rel=1e-5)
+    assert len(told) == 6
 
 
 def test_pressures_integrate_to_the_load() -> None:

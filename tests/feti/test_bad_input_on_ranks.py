@@ -12,7 +12,10 @@ from tests.conftest import run_on_ranks
 SCRIPT = Path(__file__).with_name("bad_input_on_ranks.py")
 RANKS = 3
 EXPECTED = {
-    "too_few_subdomains": ("InvalidInputError", "3 ranks share 2 subdomains: run on fewer ranks or cut"),
+    "too_few_subdomains": (
+        "InvalidInputError",
+        "3 ranks share 2 subdomains: partition with scene.partition(3), cut the bodies finer",
+    ),
     "infinite_load_on_the_last_rank": (
         "InvalidInputError",
         "stiffness and load of subdomain 5 of body 'bar' must be finite, got NaN or infinity: check",

@@ -21,7 +21,7 @@ FLOORS = [
     {"accuracy"},
     {"contact"},
     {"shape"},
-    {"optimize"},
+    {"optimize", "outer"},
 ]
 FLOOR = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
 BESIDE = {"viz", "io", "study", "scene_file"}
@@ -192,5 +192,5 @@ def test_contact_alone_loads_neither_sensitivity_nor_pictures() -> None:
     assert answer.returncode == 0, answer.stderr
     loaded = set(answer.stdout.split())
     assert f"{PACKAGE}.contact" in loaded
-    rooms = {f"{PACKAGE}.{room}" for room in ("shape", "viz", "optimize", "study")}
+    rooms = {f"{PACKAGE}.{room}" for room in ("shape", "viz", "optimize", "outer", "study")}
     assert loaded & (rooms | {"pyvista", "matplotlib"}) == set()

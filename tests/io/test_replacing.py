@@ -178,6 +178,12 @@ def test_a_file_that_names_others_is_away_while_they_are_replaced(
     assert [(tmp_path / name).read_text() for name in names] == ["new"] * 3
 
 
+def write_all(targets: list[Path]) -> None:
+    with replacing(*targets) as paths:
+        for path in paths:
+            path.write_text("new")
+
+
 def test_a_folder_in_the_place_of_one_of_several_files_is_found_before_any_is_replaced(
     tmp_path: Path,
 ) -> None:
@@ -185,7 +191,6 @@ def test_a_folder_in_the_place_of_one_of_several_files_is_found_before_any_is_re
     (tmp_path / "b").mkdir()
     (tmp_path / "index").write_text("old")
     targets = [tmp_path / name for name in ("a", "b", "index")]
-    with pytest.raises(OutputError, match="Is a directory"), replacing(*targets) as paths:
-        for path in paths:
-            path.write_text("new")
+    with pytest.raises(OutputError, match="Is a directory"):
+        write_all(targets)
     assert [(tmp_path / name).read_text() for name in ("a", "index")] == ["old", "old"]

@@ -205,6 +205,22 @@ def test_the_callback_sees_each_record_once(tmp_path: Path) -> None:
     assert tuple(seen) == result.history
 
 
+def test_a_record_whose_callback_was_cut_short_is_told_again(tmp_path: Path) -> None:
+    case, seen = BY_NAME["CB2"], []
+
+    def watch(record: Record, x: Array) -> None:
+        seen.append(record)
+        if len(seen) == 4:
+            raise Interrupted
+
+    checkpoint = Checkpoint(tmp_path / "run.npz")
+    with pytest.raises(Interrupted):
+        minimize(case.fun, case.start, FINE, callback=watch, checkpoint=checkpoint)
+    result = minimize(case.fun, case.start, FINE, callback=watch, checkpoint=checkpoint)
+    assert seen[3] == seen[4]
+    assert tuple(seen[:3] + seen[4:]) == result.history
+
+
 def test_an_unreadable_checkpoint_is_never_replaced_by_a_new_run(tmp_path: Path) -> None:
     case, path = BY_NAME["CB2"], tmp_path / "run.npz"
     stopped(case, Checkpoint(path), 4)

@@ -9,11 +9,14 @@ import pytest
 
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp import FaceNewton, Tresca, contact_step, measure, solve
+from fenics_contact.qp.face_newton import slides
 from fenics_contact.qp.iterate import Start, iterate_at
 from fenics_contact.qp.problem import CountedOperator
 from fenics_contact.qp.proximal import ProximalPoint
 from fenics_contact.qp.rescue import rescue
+from fenics_contact.qp.residual import Residuals
 from fenics_contact.qp.slip_law import Coulomb
+from fenics_contact.qp.solution import SolverStep
 from tests.qp.test_coulomb import coulomb_violations
 from tests.qp.torn_bricks import Bricks, torn_problem
 
@@ -92,3 +95,14 @@ def test_a_failure_says_what_was_reached_and_what_to_try() -> None:
     with pytest.raises(ConvergenceError, match=told) as caught:
         solve(dual, None, replace(FaceNewton(), max_products=30), friction_coefficient=40 * mu_f)
     assert caught.value.history
+
+
+def test_one_step_in_which_all_slips_does_not_mean_that_friction_is_too_small() -> None:
+    def step(stick: int, slip: int) -> SolverStep:
+        return SolverStep("face", 0, 1, Residuals(1.0, 1.0, 1.0, 1.0, 1.0, 1.0), stick + slip, stick, slip)
+
+    sticking, slipping = step(3, 5), step(0, 8)
+    assert slides([sticking] + 6 * [slipping])
+    assert not slides(6 * [slipping] + [sticking, slipping])
+    assert not slides(6 * [step(0, 0)])
+    assert not slides([])

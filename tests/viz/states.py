@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import State, Status, solve_scene
 from fenics_contact.scene import Coulomb
+from fenics_contact.viz import Picture
 from tests.contact.gallery import partitions, two_blocks
 
 
@@ -23,9 +25,10 @@ def touching_blocks(cell: str = "hexahedron") -> State:
     return state
 
 
-def pixels(path: Path) -> np.ndarray:
+def pixels(picture: Path | Picture) -> np.ndarray:
     """Read a picture, (height, width, 3) in [0, 1]."""
-    return np.asarray(imread(path))[..., :3]
+    kept = isinstance(picture, Picture) and picture.path is None and picture.png is not None
+    return np.asarray(imread(BytesIO(picture.png) if kept else picture))[..., :3]
 
 
 def painted(image: np.ndarray) -> float:

@@ -9,16 +9,22 @@ from matplotlib.colors import Colormap, to_rgb
 from fenics_contact.geometry import block, box_partition
 from fenics_contact.viz.colours import (
     BLUE,
+    ERROR_MAP,
     FAMILIES,
+    GREEN,
     GREY,
+    INK,
     ORANGE,
+    PALE,
     PRESSURE_MAP,
+    SIGNED_MAP,
     STRESS_MAP,
     colour_subdomains,
     neighbours,
 )
+from fenics_contact.viz.curves import LOOKS
 
-#: Linear RGB as seen without the medium and without the long cones (Machado, Oliveira and Fernandes, 2009).
+#: Linear RGB as seen without the medium, the long and the short cones (Machado, Oliveira, Fernandes, 2009).
 DEFICIENCIES = {
     "deuteranopia": (
         (0.367322, 0.860646, -0.227968),
@@ -30,6 +36,21 @@ DEFICIENCIES = {
         (0.114503, 0.786281, 0.099216),
         (-0.003882, -0.048116, 1.051998),
     ),
+    "tritanopia": (
+        (1.255528, -0.076749, -0.178779),
+        (-0.078411, 0.930809, 0.147602),
+        (0.004733, 0.691367, 0.303900),
+    ),
+}
+#: Colours that must be told apart in one picture.
+PURPOSES = {
+    "cool subdomains": FAMILIES[0],
+    "warm subdomains": FAMILIES[1],
+    "subdomains of two bodies": [*FAMILIES[0], *FAMILIES[1]],
+    "status on its ground": (BLUE, ORANGE, GREY, PALE),
+    "residuals": (BLUE, ORANGE, GREEN, INK),
+    "before and after": (GREY, ORANGE, BLUE, "#ffffff"),
+    "curves": (*(colour for colour, _ in LOOKS), INK),
 }
 
 
@@ -48,7 +69,7 @@ def lab(rgb: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("deficiency", sorted(DEFICIENCIES))
-@pytest.mark.parametrize("colours", [*FAMILIES, (BLUE, ORANGE, GREY)], ids=["cool", "warm", "symbols"])
+@pytest.mark.parametrize("colours", PURPOSES.values(), ids=PURPOSES.keys())
 def test_colours_of_one_purpose_stay_apart_for_colour_blind_eyes(
     deficiency: str, colours: tuple[str, ...]
 ) -> None:
@@ -63,10 +84,27 @@ def test_red_and_green_of_equal_lightness_would_be_found_too_close() -> None:
     assert np.linalg.norm(seen[0] - seen[1]) < 10
 
 
-@pytest.mark.parametrize("colours", [STRESS_MAP, PRESSURE_MAP], ids=["stress", "pressure"])
-def test_more_is_always_darker(colours: Colormap) -> None:
-    lightness = [lab(linear(colours(value)))[0] for value in np.linspace(0, 1, 30)]
+SIGHTS = {"full": np.eye(3), **DEFICIENCIES}
+
+
+@pytest.mark.parametrize("sight", SIGHTS)
+@pytest.mark.parametrize(
+    "colours", [STRESS_MAP, PRESSURE_MAP, ERROR_MAP], ids=["stress", "pressure", "error"]
+)
+def test_more_is_always_darker_to_all_eyes(colours: Colormap, sight: str) -> None:
+    matrix = np.array(SIGHTS[sight])
+    lightness = [lab(matrix @ linear(colours(value)))[0] for value in np.linspace(0, 1, 60)]
     assert np.all(np.diff(lightness) < 0)
+    assert lightness[0] - lightness[-1] > 60
+
+
+@pytest.mark.parametrize("sight", SIGHTS)
+def test_movements_outwards_and_inwards_are_dark_and_differ_to_all_eyes(sight: str) -> None:
+    matrix = np.array(SIGHTS[sight])
+    seen = np.array([lab(matrix @ linear(SIGNED_MAP(value))) for value in np.linspace(0, 1, 61)])
+    assert np.all(np.diff(seen[:31, 0]) > 0)
+    assert np.all(np.diff(seen[31:, 0]) < 0)
+    assert np.linalg.norm(seen[5] - seen[-6]) > 20
 
 
 def test_neighbours_counts_shared_nodes() -> None:

@@ -14,7 +14,7 @@ from IPython.core.formatters import DisplayFormatter
 from fenics_contact import viz
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz import Picture, plot_curves
-from fenics_contact.viz.picture import SHOWN_WIDTH, write_png
+from fenics_contact.viz.picture import SHOWN_WIDTH, write_file
 
 LINE: dict[str, Any] = {"series": {"line": ([0.0, 1.0], [0.0, 2.0])}, "xlabel": "x (mm)", "ylabel": "y (N)"}
 
@@ -60,7 +60,7 @@ def test_a_picture_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: p
 
     monkeypatch.setattr(os, "replace", fail)
     with pytest.raises(OSError, match="disk full"):
-        write_png(path, b"new")
+        write_file(path, b"new")
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
 

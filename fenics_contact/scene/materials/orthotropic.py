@@ -34,6 +34,13 @@ def material_axes(first: Sequence[float], second: Sequence[float]) -> tuple[Trip
 
     Returns:
         The three material axes as rows, orthonormal and right-handed.
+
+    Raises:
+        InvalidInputError: If the directions are parallel or zero.
+
+    Example:
+        >>> material_axes((0, 2, 0), (0, 1, 1))
+        ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
     """
     a, b = (np.array(numbers("a material axis", v, 3, "give x, y and z")) for v in (first, second))
     normal = np.cross(a, b)

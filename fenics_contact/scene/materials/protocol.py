@@ -18,7 +18,7 @@ class Material(Protocol):
 
     @property
     def dims(self) -> tuple[int, ...]:
-        """Dimensions of the bodies that it is for: ``(2,)``, ``(3,)`` or ``(2, 3)``."""
+        """Dimensions of the bodies that it is for, ``(2,)``, ``(3,)`` or ``(2, 3)``."""
 
     @property
     def parameters(self) -> tuple[float, ...]:

@@ -1,0 +1,1 @@
+"""SciPy's optimisers beside the bundle method, on the shape of the chain."""

@@ -1,0 +1,43 @@
+"""Write the study: `python -m benchmarks.optimisers [--quick] [--folder F]`; it goes to docs/studies/."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from benchmarks.optimisers.measuring import FULL, METHODS, QUICK, run
+from benchmarks.optimisers.report import page, plot
+from fenics_contact.io import versions, write_json
+
+FOLDER = Path(__file__).resolve().parents[2] / "docs" / "studies" / "optimisers"
+#: Most evaluations of a method with derivative, and of one without, which needs one a variable to begin.
+BUDGET, WITHOUT_DERIVATIVE = 150, 300
+QUICK_BUDGET = 12
+
+
+def main() -> None:
+    """Measure, then write numbers, page and picture; the numbers are written after every run."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="one problem, few evaluations; no conclusions")
+    parser.add_argument("--folder", type=Path, help="where to write instead of docs/studies/optimisers")
+    parser.add_argument("--draw", action="store_true", help="page and picture from numbers that are there")
+    chosen = parser.parse_args()
+    folder = chosen.folder or (FOLDER if not chosen.quick else Path("output") / "optimisers")
+    known = folder / "results.json"
+    runs = []
+    for case in () if chosen.draw else QUICK if chosen.quick else FULL:
+        for method in METHODS:
+            budget = WITHOUT_DERIVATIVE if method == "COBYLA" else BUDGET
+            runs.append(run(case, method, QUICK_BUDGET if chosen.quick else budget))
+            last = runs[-1]
+            print(f"{case.name}, {method}: J = {last['value']:.2f}, {last['stop']}", flush=True)
+            write_json(known, {"runs": runs, "quick": chosen.quick, "versions": versions()})
+    study = json.loads(known.read_text())
+    (folder / "README.md").write_text(page(study), encoding="utf-8")
+    plot(folder / "optimisers.png", study["runs"])
+    print(f"page in {folder / 'README.md'}")
+
+
+if __name__ == "__main__":
+    main()

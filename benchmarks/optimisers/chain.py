@@ -1,0 +1,163 @@
+"""The design problem that all methods get, and the book that is kept of what they ask."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from time import perf_counter
+
+import numpy as np
+from mpi4py import MPI
+
+from benchmarks.cases.scenes import chain, chain_links
+from fenics_contact.contact import ContactResult, State
+from fenics_contact.errors import ConvergenceError, InvalidDesignError
+from fenics_contact.geometry import TwoLinks, box_partition
+from fenics_contact.optimize import LinearConstraints, nearest_feasible
+from fenics_contact.shape import (
+    AdaptiveTolerance,
+    ContactForces,
+    Objective,
+    ShapeProblem,
+    SurfaceDesign,
+    TotalPotential,
+)
+
+#: Cells around, through and across each link, boxes, control points.
+SIZES = {
+    "coarse": ((30, 4, 10), (4, 1, 1), (7, 4)),
+    "small": ((36, 6, 14), (8, 1, 2), (7, 4)),
+}
+#: Tolerance of all states; looser ones would blur differences that the methods look at.
+STATES = 1e-8
+
+
+def _largest(contact: ContactResult) -> tuple[float, np.ndarray, np.ndarray]:
+    """Return the largest normal force and one subgradient of it."""
+    force = contact.normal_force
+    k = int(np.argmax(force))
+    return float(force[k]), np.eye(len(force))[k], np.zeros((len(force), 2))
+
+
+#: What is minimised, and the same as a function of the state alone.
+OBJECTIVES: dict[str, tuple[Objective, Callable[[State], float]]] = {
+    "total potential": (TotalPotential(), lambda state: state.energies.total_potential),
+    "largest force": (ContactForces(_largest), lambda state: float(state.contact.normal_force.max())),
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One problem: a chain, what is minimised, its friction and where the search starts.
+
+    Attributes:
+        size: One of `SIZES`.
+        objective: One of `OBJECTIVES`.
+        bound: Largest distance of a control point from its place, [mm].
+        friction: Coefficient of friction.
+        start: 0 for the shape as it is, else the seed of a random feasible one.
+    """
+
+    size: str
+    objective: str
+    bound: float
+    friction: float
+    start: int
+
+    @property
+    def name(self) -> str:
+        """How tables call it."""
+        start = "the link as it is" if self.start == 0 else f"random shape {self.start}"
+        return f"{self.objective}, {self.size} chain, ±{self.bound:g} mm, μ = {self.friction:g}, {start}"
+
+
+class Spent(Exception):
+    """The budget of evaluations is used up."""
+
+
+class Book:
+    """J with its subgradient, and J alone, every evaluation written down.
+
+    Attributes:
+        rows: A row an evaluation: value (nan where the design does not exist), violation of the constraints
+            in units of the box's width, products and seconds up to and with it.
+        designs: The designs, in the same order.
+    """
+
+    def __init__(self, case: Case, budget: int, tolerance: float | AdaptiveTolerance = STATES) -> None:
+        """Prepare the problem; no state is solved."""
+        cells, boxes, net = SIZES[case.size]
+        links = _links(cells)
+        scene = chain(links, case.friction)
+        partitions = {name: box_partition(body.mesh, boxes) for name, body in scene.bodies.items()}
+        design = SurfaceDesign("link 1", links.first.crown, net=net)
+        objective, self._judge = OBJECTIVES[case.objective]
+        self.problem = ShapeProblem(scene, partitions, design, objective, MPI.COMM_SELF, tolerance=tolerance)
+        size = self.problem.size
+        self.bound = case.bound
+        self.bounds = (np.full(size, -case.bound), np.full(size, case.bound))
+        _, by_volume = self.problem.volume(np.zeros(size))
+        self.constraints = LinearConstraints(-by_volume[None, :], [0.0])
+        self.start = np.zeros(size)
+        if case.start:
+            random = np.random.default_rng(case.start).uniform(-0.8, 0.8, size) * case.bound
+            self.start = nearest_feasible(random, self.bounds, self.constraints)
+        self.budget, self.rows, self.designs = budget, [], []
+        self._row = by_volume / np.linalg.norm(by_volume)
+        self._state_products, self._began = 0, perf_counter()
+
+    rows: list[tuple[float, float, int, float]]
+    designs: list[np.ndarray]
+
+    @property
+    def inexact(self) -> bool:
+        """Whether the bundle method may ask for less accuracy."""
+        return self.problem.inexact
+
+    def within(self, alpha: np.ndarray, value: float, subgradient: float) -> tuple[float, np.ndarray, float]:
+        """Return J, a subgradient and the error of J, no more accurate than asked."""
+        self._ask()
+        found = self.problem.within(alpha, value, subgradient)
+        self._write(alpha, found[0])
+        return found
+
+    def __call__(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return J and a subgradient."""
+        self._ask()
+        try:
+            value, gradient = self.problem(alpha)
+        except (InvalidDesignError, ConvergenceError) as error:
+            self._write(alpha, np.nan)
+            raise InvalidDesignError(str(error)) from error
+        self._write(alpha, value)
+        return value, gradient
+
+    def value(self, alpha: np.ndarray) -> float:
+        """Return J alone, without an adjoint."""
+        self._ask()
+        try:
+            state = self.problem.state_of(alpha)
+        except (InvalidDesignError, ConvergenceError) as error:
+            self._write(alpha, np.nan)
+            raise InvalidDesignError(str(error)) from error
+        self._state_products += state.solution.products
+        value = self._judge(state)
+        self._write(alpha, value)
+        return value
+
+    def _ask(self) -> None:
+        if len(self.rows) >= self.budget:
+            raise Spent
+
+    def _write(self, alpha: np.ndarray, value: float) -> None:
+        outside = float(np.abs(alpha).max()) - self.bound
+        violation = max(outside, -float(self._row @ alpha), 0.0) / (2.0 * self.bound)
+        products = self.problem.products + self._state_products
+        self.rows.append((float(value), violation, products, perf_counter() - self._began))
+        self.designs.append(np.array(alpha))
+
+
+@cache
+def _links(cells: tuple[int, int, int]) -> TwoLinks:
+    return chain_links(cells, MPI.COMM_SELF)

@@ -1,0 +1,94 @@
+"""Let every method minimise the same problem, and note what it asked and what it found."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+import scipy.optimize
+
+from benchmarks.optimisers.chain import Book, Case, Spent
+from fenics_contact.optimize import BundleTrust, ForScipy, minimize
+from fenics_contact.shape import AdaptiveTolerance
+
+#: Violation of the volume or of a bound that a method may leave, in widths of the box.
+ALLOWED = 1e-4
+#: SciPy's methods and their settings, in scaled variables and values; what is not said is SciPy's default.
+SCIPY: dict[str, dict[str, Any]] = {
+    "SLSQP": {"options": {"ftol": 1e-6, "maxiter": 1000}},
+    "trust-constr": {"options": {"xtol": 1e-5, "gtol": 1e-5, "maxiter": 1000, "initial_tr_radius": 0.3}},
+    "COBYLA": {"options": {"rhobeg": 0.1, "tol": 1e-4}},
+}
+METHODS = ("bundle", "bundle, adaptive states", *SCIPY)
+FULL = (
+    Case("coarse", "total potential", 0.25, 0.3, 0),
+    Case("coarse", "largest force", 1.0, 0.3, 0),
+    Case("coarse", "largest force", 1.0, 0.3, 1),
+    Case("coarse", "largest force", 1.0, 0.3, 2),
+    Case("coarse", "largest force", 1.0, 0.1, 0),
+    Case("coarse", "largest force", 1.0, 0.6, 0),
+    Case("coarse", "total potential", 0.25, 0.3, 1),
+    Case("coarse", "total potential", 1.0, 0.3, 0),
+    Case("small", "total potential", 0.25, 0.3, 0),
+    Case("small", "largest force", 1.0, 0.3, 0),
+)
+QUICK = (Case("coarse", "largest force", 1.0, 0.3, 0),)
+
+
+def run(case: Case, method: str, budget: int) -> dict[str, Any]:
+    """Minimise once.
+
+    Args:
+        case: The problem.
+        method: One of `METHODS`.
+        budget: Most evaluations.
+
+    Returns:
+        What it found, why it stopped, and a row for every evaluation.
+    """
+    adaptive = method == "bundle, adaptive states"
+    book = Book(case, budget, AdaptiveTolerance()) if adaptive else Book(case, budget)
+    stop = "budget spent"
+    with suppress(Spent), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of trust-constr, about steps without curvature
+        stop = (_by_bundle if method.startswith("bundle") else _by_scipy(method))(book)
+    seconds = book.rows[-1][3]
+    best = _best(book)
+    value = Book(case, 1).value(book.designs[best])
+    return {
+        "case": case.name, "objective": case.objective, "method": method, "stop": stop,
+        "evaluations": len(book.rows), "best_evaluation": best + 1,
+        "invalid": int(sum(np.isnan(row[0]) for row in book.rows)),
+        "value_claimed": book.rows[best][0], "value": value, "violation": book.rows[best][1],
+        "products": book.rows[-1][2], "seconds": seconds,
+        "design": book.designs[best], "variables": book.problem.size,
+        "unknowns": book.problem.decomposition.torn_unknowns,
+        "history": [list(row) for row in book.rows],
+    }  # fmt: skip
+
+
+def _by_bundle(book: Book) -> str:
+    method = BundleTrust(tolerance=1e-4, raise_on_failure=False)
+    result = minimize(book, book.start, method, bounds=book.bounds, constraints=book.constraints)
+    return result.reason.name.lower().replace("_", " ")
+
+
+def _by_scipy(method: str) -> Callable[[Book], str]:
+    def solve(book: Book) -> str:
+        task = ForScipy(book, book.start, bounds=book.bounds, constraints=book.constraints, value=book.value)
+        settings = {name: dict(value) for name, value in SCIPY[method].items()}
+        if method == "COBYLA":  # an exception would leave traces in its Fortran code
+            settings["options"]["maxiter"] = book.budget
+        found = scipy.optimize.minimize(**task.arguments(method), **settings)
+        return "converged" if found.success else str(found.message).rstrip(".").lower()
+
+    return solve
+
+
+def _best(book: Book) -> int:
+    """Return the number of the best evaluation that keeps the constraints."""
+    values = [row[0] if row[1] <= ALLOWED else np.nan for row in book.rows]
+    return int(np.nanargmin(values))

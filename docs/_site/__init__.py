@@ -1,0 +1,1 @@
+"""What Sphinx is told about this project beyond its settings."""

@@ -1,0 +1,292 @@
+"""Parameters in, quantities of interest out: states of a scene, or designs."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import ArrayLike
+
+from fenics_contact.contact import State, find_state
+from fenics_contact.errors import (
+    ConvergenceError,
+    InfeasibleError,
+    InvalidDesignError,
+    InvalidInputError,
+    together,
+)
+from fenics_contact.feti import Decomposition, decompose
+from fenics_contact.outer.answer import Answer
+from fenics_contact.qp import DualSolver
+from fenics_contact.scene import Scene
+from fenics_contact.shape import ShapeProblem
+
+Parameters = Mapping[str, float] | ArrayLike
+"""All parameters in their order, or some by name."""
+Quantity = Callable[[State], Any]
+"""Takes a state, returns a number. Called by all ranks together."""
+Failures = Literal["raise", "nan"]
+
+#: What tells that there is no answer at these parameters, rather than a mistake in the program.
+NO_ANSWER = (InvalidDesignError, InfeasibleError, ConvergenceError)
+
+
+class Response(ABC):
+    """A function of named numbers.
+
+    Attributes:
+        nominal: Parameter to the value it has unless given.
+        evaluations: Number of answers so far, failed ones included.
+        products: Products with the dual operator so far.
+    """
+
+    def __init__(self, nominal: Mapping[str, float], comm: MPI.Comm, failures: Failures) -> None:
+        """Check what subclasses share."""
+        if failures not in ("raise", "nan"):
+            raise InvalidInputError(f"failures must be 'raise' or 'nan', got {failures!r}")
+        if not nominal:
+            raise InvalidInputError(
+                "a response needs at least one parameter, got none: name them with their usual values, "
+                "{'load': 80e3}"
+            )
+        self.nominal = {name: float(value) for name, value in nominal.items()}
+        self.comm, self._failures = comm, failures
+        self.evaluations, self.products = 0, 0
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters, in the order of arrays."""
+        return tuple(self.nominal)
+
+    @property
+    @abstractmethod
+    def quantities(self) -> tuple[str, ...]:
+        """Names of the quantities of interest, in the order of arrays."""
+
+    def __call__(self, parameters: Parameters | None = None, **named: float) -> Answer:
+        """Answer at a set of parameters; what is not given is nominal. Collective.
+
+        Args:
+            parameters: All of them in their order, shape (n_parameters,), or a mapping from names.
+            **named: Some by name, which override the others.
+
+        Raises:
+            InvalidInputError: If a name is unknown, the shape does not fit or a number is not finite.
+            InvalidDesignError: If the design does not exist (``failures="raise"``).
+            InfeasibleError: If there is no equilibrium (``failures="raise"``).
+            ConvergenceError: If none is found (``failures="raise"``).
+        """
+        with together(self.comm):
+            values = self._values(parameters, named)
+        self.evaluations += 1
+        try:
+            found, subgradients, products = self._answer(values)
+        except NO_ANSWER as error:
+            if self._failures == "raise":
+                raise
+            nothing = dict.fromkeys(self.quantities, np.nan)
+            return Answer(values, nothing, failure=str(error) or type(error).__name__)
+        self.products += products
+        # Outer tools on different ranks must see the same bits.
+        found, subgradients = self.comm.bcast((found, subgradients))
+        return Answer(values, found, subgradients, products=products)
+
+    def table(self, samples: ArrayLike) -> np.ndarray:
+        """Answer at many sets of parameters, in their order. Collective.
+
+        Args:
+            samples: A row a set, shape (n, n_parameters).
+
+        Returns:
+            Shape (n, n_quantities).
+        """
+        rows = np.array(samples, dtype=float)
+        if rows.ndim != 2:
+            raise InvalidInputError(
+                f"samples must have shape (n, {len(self.nominal)}), a column for each of "
+                f"{list(self.parameters)}, got {rows.shape}"
+            )
+        return np.array([self(row).array for row in rows]).reshape(len(rows), len(self.quantities))
+
+    @abstractmethod
+    def _answer(self, values: dict[str, float]) -> tuple[dict[str, float], dict[str, np.ndarray], int]:
+        """Return the quantities, the subgradients that are known, and the products it took. Collective."""
+
+    def _values(self, given: Parameters | None, named: Mapping[str, float]) -> dict[str, float]:
+        """Return every parameter's value."""
+        if given is not None and not isinstance(given, Mapping):
+            array = np.array(given, dtype=float)
+            if array.shape != (len(self.nominal),):
+                raise InvalidInputError(
+                    f"parameters must have shape ({len(self.nominal)},), one number for each of "
+                    f"{list(self.parameters)}, got {array.shape}: give them all in this order, or some by "
+                    "name"
+                )
+            given = dict(zip(self.parameters, array.tolist(), strict=True))
+        chosen = {**(given or {}), **named}
+        unknown = [name for name in chosen if name not in self.nominal]
+        if unknown:
+            raise InvalidInputError(
+                f"parameters must be some of {list(self.parameters)}, got {unknown}: name them as in nominal"
+            )
+        values = {**self.nominal, **{name: float(value) for name, value in chosen.items()}}
+        bad = [name for name, value in values.items() if not np.isfinite(value)]
+        if bad:
+            raise InvalidInputError(f"parameters must be finite, got {values[bad[0]]} for {bad[0]!r}")
+        return values
+
+
+class SceneResponse(Response):
+    """Quantities of the equilibrium of a scene that depends on parameters.
+
+    A state starts from the one before, and what a parameter does not touch is kept: factors where only loads
+    change, forms and numbering where meshes stay. So let ``build`` use the same mesh objects again.
+
+    Example:
+        >>> def build(friction, load):  # doctest: +SKIP
+        ...     pair = ContactPair(Surface("block", "z0"), floor, Coulomb(friction))
+        ...     return Scene(bodies, loads=[Pressure("block", "z1", load)], contacts=[pair])
+        >>> peak = {"largest pressure": lambda state: state.contact.pressure.max()}  # doctest: +SKIP
+        >>> response = SceneResponse(build, {"friction": 0.3, "load": 10.0}, peak, comm)  # doctest: +SKIP
+        >>> response(load=12.0)["largest pressure"]  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        build: Callable[..., Scene],
+        nominal: Mapping[str, float],
+        quantities: Mapping[str, Quantity],
+        comm: MPI.Comm,
+        *,
+        partitions: Mapping[str, np.ndarray] | None = None,
+        solver: DualSolver | None = None,
+        tolerance: float = 1e-6,
+        failures: Failures = "raise",
+        warm: bool = True,
+    ) -> None:
+        """Prepare; nothing is built before the first answer.
+
+        Args:
+            build: Takes the parameters by name, returns the scene, the same on every rank.
+            nominal: Parameter to its usual value.
+            quantities: Name to a function of the state; all ranks call it together.
+            comm: Communicator over which the subdomains are spread.
+            partitions: As for `solve_scene`.
+            solver: As for `solve_scene`.
+            tolerance: Relative residual of every state.
+            failures: Whether a state that does not exist or is not found raises, or makes all quantities nan
+                with `Answer.failure` saying why. Other errors always raise.
+            warm: Whether a state starts from the one before; answers differ by their tolerance then from
+                those in another order.
+
+        Raises:
+            InvalidInputError: If there is no parameter or no quantity.
+        """
+        super().__init__(nominal, comm, failures)
+        if not quantities:
+            raise InvalidInputError(
+                "a response needs at least one quantity of interest, got none: give {'name': function of "
+                "the state}"
+            )
+        self._build, self._of_state, self._partitions = build, dict(quantities), partitions
+        self._solver, self._tolerance, self._warm = solver, tolerance, warm
+        self._decomposed: tuple[Scene, Decomposition] | None = None
+        self.state: State | None = None
+
+    state: State | None
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of the quantities of interest, in the order of arrays."""
+        return tuple(self._of_state)
+
+    def _answer(self, values: dict[str, float]) -> tuple[dict[str, float], dict[str, np.ndarray], int]:
+        with together(self.comm):
+            scene = self._build(**values)
+        decomposition = self._decomposition(scene)
+        state = find_state(
+            scene, decomposition, solver=self._solver, tolerance=self._tolerance,
+            previous=self.state if self._warm else None,
+        )  # fmt: skip
+        self.state = state
+        return evaluated(self._of_state, state, self.comm), {}, state.solution.products
+
+    def _decomposition(self, scene: Scene) -> Decomposition:
+        """Return the decomposition, a new one where topology or supported components changed. Collective."""
+        if self._decomposed is None or not _alike(scene, self._decomposed[0]):
+            with together(self.comm):
+                cut = scene.partition(self.comm.size) if self._partitions is None else self._partitions
+            self._decomposed, self.state = (scene, decompose(scene, cut, self.comm)), None
+        return self._decomposed[1]
+
+
+class DesignResponse(Response):
+    """The objective of a design problem with its subgradient, and other quantities of its state.
+
+    Parameters are the design variables, called "alpha 0" and so on.
+
+    Example:
+        >>> response = DesignResponse(problem)  # doctest: +SKIP
+        >>> answer = response(np.zeros(problem.size))  # doctest: +SKIP
+        >>> answer["objective"], answer.subgradients["objective"]  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        problem: ShapeProblem,
+        quantities: Mapping[str, Quantity] | None = None,
+        *,
+        failures: Failures = "raise",
+    ) -> None:
+        """Wrap the problem.
+
+        Args:
+            problem: The design problem.
+            quantities: More quantities of the state, beside "objective".
+            failures: As for `SceneResponse`.
+        """
+        super().__init__({f"alpha {k}": 0.0 for k in range(problem.size)}, problem.comm, failures)
+        self.problem, self._of_state = problem, dict(quantities or {})
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of the quantities of interest, in the order of arrays."""
+        return ("objective", *self._of_state)
+
+    def _answer(self, values: dict[str, float]) -> tuple[dict[str, float], dict[str, np.ndarray], int]:
+        before = self.problem.products
+        point = self.problem.evaluate(np.array(list(values.values())))
+        more = evaluated(self._of_state, point.state, self.comm)
+        found = {"objective": point.value, **more}
+        return found, {"objective": point.gradient}, self.problem.products - before
+
+
+def evaluated(quantities: Mapping[str, Quantity], state: State, comm: MPI.Comm) -> dict[str, float]:
+    """Return the quantities of a state. Collective.
+
+    Raises:
+        InvalidInputError: If one of them is no number.
+    """
+    found = {name: np.asarray(quantity(state)) for name, quantity in quantities.items()}
+    with together(comm):
+        wrong: Sequence[str] = [name for name, value in found.items() if value.size != 1]
+        if wrong:
+            raise InvalidInputError(
+                f"a quantity must be one number, {wrong[0]!r} has shape {found[wrong[0]].shape}: take its "
+                "largest entry or a norm, or make a quantity of each entry"
+            )
+    return {name: float(value.item()) for name, value in found.items()}
+
+
+def _alike(scene: Scene, other: Scene) -> bool:
+    """Tell whether two scenes can share a decomposition."""
+    if scene.body_names != other.body_names:
+        return False
+    return all(
+        np.array_equal(scene.bodies[name].mesh.cells, other.bodies[name].mesh.cells)
+        and np.array_equal(scene.fixed(name), other.fixed(name))
+        for name in scene.body_names
+    )

@@ -1,0 +1,203 @@
+"""Picture of what an optimisation achieved: contact before and after, and the moved outlines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
+
+from fenics_contact.contact import State
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.shape import DesignPoint
+from fenics_contact.viz.colours import BLUE, GREY, ORANGE, PRESSURE_MAP
+from fenics_contact.viz.patch import contact_patch
+from fenics_contact.viz.patch_axes import label_axes, label_axis
+from fenics_contact.viz.picture import Picture, draw_picture, png_path
+from fenics_contact.viz.pressure import draw_pressure
+from fenics_contact.viz.profile import Profile, profiles
+from fenics_contact.viz.sheet import sheet
+from fenics_contact.viz.trace import contact_trace
+from fenics_contact.viz.units import Units
+from fenics_contact.viz.words import checked_range, checked_reach, headline, written
+
+
+@dataclass(frozen=True)
+class _Look:
+    pair: int
+    clim: tuple[float, float] | None
+    reach: float | None
+    headline: str
+    units: Units
+    width: int
+
+
+def plot_before_after(
+    first: State | DesignPoint,
+    best: State | DesignPoint,
+    path: str | Path | None = None,
+    *,
+    pair: int = 0,
+    clim: tuple[float, float] | None = None,
+    reach: float | None = None,
+    label: str = "objective",
+    title: str = "",
+    units: Units | None = None,
+    width: int = 1600,
+) -> Picture:
+    """Draw contact pressure before and after in the same colours, and how the outlines moved. Collective.
+
+    The outlines are those of the undeformed bodies around the strongest contact: in space in two sections, in
+    the plane as they are. Their movement is magnified by a factor that is stated. The title says by how much
+    the objective fell, where design points are given.
+
+    Args:
+        first: State before, or the design point, for instance ``problem.first``.
+        best: State after, or the design point, for instance ``problem.best``.
+        path: PNG file to write, None to write none.
+        pair: Number of the contact pair in the scene.
+        clim: Range of the pressure, [force / length²]; from zero to the largest of both unless given.
+        reach: How far pictures reach around the contact's middle, [length]; chosen unless given.
+        label: Name of the objective with its unit.
+        title: What comes before the facts in the title.
+        units: Names of the units, mm, N and MPa unless given.
+        width: Width of the picture in pixels.
+
+    Returns:
+        The picture, which stands for its file where a path is needed.
+
+    Raises:
+        InvalidInputError: If the two do not belong to the same scene, it has no such pair, nothing touches
+            before, or an option cannot be used.
+    """
+    target = png_path(path)
+    before, after = (point.state if isinstance(point, DesignPoint) else point for point in (first, best))
+    _check(before, after, pair)
+    checked_reach(reach)
+    given = None if clim is None else checked_range(clim)
+    named = units or Units()
+    contacts = before.contact, after.contact
+    peaks = [float(contact.pressure[contact.on_pair(pair)].max(initial=0.0)) for contact in contacts]
+    facts = f"largest pressure {written(peaks[0])} → {written(peaks[1])} {named.stress}"
+    if isinstance(first, DesignPoint) and isinstance(best, DesignPoint):
+        facts = f"{label} {_fall(first.value, best.value)}; {facts}"
+    look = _Look(pair, given, reach, headline(title, facts), named, width)
+    draw = _draw_in_plane if before.scene.dim == 2 else _draw_in_space
+    comm = before.torn.decomposition.comm
+    return draw_picture(comm, target, lambda paper: draw(before, after, paper, look))
+
+
+def _check(first: State, best: State, pair: int) -> None:
+    cells = [
+        {name: body.mesh.cells.shape for name, body in state.scene.bodies.items()} for state in (first, best)
+    ]
+    if cells[0] != cells[1]:
+        raise InvalidInputError(
+            f"before and after must have the same bodies and cells, got {cells[0]} and {cells[1]}: give two "
+            "designs of one scene"
+        )
+    if not 0 <= pair < len(first.scene.contacts):
+        raise InvalidInputError(
+            f"pair must number one of the scene's {len(first.scene.contacts)} contact pairs from 0, got "
+            f"{pair}: draw a scene with contact"
+        )
+    if not np.any(first.contact.normal_force > 0):
+        raise InvalidInputError(
+            "a picture of before and after needs contact forces before, got none: draw with plot_stress"
+        )
+
+
+def _fall(first: float, best: float) -> str:
+    words = f"{written(first, 6)} → {written(best, 6)}"
+    if first == 0:
+        return words
+    return words + f", {100 * abs((best - first) / first):.2f} % {'lower' if best <= first else 'higher'}"
+
+
+def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> None:
+    patches = [contact_patch(state, look.pair, look.reach) for state in (first, best)]
+    low = np.minimum(patches[0].low, patches[1].low)
+    high = np.maximum(patches[0].high, patches[1].high)
+    shown = look.clim or (0.0, max(float(patch.pressure.max()) for patch in patches) or 1.0)
+    found = profiles(first, best, look.reach)
+    # Sections are equally high and together as wide as the picture, but not too high.
+    tall = [0.4 * float((high - low)[1] / (high - low)[0]) + 0.08]
+    tall.append(min(0.8 / sum(1 / _proportion(profile) for profile in found), 0.45) + 0.11)
+    size = look.width, round((sum(tall) + 0.03) * look.width)
+    with sheet(paper, size, look.headline, "constrained") as figure:
+        upper, lower = figure.subfigures(2, 1, height_ratios=tall)
+        panels = upper.subplots(1, 2)
+        for axes, patch, word in zip(panels, patches, ("before", "after"), strict=True):
+            draw_pressure(axes, patch, shown)
+            axes.set_title(f"{word}: pressure on {patch.name}")
+            label_axes(axes, replace(patch, low=low, high=high), look.units)
+        extend = "max" if max(float(patch.pressure.max()) for patch in patches) > shown[1] else "neither"
+        key = ScalarMappable(Normalize(*shown), PRESSURE_MAP)
+        words = f"contact pressure ({look.units.stress})"
+        upper.colorbar(key, ax=panels.tolist(), label=words, extend=extend)
+        _draw_sections(lower, found, look.units)
+
+
+def _draw_sections(figure: Any, found: list[Profile], units: Units) -> None:
+    ratios = {"width_ratios": [1 / _proportion(profile) for profile in found]}
+    panels = figure.subplots(1, len(found), gridspec_kw=ratios)
+    factor = min(profile.factor for profile in found)
+    for axes, profile in zip(panels, found, strict=True):
+        _draw_profile(axes, profile, factor, units)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+
+
+def _draw_in_plane(first: State, best: State, paper: BinaryIO, look: _Look) -> None:
+    traces = [contact_trace(state, look.pair) for state in (first, best)]
+    (profile,) = profiles(first, best, look.reach)
+    with sheet(paper, (look.width, round(0.5 * look.width)), look.headline, "constrained") as figure:
+        left, right = figure.subplots(1, 2)
+        for trace, word, colour, line in zip(
+            traces, ("before", "after"), (GREY, ORANGE), ("--", "-"), strict=True
+        ):
+            places, pressure = (
+                np.insert(v, trace.breaks + 1, np.nan) for v in (trace.places, trace.pressure)
+            )
+            left.plot(places, pressure, line, color=colour, lw=2.2, label=word)
+        windows = [trace.window(look.reach) for trace in traces]
+        left.set_xlim(min(window[0] for window in windows), max(window[1] for window in windows))
+        top = max(float(trace.pressure.max()) for trace in traces) or 1.0
+        left.set_ylim(*(look.clim or (-0.03 * top, 1.08 * top)))
+        left.set_xlabel(f"{traces[0].axis} ({look.units.length})")
+        left.set_ylabel(f"contact pressure ({look.units.stress})")
+        left.set_title(f"pressure on {traces[0].name}")
+        left.grid(color=GREY, alpha=0.25)
+        left.legend(loc="upper right")
+        _draw_profile(right, profile, profile.factor, look.units)
+        right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
+
+
+def _proportion(profile: Profile) -> float:
+    size = profile.high - profile.low
+    return float(size[1] / size[0])
+
+
+def _draw_profile(axes: Any, profile: Profile, factor: float, units: Units) -> None:
+    for number, (name, lines) in enumerate(profile.before.items()):
+        after = lines + factor * profile.moves[name]
+        words = ("before", f"after, movement × {factor:g}") if not number else (None, None)
+        axes.add_collection(LineCollection(lines, colors=GREY, linewidths=3.5, label=words[0]))
+        axes.add_collection(LineCollection(after, colors=ORANGE, linewidths=1.6, label=words[1]))
+        inside = lines[np.all((lines > profile.low) & (lines < profile.high), axis=(1, 2))]
+        if len(inside):
+            # The name at the outline's end that is farthest from the picture's middle: there is room.
+            middle = (profile.low + profile.high) / 2
+            place = inside.reshape(-1, 2)[np.argmax(np.abs(inside.reshape(-1, 2) - middle).sum(axis=1))]
+            towards = 0.75 * place + 0.25 * middle
+            axes.text(*towards, name, color=BLUE, ha="center", va="center")
+    axes.set_aspect("equal")
+    axes.set_xlim(profile.low[0], profile.high[0])
+    axes.set_ylim(profile.low[1], profile.high[1])
+    for axis, label, word in zip((axes.xaxis, axes.yaxis), profile.axes, ("right", "up"), strict=True):
+        label_axis(axis, label, word, units)
+    largest = f"{written(profile.largest, 2)} {units.length}"
+    axes.set_title(f"{profile.title}; moved by up to {largest}")

@@ -1,0 +1,130 @@
+"""Scenes that a browser turns and zooms: one HTML page that needs no other file and no network."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from io import BytesIO, StringIO
+from pathlib import Path
+from typing import Any
+from zipfile import ZIP_DEFLATED, ZipFile
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.viz.picture import written_path
+from fenics_contact.viz.view import Frame
+
+#: Height of the scene in a notebook, in units of its screen.
+HEIGHT = 520
+#: Words on a notebook's page and the patterns of the browser do not meet: the page is a frame of its own.
+_FRAME = (
+    '<iframe srcdoc="{page}" style="width: 100%; height: {height}px; border: 1px solid #dddddd"></iframe>'
+)
+_CAPTION = (
+    '<div style="position: absolute; left: 12px; top: 8px; z-index: 1; pointer-events: none; '
+    'font: 15px sans-serif; color: #222222; background: #ffffffcc"><b>{title}</b><br>{entries}</div>'
+)
+_ENTRY = '<span style="color: {colour}; margin-right: 0.3em">&#9679;</span>{name}&emsp;'
+
+
+@dataclass(frozen=True, eq=False)
+class InteractiveScene:
+    """A scene that Jupyter shows where it is the value of a cell; the mouse turns, shifts and zooms it.
+
+    Where a path is needed it stands for its file. On ranks that did not draw it shows nothing.
+
+    Attributes:
+        html: The page on the rank that drew, None on the others.
+        path: The file it was written to, None if it was not.
+    """
+
+    html: str | None = field(repr=False)
+    path: Path | None = None
+
+    def __fspath__(self) -> str:
+        """Return the path of the file.
+
+        Raises:
+            InvalidInputError: If the scene was written to no file.
+        """
+        return written_path(self.path, "function interactive a path, such as path='stress.html'")
+
+    def __str__(self) -> str:
+        """Return the path of the file, or say that there is none."""
+        return "scene without a file" if self.path is None else str(self.path)
+
+    def _repr_mimebundle_(self, **_: Any) -> dict[str, str]:
+        if self.html is None:
+            return {"text/plain": ""}
+        page = html.escape(self.html, quote=True)
+        return {"text/html": _FRAME.format(page=page, height=HEIGHT), "text/plain": str(self)}
+
+
+def html_path(path: str | Path | None) -> Path | None:
+    """Return the path, refuse one that names no HTML file."""
+    if path is None:
+        return None
+    target = Path(path)
+    if target.suffix != ".html":
+        raise InvalidInputError(
+            f"interactive scenes are HTML files, got the name {target.name!r}: let it end in '.html'"
+        )
+    return target
+
+
+def exported(plotter: Any) -> str:
+    """Return a plotter's scene as a page for the viewer of VTK.js, which it contains.
+
+    The scene is described by trame's serializers alone: pyvista's own export starts a server, which looks
+    for files on the network.
+
+    Raises:
+        ImportError: If trame-vtk is not installed.
+    """
+    serializers = import_module("trame_vtk.modules.vtk.serializers")
+    pages = import_module("trame_vtk.tools.vtksz2html")
+    plotter.render()
+    window, camera = plotter.render_window, plotter.camera
+    serializers.initialize_serializers()
+    context = serializers.SynchronizationContext()
+    context.set_ignore_last_dependencies(True)
+    number = serializers.reference_id(window)
+    scene = serializers.serialize(None, window, number, context, 1)
+    turning = {"centerOfRotation": list(camera.focal_point), "camera": serializers.reference_id(camera)}
+    scene["extra"] = {"vtkRefId": number, **turning}
+    arrays = {
+        entry["hash"]: {**entry, "content": context.get_cached_data_array(entry["hash"])}
+        for entry in serializers.extract_array_hash(scene)
+    }
+    packed, page = BytesIO(), StringIO()
+    with ZipFile(packed, "w", ZIP_DEFLATED) as archive:
+        archive.writestr("index.json", json.dumps({"hashes": arrays, "scene": scene}))
+    pages.write_html(packed.getvalue(), page)
+    return page.getvalue()
+
+
+def see_in_perspective(camera: Any, frame: Frame, size: tuple[int, int]) -> None:
+    """Move a camera so far away that it sees a frame: the viewer knows no parallel projection.
+
+    Args:
+        camera: pyvista's Camera; it keeps its direction and what it looks at.
+        frame: What it should see.
+        size: Width and height of the window.
+    """
+    height = max(float(frame.size[1]), float(frame.size[0]) * size[1] / size[0])
+    distance = height / 2 / np.tan(np.radians(camera.view_angle / 2))
+    backwards = -np.asarray(camera.direction)
+    camera.parallel_projection = False
+    camera.position = np.asarray(camera.focal_point) + distance * backwards
+
+
+def captioned(page: str, title: str, entries: Mapping[str, str]) -> str:
+    """Put a title above a scene, and a legend: names and their colours."""
+    listed = "".join(_ENTRY.format(colour=colour, name=html.escape(name)) for name, colour in entries.items())
+    caption = _CAPTION.format(title=html.escape(title), entries=listed)
+    # The viewer empties what it is shown in: that must not be the whole page.
+    return page.replace("<body>", f'<body>\n{caption}\n<div class="content" style="height: 100%"></div>', 1)

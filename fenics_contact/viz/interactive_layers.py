@@ -1,0 +1,199 @@
+"""What a scene for the browser is made of: coloured bodies, or contact surfaces seen through them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from fenics_contact.contact import State, Status, contact_fields, in_space
+from fenics_contact.geometry import boundary_faces
+from fenics_contact.scene import ContactPair
+from fenics_contact.viz.colours import (
+    GREY,
+    INK,
+    PALE,
+    PRESSURE_MAP,
+    STRESS_MAP,
+    colour_subdomains,
+    neighbours,
+)
+from fenics_contact.viz.fields import BodyFields
+from fenics_contact.viz.stage import Layer, balls, segments, surface
+from fenics_contact.viz.stress import stress_range
+from fenics_contact.viz.symbols import symbols_of
+from fenics_contact.viz.units import Units
+from fenics_contact.viz.words import written
+
+#: Radius of the balls on contact points and length of the longest arrow, in sides of a square as large as the
+#: mean nodal area.
+BALL, ARROW = 0.22, 1.5
+_EDGES = {"show_edges": True, "edge_color": INK, "edge_opacity": 0.25, "line_width": 1}
+_LIGHT = {"ambient": 0.5, "diffuse": 0.55}
+_BAR = {"vertical": True, "position_x": 0.87, "position_y": 0.15, "height": 0.7, "width": 0.05}
+
+
+@dataclass(frozen=True)
+class Content:
+    """What is shown and what is said of it.
+
+    Attributes:
+        layers: What to draw.
+        facts: Words for the title.
+        legend: Names and their colours.
+    """
+
+    layers: list[Layer]
+    facts: str
+    legend: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What a scene for the browser is made from.
+
+    Attributes:
+        state: The state.
+        bodies: Its bodies.
+        deformed: Factor of the displacement.
+        clim: Range of the colours, None to choose it.
+        units: Names of the units.
+    """
+
+    state: State
+    bodies: Mapping[str, BodyFields]
+    deformed: float
+    clim: tuple[float, float] | None
+    units: Units
+
+    def places(self, body: str) -> np.ndarray:
+        """Return the nodes of a body where they are drawn, (n_nodes, 3), [length]."""
+        return in_space(self.bodies[body].deformed(self.deformed))
+
+    def faces(self, body: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return the faces of a body that can be seen, and the cell of each."""
+        mesh = self.bodies[body].mesh
+        return (mesh.cells, np.arange(mesh.n_cells)) if mesh.dim == 2 else boundary_faces(mesh.cells, 3)
+
+
+def stress_content(subject: Subject) -> Content:
+    """Von Mises stress on the bodies."""
+    values = {name: body.nodal_von_mises for name, body in subject.bodies.items()}
+    peak = max(float(body.von_mises.max()) for body in subject.bodies.values())
+    unit, clim = subject.units.stress, subject.clim or stress_range(subject.bodies)
+    look = {"cmap": STRESS_MAP, "clim": clim}
+    layers = _coloured(subject, values, look, f"von Mises stress ({unit})")
+    return Content(layers, f"von Mises stress, largest {written(peak)} {unit}")
+
+
+def displacement_content(subject: Subject) -> Content:
+    """Length of the displacement on the bodies."""
+    values = {name: np.linalg.norm(body.displacement, axis=1) for name, body in subject.bodies.items()}
+    peak = max(float(length.max()) for length in values.values())
+    look = {"cmap": PRESSURE_MAP, "clim": subject.clim or (0.0, peak or 1.0)}
+    layers = _coloured(subject, values, look, f"displacement ({subject.units.length})")
+    return Content(layers, f"displacement, largest {written(peak)} {subject.units.length}")
+
+
+def subdomain_content(subject: Subject) -> Content:
+    """Subdomains in colours that tell neighbours apart."""
+    layers, count = [], 0
+    for family, (name, body) in enumerate(subject.bodies.items()):
+        part = np.asarray(subject.state.torn.decomposition.partitions[name])
+        part = np.repeat(part, body.mesh.n_cells // len(part))
+        colours = colour_subdomains(neighbours(body.mesh.cells, part), family)
+        faces, cells = subject.faces(name)
+        for number in np.unique(part):
+            mine = faces[part[cells] == number]
+            if len(mine):
+                look = {"color": colours[number], **_EDGES, **_LIGHT}
+                layers.append(Layer(surface(subject.places(name), mine), look))
+        count += np.unique(part).size
+    return Content(layers, f"{count} subdomain{'s' if count != 1 else ''}")
+
+
+def pressure_content(subject: Subject) -> Content:
+    """Contact pressure on the slave surfaces, seen through the bodies."""
+    peak = float(subject.state.contact.pressure.max())
+    label = f"contact pressure ({subject.units.stress})"
+    look = {"cmap": PRESSURE_MAP, "clim": subject.clim or (0.0, peak or 1.0), "scalars": "shown"}
+    layers = _glass(subject)
+    for number, pair in enumerate(subject.state.scene.contacts):
+        mesh = _slave_surface(subject, pair)
+        values = contact_fields(subject.state, pair.slave.body)["contact_pressure"]
+        mesh.point_data["shown"] = values[mesh.point_data["node"]]
+        layers.append(Layer(mesh, {**look, **_bar(label, number == 0), "lighting": False, "line_width": 8}))
+    return Content(layers, f"contact pressure, largest {written(peak)} {subject.units.stress}")
+
+
+def status_content(subject: Subject) -> Content:
+    """What contact points do, seen through the bodies, with arrows where they slip."""
+    contact, layers, legend = subject.state.contact, _glass(subject), {}
+    names = subject.state.torn.decomposition.tearing.body_names
+    places = np.concatenate([subject.places(name) for name in names])[contact.points.slave]
+    dim = contact.points.normal.shape[1]
+    side = float(contact.points.area.mean()) ** (1 / (dim - 1))
+    for pair in subject.state.scene.contacts:
+        layers.append(Layer(_slave_surface(subject, pair), {"color": PALE, "line_width": 4, **_LIGHT}))
+    rubs = np.array([pair.has_friction for pair in subject.state.scene.contacts])[contact.points.pair]
+    for kind in (True, False):
+        for status, (name, symbol) in symbols_of(kind).items():
+            chosen = (contact.status == status) & (rubs == kind)
+            if np.any(chosen):
+                colour = GREY if status == Status.OPEN else symbol["facecolors"]
+                size = BALL * side / (2 if status == Status.OPEN else 1)
+                layers.append(Layer(balls(places[chosen], size), {"color": colour, **_LIGHT}))
+                legend[name] = colour
+    slips = (contact.status == Status.SLIP) & rubs
+    slip = in_space(np.einsum("na,nad->nd", contact.slip, contact.points.tangents))
+    longest = float(np.linalg.norm(slip[slips], axis=1).max(initial=0.0))
+    if longest > 0:
+        arrows = pv.PolyData(places[slips])
+        arrows.point_data["slip"] = slip[slips] * (ARROW * side / longest)
+        layers.append(Layer(arrows.glyph(orient="slip", scale="slip", geom=pv.Arrow()), {"color": INK}))
+    counts = ", ".join(f"{contact.count(status)} {status.name.lower()}" for status in Status)
+    moved = f"; largest slip {written(longest, 2)} {subject.units.length}" if longest > 0 else ""
+    return Content(layers, f"contact status: {counts}{moved}", legend)
+
+
+CONTENTS = {
+    "von_mises": stress_content,
+    "displacement": displacement_content,
+    "contact_pressure": pressure_content,
+    "contact_status": status_content,
+    "subdomain": subdomain_content,
+}
+
+
+def _coloured(
+    subject: Subject, values: Mapping[str, np.ndarray], look: dict[str, Any], label: str
+) -> list[Layer]:
+    layers = []
+    for number, name in enumerate(subject.bodies):
+        mesh = surface(subject.places(name), subject.faces(name)[0])
+        mesh.point_data["shown"] = values[name][mesh.point_data["node"]]
+        options = {"scalars": "shown", **look, **_EDGES, **_LIGHT, **_bar(label, number == 0)}
+        layers.append(Layer(mesh, options))
+    return layers
+
+
+def _bar(label: str, shown: bool) -> dict[str, Any]:
+    """One bar for all: pyvista makes one for each title."""
+    return {"show_scalar_bar": shown, "scalar_bar_args": {"title": label, **_BAR}}
+
+
+def _glass(subject: Subject) -> list[Layer]:
+    look = {"color": PALE, "opacity": 0.12, **_LIGHT}
+    return [Layer(surface(subject.places(name), subject.faces(name)[0]), look) for name in subject.bodies]
+
+
+def _slave_surface(subject: Subject, pair: ContactPair) -> Any:
+    facets, places = subject.state.scene.facets(pair.slave), subject.places(pair.slave.body)
+    if facets.shape[1] > 2:
+        return surface(places, facets)
+    mesh = segments(places, facets)
+    mesh.point_data["node"] = np.arange(len(places))
+    return mesh

@@ -1,0 +1,72 @@
+"""Bodies whose material resists every motion, as on an elastic bed: no kernel, no coarse space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+from mpi4py import MPI
+
+from fenics_contact.contact import State, solve_scene
+from fenics_contact.errors import InfeasibleError
+from fenics_contact.geometry import block, box_partition
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    IsotropicElasticity,
+    RigidPlane,
+    Scene,
+    Surface,
+    TotalForce,
+    rigid_body_modes,
+)
+
+BED, FORCE = 0.05, (300.0, 0.0, -3200.0)  # N/mm⁴, N
+
+
+@dataclass(frozen=True)
+class Bedded(IsotropicElasticity):
+    bed: float = BED
+    sideways: bool = True
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        return (*super().parameters, self.bed)
+
+    def stiffness(self, u: Any, v: Any, parameters: Any) -> Any:
+        held = ufl.inner(u, v) if self.sideways else u[2] * v[2]
+        return super().stiffness(u, v, parameters) + parameters[2] * held
+
+    def kernel(self, points: np.ndarray) -> np.ndarray:
+        # Only what neither lifts nor tilts the body costs nothing on a bed that acts upwards alone.
+        return rigid_body_modes(points)[:, :, [] if self.sideways else [0, 1, 5]]
+
+
+def pushed(material: Bedded, parts: tuple[int, int, int]) -> State:
+    mesh = block((0.0, 0.0, 0.0), (20.0, 20.0, 40.0), (3, 3, 6))
+    floor = ContactPair(Surface("block", "z0"), RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
+    scene = Scene({"block": Body(mesh, material)}, [], [TotalForce("block", "z1", FORCE)], [floor])
+    return solve_scene(scene, {"block": box_partition(mesh, parts)}, MPI.COMM_SELF, tolerance=1e-9)
+
+
+@pytest.mark.parametrize("parts", [(1, 1, 1), (1, 1, 3)])
+def test_a_bed_balances_a_load_that_nothing_else_resists(parts: tuple[int, int, int]) -> None:
+    state = pushed(Bedded(1e3, 0.3), parts)
+    assert state.dual.problem.coarse.m == 0
+    subdomains = state.torn.subdomains
+    forces = [
+        part.stiffness @ u
+        for part, u in zip(subdomains, np.split(state.torn_displacement, len(subdomains)), strict=True)
+    ]
+    reaction = np.concatenate(forces).reshape(-1, 3).sum(axis=0)  # strains have no resultant
+    np.testing.assert_allclose(reaction, np.add(FORCE, state.contact.force.sum(axis=0)), atol=1e-6)
+    assert reaction[0] == pytest.approx(FORCE[0])
+    assert 100.0 < state.contact.normal_force.sum() < 3200.0
+
+
+def test_a_bed_that_acts_upwards_alone_does_not_hold_sideways() -> None:
+    with pytest.raises(InfeasibleError, match=r"translation \(1, 0, 0\) meets no resistance"):
+        pushed(Bedded(1e3, 0.3, sideways=False), (1, 1, 1))

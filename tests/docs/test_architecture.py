@@ -1,0 +1,38 @@
+"""The picture of the architecture shows the house as it is."""
+
+from __future__ import annotations
+
+import runpy
+import xml.etree.ElementTree as ET
+
+from tests.docs.pages import DOCS, ROOT
+from tests.house.source import modules
+from tests.house.test_imports import FLOORS
+
+PICTURE = DOCS / "pictures" / "architecture.svg"
+
+
+def rooms_in_picture() -> dict[str, float]:
+    """Return every room of the picture with its distance from the upper edge."""
+    groups = ET.parse(PICTURE).getroot().iter("{http://www.w3.org/2000/svg}g")
+    return {group.attrib["data-room"]: float(group.attrib["data-y"]) for group in groups}
+
+
+def test_every_room_is_in_the_picture() -> None:
+    rooms = {module.room for module in modules()} - {"", "__main__"}
+    assert len(rooms) > 15, "no rooms were found: nothing was tested"
+    assert rooms - set(rooms_in_picture()) == set(), "add it to scripts/draw_architecture.py and run that"
+
+
+def test_higher_floors_are_drawn_above() -> None:
+    places = rooms_in_picture()
+    heights = [{places[room] for room in floor} for floor in FLOORS]
+    assert all(len(height) == 1 for height in heights), "rooms of one floor stand side by side"
+    downwards = [height.pop() for height in heights]
+    assert downwards == sorted(downwards, reverse=True)
+    assert len(set(downwards)) == len(FLOORS)
+
+
+def test_the_picture_is_that_of_its_script() -> None:
+    script = runpy.run_path(str(ROOT / "scripts" / "draw_architecture.py"))
+    assert script["picture"]() == PICTURE.read_text(encoding="utf-8"), "run scripts/draw_architecture.py"

@@ -1,0 +1,101 @@
+"""What the site makes of docstrings, signatures and scripts."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tests.docs.pages import DOCS, ROOT
+
+sys.path.append(str(DOCS))
+from _site import docstrings, reference, signatures
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Vector = NDArray[Any]
+
+
+@dataclass
+class Values:
+    """Values.
+
+    Attributes:
+        first: The first.
+        more: The others.
+    """
+
+    first: Vector
+    more: dict[str, int] = field(default_factory=dict)
+
+    def of(self, name: str = "all", *, strict: bool = False) -> Vector | None:
+        """Return some."""
+
+
+class Colour(Enum):
+    RED = 1
+
+
+def written(obj: Any) -> tuple[str, str | None] | None:
+    return signatures.as_written(None, "", "", obj, None, "()", None)  # type: ignore[arg-type]
+
+
+def test_signatures_are_those_of_the_source() -> None:
+    assert written(Values) == ("(first: np.ndarray, more: dict[str, int] = ...)", None)
+    assert written(Values.of) == ("(name: str = 'all', *, strict: bool = False)", "np.ndarray | None")
+
+
+def test_nobody_calls_an_enumeration() -> None:
+    assert written(Colour) == ("", None)
+
+
+def test_attributes_have_their_types_beside_their_names() -> None:
+    lines = docstrings.types_beside_names(
+        [".. attribute:: first", "", "   The first."], signatures.annotations(Values)
+    )
+    assert lines == [".. attribute:: first", "   :type: np.ndarray", "", "   The first."]
+
+
+def test_tables_of_docstrings_become_tables() -> None:
+    lines = docstrings.tables(
+        ["Stops:", "", "| when | why |", "|---|---|", "| w is small | DONE |", "", "End."]
+    )
+    assert [line.strip() for line in lines] == [
+        *("Stops:", "", ".. list-table::", ":widths: auto", ":header-rows: 1", ""),
+        *("* - when", "- why", "* - w is small", "- DONE", "", "", "End."),
+    ]
+
+
+def test_the_text_of_a_property_is_no_type() -> None:
+    lines = ["Volume of the link: section times length."]
+    docstrings.hide_colons(None, "property", "", None, None, lines)  # type: ignore[arg-type]
+    assert ":" not in lines[0]
+    docstrings.finish(None, "property", "", None, None, lines)  # type: ignore[arg-type]
+    assert lines == ["Volume of the link: section times length."]
+
+
+def test_a_name_of_another_room_is_described_there() -> None:
+    assert reference.homes("optimize")["Checkpoint"] == "fenics_contact.checkpoint.Checkpoint"
+    assert reference.homes("optimize")["minimize"] == "fenics_contact.optimize.minimize"
+
+
+@pytest.mark.parametrize(
+    "target", ["fenics_contact.geometry.mesh.BodyMesh", "BodyMesh", "fenics_contact.geometry.BodyMesh"]
+)
+def test_a_class_is_found_by_every_name_that_it_has(target: str) -> None:
+    found = [*reference.candidates(target), target]
+    assert "fenics_contact.geometry.BodyMesh" in found
+
+
+def test_the_comment_above_a_constant_describes_it() -> None:
+    text, value = reference.constant(reference.module_of("scene"), "Friction")
+    assert text[0].startswith("A law of friction")
+    assert value == "Coulomb | Tresca | None"
+
+
+def test_pages_of_the_reference_are_made_and_not_kept() -> None:
+    assert "/docs/reference/" in (ROOT / ".gitignore").read_text().splitlines()
