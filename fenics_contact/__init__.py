@@ -11,8 +11,9 @@ The floors of the package, from the ground up; each imports only those before it
 * `fenics_contact.shape`: design → value and subgradient,
 * `fenics_contact.optimize`: the bundle trust method.
 
-Beside them: `fenics_contact.viz` (pictures) and `fenics_contact.io` (files). On top: `fenics_contact.study`
-(what accuracy costs in time).
+Beside them: `fenics_contact.viz` (pictures), `fenics_contact.io` (files) and `fenics_contact.scene_file`
+(scenes as TOML files). On top: `fenics_contact.study` (what accuracy costs in time) and `fenics_contact.cli`
+(the command line).
 """
 
 from fenics_contact import _requirements

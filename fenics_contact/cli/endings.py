@@ -47,7 +47,7 @@ MEANING = {
     Ending.TERMINATED: "terminated by a signal",
 }
 #: For the end of the help text.
-EPILOG = "\b\nExit codes:\n" + "\n".join(f"  {code.value:<4d} {words}" for code, words in MEANING.items())
+EPILOG = "\b\nExit codes:\n" + "\n".join(f"{code.value:<4d} {words}" for code, words in MEANING.items())
 
 
 class Terminated(BaseException):

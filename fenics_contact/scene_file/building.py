@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.scene import Body, Material, Scene
 from fenics_contact.scene_file.document import Document
 from fenics_contact.scene_file.expression import Expression, VectorExpression
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 class Builder:
     """Builds the parts one after the other and collects what is wrong with them.
 
-    Every rank meets the same errors: what reads files or runs gmsh agrees by itself.
+    What reads meshes or runs gmsh agrees by itself on errors; Python files are read by every rank.
     """
 
     def __init__(self, source: Source, document: Document, comm: MPI.Comm) -> None:
@@ -121,8 +121,10 @@ class Builder:
             self._mistakes.append(located(self._source, path, error))
 
     def _check(self) -> None:
-        if self._mistakes:
-            raise SceneFileError(self._source.name, self._mistakes)
+        """Raise on all ranks if one met a mistake, as in a file that it alone cannot read. Collective."""
+        with together(self._comm):
+            if self._mistakes:
+                raise SceneFileError(self._source.name, self._mistakes)
 
 
 def located(source: Source, path: Path, error: InvalidInputError) -> Mistake:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.optimize import BundleTrust, LinearConstraints, Result, minimize
 from fenics_contact.optimize.progress import Callback
 from fenics_contact.qp import FaceNewton
@@ -91,11 +91,13 @@ def shape_task(
         )
         for part in design.surfaces
     )
+    with together(comm):
+        objective = _objective(design.objective, source)
     problem = ShapeProblem(
         scene,
         partitions,
         moving,
-        _objective(design.objective, source),
+        objective,
         comm,
         solver=_solver(document, scene, partitions),
         tolerance=_tolerance(document, design),

@@ -44,21 +44,19 @@ def test_what_cannot_be_studied_is_refused(
     ("arguments", "words"),
     [
         (["accuracy", "hertz", "--tolerances", "2"], "a number between 0 and 1, or \"balanced\", got '2'"),
-        (["accuracy", "hertz", "--discretisations", "dual"], "invalid choice: 'dual' (choose from"),
+        (["accuracy", "hertz", "--discretisations", "dual"], "needs one of ['node', 'mortar'], got 'dual'"),
         (["accuracy", "hertz", "--tolerances", "tight"], "got 'tight'"),
         (["accuracy", "hertz", "--limit", "soon"], "a positive number of seconds, got 'soon'"),
         (["accuracy", "hertz", "--ranks", "0"], "a positive integer, got '0'"),
-        (["accuracy"], "the following arguments are required: SCENE"),
-        (["acuracy", "hertz"], "invalid choice: 'acuracy' (choose from"),
-        ([], "the following arguments are required: COMMAND"),
+        (["accuracy"], "Missing argument 'SCENE'"),
+        (["acuracy", "hertz"], "No such command 'acuracy'. Did you mean 'accuracy'?"),
+        ([], "Missing command."),
     ],
 )
 def test_options_that_do_not_exist_are_refused_with_those_that_do(
     arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with pytest.raises(SystemExit) as stop:
-        main(arguments)
-    assert stop.value.code == 2
+    assert main(arguments) == 2
     assert words in capsys.readouterr().err
 
 
@@ -73,8 +71,7 @@ def test_a_file_without_a_study_is_refused(
 
 
 def test_help_names_the_scenes(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["accuracy", "--help"])
+    assert main(["accuracy", "--help"]) == 0
     assert "hertz, cattaneo_mindlin, chain_links" in " ".join(capsys.readouterr().out.split())
 
 

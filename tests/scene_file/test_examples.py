@@ -21,13 +21,11 @@ def test_two_blocks_are_those_of_python() -> None:
     assert compare_states("two_blocks", two_blocks, MPI.COMM_SELF) == 1
 
 
-def test_two_blocks_are_those_of_python_on_two_ranks(mpirun: Callable[..., str]) -> None:
-    assert mpirun(SCRIPT, 2, "two_blocks") == "same 1\n"
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, 2])
-@pytest.mark.parametrize(("name", "count"), [("sheared_block", 10), ("hertz", 1), ("chain_links", 3)])
+@pytest.mark.parametrize(
+    ("name", "count"), [("two_blocks", 1), ("sheared_block", 10), ("hertz", 1), ("chain_links", 3)]
+)
 def test_an_example_is_that_of_python(name: str, count: int, ranks: int, mpirun: Callable[..., str]) -> None:
     assert mpirun(SCRIPT, ranks, name, timeout=300.0) == f"same {count}\n"
 

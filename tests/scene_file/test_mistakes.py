@@ -169,11 +169,27 @@ def test_all_ranks_report_the_same_mistake(mpirun: Callable[..., str]) -> None:
             assert len(set(found)) == 1, found
             if comm.rank == 0:
                 print(found[0])
+        from fenics_contact.errors import InvalidInputError
+        from fenics_contact.scene_file import read_scene_file
+        mesh = {"shape": "block", "lower": [0, 0, 0], "upper": [1, 1, 1], "counts": [1, 1, 1]}
+        data = {"meshes": {"m": mesh}, "materials": {"s": {"model": f"{folder}/{comm.rank}.py:A"}}}
+        file = read_scene_file({**data, "bodies": {"a": {"mesh": "m", "material": "s"}}}, comm)
+        if comm.rank == 0:
+            code = "from fenics_contact.scene import IsotropicElasticity as E; A = lambda: E(1.0, 0.0)"
+            (folder / "0.py").write_text(code)
+        try:
+            file.scene
+        except InvalidInputError as error:
+            told = comm.gather(str(error))
+        if comm.rank == 0:
+            print(told[0])
         """,
         2,
     )
     lines = printed.splitlines()
-    assert len(lines) == 3
+    assert len(lines) == 4
+    assert "there must be a Python file" in lines[3], "rank 1 alone has none"
+    assert lines[3].endswith("(met on rank 1)")
     assert lines[0].startswith("scene.toml, line 42: must be TOML, got '[solver'")
     assert "friction.coefficient must be a number of at least 0, got -1" in lines[1]
     assert "loads.0.surface must be a surface of the body 'upper'" in lines[2]

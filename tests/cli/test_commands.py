@@ -1,0 +1,163 @@
+"""`fenics-contact info`, `demo`, `view` and `schema`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+from mpi4py import MPI
+
+from fenics_contact import cli
+from fenics_contact.cli.blas import Blas, loaded_blas, numpy_speed
+from fenics_contact.cli.shipped import folder_of_demos, shipped
+from tests.conftest import ROOT
+from tests.scene_file.texts import GOOD
+
+
+def run(*arguments: object) -> int:
+    return cli.main(MPI.COMM_SELF, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the result of two blocks."""
+    folder = tmp_path_factory.mktemp("result")
+    (folder / "scene.toml").write_text(GOOD)
+    assert run("run", folder / "scene.toml", "-o", folder, "--no-pictures") == 0
+    return folder
+
+
+def test_info_knows_versions_petsc_blas_and_ranks(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("info", "--json") == 0
+    known = json.loads(capsys.readouterr().out)
+    assert known["versions"]["dolfinx"].startswith("0.")
+    assert known["machine"]["ranks"].startswith("1 on 1 node, ")
+    assert "mumps" in known["machine"]["PETSc packages"]
+    assert "GFLOP/s" in known["machine"]["NumPy's BLAS"]
+    assert known["machine"]["pictures"].startswith("can")
+    assert run("info") == 0
+    printed = capsys.readouterr().out
+    assert "OPENBLAS_NUM_THREADS=1" in printed
+    assert "dolfinx" in printed
+
+
+def test_the_blas_in_use_is_found_and_measured() -> None:
+    libraries = loaded_blas()
+    assert libraries, "this process has multiplied matrices"
+    assert any(library.speed is not None and library.speed > 0.1 for library in libraries)
+    assert numpy_speed() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("library", "slow"),
+    [
+        (Blas("/usr/lib/x86_64-linux-gnu/blas/libblas.so.3.11.0", 2.0, True), True),
+        (Blas("/opt/libblas.so", 1.5, False), True),
+        (Blas("/usr/lib/libopenblas.so.0", 40.0, False), False),
+        (Blas("/usr/lib/libopenblas.so.0", None, False), False),
+    ],
+)
+def test_a_reference_blas_counts_as_slow(library: Blas, slow: bool) -> None:
+    assert library.slow == slow
+
+
+def test_demos_are_listed_with_their_titles(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("demo") == 0
+    printed = capsys.readouterr().out
+    for path in (ROOT / "demos").glob("demo_*.py"):
+        assert path.stem.removeprefix("demo_") in printed
+    assert "Hertz: a steel ball on a steel block\n" in printed
+    assert "two_blocks.toml" in printed
+    assert folder_of_demos() == ROOT / "demos"
+
+
+def test_an_unknown_demo_is_refused_with_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("demo", "hertz_spher") == 2
+    assert "got 'hertz_spher': did you mean 'hertz_sphere'?" in capsys.readouterr().err
+
+
+def test_a_demo_gets_its_options_and_refuses_wrong_ones(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("demo", "chain_links", "--size", "huge") == 2
+    assert "--size must be one of ['paper', 'small'], got 'huge'" in capsys.readouterr().err
+    assert "--size" in " ".join(shipped()) or "chain_links" in shipped()
+
+
+def test_a_demo_runs_in_the_current_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "demos").mkdir()
+    demo = tmp_path / "demos" / "demo_tiny.py"
+    demo.write_text(
+        "# # A tiny demo. It writes.\nimport sys\nfrom pathlib import Path\nPath(sys.argv[1]).touch()\n"
+    )
+    monkeypatch.setattr("fenics_contact.cli.shipped.folder_of_demos", lambda: tmp_path / "demos")
+    monkeypatch.chdir(tmp_path)
+    assert run("demo") == 0
+    assert "A tiny demo\n" in capsys.readouterr().out
+    assert run("demo", "tiny", "made") == 0
+    assert (tmp_path / "made").exists()
+
+
+def test_an_example_scene_is_copied_with_its_schema_and_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run("demo", "two_blocks.toml", "--copy") == 0
+    assert "run it with `fenics-contact run two_blocks.toml`" in capsys.readouterr().out
+    assert (tmp_path / "scene_file.schema.json").exists()
+    assert run("demo", "two_blocks.toml", "--copy") == 2
+    assert "'two_blocks.toml' is there already" in capsys.readouterr().err
+    assert run("run", "two_blocks.toml", "--no-pictures") == 0
+    assert (tmp_path / "output" / "two_blocks" / "result.json").exists()
+    assert run("demo", "two_blocks.toml", "--set", "title=x") == 2
+    assert "a scene takes no options here" in capsys.readouterr().err
+
+
+def test_view_shows_numbers_and_fields(result: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("view", result, "--no-window") == 0
+    printed = capsys.readouterr().out
+    for words in ("torn_unknowns", "normal_force", "fields of state.vtm", "von_mises", "no window without"):
+        assert words in printed
+    assert run("view", result / "result.json", "--no-window") == 0
+
+
+def test_view_draws_to_a_file(result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    picture = tmp_path / "there" / "picture.png"
+    assert run("view", result / "state.vtm", "--save", picture, "--field", "displacement") == 0
+    assert f"picture in {picture}\n" in capsys.readouterr().out
+    assert picture.stat().st_size > 5000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("nowhere",), "a result needs a folder or file that exists, got 'nowhere'"),
+        (("{result}/scene.toml",), "a result must be a whole JSON file"),
+        (("{result}", "--save", "a.jpg"), "a picture must be a PNG file, got 'a.jpg'"),
+        (("{result}", "--save", "a.png", "--field", "stress"), "--field must be one of ['contact_force'"),
+    ],
+)
+def test_view_refuses_what_is_no_result(
+    arguments: tuple[str, ...], words: str, result: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("view", *(text.format(result=result) for text in arguments)) == 2
+    assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["<VTKFile", "<VTKFile><Collection/></VTKFile>"])
+def test_view_refuses_a_series_without_members(
+    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "a.pvd").write_text(text)
+    assert run("view", tmp_path / "a.pvd") == 2
+    assert "must be a whole .pvd file" in (err := capsys.readouterr().err) or "it names none" in err
+
+
+def test_the_schema_is_written_or_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("schema") == 0
+    printed = json.loads(capsys.readouterr().out)
+    jsonschema.Draft202012Validator.check_schema(printed)
+    assert run("schema", tmp_path / "a.json") == 0
+    assert json.loads((tmp_path / "a.json").read_text()) == printed

@@ -1,0 +1,109 @@
+"""Commands under mpirun: one rank speaks, all end alike."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import LAUNCH, MPI_TRACES, ROOT, launch
+from tests.scene_file.texts import GOOD, changed
+
+#: Runs commands one after the other on all ranks and tells how each ended on each rank.
+SCRIPT = """
+import contextlib, io, json, sys
+from mpi4py import MPI
+from fenics_contact import cli
+comm, told = MPI.COMM_WORLD, []
+for arguments in json.loads(sys.argv[1]):
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = cli.main(comm, arguments)
+    told.append(comm.gather((code, out.getvalue(), err.getvalue())))
+if comm.rank == 0:
+    print(json.dumps(told))
+"""
+
+
+def test_one_rank_speaks_and_all_end_alike(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(GOOD)
+    (tmp_path / "slides.toml").write_text(changed(("coefficient = 0.3", "coefficient = 0.0")))
+    commands = [
+        ["run", str(path), "-o", str(tmp_path / "out"), "--no-pictures"],
+        ["run", str(path), "--set", "contacts.0.friction.coefficient=-1"],
+        ["run", str(tmp_path / "slides.toml"), "-o", str(tmp_path / "out")],
+        ["--help"],
+        ["nothing"],
+        ["accuracy", "hertz"],
+        ["view", str(tmp_path / "out"), "--no-window"],
+        ["view", "nowhere"],
+        ["info"],
+    ]
+    answer = launch(2, "-c", SCRIPT, json.dumps(commands))
+    assert answer.returncode == 0, answer.stderr
+    told = json.loads(answer.stdout)
+    codes = [[code for code, _, _ in ranks] for ranks in told]
+    assert codes == [[code, code] for code in (0, 2, 4, 0, 2, 2, 0, 2, 0)]
+    assert [ranks[1][1:] for ranks in told] == [["", ""]] * len(commands), "rank 1 says nothing"
+    assert "scene.toml on 2 ranks" in told[0][0][1]
+    assert "coefficient must be a number of at least 0, got -1" in told[1][0][2]
+    assert "give --ranks 2" in told[5][0][2]
+    assert "2 on 1 node" in told[8][0][1]
+    assert (tmp_path / "out" / "state.vtm").exists()
+
+
+@pytest.mark.slow
+def test_the_program_ends_with_its_code_under_mpirun(tmp_path: Path) -> None:
+    answer = launch(2, "-m", "fenics_contact", "run", tmp_path / "nowhere.toml")
+    assert answer.returncode == 2
+    assert answer.stderr.count("error: there must be a scene file") == 1
+    assert "Traceback" not in answer.stderr
+    assert "MPI_ABORT" not in answer.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_run_that_is_terminated_goes_on(ranks: int, tmp_path: Path) -> None:
+    scene = ROOT / "demos" / "scenes" / "sheared_block.toml"
+    arguments = (scene, "-o", tmp_path, "--no-pictures", "--set", "steps.3.count=1")
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(MPI_TRACES)}
+    command = [str(LAUNCH), str(ranks), sys.executable, "-m", "fenics_contact", "run", *map(str, arguments)]
+    stopped = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+    )
+    while not (tmp_path / "history.pvd").exists() and stopped.poll() is None:
+        time.sleep(0.05)
+    # What the launcher passes on to ranks and waits for; alone, the process hears it itself.
+    stopped.send_signal(signal.SIGUSR1 if ranks > 1 else signal.SIGTERM)
+    _, words = stopped.communicate(timeout=120.0)
+    assert stopped.returncode == (128 + signal.SIGUSR1 if ranks > 1 else 143), words
+    assert "Traceback" not in words
+    assert (tmp_path / "checkpoint.npz").exists()
+    assert not (tmp_path / "result.json").exists()
+    again = launch(ranks, "-m", "fenics_contact", "run", *arguments, "--resume", timeout=300.0)
+    assert again.returncode == 0, again.stderr
+    assert "going on from" in again.stdout
+    steps = json.loads((tmp_path / "result.json").read_text())["more"]["steps"]
+    assert steps["number"] == list(range(20))
+    assert steps["friction_force"][18] == pytest.approx(85.52, rel=2e-3)
+    assert (tmp_path / "history.pvd").read_text().count("timestep") == 20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ranks", [1, 2, 4])
+def test_a_sheared_block_has_the_same_steps_on_any_ranks(ranks: int, tmp_path: Path) -> None:
+    settings = ("--set", "steps.1.count=3", "--set", "steps.2.count=1", "--set", "steps.3.count=1")
+    scene = ROOT / "demos" / "scenes" / "sheared_block.toml"
+    answer = launch(ranks, "-m", "fenics_contact", "run", scene, "-o", tmp_path, "--no-pictures", *settings)
+    assert answer.returncode == 0, answer.stderr
+    steps = json.loads((tmp_path / "result.json").read_text())["more"]["steps"]
+    assert steps["normal_force"] == pytest.approx(
+        [193.665, 191.284, 181.971, 173.993, 171.657, 171.225], rel=1e-5
+    )

@@ -1,0 +1,261 @@
+"""`fenics-contact run` and `optimize`: what they print, write and refuse."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from typer.testing import CliRunner
+
+from fenics_contact import cli
+from fenics_contact.contact import LoadSequence
+from fenics_contact.errors import ConvergenceError, InfeasibleError, MissingRequirementError
+from fenics_contact.io import read_result
+from fenics_contact.scene_file import read_scene_file
+from tests.conftest import ROOT
+from tests.scene_file.texts import GOOD, changed
+
+SCENES = ROOT / "demos" / "scenes"
+#: A block on a floor, pressed and shifted in three steps.
+STEPS = """
+title = "Shifted block"
+meshes.m = { shape = "block", lower = [0, 0, 0], upper = [2, 1, 1], counts = [3, 2, 2] }
+materials.s = { young_modulus = 10.0, poisson_ratio = 0.3 }
+bodies.block = { mesh = "m", material = "s" }
+output.pictures = []
+solver.tolerance = 1e-8
+
+[[supports]]
+name = "top"
+body = "block"
+surface = "z1"
+value = [0.0, 0.0, -0.1]
+
+[[contacts]]
+slave = { body = "block", surface = "z0" }
+master = { obstacle = "plane", point = [0, 0, 0], normal = [0, 0, 1] }
+friction = { law = "coulomb", coefficient = 0.3 }
+
+[[steps]]
+name = "pressed"
+
+[[steps]]
+name = "shifted"
+count = 2
+supports.top = [0.4, 0.0, -0.1]
+"""
+
+
+def run(*arguments: object) -> int:
+    return cli.main(MPI.COMM_SELF, [str(argument) for argument in arguments])
+
+
+def scene(folder: Path, text: str) -> Path:
+    path = folder / "scene.toml"
+    path.write_text(text)
+    return path
+
+
+def test_a_scene_is_solved_and_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "there"
+    path = scene(tmp_path, GOOD)
+    assert run("run", path, "-o", output, "--set", "output.files=['vtu', 'xdmf']", "--no-pictures") == 0
+    printed = capsys.readouterr().out
+    assert "Two blocks: scene.toml on 1 rank\n" in printed
+    assert "Coulomb friction (1 pair has a friction coefficient" in printed, "the plan comes first"
+    assert printed.index("cone ") < printed.index("total potential")
+    assert f"results in {output}/: result.json, state.vtm\n" in printed
+    assert "\x1b" not in printed, "no colours where there is no terminal"
+    assert not [line for line in printed.splitlines() if line != line.rstrip()]
+    record = read_result(output)
+    assert record["more"]["scene_file"] == "scene.toml"
+    state = read_scene_file(path, MPI.COMM_SELF).solve()
+    assert record["energies"]["total_potential"] == pytest.approx(state.energies.total_potential, rel=1e-12)
+    assert {file.name for file in output.iterdir()} >= {"state.vtm", "state_upper.xdmf", "result.json"}
+    assert not list(output.glob("*.png"))
+
+
+def test_options_count_more_than_the_file(tmp_path: Path) -> None:
+    path = scene(tmp_path, GOOD)
+    arguments = ("--no-pictures", "--set", "contacts.0.friction={law = 'none'}", "--tolerance", "1e-4")
+    # Without friction nothing holds the upper block against the push.
+    assert run("run", path, "-o", tmp_path, *arguments) == cli.Ending.NO_EQUILIBRIUM == 4
+    assert run("run", path, "-o", tmp_path, *arguments, "--set", "loads.0.value=[0, 0, -100]") == 0
+    assert read_result(tmp_path)["solver"]["tolerance"] == 1e-4
+
+
+def test_a_dry_run_writes_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "there"
+    assert run("run", scene(tmp_path, GOOD), "-o", output, "--dry-run") == 0
+    printed = capsys.readouterr().out
+    assert f"would write to {output}/: result.json, vtu files, pictures of stress\n" in printed
+    assert not output.exists()
+
+
+def test_load_steps_are_listed_and_make_a_film(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("run", scene(tmp_path, STEPS), "-o", tmp_path) == 0
+    printed = capsys.readouterr().out
+    assert "load steps      3\n" in printed
+    assert [f"  {number}   {name} " in printed for number, name in enumerate(("pressed", "shifted 1/2"))]
+    record = read_result(tmp_path)["more"]["steps"]
+    assert record["name"] == ["pressed", "shifted 1/2", "shifted 2/2"]
+    assert record["friction_force"][0] < 1e-6 < record["friction_force"][1]
+    assert record["slip"][2] > 0
+    assert (tmp_path / "history.pvd").read_text().count("timestep") == 3
+    assert not (tmp_path / "checkpoint.npz").exists(), "a run that is complete leaves none"
+
+
+def test_an_interrupted_history_goes_on_to_the_same_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, advance = scene(tmp_path, STEPS), LoadSequence.advance
+    assert run("run", path, "-o", tmp_path / "whole") == 0
+
+    def stopped(sequence: LoadSequence, step: object) -> object:
+        if getattr(step, "name", "") == "shifted 2/2":
+            raise KeyboardInterrupt
+        return advance(sequence, step)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(LoadSequence, "advance", stopped)
+    assert run("run", path, "-o", tmp_path / "cut") == cli.Ending.INTERRUPTED == 130
+    monkeypatch.undo()
+    assert not (tmp_path / "cut" / "result.json").exists()
+    assert "interrupted" in capsys.readouterr().err
+    assert run("run", path, "-o", tmp_path / "cut", "--resume") == 0
+    assert "going on from" in capsys.readouterr().out
+    whole, cut = (read_result(tmp_path / name) for name in ("whole", "cut"))
+    np.testing.assert_allclose(
+        cut["more"]["steps"]["normal_force"], whole["more"]["steps"]["normal_force"], rtol=1e-6
+    )
+    assert (tmp_path / "cut" / "history.pvd").read_text().count("timestep") == 3
+
+
+def test_a_checkpoint_of_another_scene_is_refused_with_the_way_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, advance = scene(tmp_path, STEPS), LoadSequence.finish
+    monkeypatch.setattr(LoadSequence, "finish", lambda _: (_ for _ in ()).throw(KeyboardInterrupt))
+    assert run("run", path, "-o", tmp_path) == 130
+    monkeypatch.setattr(LoadSequence, "finish", advance)
+    assert (tmp_path / "checkpoint.npz").exists()
+    assert run("run", path, "-o", tmp_path, "--set", "materials.s.young_modulus=11") == 2
+    assert "(with --fresh the run starts anew)" in capsys.readouterr().err
+    assert run("run", path, "-o", tmp_path, "--set", "materials.s.young_modulus=11", "--fresh") == 0
+
+
+def test_a_checkpoint_that_is_demanded_must_be_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("run", scene(tmp_path, STEPS), "-o", tmp_path, "--resume") == 2
+    assert "checkpoint.npz" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "nowhere.toml"], "error: there must be a scene file 'nowhere.toml', there is none"),
+        (["run"], "Missing argument 'SCENE.toml'"),
+        (["run", "a.toml", "--tolerence", "1"], "No such option: --tolerence"),
+        (["runn"], "No such command 'runn'. Did you mean 'run'?"),
+        (["run", str(SCENES / "two_blocks.toml"), "--tolerance", "2"], "--set: solver.tolerance must be a"),
+        (["optimize", str(SCENES / "two_blocks.toml")], "an optimisation needs [design] with"),
+    ],
+)  # fmt: skip
+def test_wrong_input_ends_with_two(
+    arguments: Sequence[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(*arguments) == cli.Ending.WRONG_INPUT == 2
+    written = capsys.readouterr()
+    assert words in written.err
+    assert written.out == ""
+    assert "Traceback" not in written.err
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (ConvergenceError("stopped"), 3),
+        (InfeasibleError("slides"), 4),
+        (MissingRequirementError("gmsh"), 5),
+        (KeyboardInterrupt(), 130),
+        (RuntimeError("a bug"), 1),
+    ],
+)
+def test_every_ending_has_its_number(
+    error: BaseException, code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fails(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr("fenics_contact.cli.run.read", fails)
+    assert run("run", SCENES / "two_blocks.toml") == code
+    written = capsys.readouterr().err
+    assert ("Traceback" in written) == (code == 1), "a traceback is for bugs"
+    assert str(error) in written
+
+
+def test_help_tells_the_exit_codes() -> None:
+    answer = CliRunner().invoke(cli.app, ["--help"], obj=cli.Desk(MPI.COMM_SELF))
+    assert answer.exit_code == 0
+    for code in cli.Ending:
+        assert f"\n  {code.value} " in answer.output
+    for command in ("run", "optimize", "accuracy", "demo", "view", "info", "schema"):
+        assert f"\n  {command} " in answer.output
+
+
+def test_commands_run_in_the_runner_of_the_library(tmp_path: Path) -> None:
+    arguments = ["run", str(scene(tmp_path, GOOD)), "-o", str(tmp_path), "--dry-run"]
+    answer = CliRunner().invoke(cli.app, arguments, obj=cli.Desk(MPI.COMM_SELF))
+    assert (answer.exit_code, "nothing was solved" in answer.output) == (0, True)
+    answer = CliRunner().invoke(cli.app, ["run", "nowhere.toml"], obj=cli.Desk(MPI.COMM_SELF))
+    assert answer.exit_code == 2
+
+
+def test_pictures_are_drawn_with_the_names_of_units(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = scene(
+        tmp_path,
+        changed(("[solver]", '[units]\nstress = "kN/cm²"\n[output]\npictures = ["pressure"]\n[solver]')),
+    )
+    assert run("run", path, "-o", tmp_path) == 0
+    assert "result.json, state.vtm, pressure.png\n" in capsys.readouterr().out
+    assert (tmp_path / "pressure.png").stat().st_size > 10_000
+    assert json.loads((tmp_path / "result.json").read_text())["more"]["unit_names"]["stress"] == "kN/cm²"
+
+
+def test_a_picture_that_does_not_suit_the_scene_is_left_out_with_the_reason(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = GOOD[: GOOD.index("[[contacts]]")].replace('body = "upper"', 'body = "lower"')
+    one_body = text[: text.index("[bodies.upper]")] + text[text.index("[[supports]]") :]
+    path = scene(tmp_path, f'{one_body}[output]\npictures = ["pressure"]\n')
+    assert run("run", path, "-o", tmp_path) == 0
+    assert "no picture pressure.png: " in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_an_optimisation_writes_its_designs_and_says_when_it_stopped_early(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    small = (
+        "meshes.links.n_around=36", "meshes.links.n_a=4", "meshes.links.n_b=10",
+        "solver.subdomains=[4, 1, 1]", "design.surfaces.0.net=[5, 3]", "output.pictures=[]",
+    )  # fmt: skip
+    settings = [part for value in small for part in ("--set", value)]
+    arguments = ("optimize", SCENES / "chain_links.toml", "-o", tmp_path, *settings)
+    assert run(*arguments, "--set", "design.max_iterations=1") == cli.Ending.NOT_CONVERGED == 3
+    assert "not converged: max_iterations serious steps" in capsys.readouterr().out
+    assert (tmp_path / "checkpoint.npz").exists(), "it goes on with a larger limit"
+    assert run(*arguments, "--set", "design.max_iterations=2") == 3
+    printed = capsys.readouterr().out
+    assert "going on from" in printed
+    assert "control_net.png, convergence.png" in printed
+    record = read_result(tmp_path)
+    assert record["optimisation"]["stop"]["iterations"] == 2
+    assert record["optimisation"]["objective"]["final"] < record["optimisation"]["objective"]["initial"]
+    assert (tmp_path / "designs.pvd").read_text().count("timestep") == 3
