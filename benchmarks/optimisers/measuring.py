@@ -93,6 +93,8 @@ def _by_scipy(method: str) -> Callable[[Book], str]:
         if method == "COBYLA":  # an exception would leave traces in its Fortran code
             settings["options"]["maxiter"] = book.budget
         found = scipy.optimize.minimize(**task.arguments(method), **settings)
+        if not found.success and len(book.rows) >= book.budget:
+            return "budget spent"
         return "converged" if found.success else str(found.message).rstrip(".").lower()
 
     return solve
