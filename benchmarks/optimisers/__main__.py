@@ -6,14 +6,11 @@ import argparse
 import json
 from pathlib import Path
 
-from benchmarks.optimisers.measuring import FULL, METHODS, QUICK, run
+from benchmarks.optimisers.measuring import FULL, METHODS, QUICK, budget_of, run
 from benchmarks.optimisers.report import page, plot
 from fenics_contact.io import versions, write_json
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "studies" / "optimisers"
-#: Most evaluations of a method with derivative, and of one without, which needs one a variable to begin.
-BUDGET, WITHOUT_DERIVATIVE = 150, 300
-QUICK_BUDGET = 12
 
 
 def main() -> None:
@@ -21,15 +18,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="one problem, few evaluations; no conclusions")
     parser.add_argument("--folder", type=Path, help="where to write instead of docs/studies/optimisers")
+    parser.add_argument("--resume", action="store_true", help="leave out what the results hold already")
     parser.add_argument("--draw", action="store_true", help="page and picture from numbers that are there")
     chosen = parser.parse_args()
     folder = chosen.folder or (FOLDER if not chosen.quick else Path("output") / "optimisers")
     known = folder / "results.json"
-    runs = []
+    runs = json.loads(known.read_text())["runs"] if chosen.resume else []
+    there = {(each["case"], each["method"]) for each in runs}
     for case in () if chosen.draw else QUICK if chosen.quick else FULL:
         for method in METHODS:
-            budget = WITHOUT_DERIVATIVE if method == "COBYLA" else BUDGET
-            runs.append(run(case, method, QUICK_BUDGET if chosen.quick else budget))
+            budget = budget_of(case, method, chosen.quick)
+            if (case.name, method) in there or not budget:
+                continue
+            runs.append(run(case, method, budget))
             last = runs[-1]
             print(f"{case.name}, {method}: J = {last['value']:.2f}, {last['stop']}", flush=True)
             write_json(known, {"runs": runs, "quick": chosen.quick, "versions": versions()})

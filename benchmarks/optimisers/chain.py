@@ -83,6 +83,7 @@ class Book:
         rows: A row an evaluation: value (nan where the design does not exist), violation of the constraints
             in units of the box's width, products and seconds up to and with it.
         designs: The designs, in the same order.
+        notes: Why designs did not exist.
     """
 
     def __init__(self, case: Case, budget: int, tolerance: float | AdaptiveTolerance = STATES) -> None:
@@ -103,12 +104,13 @@ class Book:
         if case.start:
             random = np.random.default_rng(case.start).uniform(-0.8, 0.8, size) * case.bound
             self.start = nearest_feasible(random, self.bounds, self.constraints)
-        self.budget, self.rows, self.designs = budget, [], []
+        self.budget, self.rows, self.designs, self.notes = budget, [], [], []
         self._row = by_volume / np.linalg.norm(by_volume)
         self._state_products, self._began = 0, perf_counter()
 
     rows: list[tuple[float, float, int, float]]
     designs: list[np.ndarray]
+    notes: list[str]
 
     @property
     def inexact(self) -> bool:
@@ -129,6 +131,7 @@ class Book:
             value, gradient = self.problem(alpha)
         except (InvalidDesignError, ConvergenceError) as error:
             self._write(alpha, np.nan)
+            self.notes.append(str(error))
             raise InvalidDesignError(str(error)) from error
         self._write(alpha, value)
         return value, gradient
@@ -140,6 +143,7 @@ class Book:
             state = self.problem.state_of(alpha)
         except (InvalidDesignError, ConvergenceError) as error:
             self._write(alpha, np.nan)
+            self.notes.append(str(error))
             raise InvalidDesignError(str(error)) from error
         self._state_products += state.solution.products
         value = self._judge(state)

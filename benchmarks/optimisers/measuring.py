@@ -11,7 +11,7 @@ import numpy as np
 import scipy.optimize
 
 from benchmarks.optimisers.chain import Book, Case, Spent
-from fenics_contact.optimize import BundleTrust, ForScipy, minimize
+from fenics_contact.optimize import BundleTrust, ForScipy, minimize, nearest_feasible
 from fenics_contact.shape import AdaptiveTolerance
 
 #: Violation of the volume or of a bound that a method may leave, in widths of the box.
@@ -23,19 +23,26 @@ SCIPY: dict[str, dict[str, Any]] = {
     "COBYLA": {"options": {"rhobeg": 0.1, "tol": 1e-4}},
 }
 METHODS = ("bundle", "bundle, adaptive states", *SCIPY)
+#: Most evaluations of a method with derivative by size of the chain, and of one without, which needs one for
+#: each variable to begin; it is left out where an evaluation takes long.
+BUDGET = {"coarse": 150, "small": 80}
+WITHOUT_DERIVATIVE = {"coarse": 300, "small": 0}
+QUICK_BUDGET = 12
 FULL = (
     Case("coarse", "total potential", 0.25, 0.3, 0),
     Case("coarse", "largest force", 1.0, 0.3, 0),
     Case("coarse", "largest force", 1.0, 0.3, 1),
-    Case("coarse", "largest force", 1.0, 0.3, 2),
     Case("coarse", "largest force", 1.0, 0.1, 0),
-    Case("coarse", "largest force", 1.0, 0.6, 0),
-    Case("coarse", "total potential", 0.25, 0.3, 1),
-    Case("coarse", "total potential", 1.0, 0.3, 0),
-    Case("small", "total potential", 0.25, 0.3, 0),
     Case("small", "largest force", 1.0, 0.3, 0),
 )
 QUICK = (Case("coarse", "largest force", 1.0, 0.3, 0),)
+
+
+def budget_of(case: Case, method: str, quick: bool) -> int:
+    """Return how many evaluations a method may spend."""
+    if quick:
+        return QUICK_BUDGET
+    return (WITHOUT_DERIVATIVE if method == "COBYLA" else BUDGET)[case.size]
 
 
 def run(case: Case, method: str, budget: int) -> dict[str, Any]:
@@ -57,16 +64,19 @@ def run(case: Case, method: str, budget: int) -> dict[str, Any]:
         stop = (_by_bundle if method.startswith("bundle") else _by_scipy(method))(book)
     seconds = book.rows[-1][3]
     best = _best(book)
-    value = Book(case, 1).value(book.designs[best])
+    # What is compared keeps every constraint: the smallest violation would pay.
+    design = nearest_feasible(book.designs[best], book.bounds, book.constraints)
+    value = Book(case, 1).value(design)
     return {
         "case": case.name, "objective": case.objective, "method": method, "stop": stop,
         "evaluations": len(book.rows), "best_evaluation": best + 1,
         "invalid": int(sum(np.isnan(row[0]) for row in book.rows)),
         "value_claimed": book.rows[best][0], "value": value, "violation": book.rows[best][1],
         "products": book.rows[-1][2], "seconds": seconds,
-        "design": book.designs[best], "variables": book.problem.size,
+        "design": design, "variables": book.problem.size,
         "unknowns": book.problem.decomposition.torn_unknowns,
-        "history": [list(row) for row in book.rows],
+        "history": [[None if np.isnan(row[0]) else row[0], *row[1:]] for row in book.rows],
+        "notes": sorted(set(book.notes)),
     }  # fmt: skip
 
 
@@ -83,6 +93,8 @@ def _by_scipy(method: str) -> Callable[[Book], str]:
         if method == "COBYLA":  # an exception would leave traces in its Fortran code
             settings["options"]["maxiter"] = book.budget
         found = scipy.optimize.minimize(**task.arguments(method), **settings)
+        if not found.success and len(book.rows) >= book.budget:
+            return "budget spent"
         return "converged" if found.success else str(found.message).rstrip(".").lower()
 
     return solve

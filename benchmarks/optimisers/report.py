@@ -2,12 +2,145 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+
+from benchmarks.optimisers.measuring import ALLOWED
+from benchmarks.report import table
+
+LOOKS = {
+    "bundle": ("#0072b2", "o", "-"),
+    "bundle, adaptive states": ("#56b4e9", "v", "-"),
+    "SLSQP": ("#d55e00", "s", "--"),
+    "trust-constr": ("#cc79a7", "^", "--"),
+    "COBYLA": ("#009e73", "D", ":"),
+}
+#: What products and times are compared with.
+USUAL = "bundle"
+#: Smallest distance to the best value that the picture tells apart from none.
+LEAST = 1e-6
+
+INTRODUCTION = """\
+# SciPy's optimisers beside the bundle method
+
+The shape of a chain link's crown: 28 control points, the volume may not fall, friction between the links.
+All methods get the same function, the same start, the same box and the same row for the volume; SciPy's get
+them from `fenics_contact.optimize.ForScipy`, which scales variables and values. Written by
+`python -m benchmarks.optimisers`.
+
+![How close to the best, by evaluations and by products](optimisers.png)
+
+- *total potential*: the objective of the demo, within ±0.25 mm. It is almost linear in the design, and its
+  minimum lies in a corner of the box.
+- *largest force*: the largest nodal contact force, within ±1 mm: a maximum over the contact points, of forces
+  that have kinks themselves where points open, close, stick or slide. Its minimum has kinks through it.
+- *above the best*: J of the best design of the method, moved onto the constraints and evaluated again, over
+  the best of all methods on this problem.
+- *evaluations*: states that were solved, and after how many of them the best design was met; *products*: with
+  the dual operator, states and adjoints together, the measure of work that does not depend on the machine.
+- *time*: over that of the bundle method, measured one after the other on a machine with other work: a rough
+  figure.
+
+The bundle method ("adaptive states": with `AdaptiveTolerance`) and SLSQP and trust-constr take a subgradient
+with every value, COBYLA takes values alone, without adjoints. States are solved to 1e-8.
+"""
 
 
 def page(study: dict[str, Any]) -> str:
-    return ""
+    """Return the page of Markdown."""
+    parts = [INTRODUCTION] + ([QUICK] if study["quick"] else [CONCLUSIONS])
+    for case in dict.fromkeys(run["case"] for run in study["runs"]):
+        runs = [run for run in study["runs"] if run["case"] == case]
+        first = runs[0]
+        parts.append(f"## {case[0].upper()}{case[1:]}\n")
+        parts.append(f"{first['unknowns']} unknowns; J before: {first['history'][0][0]:.1f} {_unit(first)}\n")
+        parts.append(_table(runs))
+    parts.append(SETTINGS)
+    return "\n".join(parts)
 
 
-def plot(path: Any, runs: Any) -> None:
-    return None
+QUICK = "A quick run: the budget is a dozen evaluations, and nothing follows from it.\n"
+
+CONCLUSIONS = ""
+
+SETTINGS = f"""\
+## Settings
+
+Bundle: tolerance 1e-4. In scaled values and variables: SLSQP ftol 1e-6; trust-constr xtol and gtol 1e-5,
+first radius 0.3; COBYLA rhobeg 0.1, tol 1e-4. A design counts if it violates no constraint by more than
+{ALLOWED:g} widths of the box. At most 150 evaluations (COBYLA 300), on the small chain 80 (COBYLA left out).
+"""
+
+
+def above_best(run: dict[str, Any], runs: list[dict[str, Any]]) -> float:
+    """Return by how much a method's value lies above the best on this problem, relative to it."""
+    best = min(other["value"] for other in runs if other["case"] == run["case"])
+    return float((run["value"] - best) / abs(best))
+
+
+def _unit(run: dict[str, Any]) -> str:
+    return "N mm" if run["objective"] == "total potential" else "N"
+
+
+def _table(runs: list[dict[str, Any]]) -> str:
+    usual = next(run for run in runs if run["method"] == USUAL)
+    rows = [
+        (run["method"], f"{run['value']:.2f}", f"{100 * above_best(run, runs):.3f} %",
+         f"{max(run['violation'], 0.0):.0e}" if run["violation"] > 1e-12 else "none",
+         f"{run['evaluations']} ({run['best_evaluation']})", str(run["invalid"] or "none"),
+         str(run["products"]), f"{run['products'] / usual['products']:.2f}",
+         f"{run['seconds'] / usual['seconds']:.1f}", run["stop"])
+        for run in runs
+    ]  # fmt: skip
+    head = (
+        "method", f"J [{_unit(runs[0])}]", "above the best", "violation", "evaluations (best)", "not there",
+        "products", "products, ratio", "time, ratio", "stop",
+    )  # fmt: skip
+    return table(head, rows) + "\n"
+
+
+def plot(path: Path, runs: list[dict[str, Any]]) -> None:
+    """Draw how close to the best value every method came, by evaluations and by products, a row a problem."""
+    cases = list(dict.fromkeys(run["case"] for run in runs))
+    figure, grid = plt.subplots(
+        len(cases), 2, figsize=(11, 3.1 * len(cases) + 0.6), layout="constrained", squeeze=False
+    )
+    for case, axes in zip(cases, grid, strict=True):
+        mine = [run for run in runs if run["case"] == case]
+        for run in mine:
+            _curve(axes, run, mine)
+        axes[0].set_title(case, fontsize="medium", loc="left")
+        axes[0].set_ylabel("above the best")
+    for axis, label in zip(grid[-1], ("evaluations", "products with the dual operator"), strict=True):
+        axis.set_xlabel(label)
+    handles, labels = grid[-1][0].get_legend_handles_labels()
+    if len(cases) > 1:
+        handles, labels = grid[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
+
+
+def _curve(axes: Any, run: dict[str, Any], runs: list[dict[str, Any]]) -> None:
+    best = min(other["value"] for other in runs)
+    colour, marker, line = LOOKS[run["method"]]
+    rows = [
+        (np.inf if row[0] is None or row[1] > ALLOWED else row[0], number, row[2])
+        for number, row in enumerate(run["history"], 1)
+    ]
+    values, numbers, products = np.array(rows).T
+    # What was claimed on the way may lie a little below what is true: by the tolerance of the state.
+    reached = np.maximum((np.minimum.accumulate(values) - best) / abs(best), LEAST)
+    end = max(above_best(run, runs), LEAST)
+    for axis, place in zip(axes, (numbers, products), strict=True):
+        axis.semilogy(place, reached, color=colour, linestyle=line, linewidth=1.4)
+        axis.semilogy(place[-1], end, marker=marker, color=colour, linestyle="none", label=run["method"])
+        axis.set_xscale("log")
+        axis.grid(True, alpha=0.3)
+        axis.spines[["top", "right"]].set_visible(False)

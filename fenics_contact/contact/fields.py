@@ -59,6 +59,21 @@ def displacement_function(mesh: Any, values: np.ndarray) -> Any:
     return function
 
 
+def nodal_function(mesh: Any, name: str, values: np.ndarray) -> Any:
+    """Return a scalar field on a body's mesh by its values in the nodes. Collective.
+
+    Args:
+        mesh: The body's mesh.
+        name: Name of the Function.
+        values: One for each node of the body, on every rank, shape (at least n_nodes,).
+    """
+    function = _dolfinx.Function(_dolfinx.scalar_space(mesh, 1), name=name)
+    nodes, dofs = _dolfinx.node_dofs(function.function_space)
+    function.x.array[dofs] = values[nodes]
+    function.x.scatter_forward()
+    return function
+
+
 def von_mises(displacement: Any, body: Body, temperature: Temperature = Temperature()) -> Any:
     """Return the von Mises stress averaged over each cell, [force / length²], a piecewise constant Function.
 

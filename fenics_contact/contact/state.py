@@ -15,6 +15,7 @@ from fenics_contact.contact.fields import (
     cell_values,
     displacement_function,
     nodal_displacement,
+    nodal_function,
     von_mises,
 )
 from fenics_contact.contact.result import ContactResult
@@ -129,6 +130,21 @@ class State:
         return {
             name: von_mises(self.displacement[name], body, temperature_of(self.scene.loads, name))
             for name, body in self.scene.bodies.items()
+        }
+
+    @cached_property
+    def contact_pressure(self) -> dict[str, Any]:
+        """Contact pressure of each body as a Function on its own mesh, [force / length²].
+
+        Its values are those of the contact points in the nodes of the slave surfaces; it is zero in all other
+        nodes, on masters too. Collective on first use.
+        """
+        tearing, contact = self.torn.decomposition.tearing, self.contact
+        values = np.bincount(contact.points.slave, contact.pressure, minlength=int(tearing.node_offset[-1]))
+        starts = dict(zip(tearing.body_names, tearing.node_offset[:-1], strict=True))
+        return {
+            name: nodal_function(u.function_space.mesh, "contact_pressure", values[int(starts[name]) :])
+            for name, u in self.displacement.items()
         }
 
     def gather_displacement(self, body: str) -> np.ndarray:

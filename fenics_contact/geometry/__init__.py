@@ -18,6 +18,7 @@ from fenics_contact.geometry.hemisphere import half_cylinder, hemisphere
 from fenics_contact.geometry.link import DesignSurface, Link, chain_link
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.meshio_import import from_meshio, read_mesh
+from fenics_contact.geometry.near_surfaces import near_surfaces
 from fenics_contact.geometry.partition import (
     bisection_partition,
     box_partition,
@@ -80,6 +81,7 @@ __all__ = [
     "merge_duplicate_nodes",
     "merge_pieces",
     "mutual_clearance",
+    "near_surfaces",
     "orient",
     "quadratic",
     "quadrature",

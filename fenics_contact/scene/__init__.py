@@ -1,5 +1,6 @@
 """Scenes: bodies, materials, supports, loads and contact pairs."""
 
+from fenics_contact.scene.bodies import bodies_from
 from fenics_contact.scene.body import Body
 from fenics_contact.scene.effects import Effect, EffectName
 from fenics_contact.scene.kernels import rigid_body_modes
@@ -84,6 +85,7 @@ __all__ = [
     "Tresca",
     "Ufl",
     "VolumeLoad",
+    "bodies_from",
     "can_expand",
     "choose_solver",
     "gravity",

@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import Status, solve_scene
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh, boundary_faces, read_msh
+from fenics_contact.geometry import BodyMesh, block, boundary_faces, near_surfaces, read_mesh, read_msh
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -23,7 +23,9 @@ from fenics_contact.scene import (
     Surface,
     Tie,
     Traction,
+    bodies_from,
 )
+from tests.geometry.mesh_files import joined
 
 DATA = Path(__file__).parents[1] / "data"
 STEEL = IsotropicElasticity(1000.0, 0.3)
@@ -71,6 +73,18 @@ def test_regions_of_a_plane_msh_file_are_two_materials_or_two_tied_bodies() -> N
     found = solve_scene(two, None, MPI.COMM_SELF, tolerance=1e-10)
     assert found.energies.total_potential == pytest.approx(expected.energies.total_potential, rel=1e-8)
     assert expected.energies.total_potential < -1e-5
+
+
+def test_bodies_of_an_abaqus_file_press_on_each_other_where_they_are_near(tmp_path: Path) -> None:
+    """From the file to the forces in four calls; the file names bodies and loads, but no contact surface."""
+    table = block((0, 0, 0), (2, 1, 1), (4, 2, 2))
+    joined([table, block((0.5, 0, 1), (1.5, 1, 2), (3, 2, 2))]).write(tmp_path / "press.inp")
+    meshes, pairs = near_surfaces(read_mesh(tmp_path / "press.inp"), 0.01)
+    contacts = [ContactPair(Surface(b, f"near {a}"), Surface(a, f"near {b}"), Coulomb(0.5)) for a, b in pairs]
+    loads = [Traction("tool", "pushed", (0.2, 0.0, -1.0))]
+    scene = Scene(bodies_from(meshes, {"t*": STEEL}), [Support("table", "held")], loads, contacts)
+    state = solve_scene(scene, None, MPI.COMM_SELF, tolerance=1e-6)
+    np.testing.assert_allclose(state.contact.force.sum(axis=0), [-0.2, 0.0, 1.0], atol=1e-5)
 
 
 def with_side(mesh: BodyMesh, x: float) -> BodyMesh:

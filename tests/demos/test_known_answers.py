@@ -47,15 +47,24 @@ DEMOS: dict[str, tuple[dict[str, float | list[float]], set[str]]] = {
         {"forces": [40e3] * 4, "displacements": [0.020548, 0.141450, 0.279922, 0.418392, 0.553923]},
         {"stress", "pressure", "decomposition"},
     ),
+    "uncertain_friction": (
+        {"slide": 7, "largest_pressure_median": 2384.37, "largest_pressure_95": 2571.78},
+        {"samples", "distribution", "stress"},
+    ),
     "orthotropic": (
         {"force": 1849.15, "half_axes": [3.20134, 2.71753], "angle": 89.153},
         {"stress", "pressure"},
     ),
 }
 
+#: Many states.
+SLOW = {"uncertain_friction"}
+
 
 @pytest.mark.parametrize("ranks", [1, 2])
-@pytest.mark.parametrize("name", DEMOS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in DEMOS]
+)
 def test_a_demo_finds_its_number_on_one_rank_and_on_two(
     name: str, ranks: int, mpirun: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -41,9 +41,7 @@ def test_no_rank_is_left_waiting_whoever_fails(mpirun: Callable[..., str], ranks
 
 
 @pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.slow)])
-def test_a_scene_sampled_by_rank_0_has_the_answers_of_one_rank(
-    mpirun: Callable[..., str], ranks: int
-) -> None:
+def test_rank_0_samples_a_scene_as_one_rank_would(mpirun: Callable[..., str], ranks: int) -> None:
     found = json.loads(mpirun(HERE / "sampled.py", ranks))
     alone, samples = response(failures="nan"), ((0.3, 1e3), (0.25, 9e2), (0.19, 1e3), (0.5, 5e2))
     expected = [alone(friction=friction, load=load).array for friction, load in samples]

@@ -1,0 +1,80 @@
+"""The study of optimisers is fair: one function for all, and only designs that keep the constraints count."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks.optimisers.measuring import ALLOWED, FULL, METHODS, budget_of
+from benchmarks.optimisers.report import above_best, page, plot
+from tests.conftest import ROOT
+
+
+def runs() -> list[dict[str, Any]]:
+    """Two methods on one problem; the second met a design that does not exist, and one outside a row."""
+    common = {
+        "case": "largest force, an example",
+        "objective": "largest force",
+        "unknowns": 100,
+        "seconds": 2.0,
+    }
+    first = {
+        **common, "method": "bundle", "value": 10.0, "violation": 0.0, "evaluations": 3, "best_evaluation": 3,
+        "invalid": 0, "products": 30, "stop": "converged",
+        "history": [[20.0, 0.0, 10, 0.5], [12.0, 0.0, 20, 1.0], [10.0, 0.0, 30, 2.0]],
+    }  # fmt: skip
+    second = {
+        **common, "method": "SLSQP", "value": 11.0, "violation": 0.0, "evaluations": 4, "best_evaluation": 2,
+        "invalid": 1, "products": 45, "stop": "budget spent",
+        "history": [[20.0, 0.0, 10, 0.5], [11.0, 0.0, 20, 1.0], [None, 0.0, 20, 1.5], [5.0, 1.0, 45, 2.0]],
+    }  # fmt: skip
+    return [first, second]
+
+
+def test_the_page_tells_how_far_above_the_best_and_at_what_cost(tmp_path: Path) -> None:
+    text = page({"runs": runs(), "quick": True})
+    assert "## Largest force, an example" in text
+    assert "| SLSQP | 11.00 | 10.000 % | none | 4 (2) | 1 | 45 | 1.50 | 1.0 | budget spent |" in text
+    assert above_best(runs()[0], runs()) == 0.0
+    plot(tmp_path / "optimisers.png", runs())
+    assert (tmp_path / "optimisers.png").stat().st_size > 10_000
+
+
+def test_every_method_but_the_one_without_derivative_has_the_same_budget() -> None:
+    for case in FULL:
+        budgets = {method: budget_of(case, method, quick=False) for method in METHODS}
+        budgets.pop("COBYLA")
+        assert len(set(budgets.values())) == 1
+
+
+def test_the_stored_study_has_every_problem_and_designs_that_keep_the_constraints() -> None:
+    folder = ROOT / "docs" / "studies" / "optimisers"
+    study = json.loads((folder / "results.json").read_text())
+    expected = [(c.name, m) for c in FULL for m in METHODS if budget_of(c, m, quick=False)]
+    assert [(run["case"], run["method"]) for run in study["runs"]] == expected
+    for run in study["runs"]:
+        assert run["violation"] <= ALLOWED
+        assert run["evaluations"] == len(run["history"])
+        assert len(run["design"]) == run["variables"] == 28
+        assert run["value"] < np.inf
+    assert (folder / "README.md").read_text() == page(study)
+
+
+@pytest.mark.slow
+def test_the_quick_study_runs_from_its_first_line_to_its_last(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "benchmarks.optimisers", "--quick", "--folder", str(tmp_path)]
+    printed = subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=ROOT, check=True)
+    assert printed.stderr == ""
+    study = json.loads((tmp_path / "results.json").read_text())
+    assert [run["method"] for run in study["runs"]] == list(METHODS)
+    before = {round(run["history"][0][0], 1) for run in study["runs"]}
+    assert len(before) == 1, "all start from the same shape"
+    assert all(run["evaluations"] <= 12 for run in study["runs"])
+    assert min(run["value"] for run in study["runs"]) < 0.6 * before.pop()
+    assert (tmp_path / "optimisers.png").stat().st_size > 10_000
