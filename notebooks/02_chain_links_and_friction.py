@@ -230,6 +230,19 @@ plot_contact_status(maps, title="Stick and slip while the chain swings", width=1
 # *Slip begins at the rim and eats its way to the middle, until everything slides along z. One step back,
 # and all but the rim sticks again; then slip spreads the other way.*
 #
+# ## In three dimensions
+#
+# `interactive(history[4], "contact_pressure")` alone in a cell shows the state here, to turn and to zoom. It
+# is larger than all pictures of this notebook together, so this cell puts it into a file instead: one page
+# that any browser opens, without a server or a network.
+
+# %%
+from fenics_contact.viz import interactive
+
+page = interactive(history[4], "contact_pressure", path="output/notebooks/chain_links/swung.html")
+print("to open in a browser:", page)
+
+# %% [markdown]
 # ## What to try next
 #
 # - A swing of 0.3 mm only: part of the surface never slips (*partial slip*), and the loop becomes thin.

@@ -165,7 +165,7 @@ plot_curves(
 
 # %% [markdown]
 # *The computed points lie on the formula, to nine digits: linear elements represent this solution exactly.
-# Ten degrees off the fibres, and the block gives in by half as much again.*
+# Ten degrees off the fibres, and the block gives in by nearly half as much again.*
 #
 # At 30° the block also shears, although it is only pressed: fibres, pressure and floor do not agree about
 # the directions.
@@ -174,7 +174,7 @@ plot_curves(
 from fenics_contact.viz import plot_stress
 
 _, state = shortening(30)
-plot_stress(state, title="Fibres at 30°", scale=40, width=900)
+plot_stress(state, title="Fibres at 30°", scale=40, clim=(0.0, 16.0), sections=False, width=800)
 
 # %% [markdown]
 # *The stress is the same in every cell. The block leans over because its fibres do.*

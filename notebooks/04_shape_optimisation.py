@@ -163,7 +163,7 @@ assert np.linalg.norm(first) > 1e3  # a zero would pass every check below
 #
 # The acid test of every derivative: difference quotients. Along a direction $d$, $(J(\beta + h d) - J(\beta
 # - h d)) / 2h$ must tend to $g \cdot d$ until rounding and the tolerance of the states take over. At a
-# design with no symmetry of its own values:
+#   design with no symmetry of its own values:
 
 # %%
 rng = np.random.default_rng(1)
@@ -211,9 +211,9 @@ e = -first / np.linalg.norm(first)
 steps = np.linspace(0.0, 0.6, 13)
 along = [problem.value_of(S @ (t * e)) for t in steps]
 tangents = {}
-for t in (0.0, 0.25, 0.5):
+for t in (0.0, 0.2, 0.4):
     value, gradient = J(t * e)
-    reach = np.array([max(0.0, t - 0.2), min(0.6, t + 0.2)])
+    reach = np.array([max(0.0, t - 0.2), t + 0.2])
     tangents[f"plane from {t:g} mm"] = (reach, value + (gradient @ e) * (reach - t))
 plot_curves(
     {"J": (steps, along)}, reference=tangents, connected=True, width=1000,
@@ -221,8 +221,8 @@ plot_curves(
 )  # fmt: skip
 
 # %% [markdown]
-# *The largest force falls, then another point takes over: a kink, and it rises again. Steepest descent
-# would hop to and fro across the kink. Planes from both sides together know where it is.*
+# *The largest force falls, then another point takes over: a kink, and it rises steeply. Steepest descent
+# would hop to and fro across the kink. The planes from both sides (dark) together know where it is.*
 #
 # ## The bundle method at work
 #
@@ -266,11 +266,12 @@ assert change > -1e-4
 from fenics_contact.viz import plot_convergence
 
 values, kinds = zip(*[(record.value, record.kind.value) for record in result.history], strict=True)
-plot_convergence(values, kinds, label="largest contact force (N)", title="Bundle method", width=1000)
+words = {"label": "largest contact force (N)", "title": "Bundle method"}
+plot_convergence(values, kinds, **words, logarithmic=True, width=1000)
 
 # %% [markdown]
-# *Serious steps on the line, null steps beside it. The first null step, too long, is far off; its plane
-# keeps all later ones from going there again.*
+# *Serious steps on the line, null steps beside it. The first null step, too long, is far off (the scale is
+# logarithmic); its plane keeps all later ones from going there again.*
 #
 # ## Before and after
 #

@@ -28,6 +28,7 @@ def plot_convergence(
     *,
     label: str = "objective",
     title: str = "",
+    logarithmic: bool = False,
     width: int = 1200,
     comm: MPI.Comm | None = None,
 ) -> Picture:
@@ -39,6 +40,7 @@ def plot_convergence(
         path: PNG file to write, None to write none.
         label: Name of the objective, with its unit.
         title: What comes before the facts in the title.
+        logarithmic: Draw a positive objective logarithmically: a trial far off leaves the others their room.
         width: Width of the picture in pixels.
         comm: If given, only rank 0 draws, and all ranks learn of an error.
 
@@ -53,7 +55,15 @@ def plot_convergence(
     """
     target = png_path(path)
     objective, kind = _checked(values, kinds)
-    return draw_picture(comm, target, lambda paper: _draw(objective, kind, paper, (label, title), width))
+    if logarithmic and np.nanmin(objective) <= 0.0:
+        raise InvalidInputError(
+            f"a logarithmic diagram needs a positive objective, got {np.nanmin(objective):g}: leave "
+            "logarithmic=False"
+        )
+    scale = "log" if logarithmic else "linear"
+    return draw_picture(
+        comm, target, lambda paper: _draw(objective, kind, paper, (label, title, scale), width)
+    )
 
 
 def _checked(values: Sequence[float] | np.ndarray, kinds: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
@@ -77,8 +87,10 @@ def _checked(values: Sequence[float] | np.ndarray, kinds: Sequence[str]) -> tupl
     return objective, kind
 
 
-def _draw(values: np.ndarray, kind: np.ndarray, paper: BinaryIO, words: tuple[str, str], width: int) -> None:
-    label, title = words
+def _draw(
+    values: np.ndarray, kind: np.ndarray, paper: BinaryIO, words: tuple[str, str, str], width: int
+) -> None:
+    label, title, scale = words
     number = np.arange(len(values))
     centre = np.isin(kind, ("start", "serious", "refined"))
     first, last = values[centre][0], values[centre][-1]
@@ -94,6 +106,7 @@ def _draw(values: np.ndarray, kind: np.ndarray, paper: BinaryIO, words: tuple[st
         _mark_rejected(axes, number[kind == "rejected"])
         axes.set_xlabel("evaluation")
         axes.set_ylabel(label)
+        axes.set_yscale(scale)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.grid(axis="y", color=GREY, alpha=0.3)
         axes.legend(loc="best")

@@ -141,6 +141,20 @@ def test_convergence_marks_serious_and_null_steps(tmp_path: Path) -> None:
     assert not contains(plain, "#d55e00", 0.1)
 
 
+def test_a_logarithmic_convergence_leaves_room_beside_a_trial_far_off(tmp_path: Path) -> None:
+    history = [2.0, 1000.0, 1.0], ["start", "null", "serious"]
+
+    def height(logarithmic: bool) -> int:
+        path = tmp_path / "history.png"
+        image = pixels(plot_convergence(*history, path, logarithmic=logarithmic, width=600))
+        blue = np.abs(image - np.array([0, 114, 178]) / 255).max(axis=-1) < 0.02
+        return int(np.ptp(np.flatnonzero(blue[:, 60:400].any(axis=1))))
+
+    assert height(True) > 1.5 * height(False) > 0
+    with pytest.raises(InvalidInputError, match="needs a positive objective, got -1: leave logarithmic=False"):
+        plot_convergence([-1.0], ["start"], logarithmic=True)
+
+
 @pytest.mark.parametrize(
     ("values", "kinds", "message"),
     [

@@ -1,4 +1,7 @@
-"""The figures of a study; they need matplotlib, an extra, and are imported by nobody but the report."""
+"""The figures of a study, of `Errors`, for files and notebooks.
+
+They need matplotlib, an extra; nothing but the report imports them.
+"""
 
 from fenics_contact.study.figures.accuracy import plot_accuracy
 from fenics_contact.study.figures.convergence import plot_convergence

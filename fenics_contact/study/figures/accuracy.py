@@ -3,22 +3,35 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from fenics_contact.study.errors import Errors
 from fenics_contact.study.figures.series import WIDTH, against, height, logarithmic, panels, series_of, style
 from fenics_contact.study.pareto import pareto_front
 from fenics_contact.study.protocol import QuantityFacts
 from fenics_contact.viz.colours import INK
+from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.sheet import sheet
 
 
-def plot_accuracy(errors: Errors, path: Path) -> Path:
-    """Draw the error of every run in every quantity over its time, and the Pareto front."""
+def plot_accuracy(errors: Errors, path: Path | None = None) -> Picture:
+    """Draw the error of every run in every quantity over its time, and the Pareto front.
+
+    Args:
+        errors: Errors of a study's runs.
+        path: PNG file to write, None to write none.
+
+    Returns:
+        The picture, which stands for its file where a path is needed.
+    """
+    return draw_picture(None, png_path(path), lambda paper: _draw_all(errors, paper))
+
+
+def _draw_all(errors: Errors, paper: BinaryIO) -> None:
     quantities = _known(errors)
     scene, ranks = errors.results.scene, errors.results.ranks
     title = f"{scene.title}: error against time on {ranks} rank{'s' if ranks > 1 else ''}"
-    with sheet(path, (WIDTH, height(len(quantities))), title, "constrained") as figure:
+    with sheet(paper, (WIDTH, height(len(quantities))), title, "constrained") as figure:
         for axes, quantity in zip(panels(figure, len(quantities)), quantities, strict=True):
             _draw(axes, errors, quantity)
         handles = {
@@ -28,7 +41,6 @@ def plot_accuracy(errors: Errors, path: Path) -> Path:
         }
         columns = len(handles) if len(handles) < 7 else -(-len(handles) // 2)
         figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns)
-    return path
 
 
 def _known(errors: Errors) -> list[QuantityFacts]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
@@ -21,14 +21,27 @@ from fenics_contact.study.figures.series import (
 from fenics_contact.study.protocol import QuantityFacts
 from fenics_contact.study.richardson import measured_rate
 from fenics_contact.viz.colours import INK
+from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.sheet import sheet
 
 #: Height of the legends under a row of panels in pixels.
 LEGENDS = 120
 
 
-def plot_convergence(errors: Errors, path: Path) -> Path:
-    """Draw the error of every quantity, and the estimate of the mesh's error, over the mesh size."""
+def plot_convergence(errors: Errors, path: Path | None = None) -> Picture:
+    """Draw the error of every quantity, and the estimate of the mesh's error, over the mesh size.
+
+    Args:
+        errors: Errors of a study's runs.
+        path: PNG file to write, None to write none.
+
+    Returns:
+        The picture, which stands for its file where a path is needed.
+    """
+    return draw_picture(None, png_path(path), lambda paper: _draw_all(errors, paper))
+
+
+def _draw_all(errors: Errors, paper: BinaryIO) -> None:
     ways = [series for series in series_of(errors) if series.connected and len(series.runs) > 1]
     ways = [series for series in ways if series.name != "balanced"] if len(ways) > 1 else ways
     quantities = [
@@ -38,14 +51,13 @@ def plot_convergence(errors: Errors, path: Path) -> Path:
     ]
     count = len(quantities) + 1
     title = f"{errors.results.scene.title}: convergence"
-    with sheet(path, (WIDTH, height(count) + LEGENDS * (1 + (count > 3))), title, "constrained") as figure:
+    with sheet(paper, (WIDTH, height(count) + LEGENDS * (1 + (count > 3))), title, "constrained") as figure:
         drawn = panels(figure, count)
         for axes, quantity in zip(drawn, quantities, strict=False):
             _draw(axes, errors, quantity, ways)
         _draw_estimate(drawn[-1], errors, ways)
         for axes in drawn:
             _scales(axes, errors)
-    return path
 
 
 def _draw(axes: Any, errors: Errors, quantity: QuantityFacts, ways: list[Series]) -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from fenics_contact.study.errors import Errors
 from fenics_contact.study.figures.series import WIDTH, style
 from fenics_contact.study.parameters import BALANCED
 from fenics_contact.study.results import Run
 from fenics_contact.viz.colours import BLUE, GREEN, INK, ORANGE
+from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.sheet import sheet
 
 #: Part -> words, colour, symbol.
@@ -22,8 +23,20 @@ PARTS = {
 }
 
 
-def plot_parts(errors: Errors, path: Path) -> Path:
-    """Draw the parts and their shares: by mesh if balanced, by tolerance on the base's mesh."""
+def plot_parts(errors: Errors, path: Path | None = None) -> Picture:
+    """Draw the parts and their shares: by mesh if balanced, by tolerance on the base's mesh.
+
+    Args:
+        errors: Errors of a study's runs.
+        path: PNG file to write, None to write none.
+
+    Returns:
+        The picture, which stands for its file where a path is needed.
+    """
+    return draw_picture(None, png_path(path), lambda paper: _draw_all(errors, paper))
+
+
+def _draw_all(errors: Errors, paper: BinaryIO) -> None:
     results, base = errors.results, errors.results.base
     meshes = [run for run in errors.sequence(replace(base, tolerance=BALANCED)) if run.parts]
     varied = [
@@ -31,7 +44,7 @@ def plot_parts(errors: Errors, path: Path) -> Path:
     ]
     sizes, names = [str(run.parameters.size) for run in meshes], [tolerance_words(run) for run in varied]
     title = f"{results.scene.title}: parts of the error"
-    with sheet(path, (WIDTH, 1000), title, "constrained") as figure:
+    with sheet(paper, (WIDTH, 1000), title, "constrained") as figure:
         axes = figure.subplots(2, 2, sharey="row")
         _draw_sizes(axes[0, 0], meshes, sizes)
         _draw_sizes(axes[0, 1], varied, names)
@@ -45,7 +58,6 @@ def plot_parts(errors: Errors, path: Path) -> Path:
         axes[1, 0].set_ylabel("share of the sum")
         handles, labels = axes[0, 1].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=5)
-    return path
 
 
 def tolerance_words(run: Run) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from fenics_contact.study.errors import Errors
 from fenics_contact.study.figures.parts import tolerance_words
@@ -13,6 +13,7 @@ from fenics_contact.study.figures.series import WIDTH, style
 from fenics_contact.study.parameters import BALANCED
 from fenics_contact.study.results import Run
 from fenics_contact.viz.colours import FAMILIES, SPARE
+from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.sheet import sheet
 
 #: Phases from the bottom of a bar to its top.
@@ -32,14 +33,26 @@ COLOURS = dict(zip(ORDER, (SPARE, *FAMILIES[0], *FAMILIES[1]), strict=True))
 MORE = ("#aaaa00", "#666666", "#000000")
 
 
-def plot_phases(errors: Errors, path: Path) -> Path:
-    """Draw the seconds by phase: by mesh at the balanced tolerance, by tolerance on the base's mesh."""
+def plot_phases(errors: Errors, path: Path | None = None) -> Picture:
+    """Draw the seconds by phase: by mesh at the balanced tolerance, by tolerance on the base's mesh.
+
+    Args:
+        errors: Errors of a study's runs.
+        path: PNG file to write, None to write none.
+
+    Returns:
+        The picture, which stands for its file where a path is needed.
+    """
+    return draw_picture(None, png_path(path), lambda paper: _draw_all(errors, paper))
+
+
+def _draw_all(errors: Errors, paper: BinaryIO) -> None:
     results, base = errors.results, errors.results.base
     meshes = errors.sequence(replace(base, tolerance=BALANCED))
     varied = [run for run in results.good if replace(run.parameters, tolerance=base.tolerance) == base]
     ranks = results.ranks
     title = f"{results.scene.title}: time by phase on {ranks} rank{'s' if ranks > 1 else ''}"
-    with sheet(path, (WIDTH, 760), title, "constrained") as figure:
+    with sheet(paper, (WIDTH, 760), title, "constrained") as figure:
         left, right = figure.subplots(1, 2)
         _draw(left, meshes, [f"{run.parameters.size}\n{_unknowns(run)}" for run in meshes])
         _draw(right, varied, [tolerance_words(run) for run in varied])
@@ -50,7 +63,6 @@ def plot_phases(errors: Errors, path: Path) -> Path:
         more = dict(zip(*right.get_legend_handles_labels()[::-1], strict=True))
         known = dict(zip(labels, handles, strict=True)) | more
         figure.legend(known.values(), known.keys(), loc="outside lower center", ncols=10)
-    return path
 
 
 def _unknowns(run: Run) -> str:
