@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 import typer
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from fenics_contact.progress.places import terminal_width
 
@@ -30,37 +31,34 @@ class Desk:
     comm: MPI.Comm
 
     @property
-    def console(self) -> Console:
-        """The console: stdout on rank 0, nothing on other ranks; colours on terminals alone."""
-        width = terminal_width(sys.stdout)
-        return Console(
-            width=width or WIDTH,
-            force_terminal=width is not None,
-            no_color=True if width is None else None,
-            quiet=self.comm.rank != 0,
-            highlight=False,
-            soft_wrap=True,
-        )
-
-    @property
     def ranks(self) -> str:
         """The number of ranks in words."""
         return "1 rank" if self.comm.size == 1 else f"{self.comm.size} ranks"
 
     def say(self, text: str = "") -> None:
         """Write a line, as it is."""
-        self.console.print(text, markup=False)
+        self._write(Text(text))
 
     def show(self, table: Table) -> None:
-        """Write a table, without blanks at the ends of lines where it is no terminal."""
-        console = self.console
-        if console.is_terminal:
-            console.print(table)
+        """Write a table."""
+        self._write(table)
+
+    def _write(self, what: Table | Text) -> None:
+        """Write on rank 0: with colours to a terminal, else without blanks at the ends of lines."""
+        if self.comm.rank != 0:
             return
+        width = terminal_width(sys.stdout)
+        console = Console(
+            width=width or WIDTH,
+            force_terminal=width is not None,
+            no_color=True if width is None else None,
+            highlight=False,
+        )
         with console.capture() as captured:
-            console.print(table)
-        for line in captured.get().splitlines():
-            self.say(line.rstrip())
+            console.print(what, soft_wrap=isinstance(what, Text))
+        lines = captured.get().split("\n")
+        # Through sys.stdout itself: bars that are drawn at this moment stay below.
+        sys.stdout.write("\n".join(lines if width else [line.rstrip() for line in lines]))
 
 
 def desk_of(context: typer.Context) -> Desk:

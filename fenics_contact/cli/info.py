@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -33,7 +34,7 @@ def info(
     desk = desk_of(context)
     known = gathered(desk.comm)
     if as_json:
-        desk.console.print_json(data=known)
+        desk.say(json.dumps(known, indent=2, ensure_ascii=False))
         return
     desk.show(facts(known["versions"], "versions"))
     desk.say()

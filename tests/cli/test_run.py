@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import json
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mpi4py import MPI
+from rich.console import Console
+from rich.file_proxy import FileProxy
 from typer.testing import CliRunner
 
 from fenics_contact import cli
@@ -259,3 +263,11 @@ def test_an_optimisation_writes_its_designs_and_says_when_it_stopped_early(
     assert record["optimisation"]["stop"]["iterations"] == 2
     assert record["optimisation"]["objective"]["final"] < record["optimisation"]["objective"]["initial"]
     assert (tmp_path / "designs.pvd").read_text().count("timestep") == 3
+
+
+def test_what_is_said_while_bars_are_drawn_appears_above_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn, underneath = io.StringIO(), io.StringIO()
+    # Like this bars take over stdout while they are drawn.
+    monkeypatch.setattr(sys, "stdout", FileProxy(Console(file=drawn), underneath))
+    cli.Desk(MPI.COMM_SELF).say("a line")
+    assert (drawn.getvalue(), underneath.getvalue()) == ("a line\n", "")
