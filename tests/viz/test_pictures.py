@@ -151,7 +151,9 @@ def test_a_logarithmic_convergence_leaves_room_beside_a_trial_far_off(tmp_path: 
         return int(np.ptp(np.flatnonzero(blue[:, 60:400].any(axis=1))))
 
     assert height(True) > 1.5 * height(False) > 0
-    with pytest.raises(InvalidInputError, match="needs a positive objective, got -1: leave logarithmic=False"):
+    with pytest.raises(
+        InvalidInputError, match="needs a positive objective, got -1: leave logarithmic=False"
+    ):
         plot_convergence([-1.0], ["start"], logarithmic=True)
 
 
