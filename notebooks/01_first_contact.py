@@ -25,10 +25,11 @@
 # %% [markdown]
 # ## Three conditions
 #
-# Inside each block the displacement $u$ [mm] obeys linear elasticity: the stress $\sigma = \lambda\,
-# \mathrm{tr}(\varepsilon)\, I + 2 G\, \varepsilon$ [N/mm²] balances the loads, with the strain $\varepsilon
-# = \tfrac12 (\nabla u + \nabla u^T)$. Where the blocks can touch, three conditions join in. Let $g$ [mm] be
-# the gap after deformation, $p$ [N/mm²] the contact pressure and $\tau$ [N/mm²] the friction traction:
+# Inside each block the displacement $u$ [mm] obeys linear elasticity: the stress
+# $\sigma = \lambda\, \mathrm{tr}(\varepsilon)\, I + 2 G\, \varepsilon$ [N/mm²] balances the loads, with the
+# strain $\varepsilon = \tfrac12 (\nabla u + \nabla u^T)$. Where the blocks can touch, three conditions join
+# in. Let $g$ [mm] be the gap after deformation, $p$ [N/mm²] the contact pressure and $\tau$ [N/mm²] the
+# friction traction:
 #
 # $$ g \ge 0, \qquad p \ge 0, \qquad g\, p = 0. $$
 #
@@ -156,8 +157,8 @@ assert np.allclose(total, (-3000.0, 0.0, 16000.0), atol=1e-6)
 assert abs(resultant - 10.0 - e) < 1e-8
 
 # %% [markdown]
-# Engineers know the *middle third*: as long as the resultant stays within the middle third of the base, $e
-# \le L/6$ = 3.3 mm, nothing lifts. Here $e$ = 5.6 mm. If the pressure were distributed linearly, the
+# Engineers know the *middle third*: as long as the resultant stays within the middle third of the base,
+# $e \le L/6$ = 3.3 mm, nothing lifts. Here $e$ = 5.6 mm. If the pressure were distributed linearly, the
 # contact would be $3 (L/2 - e)$ = 13.1 mm long. It is not linear, as the pictures show, but the estimate is
 # not bad:
 

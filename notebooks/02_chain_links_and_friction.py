@@ -232,9 +232,9 @@ plot_contact_status(maps, title="Stick and slip while the chain swings", width=1
 #
 # ## In three dimensions
 #
-# `interactive(history[4], "contact_pressure")` alone in a cell shows the state here, to turn and to zoom. It
-# is larger than all pictures of this notebook together, so this cell puts it into a file instead: one page
-# that any browser opens, without a server or a network.
+# `interactive(history[4], "contact_pressure")` alone in a cell shows the state here, to turn and to zoom.
+# It is larger than all pictures of this notebook together, so this cell puts it into a file instead: one
+# page that any browser opens, without a server or a network.
 
 # %%
 from fenics_contact.viz import interactive

@@ -234,9 +234,9 @@ assert len(refused) == 4
 # ## A load in UFL
 #
 # Loads are numbers, functions of position (evaluated at the nodes) or UFL (evaluated in the integrals). A
-# pressure $p(x) = 2 (1 + x/20)^2$ N/mm² on the top has the resultant $20 \int_0^{20} p\, \mathrm{d}x =
-# 5600/3$ N; the floor must push back with as much. UFL integrates the square exactly. A function of
-# position is interpolated first and gives a little more.
+# pressure $p(x) = 2 (1 + x/20)^2$ N/mm² on the top has the resultant
+# $20 \int_0^{20} p\, \mathrm{d}x = 5600/3$ N; the floor must push back with as much. UFL integrates the
+# square exactly. A function of position is interpolated first and gives a little more.
 
 # %%
 from fenics_contact.scene import Ufl

@@ -145,9 +145,9 @@ print(S.shape, "from 6 variables to 15 control points")
 #
 # One call evaluates a design: mesh, state, adjoint, subgradient. The adjoint is *one* linear system with
 # the transposed matrix of the state at its solution (who touches, who sticks, who slips is kept), whatever
-# the number of variables. With the adjoint $w$ [mm/N of J] the derivative by $\alpha_k$ is $\partial J /
-# \partial \alpha_k + \langle w, \text{change of the equilibrium along } V_k \rangle$, where $V_k$ is the
-# mesh motion of control point $k$ and UFL differentiates the forms.
+# the number of variables. With the adjoint $w$ [mm/N of J] the derivative by $\alpha_k$ is
+# $\partial J / \partial \alpha_k + \langle w, \text{change of the equilibrium along } V_k \rangle$, where
+# $V_k$ is the mesh motion of control point $k$ and UFL differentiates the forms.
 
 # %%
 start = np.zeros(6)
@@ -161,9 +161,9 @@ assert np.linalg.norm(first) > 1e3  # a zero would pass every check below
 # %% [markdown]
 # ## Is it right?
 #
-# The acid test of every derivative: difference quotients. Along a direction $d$, $(J(\beta + h d) - J(\beta
-# - h d)) / 2h$ must tend to $g \cdot d$ until rounding and the tolerance of the states take over. At a
-#   design with no symmetry of its own values:
+# The acid test of every derivative: difference quotients. Along a direction $d$,
+# $(J(\beta + h d) - J(\beta - h d)) / 2h$ must tend to $g \cdot d$ until rounding and the tolerance of the
+# states take over. At a design with no symmetry of its own values:
 
 # %%
 rng = np.random.default_rng(1)

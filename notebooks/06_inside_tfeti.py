@@ -144,14 +144,14 @@ assert np.allclose((B_E @ B_E.T).toarray(), np.eye(torn.n_gluing), atol=1e-12)
 # ## The dual problem
 #
 # Equilibrium of the torn subdomains is $K u = f - B^T \lambda$. It can be solved for $u$ if the forces on
-# each subdomain balance, $R^T (f - B^T \lambda) = 0$, and then up to rigid motions: $u = K^+ (f - B^T
-# \lambda) + R \alpha$. With
+# each subdomain balance, $R^T (f - B^T \lambda) = 0$, and then up to rigid motions:
+# $u = K^+ (f - B^T \lambda) + R \alpha$. With
 #
 # $$ F = B K^+ B^T\ [\mathrm{mm/N}], \qquad G = R^T B^T, \qquad e = R^T f\ [\mathrm{N}], \qquad
 #    d = B K^+ f - c\ [\mathrm{mm}] $$
 #
-# what remains is a problem for the multipliers $\lambda$ [N] alone: minimise $\tfrac12 \lambda^T F \lambda
-# - \lambda^T d$ under $G \lambda = e$.
+# what remains is a problem for the multipliers $\lambda$ [N] alone: minimise
+# $\tfrac12 \lambda^T F \lambda - \lambda^T d$ under $G \lambda = e$.
 
 # %%
 import scipy.sparse as sp
@@ -293,9 +293,10 @@ plot_curves(curves, **labels, connected=True, logarithmic=True, width=1000)
 # what makes the method scale. Without it, news passes from one subdomain to its neighbours in each step,
 # and the number of products grows with the number of subdomains in a row, even faster than it.*
 #
-# The other question is how large a subdomain may be, $H/h$ cells along its side. Theory promises $\kappa
-# \le C\, H/h$ with the coarse space alone (Farhat, Mandel and Roux 1994), and with the preconditioner no
-# more than a power of a logarithm, $\kappa \le C\, (1 + \log (H/h))^3$ (Mandel and Tezaur 1996).
+# The other question is how large a subdomain may be, $H/h$ cells along its side. Theory promises
+# $\kappa \le C\, H/h$ with the coarse space alone (Farhat, Mandel and Roux 1994), and with the
+# preconditioner no more than a power of a logarithm, $\kappa \le C\, (1 + \log (H/h))^3$ (Mandel and Tezaur
+# 1996).
 
 # %%
 cells = np.array([2, 4, 8, 16, 32])
@@ -317,9 +318,10 @@ plot_curves(curves, **labels, connected=True, width=900)
 #
 # ## Contact rows and the active set
 #
-# Back to the two blocks. Rows of contact are inequalities: $\lambda_N \ge 0$ [N] and $|\tau| \le \mu
-# \lambda_N$. Each Newton step guesses the *face*: which points are closed, which of them stick or slip. On
-# a face the problem is linear and solved as above, and its solution says what was wrong with the guess.
+# Back to the two blocks. Rows of contact are inequalities: $\lambda_N \ge 0$ [N] and
+# $|\tau| \le \mu \lambda_N$. Each Newton step guesses the *face*: which points are closed, which of them
+# stick or slip. On a face the problem is linear and solved as above, and its solution says what was wrong
+# with the guess.
 
 # %%
 from fenics_contact.contact import Status, solve_scene
@@ -350,8 +352,8 @@ plot_contact_pressure(state, width=900)
 #
 # From $\lambda$ follows the residual of all rows, from that $\alpha$, and $u$. Then everything must fit:
 # the torn subdomains are in equilibrium, copies agree, contact is complementary, and, as in any convex
-# problem, primal and dual energy are the same: with the slip bounds of the solution, $\tfrac12 u^T K u -
-# f^T u + \sum \mu \lambda_N |s| = -\tfrac12 \lambda^T F \lambda + \dots$ [N mm].
+# problem, primal and dual energy are the same: with the slip bounds of the solution,
+# $\tfrac12 u^T K u - f^T u + \sum \mu \lambda_N |s| = -\tfrac12 \lambda^T F \lambda + \dots$ [N mm].
 
 # %%
 u, lam, contact = state.torn_displacement, state.solution.multiplier, state.contact

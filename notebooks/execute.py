@@ -16,9 +16,11 @@ from __future__ import annotations
 import argparse
 import base64
 import os
+import re
 import sys
 import tempfile
 import time
+from itertools import pairwise
 from pathlib import Path
 
 import jupytext
@@ -38,6 +40,8 @@ PAGES = ROOT / "output" / "notebooks"
 COVERS = ROOT / "docs" / "pictures" / "notebooks"
 #: Seconds that one cell may take.
 PATIENCE = 600
+#: The same whichever Python runs the notebooks.
+LANGUAGE = {"name": "python", "pygments_lexer": "ipython3"}
 
 
 def sources(wanted: list[str] | None = None) -> list[Path]:
@@ -50,7 +54,7 @@ def read_source(path: Path) -> NotebookNode:
     """Return the notebook of a text source, without results; the same bytes give the same notebook."""
     text = jupytext.read(path)
     notebook = nbformat.v4.new_notebook(metadata={"kernelspec": dict(text.metadata["kernelspec"])})
-    notebook.metadata["language_info"] = {"name": "python"}
+    notebook.metadata["language_info"] = LANGUAGE
     for number, cell in enumerate(text.cells):
         new = nbformat.v4.new_code_cell if cell.cell_type == "code" else nbformat.v4.new_markdown_cell
         tags = {key: value for key, value in cell.metadata.items() if key == "tags"}
@@ -64,16 +68,26 @@ def execute(notebook: NotebookNode, folder: Path = ROOT) -> NotebookNode:
     Raises:
         CellExecutionError: If a cell fails.
     """
-    # Of all kernels called python3 on this machine the one of this Python: no folder is searched.
-    manager = AsyncKernelManager(
-        kernel_name="python3", kernel_spec_manager=KernelSpecManager(kernel_dirs=[]), transport="ipc"
-    )
-    client = NotebookClient(
-        notebook, km=manager, timeout=PATIENCE, resources={"metadata": {"path": str(folder)}},
-        record_timing=False, coalesce_streams=True,
-    )  # fmt: skip
-    with tempfile.TemporaryDirectory() as profile:  # nobody's start-up files
-        return client.execute(env={**os.environ, "IPYTHONDIR": profile}, cleanup_kc=True)
+    with tempfile.TemporaryDirectory() as private:  # sockets, and nobody's start-up files
+        # Of all kernels called python3 on this machine the one of this Python: no folder is searched.
+        manager = AsyncKernelManager(
+            kernel_name="python3",
+            kernel_spec_manager=KernelSpecManager(kernel_dirs=[]),
+            transport="ipc",
+            ip=str(Path(private) / "kernel"),
+        )
+        client = NotebookClient(
+            notebook,
+            km=manager,
+            timeout=PATIENCE,
+            resources={"metadata": {"path": str(folder)}},
+            record_timing=False,
+            coalesce_streams=True,
+        )
+        client.execute(env={**os.environ, "IPYTHONDIR": private}, cleanup_kc=True)
+    notebook.metadata["language_info"] = LANGUAGE
+    describe(notebook)
+    return notebook
 
 
 def complaints(notebook: NotebookNode) -> list[str]:
@@ -119,10 +133,28 @@ def keep(notebook: NotebookNode, source: Path) -> Path:
     return target
 
 
+def describe(notebook: NotebookNode) -> None:
+    """Give each picture the words of its caption, for those who cannot see it.
+
+    A caption is the first paragraph, in italics, of the cell of text that follows the picture.
+    """
+    for cell, after in pairwise(notebook.cells):
+        first = after.source.split("\n\n")[0]
+        for output in cell.get("outputs", ()):
+            if "image/png" in output.get("data", {}) and first.startswith("*") and first.endswith("*"):
+                words = " ".join(first.strip("*").split()).replace("*", "").replace("$", "")
+                output.metadata.setdefault("image/png", {})["alt"] = words
+
+
 def write_page(stored: Path) -> Path:
-    """Write a stored notebook as one HTML file with its pictures in it."""
-    exporter = HTMLExporter(embed_images=True)
-    page, _ = exporter.from_filename(str(stored))
+    """Write a stored notebook as one HTML file with its pictures in it; links lead to the other pages."""
+    notebook = nbformat.read(stored, as_version=4)
+    for cell in notebook.cells:
+        if cell.cell_type == "markdown":
+            cell.source = cell.source.replace("](../", "](")  # pictures are looked for below one folder
+            cell.source = re.sub(r"(\]\(\d\d_\w+)\.ipynb\)", r"\1.html)", cell.source)
+    place = {"metadata": {"path": str(ROOT), "name": stored.stem}}
+    page, _ = HTMLExporter(embed_images=True).from_notebook_node(notebook, place)
     target = PAGES / f"{stored.stem}.html"
     with replacing(target) as (hidden,):
         hidden.write_text(page, encoding="utf-8")

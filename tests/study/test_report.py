@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.study import read_study, write_report
+from fenics_contact.study import Errors, read_study, write_report
 from fenics_contact.study.overview import write_overview
 from tests.study.samples import results, run
 from tests.viz.states import contains, pixels
@@ -74,3 +74,16 @@ def test_the_page_of_all_studies_takes_its_numbers_from_them(tmp_path: Path) -> 
 def test_a_page_of_no_studies_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match=r"a page of studies needs some, .* holds none: run a study"):
         write_overview(tmp_path)
+
+
+def test_figures_need_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from fenics_contact.study import figures
+
+    monkeypatch.chdir(tmp_path)
+    known = Errors(results())
+    for draw in (figures.plot_accuracy, figures.plot_convergence, figures.plot_parts, figures.plot_phases):
+        picture = draw(known)
+        assert picture.png is not None
+        assert picture.path is None
+        assert len(picture.png) > 10_000
+    assert not list(tmp_path.iterdir())
