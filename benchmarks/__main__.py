@@ -15,6 +15,7 @@ from benchmarks.report import write_json, write_results
 from benchmarks.row import Summaries
 from benchmarks.running import ROOT, RunFailed, fingerprint, measure, raw_file, read
 from benchmarks.summary import summarise
+from fenics_contact.progress import Task, shown
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -63,19 +64,22 @@ def _measure_all(runs: Sequence[Run], mark: str, *, again: bool) -> list[str]:
     for run in WARM_UP if wanted else ():
         measure(run)
     # A run is repeated only after all others were measured: load that lasts a while then hits no run alone.
-    for run, repeat in sorted(wanted, key=lambda key: key[1]):
-        if run.name in failed:
-            continue
-        try:
-            record = measure(run)
-        except RunFailed as error:
-            print(error, file=sys.stderr, flush=True)
-            failed.append(run.name)
-            continue
-        write_json(files[run, repeat], record)
-        told = record.get("seconds", record.get("refused", record.get("skipped", "")))
-        told = f"{told:.2f} s" if isinstance(told, float) else told
-        print(f"{run.name} {repeat + 1}/{run.repeats}: {told}", flush=True)
+    ordered = sorted(wanted, key=lambda key: key[1])
+    with shown(), Task("benchmarks", unit="runs", total=len(ordered)) as task:
+        for number, (run, repeat) in enumerate(ordered):
+            task.step(number, words=run.name)
+            if run.name in failed:
+                continue
+            try:
+                record = measure(run)
+            except RunFailed as error:
+                print(error, file=sys.stderr, flush=True)
+                failed.append(run.name)
+                continue
+            write_json(files[run, repeat], record)
+            told = record.get("seconds", record.get("refused", record.get("skipped", "")))
+            told = f"{told:.2f} s" if isinstance(told, float) else told
+            print(f"{run.name} {repeat + 1}/{run.repeats}: {told}", flush=True)
     return failed
 
 

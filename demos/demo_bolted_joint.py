@@ -21,7 +21,8 @@ from mpi4py import MPI
 
 from fenics_contact.contact import LoadSequence, Status
 from fenics_contact.geometry import block, bolt, drilled_plate
-from fenics_contact.io import write_json, write_vtu
+from fenics_contact.io import ResultSeries, write_result
+from fenics_contact.progress import shown
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,
@@ -112,25 +113,30 @@ if comm.rank == 0:
 # the half. Sticking and sliding points are counted between the plates. A residual of 1e-5 is far below the
 # percent that we look for.
 
-steps = LoadSequence(scene, None, comm, solver=FaceNewton(tolerance=1e-5))
 moved, pulled, clamped, counts = [0.0, 0.02, 0.04, 0.06, 0.08, 0.11], [], [], []
-for displacement in moved:
-    state = steps.advance(LoadStep(f"end at {displacement} mm", supports=supports(displacement)))
-    contact = state.contact
-    between = np.concatenate([contact.on_pair(0), contact.on_pair(1)])
-    pulled.append(-2 * contact.force[between, 0].sum())
-    clamped.append(2 * contact.normal_force[contact.on_pair(2)].sum())
-    counts.append([int(np.sum(contact.status[between] == kind)) for kind in (Status.STICK, Status.SLIP)])
-    if displacement == 0.0:
-        plot_contact_pressure(state, output / "pressure_tightened.png", title="Plate under the upper strap")
+steps = LoadSequence(scene, None, comm, solver=FaceNewton(tolerance=1e-5), count=len(moved))
+series = ResultSeries(output, "pulling", comm)
+with shown(comm):
+    for displacement in moved:
+        state = steps.advance(LoadStep(f"end at {displacement} mm", supports=supports(displacement)))
+        series.add(state, displacement)
+        contact = state.contact
+        between = np.concatenate([contact.on_pair(0), contact.on_pair(1)])
+        pulled.append(-2 * contact.force[between, 0].sum())
+        clamped.append(2 * contact.normal_force[contact.on_pair(2)].sum())
+        counts.append([int(np.sum(contact.status[between] == kind)) for kind in (Status.STICK, Status.SLIP)])
+        if displacement == 0.0:
+            plot_contact_pressure(
+                state, output / "pressure_tightened.png", title="Plate under the upper strap"
+            )
 
 # ![Load over displacement](../docs/pictures/bolted_joint_curve.png)
 #
 # The force in the bolt is what its head presses with. Tightening gives a preload; pulling loses a little of
 # it, as the plate gets thinner. At zero the plate already pushes a little: it was squeezed between its ends.
 
-record = {"ranks": comm.size, "moved": moved, "pull": pulled, "bolt_force": clamped}
-write_json(output / "result.json", record, comm=comm)
+record = {"moved": moved, "pull": pulled, "bolt_force": clamped}
+write_result(state, output, more=record)
 
 if comm.rank == 0:
     ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"
@@ -141,9 +147,10 @@ if comm.rank == 0:
         ratio = pull / (2 * friction.friction_coefficient * P)
         print(f"  {displacement:14.3f} {pull:10.1f} {P:16.1f} {ratio:14.4f} {stick:7d} {slip:6d}")
 
-# ## Pictures and files for ParaView
+# ## Pictures
+#
+# ParaView opens `pulling.pvd`: all steps, with the displacements of the end as times.
 
-write_vtu(state, output, "sliding")
 plot_stress(state, output / "stress.png", clim=(0, 400), scale=50, reach=19.0, title="Sliding joint")
 plot_contact_pressure(state, output / "pressure_sliding.png", title="Plate under the upper strap")
 limit = 2 * friction.friction_coefficient * np.array(clamped)

@@ -20,7 +20,8 @@ from mpi4py import MPI
 
 from fenics_contact.contact import Status, solve_steps
 from fenics_contact.geometry import BodyMesh, rectangle_lattice
-from fenics_contact.io import write_json, write_vtu
+from fenics_contact.io import ResultSeries, write_result
+from fenics_contact.progress import shown
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -85,7 +86,8 @@ steps = [
     LoadStep(name, supports=[base, Support("upper", "y1", (shift, -0.00205))])
     for name, shift in shifts.items()
 ]
-states = dict(zip(shifts, solve_steps(scene, steps, None, comm, tolerance=1e-6), strict=True))
+with shown(comm):
+    states = dict(zip(shifts, solve_steps(scene, steps, None, comm, tolerance=1e-6), strict=True))
 
 # ## Theory for measured forces
 #
@@ -140,8 +142,10 @@ for name, (ratio, _, _) in found.items():
     curves[f"q, Q = {ratio:.2f} μP"] = (place[order], traction[order])
     known[f"theory, {ratio:.2f}"] = (x, theory(x, ratio))
 
-# Symbols are nodes, lines are theory. Of one step also what each point does, and the stress around the
-# contact.
+# Symbols are nodes, lines are theory. Of one step also what each point does and which way it slips, and the
+# stress around the contact.
+#
+# ![Pressure, traction and slip](../docs/pictures/cattaneo_mindlin_contact.png)
 
 plot_curves(
     curves,
@@ -157,15 +161,17 @@ plot_contact_pressure(last, output / "contact.png", title="Sheared cylinders")
 plot_stress(last, output / "stress.png", scale=1.0, title="Sheared cylinders")
 
 # ## Files for ParaView
+#
+# The steps one after the other: open `shear.pvd`.
 
-for number, state in enumerate(states.values()):
-    write_vtu(state, output, f"step_{number}")
+series = ResultSeries(output, "shear", comm)
+for number, (name, state) in enumerate(states.items()):
+    series.add(state, number, name)
 
 # ## Result
 
 error = max(abs(measured / exact - 1) for _, measured, exact in found.values())
 record = {
-    "ranks": comm.size,
     "normal_force": force,
     "half_width": half_width,
     "peak_pressure": peak,
@@ -174,7 +180,7 @@ record = {
     "stick_half_width_theory": [values[2] for values in found.values()],
     "largest_error": error,
 }
-write_json(output / "result.json", record, comm=comm)
+write_result(last, output, more=record)
 
 # Every rank has the same numbers; one prints them.
 

@@ -24,8 +24,9 @@ from mpi4py import MPI
 
 from fenics_contact.contact import Status
 from fenics_contact.geometry import LinkShape, box_partition, two_links
-from fenics_contact.io import versions, write_json, write_vtu, write_xdmf
+from fenics_contact.io import ResultSeries, write_optimisation_result, write_vtu, write_xdmf
 from fenics_contact.optimize import BundleTrust, LinearConstraints, minimize
+from fenics_contact.progress import shown
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -105,14 +106,19 @@ volume, volume_gradient = problem.volume(start)
 keep_volume = LinearConstraints(-volume_gradient[None, :], [0.0])
 
 # ## Optimisation
+#
+# Every better design becomes a member of a series: ParaView plays `designs.pvd` as a film.
 
-result = minimize(
-    problem,
-    start,
-    BundleTrust(tolerance=1e-4),
-    bounds=(np.full(problem.size, -0.25), np.full(problem.size, 0.25)),
-    constraints=keep_volume,
-)
+series = ResultSeries(output, "designs", comm)
+with shown(comm):
+    result = minimize(
+        problem,
+        start,
+        BundleTrust(tolerance=1e-4),
+        bounds=(np.full(problem.size, -0.25), np.full(problem.size, 0.25)),
+        constraints=keep_volume,
+        callback=series.follow(problem),
+    )
 before, after = problem.first, problem.best
 assert np.array_equal(after.alpha, result.x)
 
@@ -122,21 +128,24 @@ assert np.array_equal(after.alpha, result.x)
 
 points = {"before": before, "after": after}
 peak = max(float(point.state.contact.pressure.max()) for point in points.values())
-with timer.phase("pictures"):
+with shown(comm), timer.phase("pictures"):
     plot_decomposition(scene, partitions, output / "decomposition.png", comm=comm)
     for name, point in points.items():
         title = name.capitalize()
         plot_stress(point.state, output / f"stress_{name}.png", clim=(0, 1500), reach=12.0, title=title)
         plot_contact_pressure(point.state, output / f"pressure_{name}.png", clim=(0, peak), title=title)
 
-# The control points, and the surface that they move.
+# The control points and the surface that they move, how the first state was found, and what the new shape
+# does to contact and outlines.
+#
+# ![Contact pressure and outlines before and after](../docs/pictures/chain_links_before_after.png)
 
 mesh = links.first.mesh
 moved = problem.points_of(result.x)["link 1"]
 nets = tuple(design.control_points(mesh.points, alpha) for alpha in (start, result.x))
 values = [record.value for record in result.history]
 kinds = [record.kind.value for record in result.history]
-with timer.phase("pictures"):
+with shown(comm), timer.phase("pictures"):
     plot_control_net(links.first.crown, (mesh.points, moved), nets, output / "control_net.png", comm=comm)
     plot_convergence(values, kinds, output / "convergence.png", label="total potential (N mm)", comm=comm)
     plot_residuals(before.state.solution.history, output / "residuals.png", title="First state", comm=comm)
@@ -153,39 +162,24 @@ with timer.phase("files"):
 #
 # The drop is printed beside the published one, which belongs to other dimensions, load and bounds: $J$
 # contains the potential of the dead force, which gains 80 kN × 0.25 mm when the seat of link 2 gives way by
-# as much as the bounds allow.
+# as much as the bounds allow. The file tells the scene, the history, the best design and its state; what is
+# added here stands under `more`.
 
 drop = (before.value - after.value) / abs(before.value) * 100
 seconds = {**timer.seconds, **problem.seconds}
 counts = after.state.counts
 record = {
     "size": size,
-    "torn_unknowns": counts["torn_unknowns"],
-    "subdomains": counts["subdomains"],
-    "design_variables": problem.size,
-    "ranks": comm.size,
-    "friction_coefficient": friction_coefficient,
-    "objective_initial": before.value,
-    "objective_final": after.value,
-    "drop_percent": drop,
-    "iterations": result.iterations,
-    "evaluations": result.evaluations,
-    "f_products": problem.products,
     "f_products_first_state": before.state.solution.products,
-    "seconds": seconds,
-    "natural_residual": after.state.solution.natural_residual,
-    "gluing_residual": after.state.solution.gluing_residual,
     "volume_initial": volume,
     "volume_final": problem.volume(result.x)[0],
-    "design": result.x,
     "weak_contacts": after.weak.contacts,
     "weak_discs": after.weak.discs,
     "points_on_facet_edges": after.weak.edges,
     "weak_choice": after.weak.choice.name,
-    "reason": result.reason.value,
-    "versions": versions(),
+    "seconds_beside": timer.seconds,
 }
-write_json(output / "result.json", record, comm=comm)
+write_optimisation_result(result, problem, output, more=record)
 
 # Every rank has the same numbers; one prints them.
 
@@ -216,7 +210,10 @@ assert record["volume_final"] > volume * (1 - 1e-4)
 # - `Coulomb(0.1)`: most of the contact slips.
 # - Another objective, for example the largest contact force: see `fenics_contact.shape.ContactForces`.
 # - `checkpoint=Checkpoint(output / "run.npz")` in `minimize` (from `fenics_contact.optimize`): a run that is
-#   interrupted goes on from there when it is started again.
+#   interrupted goes on from there when it is started again. Within `with interruptible(comm):` (from
+#   `fenics_contact.checkpoint`) Ctrl-C lets the evaluation under way come to its end first.
 # - `tolerance=AdaptiveTolerance()` in `ShapeProblem` (from `fenics_contact.shape`): states are solved no more
 #   accurately than the optimiser needs, which saves a third of the products.
 # - A finer net, or `LinkShape(cell="tetrahedron")`.
+# - `interactive(after.state, "contact_pressure", path=output / "pressure.html")` (from `fenics_contact.viz`):
+#   a page on which the mouse turns the links; `after.state.to_pyvista()` for pictures of your own.

@@ -21,7 +21,8 @@ from mpi4py import MPI
 
 from fenics_contact.contact import Status, solve_scene
 from fenics_contact.geometry import LinkShape, chain
-from fenics_contact.io import write_json, write_vtu
+from fenics_contact.io import write_result, write_vtu
+from fenics_contact.progress import shown
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -76,7 +77,8 @@ if comm.rank == 0:
 # nothing resists.
 
 partitions = scene.partition(comm.size)
-state = solve_scene(scene, partitions, comm, tolerance=1e-6)
+with shown(comm):
+    state = solve_scene(scene, partitions, comm, tolerance=1e-6)
 
 # ## Result
 #
@@ -85,8 +87,8 @@ state = solve_scene(scene, partitions, comm, tolerance=1e-6)
 contact = state.contact
 forces = np.array([contact.force[contact.on_pair(pair)].sum(axis=0) for pair in range(len(links.pairs))])
 moved = [state.gather_displacement(name)[:, 0].mean() for name in names]
-record = {"ranks": comm.size, "forces": -forces[:, 0], "displacements": moved}
-write_json(output / "result.json", record, comm=comm)
+record = {"forces": -forces[:, 0], "displacements": moved}
+write_result(state, output, more=record)
 
 if comm.rank == 0:
     ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"

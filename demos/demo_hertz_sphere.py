@@ -22,7 +22,8 @@ from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
 from fenics_contact.geometry import box_lattice, hemisphere
-from fenics_contact.io import write_json, write_vtu
+from fenics_contact.io import write_result, write_vtu
+from fenics_contact.progress import shown
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -83,7 +84,8 @@ def scene(discretisation):
 if comm.rank == 0:
     print(scene("mortar").plan(ranks=comm.size))
 
-states = {name: solve_scene(scene(name), None, comm, tolerance=1e-6) for name in ("mortar", "node")}
+with shown(comm):
+    states = {name: solve_scene(scene(name), None, comm, tolerance=1e-6) for name in ("mortar", "node")}
 
 # ## Result
 #
@@ -104,8 +106,8 @@ for name, state in states.items():
         "a": measured,
     }
 
-record = {"ranks": comm.size, "peak_pressure": found["mortar"]["peak"], "radius": found["mortar"]["a"]}
-write_json(output / "result.json", record, comm=comm)
+record = {"peak_pressure": found["mortar"]["peak"], "radius": found["mortar"]["a"]}
+write_result(states["mortar"], output, more=record)
 
 if comm.rank == 0:
     ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"

@@ -26,7 +26,8 @@ from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
 from fenics_contact.geometry import box_lattice
-from fenics_contact.io import write_json, write_vtu
+from fenics_contact.io import write_result, write_vtu
+from fenics_contact.progress import shown
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -115,8 +116,9 @@ def block_of(material):
 if comm.rank == 0:
     print(block_of(wood).plan(ranks=comm.size))
 
-state = solve_scene(block_of(wood), None, comm, tolerance=1e-6)
-compared = solve_scene(block_of(reference), None, comm, tolerance=1e-6)
+with shown(comm):
+    state = solve_scene(block_of(wood), None, comm, tolerance=1e-6)
+    compared = solve_scene(block_of(reference), None, comm, tolerance=1e-6)
 
 # ## Result
 #
@@ -133,8 +135,8 @@ turned = np.degrees(np.arccos(abs(axes[:, 1] @ fibre[:2])))
 # The forces of both models, point by point.
 
 difference = np.abs(force - compared.contact.normal_force).max() / force.max()
-record = {"ranks": comm.size, "force": force.sum(), "half_axes": [long, short], "angle": turned}
-write_json(output / "result.json", record, comm=comm)
+record = {"force": force.sum(), "half_axes": [long, short], "angle": turned}
+write_result(state, output, more=record)
 
 if comm.rank == 0:
     ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"

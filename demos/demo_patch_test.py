@@ -21,7 +21,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
 from fenics_contact.geometry import block
-from fenics_contact.io import write_json, write_vtu
+from fenics_contact.io import write_result, write_vtu
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, Scene, Support, Surface, Traction
 from fenics_contact.viz import plot_contact_pressure
@@ -70,9 +70,11 @@ for slave, master in CELLS:
             write_vtu(state, output, discretisation)
 
 # ## Result
+#
+# The file tells the last of the scenes in full, and the errors of all.
 
-record = {"ranks": comm.size, "errors": {", ".join(names): error for names, error in errors.items()}}
-write_json(output / "result.json", record, comm=comm)
+record = {"errors": {", ".join(names): error for names, error in errors.items()}}
+write_result(state, output, more=record)
 
 if comm.rank == 0:
     ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"

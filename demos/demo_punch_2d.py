@@ -19,7 +19,8 @@ from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
 from fenics_contact.geometry import half_disc, rectangle_lattice
-from fenics_contact.io import write_json, write_vtu, write_xdmf
+from fenics_contact.io import write_result, write_vtu, write_xdmf
+from fenics_contact.progress import shown
 from fenics_contact.scene import Body, ContactPair, PlaneStrain, Scene, Support, Surface
 from fenics_contact.viz import plot_contact_pressure, plot_curves, plot_decomposition, plot_stress
 
@@ -53,7 +54,8 @@ scene = Scene(
     contacts=[ContactPair(Surface("block", "y1"), Surface("punch", "contact"), discretisation="mortar")],
 )
 partitions = scene.partition(comm.size)
-state = solve_scene(scene, partitions, comm, tolerance=1e-6)
+with shown(comm):
+    state = solve_scene(scene, partitions, comm, tolerance=1e-6)
 
 # ## Hertz
 #
@@ -97,7 +99,6 @@ write_xdmf(state, output / "punch.xdmf")
 
 errors = {"half_width": found_half_width / half_width - 1, "peak_pressure": found_peak / peak - 1}
 record = {
-    "ranks": comm.size,
     "force": force,
     "half_width": found_half_width,
     "half_width_hertz": half_width,
@@ -105,7 +106,7 @@ record = {
     "peak_pressure_hertz": peak,
     "errors": errors,
 }
-write_json(output / "result.json", record, comm=comm)
+write_result(state, output, more=record)
 
 # Every rank has the same numbers; one prints them.
 

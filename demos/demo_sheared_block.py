@@ -22,7 +22,8 @@ from mpi4py import MPI
 
 from fenics_contact.contact import Status, solve_steps
 from fenics_contact.geometry import block
-from fenics_contact.io import write_json, write_vtu
+from fenics_contact.io import ResultSeries, write_result
+from fenics_contact.progress import shown
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -61,7 +62,8 @@ path = np.concatenate([forth, back[1:], -back[1:]])  # mm
 steps = [
     LoadStep(f"{shift:+.2f} mm", supports=[Support("block", "z1", (shift, 0.0, -0.5))]) for shift in path
 ]
-states = solve_steps(scene, steps, None, comm, tolerance=1e-6)
+with shown(comm):
+    states = solve_steps(scene, steps, None, comm, tolerance=1e-6)
 
 # ## Shear force
 #
@@ -100,21 +102,25 @@ plot_curves(
 
 chosen = [0, 2, 4, 6, 10, 14]
 names = ["pressed", "forth", "forth", "all slides", "back", "back"]
-maps = {f"{name}, {steps[k].name}": states[k] for name, k in zip(names, chosen, strict=True)}
+maps = {
+    f"{name}, {steps[k].name.replace('-', '−')}": states[k] for name, k in zip(names, chosen, strict=True)
+}
 plot_contact_status(maps, output / "status.png", title="Stick and slip on the floor")
 plot_stress(states[6], output / "stress.png", title="Sheared block")
 
 # ## Files for ParaView
+#
+# All steps as a film: `history.pvd` opens them together, with the shifts as labels.
 
-for number in chosen:
-    write_vtu(states[number], output, f"step_{number:02d}")
+series = ResultSeries(output, "history", comm)
+for number, state in enumerate(states):
+    series.add(state, number, steps[number].name)
 
 # ## Result
 #
 # Where all points slide, the shear force is $\mu N$, but for what points at the edges also slip sideways.
 
 record = {
-    "ranks": comm.size,
     "friction_coefficient": friction_coefficient,
     "shift": path,
     "shear_force": shear,
@@ -123,7 +129,7 @@ record = {
     "plateau_over_bound": plateau,
     "dissipated_energy": work,
 }
-write_json(output / "result.json", record, comm=comm)
+write_result(states[-1], output, more=record)
 
 # Every rank has the same numbers; one prints them.
 

@@ -23,7 +23,8 @@ from mpi4py import MPI
 
 from fenics_contact.contact import solve_steps
 from fenics_contact.geometry import BodyMesh
-from fenics_contact.io import write_json, write_vtu
+from fenics_contact.io import ResultSeries, write_result
+from fenics_contact.progress import shown
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -97,7 +98,8 @@ cooling = 60.0  # K
 angles = np.concatenate([np.linspace(0.0, 0.016, 9), np.linspace(0.016, -0.008, 13)[1:]])  # rad
 shrunk = [ThermalStrain("hub", -cooling)]
 steps = [LoadStep(f"{angle:g}", loads=shrunk, supports=held(angle)) for angle in angles]
-states = solve_steps(scene, steps, None, comm, tolerance=1e-6)
+with shown(comm):
+    states = solve_steps(scene, steps, None, comm, tolerance=1e-6)
 
 # ## Lamé
 #
@@ -143,15 +145,17 @@ plot_contact_pressure(states[turned], output / "contact.png", title="All of the 
 plot_decomposition(scene, scene.partition(comm.size), output / "decomposition.png", comm=comm)
 
 # ## Files for ParaView
+#
+# All steps as a film: open `turning.pvd`.
 
-for name, state in {"fitted": states[0], "turned": states[turned], "turned_back": states[-1]}.items():
-    write_vtu(state, output, name)
+series = ResultSeries(output, "turning", comm)
+for number, state in enumerate(states):
+    series.add(state, number, f"turned by {angles[number]:g} rad")
 
 # ## Result
 
 found_limit = float(np.abs(torques).max())
 record = {
-    "ranks": comm.size,
     "pressure": found_pressure,
     "pressure_lame": pressure,
     "torque_limit": found_limit,
@@ -159,7 +163,7 @@ record = {
     "angle": angles,
     "torque": torques,
 }
-write_json(output / "result.json", record, comm=comm)
+write_result(states[-1], output, more=record)
 
 # Every rank has the same numbers; one prints them.
 

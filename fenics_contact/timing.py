@@ -6,9 +6,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from time import perf_counter
 
+from fenics_contact.progress import Task
+
 
 class PhaseTimer:
-    """Adds up wall time under names.
+    """Adds up wall time under names, and tells which phase is under way (`fenics_contact.progress`).
 
     Example:
         >>> timer = PhaseTimer()
@@ -27,6 +29,7 @@ class PhaseTimer:
         """Add the time spent in the block to phase ``name``, also when the block fails."""
         start = perf_counter()
         try:
-            yield
+            with Task(name):
+                yield
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start

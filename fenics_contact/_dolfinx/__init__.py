@@ -29,7 +29,7 @@ from fenics_contact._dolfinx.numbering import (
     scalar_space,
     update_coordinates,
 )
-from fenics_contact._dolfinx.output import write_xdmf
+from fenics_contact._dolfinx.output import HAS_VTX, write_vtx, write_xdmf
 from fenics_contact._dolfinx.templates import (
     cellwise_space,
     displacement_space,
@@ -43,6 +43,7 @@ Function = dolfinx.fem.Function
 
 __all__ = [
     "CELL_TYPES",
+    "HAS_VTX",
     "VERSION",
     "CompiledForm",
     "Constant",
@@ -72,5 +73,6 @@ __all__ = [
     "shape",
     "template",
     "update_coordinates",
+    "write_vtx",
     "write_xdmf",
 ]

@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from fenics_contact._dolfinx.loading import OLD, cpp, dolfinx, jit, side_effects_undone
 from fenics_contact._dolfinx.numbering import cell_count, table
+from fenics_contact.progress import Task
 
 #: Cells or facets with one tag: cell numbers, or (cells, local facets).
 Facets = Mapping[int, tuple[np.ndarray, np.ndarray]]
@@ -22,7 +23,7 @@ class CompiledForm:
     def __init__(self, comm: MPI.Comm, form: Any) -> None:
         """Compile ``form``. Collective on ``comm``: one rank compiles, the others read its cache."""
         self.form = form
-        with side_effects_undone():
+        with Task("compile forms"), side_effects_undone():
             build = jit.ffcx_jit if OLD else dolfinx.fem.compile_form
             self._compiled = build(comm, form, {}, {})
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from fenics_contact._dolfinx.loading import dolfinx
+from fenics_contact._dolfinx.loading import OLD, dolfinx
+
+#: Whether this dolfinx was built with ADIOS2.
+HAS_VTX = hasattr(dolfinx.io, "VTXWriter")
 
 
 def write_xdmf(path: Any, mesh: Any, functions: Sequence[Any]) -> None:
@@ -14,3 +17,28 @@ def write_xdmf(path: Any, mesh: Any, functions: Sequence[Any]) -> None:
         file.write_mesh(mesh)
         for function in functions:
             file.write_function(function)
+
+
+def write_vtx(path: Any, function: Any, value: float, *, cellwise: bool) -> None:
+    """Write a field to a folder in the VTX format of ADIOS2, as its one step. Collective on its mesh.
+
+    Args:
+        path: The folder.
+        function: The field.
+        value: Time of the step.
+        cellwise: Whether the field is constant on cells; it is written as a discontinuous linear one, the
+            lowest degree that every version of dolfinx writes.
+    """
+    mesh = function.function_space.mesh
+    options = {} if OLD else {"engine": "BP4"}
+    fields = [_discontinuous(function) if cellwise else function]
+    with dolfinx.io.VTXWriter(mesh.comm, str(path), fields, **options) as file:
+        file.write(value)
+
+
+def _discontinuous(function: Any) -> Any:
+    make = dolfinx.fem.FunctionSpace if OLD else dolfinx.fem.functionspace
+    space = make(function.function_space.mesh, ("Discontinuous Lagrange", 1))
+    finer = dolfinx.fem.Function(space, name=function.name)
+    finer.interpolate(function)
+    return finer

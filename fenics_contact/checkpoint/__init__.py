@@ -1,17 +1,30 @@
 """Checkpoints: long runs write down all that they need to go on, in files that are whole or not there."""
 
 from fenics_contact.checkpoint.archive import read_archive, write_archive
-from fenics_contact.checkpoint.checkpoint import Checkpoint
+from fenics_contact.checkpoint.checkpoint import Checkpoint, without_checkpoint
 from fenics_contact.checkpoint.fingerprint import described, differences
+from fenics_contact.checkpoint.interruption import (
+    Interrupted,
+    Interruption,
+    interruptible,
+    safe_point,
+    telling_what_is_kept,
+)
 from fenics_contact.checkpoint.whole_file import CheckpointError, synchronise, write_whole
 
 __all__ = [
     "Checkpoint",
     "CheckpointError",
+    "Interrupted",
+    "Interruption",
     "described",
     "differences",
+    "interruptible",
     "read_archive",
+    "safe_point",
     "synchronise",
+    "telling_what_is_kept",
+    "without_checkpoint",
     "write_archive",
     "write_whole",
 ]

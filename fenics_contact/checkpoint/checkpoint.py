@@ -73,3 +73,25 @@ class Checkpoint:
         with together(comm):
             if comm.rank == 0:
                 write_archive(Path(self.path), kind, fingerprint, arrays)
+
+    def way_on(self, done: int, kept: str) -> str:
+        """Say what an interrupted run leaves in the file, and how the next one goes on.
+
+        Args:
+            done: How many pieces of work the file holds.
+            kept: They in words: "3 of 5 load steps".
+        """
+        if done == 0:
+            return f"nothing was done yet that {self.path} could keep: run the same command again"
+        again = "run the same command again to go on"
+        if self.resume is False:
+            again = "to go on run again without resume=False"
+        return f"{kept} {'is' if done == 1 else 'are'} kept in {self.path}: {again}"
+
+
+def without_checkpoint(done: str) -> str:
+    """Say that an interrupted run leaves nothing, and how it could."""
+    return (
+        f'nothing is kept of {done}: give checkpoint=Checkpoint("run.npz"), and the same command, run again, '
+        "goes on from where it was stopped"
+    )

@@ -93,6 +93,7 @@ class FixedPoint:
             reached = solution.natural_residual
             slip_bound, note = sequence.advance(slip_bound, solution.slip_bound, reached)
             history[-1] = replace(history[-1], note=f"{history[-1].note}; {note}")
+            start.reached(replace(history[-1], residuals=solution.residuals))
             if solution.residuals.within(self.tolerance):
                 return replace(solution, iterations=len(history), products=products, history=tuple(history))
             if sequence.exhausted:

@@ -155,7 +155,7 @@ def _to_tolerance(
         solution = solve_dual(system, solver, start)
     with timer.phase("state"):
         displacement = system.displacement(solution.multiplier, solution.alpha)
-    return state_of(system, solution, displacement, timer)
+    return replace(state_of(system, solution, displacement, timer), tolerance=solver.tolerance)
 
 
 def _balanced(
@@ -170,9 +170,10 @@ def _balanced(
     from fenics_contact.accuracy import Balanced
     from fenics_contact.contact.balancing import solve_balanced
 
-    rounds = solve_balanced(system, solve_dual, solver, balanced or Balanced(), start, timer)
+    wanted = balanced or Balanced()
+    rounds = solve_balanced(system, solve_dual, solver, wanted, start, timer)
     state = state_of(system, rounds.solution, rounds.displacement, timer)
-    return replace(state, known_errors=rounds.state_errors(state.energies.norm))
+    return replace(state, known_errors=rounds.state_errors(state.energies.norm), tolerance=wanted)
 
 
 def state_of(

@@ -18,9 +18,11 @@ from fenics_contact.contact.fields import (
     von_mises,
 )
 from fenics_contact.contact.result import ContactResult
+from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem, TornSystem
 from fenics_contact.feti.temperature import temperature_of
+from fenics_contact.progress import Task
 from fenics_contact.qp import DualSolution
 from fenics_contact.scene import Scene
 
@@ -42,6 +44,7 @@ class State:
         energies: Energies of all bodies.
         seconds: Wall time of this rank by phase, of all work up to this state that shares its timer.
         known_errors: Errors that were found on the way, None if they were not needed; ask `errors`.
+        tolerance: What it was solved to, a relative residual or `Balanced`; None where no solver iterated.
     """
 
     system: DualSystem | DirectSystem
@@ -51,6 +54,7 @@ class State:
     energies: Energies
     seconds: Mapping[str, float]
     known_errors: StateErrors | None = field(default=None, repr=False)
+    tolerance: Tolerance = None
 
     @property
     def torn(self) -> TornSystem:
@@ -92,9 +96,10 @@ class State:
             return self.known_errors
         from fenics_contact.accuracy import discretisation_error, solver_errors, state_errors
 
-        solver = solver_errors(self.system, self.solution)
-        estimate = discretisation_error(self.torn, self.torn_displacement)
-        return state_errors(solver, estimate, self.energies.norm)
+        with Task("errors"):
+            solver = solver_errors(self.system, self.solution)
+            estimate = discretisation_error(self.torn, self.torn_displacement)
+            return state_errors(solver, estimate, self.energies.norm)
 
     @cached_property
     def contact_places(self) -> np.ndarray:

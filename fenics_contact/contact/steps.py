@@ -7,12 +7,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.checkpoint import Checkpoint
+from fenics_contact.checkpoint import Checkpoint, safe_point, telling_what_is_kept
 from fenics_contact.contact.equilibrium import decomposed, find_state
 from fenics_contact.contact.state import State
 from fenics_contact.contact.steps_done import StepsDone
 from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.feti import Decomposition
+from fenics_contact.progress import Task
 from fenics_contact.qp import DualSolver
 from fenics_contact.scene import LoadStep, Scene
 from fenics_contact.timing import PhaseTimer
@@ -43,6 +44,7 @@ class LoadSequence:
         solver: DualSolver | None = None,
         tolerance: Tolerance = None,
         checkpoint: Checkpoint | None = None,
+        count: int | None = None,
     ) -> None:
         """Start unloaded; arguments as for `solve_scene`.
 
@@ -53,6 +55,7 @@ class LoadSequence:
             solver: As for `solve_scene`.
             tolerance: As for `solve_scene`, for every step.
             checkpoint: File that is written after the steps and that an interrupted history goes on from.
+            count: How many steps there will be, which progress tells; not needed.
 
         Raises:
             InvalidInputError: If the checkpoint cannot be read or is one of another scene.
@@ -66,6 +69,7 @@ class LoadSequence:
         self._solver, self._tolerance = solver, tolerance
         self._decomposition: Decomposition | None = None
         self._timer = PhaseTimer()
+        self._task, self._count, self._number = Task("load steps", unit="done", total=count), count, 0
 
     state: State | None
 
@@ -78,6 +82,33 @@ class LoadSequence:
             ConvergenceError: If the solver does not reach its tolerance.
             CheckpointError: If the checkpoint cannot be written.
         """
+        if self._number == 0 or self._count is None:
+            self._task.begin(self._number)
+        self._task.step(self._number, words=step.name)
+        try:
+            self._may_stop()
+            with telling_what_is_kept(self._left, self._comm):
+                state = self._advanced(step)
+            self._number += 1
+            self._may_stop()
+        except BaseException as error:
+            self._task.end(error)
+            raise
+        self._task.step(self._number, timed=not self._done.recalling)
+        if self._count in (None, self._number):
+            self._task.end()
+        return state
+
+    def _may_stop(self) -> None:
+        """Stop between two steps if a signal asks for it. Collective."""
+        safe_point(lambda: self._done.kept(self._number, self._count), self._done.write, self._comm)
+
+    def _left(self) -> str:
+        """Write what can be written in the middle of a step, and say what is kept."""
+        self._done.write_rest()
+        return self._done.kept(self._number, self._count)
+
+    def _advanced(self, step: LoadStep) -> State:
         scene = step.applied_to(self.scene)
         if self._decomposition is None:
             self._decomposition, self._timer = decomposed(scene, self._partitions, self._comm)
@@ -94,6 +125,8 @@ class LoadSequence:
     def finish(self) -> None:
         """Write the steps that the checkpoint does not hold yet, if it is written less often. Collective."""
         self._done.write()
+        if self._count not in (None, self._number):
+            self._task.end()
 
 
 def solve_steps(
@@ -122,7 +155,7 @@ def solve_steps(
         >>> states = solve_steps(scene, push, partitions, comm)  # doctest: +SKIP
     """
     sequence = LoadSequence(
-        scene, partitions, comm, solver=solver, tolerance=tolerance, checkpoint=checkpoint
+        scene, partitions, comm, solver=solver, tolerance=tolerance, checkpoint=checkpoint, count=len(steps)
     )
     states = tuple(sequence.advance(step) for step in steps)
     sequence.finish()

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.checkpoint import Checkpoint, described, differences
+from fenics_contact.checkpoint import Checkpoint, CheckpointError, described, differences, without_checkpoint
 from fenics_contact.contact.state import State
 from fenics_contact.contact.stored import restored_state, stored_state
 from fenics_contact.errors import InvalidInputError
@@ -46,6 +47,11 @@ class StepsDone:
         if found is not None:
             self._stored = self._written = int(found.pop("steps"))
             self._arrays = found
+
+    @property
+    def recalling(self) -> bool:
+        """Whether the last step was read from the file."""
+        return self._here <= self._stored
 
     def recalled(
         self,
@@ -101,6 +107,26 @@ class StepsDone:
             arrays = {"steps": np.array(self._here), **self._arrays}
             self._checkpoint.write(KIND, self._fingerprint, arrays, self._comm)
             self._written = self._here
+
+    def write_rest(self) -> None:
+        """Write what is done in the middle of a step, where no other rank is needed for that."""
+        if self._comm.size == 1:
+            with suppress(CheckpointError):
+                self.write()
+
+    def kept(self, done: int, count: int | None) -> str:
+        """Say what a run leaves that ends now, and how to go on.
+
+        Args:
+            done: Steps that are done.
+            count: All steps, None if nobody knows.
+        """
+        if self._checkpoint is None:
+            return without_checkpoint(f"{done} load step{'' if done == 1 else 's'}")
+        number = self._written
+        words = f"{number} of {count}" if count is not None else f"{number}"
+        steps = "load step" if (count or number) == 1 else "load steps"
+        return self._checkpoint.way_on(number, f"{words} {steps}")
 
     @property
     def _prefix(self) -> str:

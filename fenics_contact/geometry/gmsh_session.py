@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from types import ModuleType
 
 from fenics_contact._requirements import check_gmsh
+from fenics_contact.progress import Task
 
 _OPTIONS = {
     "General.Terminal": 0.0,
@@ -40,7 +41,7 @@ def gmsh_model(name: str) -> Iterator[ModuleType]:
     Raises:
         MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
     """
-    with _interrupt_handler_kept():
+    with Task("mesh"), _interrupt_handler_kept():
         gmsh = _import_gmsh()
         foreign = _is_initialised(gmsh)
         if not foreign:

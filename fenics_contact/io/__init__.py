@@ -5,7 +5,23 @@ On several ranks rank 0 writes (XDMF: all ranks together), and all raise if one 
 
 from fenics_contact.io.json_file import write_json
 from fenics_contact.io.provenance import versions
+from fenics_contact.io.reading import read_result
+from fenics_contact.io.replacing import OutputError
+from fenics_contact.io.result import write_optimisation_result, write_result
+from fenics_contact.io.series import ResultSeries
 from fenics_contact.io.vtu import write_vtu
+from fenics_contact.io.vtx import write_vtx
 from fenics_contact.io.xdmf import write_xdmf
 
-__all__ = ["versions", "write_json", "write_vtu", "write_xdmf"]
+__all__ = [
+    "OutputError",
+    "ResultSeries",
+    "read_result",
+    "versions",
+    "write_json",
+    "write_optimisation_result",
+    "write_result",
+    "write_vtu",
+    "write_vtx",
+    "write_xdmf",
+]

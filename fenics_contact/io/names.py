@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
+from fenics_contact.errors import InvalidInputError
+
 
 def file_of_each(bodies: Iterable[str], folder: Path, stem: str, suffix: str) -> dict[str, Path]:
     """Name one file for each body: "state_link_1.vtu" for the body "link 1".
@@ -28,3 +30,16 @@ def file_of_each(bodies: Iterable[str], folder: Path, stem: str, suffix: str) ->
             path = folder / f"{plain}_{number}{suffix}"
         files[body] = path
     return files
+
+
+def checked_name(folder: str | Path, name: str, suffix: str) -> Path:
+    """Return the file of a name in a folder.
+
+    Raises:
+        InvalidInputError: If the name is empty or holds a folder itself.
+    """
+    if not name.strip(".") or Path(name).name != name:
+        raise InvalidInputError(
+            f"name must be the beginning of a file's name, got {name!r}: put folders into folder"
+        )
+    return Path(folder) / f"{name}{suffix}"

@@ -11,7 +11,7 @@ import numpy as np
 
 from fenics_contact.contact import State, gathered_fields, in_space
 from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.io.names import file_of_each
+from fenics_contact.io.names import checked_name, file_of_each
 from fenics_contact.io.replacing import replacing
 
 _MESHIO_NAMES = {
@@ -51,12 +51,8 @@ def write_vtu(
     Raises:
         InvalidInputError: If the name holds a folder, or a field lacks a body or does not fit its cells.
     """
-    if not name.strip(".") or Path(name).name != name:
-        raise InvalidInputError(
-            f"name must be the beginning of a file's name, got {name!r}: put folders into folder"
-        )
+    index = checked_name(folder, name, ".vtm")
     more = {body: _checked(state, body, cell_fields or {}) for body in state.scene.bodies}
-    index = Path(folder) / f"{name}.vtm"
     meshes = {body: _gathered(state, body, more[body]) for body in state.scene.bodies}
     files = list(file_of_each(meshes, index.parent, name, ".vtu").values())
     comm = state.torn.decomposition.comm

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import secrets
-import shutil
 from pathlib import Path
 from typing import Any
 
 from fenics_contact import _dolfinx
 from fenics_contact.contact import State
-from fenics_contact.errors import InvalidInputError, agree, together
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.io.names import file_of_each
-from fenics_contact.io.replacing import replace_all
+from fenics_contact.io.replacing import replacing_together
 
 
 def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
@@ -48,26 +46,13 @@ _XINCLUDE, _UNKNOWN = "http://www.w3.org/2001/XInclude", "https://www.w3.org/200
 
 def _write(target: Path, displacement: Any, von_mises: Any) -> None:
     mesh = displacement.function_space.mesh
-    comm = mesh.comm
-    token = comm.bcast(secrets.token_hex(4))
     # The XDMF file names its HDF5 file: both keep their names and are written in a folder of their own.
-    hidden = target.parent / f".{target.stem}.{token}"
-    with together(comm):
-        if comm.rank == 0:
-            hidden.mkdir(parents=True)
-    error: Exception | None = None
-    try:
-        _dolfinx.write_xdmf(hidden / target.name, mesh, [displacement, von_mises])
-        comm.barrier()
-        if comm.rank == 0:
-            _repair(hidden / target.name)
-            replace_all([hidden / target.with_suffix(".h5").name, hidden / target.name], target.parent)
-    except Exception as caught:
-        error = caught
-    finally:
-        if comm.rank == 0:
-            shutil.rmtree(hidden, ignore_errors=True)
-    agree(comm, error)
+    replacing_together(
+        mesh.comm,
+        [target.with_suffix(".h5"), target],
+        lambda hidden: _dolfinx.write_xdmf(hidden / target.name, mesh, [displacement, von_mises]),
+        lambda hidden: _repair(hidden / target.name),
+    )
 
 
 def _repair(path: Path) -> None:

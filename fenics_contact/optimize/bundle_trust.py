@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +14,7 @@ from fenics_contact.optimize.bundle import Bundle
 from fenics_contact.optimize.inexactness import Demand, again, demand
 from fenics_contact.optimize.objective import Accuracy, Evaluation, can_be_inexact, evaluate
 from fenics_contact.optimize.problem import Problem
-from fenics_contact.optimize.progress import Progress
+from fenics_contact.optimize.progress import Callback, Progress
 from fenics_contact.optimize.quadratic_program import SubproblemError
 from fenics_contact.optimize.result import Kind, NotConvergedError, Reason, Record, Result
 from fenics_contact.optimize.state import MethodState
@@ -24,7 +23,6 @@ from fenics_contact.optimize.subproblem import Step, solve_step
 from fenics_contact.optimize.trust import Trial, Trust
 
 Array = NDArray[np.float64]
-Callback = Callable[[Record, Array], None]
 
 _LOG = logging.getLogger(__name__)
 
@@ -134,14 +132,18 @@ class BundleTrust:
             InvalidInputError: If the checkpoint cannot be gone on from.
             CheckpointError: If the checkpoint cannot be written.
         """
-        progress = Progress(checkpoint, self, problem)
+        progress = Progress(checkpoint, self, problem, callback)
+        with progress.told() as task:
+            state, reason = self._run(problem, progress)
+            task.outcome = reason.name.lower().replace("_", " ")
+        return _finish(self, state, reason)
+
+    def _run(self, problem: Problem, progress: Progress) -> tuple[MethodState, Reason]:
+        """Go on from where an earlier run was, or from the start, to the stop."""
         state = progress.recalled()
         if state is None:
             state = _start(self, problem)
-            progress.keep(state)
-            _tell(callback, state)
-        else:
-            _LOG.info("going on after %d evaluations", state.evaluations)
+            progress.evaluated(state)
         reason: Reason | None = None
         while reason is None:
             try:
@@ -150,15 +152,9 @@ class BundleTrust:
                 _LOG.warning("%s", error)
                 reason = Reason.STEP_FAILED
             if reason is None:
-                progress.keep(state)
-                _tell(callback, state)
+                progress.evaluated(state)
         progress.keep(state, last=True)
-        return _finish(self, state, reason)
-
-
-def _tell(callback: Callback | None, state: MethodState) -> None:
-    if callback is not None:
-        callback(state.history[-1], state.centre.x.copy())
+        return state, reason
 
 
 def _start(method: BundleTrust, problem: Problem) -> MethodState:
@@ -303,7 +299,6 @@ def _recorded(
         error=0.0 if found is None else found.error,
         note=note,
     )
-    _LOG.info("%s", record)
     return (*state.history, record)
 
 

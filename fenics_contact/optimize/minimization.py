@@ -5,10 +5,11 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.optimize.bundle_trust import BundleTrust, Callback
+from fenics_contact.optimize.bundle_trust import BundleTrust
 from fenics_contact.optimize.constraints import Bounds, LinearConstraints
 from fenics_contact.optimize.objective import Fun
 from fenics_contact.optimize.problem import pose
+from fenics_contact.optimize.progress import Callback
 from fenics_contact.optimize.result import Result
 
 

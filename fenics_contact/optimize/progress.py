@@ -1,22 +1,34 @@
-"""The checkpoint of a minimisation: the method's state and what the function itself remembers."""
+"""How far a minimisation is: kept in its checkpoint with what the function remembers, and told."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fenics_contact.checkpoint import Checkpoint, described
+from fenics_contact.checkpoint import (
+    Checkpoint,
+    described,
+    safe_point,
+    telling_what_is_kept,
+    without_checkpoint,
+)
 from fenics_contact.optimize.problem import Problem
+from fenics_contact.optimize.result import Record
 from fenics_contact.optimize.state import MethodState
+from fenics_contact.progress import Task
 
 Array = NDArray[np.float64]
+Callback = Callable[[Record, Array], None]
 
 if TYPE_CHECKING:
     from mpi4py import MPI
+
+    from fenics_contact.optimize.bundle_trust import BundleTrust as Method
 
 KIND = "minimisation by the bundle trust method"
 #: Parameters that only say when to stop: a run may go on with others.
@@ -46,23 +58,39 @@ class Resumable(Protocol):
 
 
 class Progress:
-    """Writes a minimisation to its checkpoint and reads it; does nothing where there is none."""
+    """Keeps a minimisation in its checkpoint, if it has one, and tells how far it is.
 
-    def __init__(self, checkpoint: Checkpoint | None, method: Any, problem: Problem) -> None:
+    Attributes:
+        comm: Communicator on which the minimisation is replicated, None where nobody knows.
+    """
+
+    def __init__(
+        self, checkpoint: Checkpoint | None, method: Method, problem: Problem, callback: Callback | None
+    ) -> None:
         """Describe the problem; nothing is read or written yet.
 
         Args:
             checkpoint: The file, or None.
             method: Parameters of the method, a dataclass.
             problem: The checked problem.
+            callback: Called after every evaluation.
         """
         self._checkpoint, self._written = checkpoint, -1
+        self._method, self._callback = method, callback
+        self._state: MethodState | None = None
+        self._task = Task(
+            "optimisation",
+            unit="evaluations",
+            most=method.max_evaluations,
+            target=method.tolerance,
+            measured="decrease",
+        )
         self._fun = problem.fun if isinstance(problem.fun, Resumable) else None
+        self.comm = None if checkpoint is None else checkpoint.comm
+        if self.comm is None and self._fun is not None:
+            self.comm = self._fun.comm
         if checkpoint is None:
             return
-        self._comm = checkpoint.comm
-        if self._comm is None and self._fun is not None:
-            self._comm = self._fun.comm
         self._fingerprint = _fingerprint(method, problem)
         if self._fun is not None:
             self._fingerprint.update(self._fun.fingerprint())
@@ -75,7 +103,7 @@ class Progress:
         """
         if self._checkpoint is None:
             return None
-        stored = self._checkpoint.read(KIND, self._fingerprint, self._comm)
+        stored = self._checkpoint.read(KIND, self._fingerprint, self.comm)
         if stored is None:
             return None
         if self._fun is not None:
@@ -83,7 +111,32 @@ class Progress:
             self._fun.recall({name.removeprefix(_OF_FUN): stored.pop(name) for name in names})
         state = MethodState.from_arrays(stored)
         self._written = state.evaluations
+        self._tell(state, timed=False)
         return state
+
+    @contextmanager
+    def told(self) -> Iterator[Task]:
+        """Tell that the minimisation is under way, and what it leaves where it is interrupted."""
+        with self._task as task, telling_what_is_kept(self._kept, self.comm):
+            yield task
+
+    def evaluated(self, state: MethodState) -> None:
+        """Keep a state, tell it, and stop here if a signal asks for it. Collective.
+
+        Raises:
+            CheckpointError: If it cannot be written; the file is then what it was.
+            Interrupted: If a signal was heard, see `fenics_contact.checkpoint.interruptible`.
+        """
+        self.keep(state)
+        self._tell(state)
+        if self._callback is not None:
+            self._callback(state.history[-1], state.centre.x.copy())
+        safe_point(self._kept, lambda: self.keep(state, last=True), self.comm)
+
+    def _tell(self, state: MethodState, *, timed: bool = True) -> None:
+        self._state, record = state, state.history[-1]
+        predicted = record.predicted_decrease / (self._method.value_scale + abs(record.best))
+        self._task.step(record.evaluations, measure=predicted or None, value=record.best, timed=timed)
 
     def keep(self, state: MethodState, *, last: bool = False) -> None:
         """Write the state where it is due. Collective.
@@ -104,11 +157,22 @@ class Progress:
         if self._fun is not None:
             memory = self._fun.memory()
             arrays.update({f"{_OF_FUN}{name}": value for name, value in memory.items()})
-        self._checkpoint.write(KIND, self._fingerprint, arrays, self._comm)
+        self._checkpoint.write(KIND, self._fingerprint, arrays, self.comm)
         self._written = state.evaluations
 
+    def _kept(self) -> str:
+        """Say what a run leaves that ends now, and how to go on."""
+        if self._checkpoint is None:
+            return without_checkpoint(_evaluations(0 if self._state is None else self._state.evaluations))
+        written = max(self._written, 0)
+        return self._checkpoint.way_on(written, _evaluations(written))
 
-def _fingerprint(method: Any, problem: Problem) -> dict[str, str]:
+
+def _evaluations(number: int) -> str:
+    return f"{number} evaluation{'' if number == 1 else 's'}"
+
+
+def _fingerprint(method: Method, problem: Problem) -> dict[str, str]:
     options = {
         field.name: getattr(method, field.name) for field in fields(method) if field.name not in LIMITS
     }

@@ -84,6 +84,7 @@ class FaceNewton:
         while len(history) < self.max_steps and operator.products < self.max_products:
             iterate, line = newton.step(iterate, len(history))
             history.append(line)
+            start.reached(line)
             iterate, answer = self._checked(problem, law, operator, iterate)
             if answer is not None:
                 return answer.solution(problem, history, operator.products, memory)
@@ -105,6 +106,7 @@ class FaceNewton:
                 reason=newton.stall(),
                 history=history,
             )
+            start.reached(history[-1])
             iterate, answer = self._checked(problem, law, operator, found)
             if answer is not None:
                 return answer.solution(problem, history, operator.products, memory)

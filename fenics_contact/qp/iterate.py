@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact.progress import Task
 from fenics_contact.qp.problem import CountedOperator, DualProblem, Operator
 from fenics_contact.qp.reductions import Vector
 from fenics_contact.qp.residual import Residuals, measure
 from fenics_contact.qp.slip_law import SlipLaw
-from fenics_contact.qp.solution import SmalseMemory
+from fenics_contact.qp.solution import SmalseMemory, SolverStep
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +40,19 @@ class Start:
         operator: F with its counter, to be used for the whole solve.
         memory: What SMALSE learned before, None if nothing.
         cold: Whether λ is the shortest multiplier in equilibrium, Gᵀ(G Gᵀ)⁻¹e.
+        task: The solve, which tells how far it is; None within another.
     """
 
     iterate: Iterate
     operator: CountedOperator
     memory: SmalseMemory | None = None
     cold: bool = True
+    task: Task | None = None
+
+    def reached(self, step: SolverStep) -> None:
+        """Tell whoever listens what a step of the solver has reached."""
+        if self.task is not None:
+            self.task.step(step.products, measure=step.residuals.worst)
 
 
 def iterate_at(

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 from fenics_contact.errors import InfeasibleError, InvalidInputError, together
+from fenics_contact.progress import Task
 from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector, global_sum
@@ -111,15 +112,23 @@ class CountedOperator:
         products: Applications of F so far.
     """
 
-    def __init__(self, operator: Operator) -> None:
-        """Wrap ``operator``."""
-        self._operator = operator
+    def __init__(self, operator: Operator, task: Task | None = None) -> None:
+        """Wrap ``operator``.
+
+        Args:
+            operator: F.
+            task: Work of which a product is a step.
+        """
+        self._operator, self._task = operator, task
         self.products = 0
 
     def __call__(self, x: Vector) -> Vector:
         """Apply F to an owned vector and count. Collective."""
+        found = self._operator(x)
         self.products += 1
-        return self._operator(x)
+        if self._task is not None:
+            self._task.step(self.products)
+        return found
 
 
 class ShiftedOperator:

@@ -69,6 +69,7 @@ class Smalse:
         operator, history = start.operator, list[SolverStep]()
         for state in outer_iterations(problem, law.feasible(start.iterate.multiplier), start, self):
             history.append(state.record(len(history), problem, operator.products))
+            start.reached(history[-1])
             if state.residuals.within(0.5 * self.tolerance):
                 answer = certify(problem, operator, law, state.multiplier, state.residual)
                 if answer.iterate.residuals.within(self.tolerance):

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from fenics_contact.errors import ConvergenceError, InvalidInputError, together
+from fenics_contact.progress import Task
 from fenics_contact.qp.equilibrium import require_equilibrium
 from fenics_contact.qp.iterate import Start, apply_unless_zero, iterate_at
 from fenics_contact.qp.problem import CountedOperator, DualProblem
@@ -67,9 +68,10 @@ def solve(
         law = _slip_law(problem, slip_bound, friction_coefficient)
     if problem.scaling is not None:
         return _solve_scaled(problem, law, slip_bound, solver, start, friction_coefficient)
-    if start is None:
-        require_equilibrium(problem, law)
-    solution = solver.run(problem, law, _begin(problem, law, start))
+    with Task("solve", unit="products", target=solver.tolerance) as task:
+        if start is None:
+            require_equilibrium(problem, law)
+        solution = solver.run(problem, law, _begin(problem, law, start, task))
     if not solution.residuals.within(solver.tolerance):
         raise ConvergenceError(
             f"a solution needs residuals below {solver.tolerance:.1e}, got {solution.residuals}: "
@@ -126,9 +128,9 @@ def _slip_law(
     return law
 
 
-def _begin(problem: DualProblem, law: SlipLaw, start: DualSolution | Vector | None) -> Start:
+def _begin(problem: DualProblem, law: SlipLaw, start: DualSolution | Vector | None, task: Task) -> Start:
     """Compute product and residual of the starting multiplier. Collective; at most one product."""
-    coarse, operator = problem.coarse, CountedOperator(problem.operator)
+    coarse, operator = problem.coarse, CountedOperator(problem.operator, task)
     earlier = start if isinstance(start, DualSolution) else None
     if earlier is not None and earlier.problem is problem:
         multiplier, product = earlier.multiplier, earlier.product
@@ -149,8 +151,8 @@ def _begin(problem: DualProblem, law: SlipLaw, start: DualSolution | Vector | No
         nothing = np.zeros_like(multiplier)
         rest = iterate_at(problem, law, nothing, nothing, fit_rigid_motions(problem, law, nothing, nothing))
         if rest.residuals.worst <= iterate.residuals.worst:
-            return Start(rest, operator, memory, cold=True)
-    return Start(iterate, operator, memory, cold=start is None)
+            return Start(rest, operator, memory, cold=True, task=task)
+    return Start(iterate, operator, memory, cold=start is None, task=task)
 
 
 def _require_size(multiplier: Vector, size: int) -> None:

@@ -8,7 +8,16 @@ import numpy as np
 
 from fenics_contact.contact import State
 from fenics_contact.errors import ConvergenceError
-from fenics_contact.qp import CoupledSystem, DualProblem, Face, FaceSystems, Stop, projected_gmres
+from fenics_contact.progress import Task
+from fenics_contact.qp import (
+    CountedOperator,
+    CoupledSystem,
+    DualProblem,
+    Face,
+    FaceSystems,
+    Stop,
+    projected_gmres,
+)
 from fenics_contact.shape.linearised_face import LinearisedFace
 from fenics_contact.shape.objective import Partials
 
@@ -60,7 +69,9 @@ def solve_adjoint(
     """
     system = state.dual
     problem, face, factor = _evened_out(system.problem, linearised.face)
-    face_system = FaceSystems(problem, problem.operator).build(face)
+    task = Task("adjoint", unit="products")
+    operator = CountedOperator(problem.operator, task)
+    face_system = FaceSystems(problem, operator).build(face)
     transposed = CoupledSystem.build(face_system, problem.coarse, linearised.moving, linearised.tested)
     if transposed is None:
         raise ConvergenceError(
@@ -76,7 +87,8 @@ def solve_adjoint(
     gradient = transposed.operate(start, problem.operator(linearised.tested @ start)) - right
     scale = max(problem.norm(transposed.oblique(right)), problem.norm(transposed.oblique(gradient)))
     weights = np.ones(len(start))
-    solved = projected_gmres(transposed, gradient, weights, tolerance * scale, max_iterations)
+    with task:
+        solved = projected_gmres(transposed, gradient, weights, tolerance * scale, max_iterations)
     if solved.stop is not Stop.CONVERGED:
         raise ConvergenceError(
             f"the adjoint needs a relative residual below {tolerance:.1e}, reached "

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 import logging
-import sys
 from collections.abc import Sequence
 from types import TracebackType
-from typing import Any, TextIO
 
 import numpy as np
 
+from fenics_contact.progress import Task, duration
 from fenics_contact.study.parameters import Parameters
 
 #: Power of `Parameters.size` with which time grows, until two sizes have shown what it is.
@@ -48,40 +46,29 @@ class Forecast:
         return float(nearest * (size / sizes[0]) ** np.clip(growth, 0.0, 4.0))
 
 
-def duration(seconds: float | None) -> str:
-    """Write a duration for readers: 8 s, 3 min, 1.5 h."""
-    if seconds is None:
-        return "?"
-    if seconds < 90.0:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 5400.0 else f"{seconds / 3600:.1f} h"
-
-
 class Progress:
-    """A bar on a terminal, lines in a log elsewhere."""
+    """Tells which run of a study is under way, and logs a line about each that is done."""
 
-    def __init__(self, runs: Sequence[Parameters], title: str, stream: TextIO | None = None) -> None:
+    def __init__(self, runs: Sequence[Parameters], title: str) -> None:
         """Announce so many measurements."""
         self._left, self._count, self._forecast = list(runs), len(runs), Forecast()
-        stream = sys.stderr if stream is None else stream
-        shown = stream.isatty() and importlib.util.find_spec("tqdm") is not None
-        self._bar: Any = _bar(self._count, title, stream) if shown else None
+        self._task = Task(title, unit="runs", total=len(runs))
 
     def __enter__(self) -> Progress:
-        """Return itself."""
+        """Begin."""
+        self._task.begin(0)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close the bar."""
-        if self._bar is not None:
-            self._bar.close()
+        """End."""
+        self._task.end(error)
 
     def begin(self, parameters: Parameters) -> None:
         """Say which run begins."""
-        if self._bar is not None:
-            self._bar.set_postfix_str(f"{described(parameters)}, {self.left()} left")
+        seconds = self._forecast.seconds(self._left)
+        self._task.step(self._count - len(self._left), words=described(parameters), left=seconds)
 
     def done(self, parameters: Parameters, seconds: float, words: str) -> None:
         """Count a run.
@@ -93,18 +80,10 @@ class Progress:
         """
         self._left.remove(parameters)
         self._forecast.learn(parameters, seconds)
-        if self._bar is not None:
-            self._bar.update()
-            self._bar.set_postfix_str(f"{self.left()} left")
-        else:
-            number = self._count - len(self._left)
-            logger.info(
-                "%d/%d %s: %s, %s left", number, self._count, described(parameters), words, self.left()
-            )
-
-    def left(self) -> str:
-        """Return the time that the remaining runs will take, in words."""
-        return duration(self._forecast.seconds(self._left))
+        number, left = self._count - len(self._left), self._forecast.seconds(self._left)
+        self._task.step(number, left=left)
+        rest = f", {duration(left)} left" if self._left else ""
+        logger.info("%d/%d %s: %s%s", number, self._count, described(parameters), words, rest)
 
 
 def described(parameters: Parameters) -> str:
@@ -116,10 +95,3 @@ def described(parameters: Parameters) -> str:
     if parameters.subdomains is not None:
         words.append(f"{parameters.subdomains} subdomains")
     return ", ".join(words)
-
-
-def _bar(count: int, title: str, stream: TextIO) -> Any:
-    from tqdm import tqdm  # an extra: where it is missing there are lines
-
-    pattern = "{desc} {n_fmt}/{total_fmt} |{bar}| {postfix}"
-    return tqdm(total=count, desc=title, file=stream, bar_format=pattern, dynamic_ncols=True)

@@ -7,16 +7,14 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
-from matplotlib.colors import Normalize
 
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.shape import DesignPoint
-from fenics_contact.viz.colours import BLUE, GREY, ORANGE, PRESSURE_MAP
+from fenics_contact.viz.colours import BLUE, GREY, ORANGE
 from fenics_contact.viz.patch import contact_patch
-from fenics_contact.viz.patch_axes import label_axes, label_axis
+from fenics_contact.viz.patch_axes import label_axes, label_axis, make_as_high, pressure_bar
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.pressure import draw_pressure
 from fenics_contact.viz.profile import Profile, profiles
@@ -126,7 +124,7 @@ def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> N
     found = profiles(first, best, look.reach)
     # Sections are equally high and together as wide as the picture, but not too high.
     tall = [0.4 * float((high - low)[1] / (high - low)[0]) + 0.08]
-    tall.append(min(0.8 / sum(1 / _proportion(profile) for profile in found), 0.45) + 0.11)
+    tall.append(min(0.8 / sum(1 / _proportion(profile) for profile in found), 0.45) + 0.13)
     size = look.width, round((sum(tall) + 0.03) * look.width)
     with sheet(paper, size, look.headline, "constrained") as figure:
         upper, lower = figure.subfigures(2, 1, height_ratios=tall)
@@ -136,10 +134,9 @@ def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> N
             axes.set_title(f"{word}: pressure on {patch.name}")
             label_axes(axes, replace(patch, low=low, high=high), look.units)
         extend = "max" if max(float(patch.pressure.max()) for patch in patches) > shown[1] else "neither"
-        key = ScalarMappable(Normalize(*shown), PRESSURE_MAP)
-        words = f"contact pressure ({look.units.stress})"
-        upper.colorbar(key, ax=panels.tolist(), label=words, extend=extend)
+        bar = pressure_bar(upper, panels, shown, extend, look.units)
         _draw_sections(lower, found, look.units)
+        make_as_high(figure, bar, panels[1])
 
 
 def _draw_sections(figure: Any, found: list[Profile], units: Units) -> None:
@@ -187,17 +184,13 @@ def _draw_profile(axes: Any, profile: Profile, factor: float, units: Units) -> N
         words = ("before", f"after, movement × {factor:g}") if not number else (None, None)
         axes.add_collection(LineCollection(lines, colors=GREY, linewidths=3.5, label=words[0]))
         axes.add_collection(LineCollection(after, colors=ORANGE, linewidths=1.6, label=words[1]))
-        inside = lines[np.all((lines > profile.low) & (lines < profile.high), axis=(1, 2))]
-        if len(inside):
-            # The name at the outline's end that is farthest from the picture's middle: there is room.
-            middle = (profile.low + profile.high) / 2
-            place = inside.reshape(-1, 2)[np.argmax(np.abs(inside.reshape(-1, 2) - middle).sum(axis=1))]
-            towards = 0.75 * place + 0.25 * middle
-            axes.text(*towards, name, color=BLUE, ha="center", va="center")
+        place = profile.place_in(name)
+        if place is not None:
+            axes.text(*place, name, color=BLUE, ha="center", va="center")
     axes.set_aspect("equal")
     axes.set_xlim(profile.low[0], profile.high[0])
     axes.set_ylim(profile.low[1], profile.high[1])
     for axis, label, word in zip((axes.xaxis, axes.yaxis), profile.axes, ("right", "up"), strict=True):
         label_axis(axis, label, word, units)
     largest = f"{written(profile.largest, 2)} {units.length}"
-    axes.set_title(f"{profile.title}; moved by up to {largest}")
+    axes.set_title(f"{profile.title}\nmoved by up to {largest}")

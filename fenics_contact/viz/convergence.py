@@ -94,7 +94,7 @@ def _draw(
     number = np.arange(len(values))
     centre = np.isin(kind, ("start", "serious", "refined"))
     first, last = values[centre][0], values[centre][-1]
-    facts = f"{written(first, 6)} → {written(last, 6)}"
+    facts = f"{label} {written(first, 6)} → {written(last, 6)}"
     if first != 0:
         facts += f", {100 * abs((last - first) / first):.2f} % {'lower' if last <= first else 'higher'}"
     with sheet(paper, (width, round(0.6 * width)), headline(title, facts), "constrained") as figure:

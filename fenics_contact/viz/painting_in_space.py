@@ -80,8 +80,9 @@ def _body_layer(name: str, body: Moved, paints: Paints) -> Layer:
         mesh.cell_data["shown"] = shown[cells]
     edges = {"show_edges": True, "edge_color": INK, "edge_opacity": 0.12, "line_width": 1}
     shading = {
-        "ambient": 0.6,
-        "diffuse": 0.42,
+        # So much light from all sides that colours of faces in shade can be found on the bar.
+        "ambient": 0.75,
+        "diffuse": 0.28,
         "smooth_shading": True,
         "split_sharp_edges": True,
         "feature_angle": 50,
@@ -96,7 +97,7 @@ def _sections(bodies: Mapping[str, Moved], spot: Spot, main: View, paints: Paint
     frames = [section_frame(view, spot, points, paints.reach) for view in views]
     # All are equally high and together as wide as the picture, but not higher than half of that.
     proportions = [float(frame.size[0] / frame.size[1]) for frame in frames]
-    height = paints.width * min((WIDE - GAP) / sum(proportions), 0.4)
+    height = paints.width * min((WIDE - 2 * GAP) / sum(proportions), 0.4)
     details = []
     for view, frame, proportion in zip(views, frames, proportions, strict=True):
         layers = section_layers(bodies, scalars, view, spot.centre, paints.of_surfaces)

@@ -91,7 +91,7 @@ def _window(
     if reach is not None:
         return middle - reach, middle + reach
     half = float(np.max(high - low)) / 2 + 2.5 * float(np.sqrt(area[closed].mean()))
-    border = 0.05 * float(np.ptp(places, axis=0).max())
+    border = 0.1 * min(half, float(np.ptp(places, axis=0).max()) / 2)
     low, high = places.min(axis=0) - border, places.max(axis=0) + border
     return np.maximum(middle - half, low), np.minimum(middle + half, high)
 

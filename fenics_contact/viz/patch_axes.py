@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.ticker import FuncFormatter
 
+from fenics_contact.viz.colours import PRESSURE_MAP
 from fenics_contact.viz.patch import ContactPatch
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.view import axis_label
@@ -28,6 +32,23 @@ def label_axes(axes: Any, patch: ContactPatch, units: Units, *, from_slave: bool
         label_axis(axis, name, word, units)
         if name.startswith("−") and from_slave and axis is axes.xaxis:
             axes.set_xlim(patch.high[0], patch.low[0])
+
+
+def pressure_bar(
+    figure: Any, panels: Sequence[Any], clim: tuple[float, float], extend: str, units: Units
+) -> Any:
+    """Put a colour bar beside axes and return its axes."""
+    key, label = ScalarMappable(Normalize(*clim), PRESSURE_MAP), f"contact pressure ({units.stress})"
+    return figure.colorbar(key, ax=list(panels), label=label, extend=extend).ax
+
+
+def make_as_high(figure: Any, bar: Any, axes: Any) -> None:
+    """Give a colour bar the height of axes with equal scales, which is known when all else is placed."""
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    place, beside = bar.get_position(), axes.get_position()
+    bar.set_box_aspect(None)
+    bar.set_position((place.x0, beside.y0, place.width, beside.height))
 
 
 def label_axis(axis: Any, name: str, word: str, units: Units) -> None:

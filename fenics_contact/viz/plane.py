@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_rgb
 from matplotlib.tri import Triangulation
 
 from fenics_contact.geometry import boundary_faces
 from fenics_contact.viz.colours import INK
 
-#: Edges closer than this, relative to the size of the picture, would blacken it.
-CLOSEST = 0.006
+#: Edges closer than this, relative to the size of the picture, would blacken it, and fade.
+CLOSEST = 0.009
 
 
 def draw_field(
@@ -61,12 +62,14 @@ def draw_outline(axes: Any, points: np.ndarray, cells: np.ndarray, *, width: flo
 def draw_cell_edges(
     axes: Any, points: np.ndarray, cells: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> None:
-    """Draw the edges of cells inside a window faintly, but of cells too small to be told apart."""
+    """Draw the edges of cells inside a window faintly, and fainter the smaller the cells are."""
     corners = points[cells]
     inside = np.all((corners.max(axis=1) > low) & (corners.min(axis=1) < high), axis=1)
     length = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).min(axis=1)
-    seen = inside & (length > CLOSEST * float(np.max(high - low)))
-    look = {"facecolors": "none", "edgecolors": INK, "linewidths": 0.4, "alpha": 0.25}
+    strength = 0.25 * np.minimum(1.0, (length / (CLOSEST * float(np.max(high - low)))) ** 2)
+    seen = inside & (strength > 0.01)
+    colours = np.column_stack([np.tile(to_rgb(INK), (np.count_nonzero(seen), 1)), strength[seen]])
+    look = {"facecolors": "none", "edgecolors": colours, "linewidths": 0.4}
     axes.add_collection(PolyCollection(corners[seen], **look))
 
 

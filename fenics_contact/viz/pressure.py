@@ -6,15 +6,13 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import Normalize
 
 from fenics_contact.contact import State, Status
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import GREY, PRESSURE_MAP
 from fenics_contact.viz.patch import ContactPatch, contact_patch, refined
-from fenics_contact.viz.patch_axes import label_axes
+from fenics_contact.viz.patch_axes import label_axes, make_as_high, pressure_bar
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.sheet import sheet
 from fenics_contact.viz.status import draw_status
@@ -92,18 +90,18 @@ def _draw(
         f"largest pressure {written(peak)} {units.stress}, normal force {written(patch.force)} {units.force}"
     )
     proportion = float((patch.high - patch.low)[1] / (patch.high - patch.low)[0])
-    height = round((0.17 + 0.39 * proportion) * width)
+    height = round((0.19 + 0.38 * proportion) * width)
     with sheet(paper, (width, height), headline(title, facts), "constrained") as figure:
         left, right = figure.subplots(1, 2, sharex=True, sharey=True)
         draw_pressure(left, patch, shown)
-        label = f"contact pressure ({units.stress})"
-        extend = "max" if peak > shown[1] else "neither"
-        figure.colorbar(ScalarMappable(Normalize(*shown), PRESSURE_MAP), ax=left, label=label, extend=extend)
+        bar = pressure_bar(figure, [left], shown, "max" if peak > shown[1] else "neither", units)
         _draw_status(right, patch, units)
         for axes in (left, right):
             label_axes(axes, patch, units)
+        right.set_ylabel("")
         handles, labels = right.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower right", ncols=3, handletextpad=0.2)
+        make_as_high(figure, bar, left)
 
 
 def draw_pressure(axes: Any, patch: ContactPatch, clim: tuple[float, float]) -> None:

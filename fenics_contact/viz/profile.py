@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from fenics_contact.contact import State
 from fenics_contact.geometry import boundary_faces
@@ -19,6 +20,8 @@ from fenics_contact.viz.words import nice_number
 VISIBLE = 0.06
 #: Room around the bodies, relative to their size.
 BORDER = 0.08
+#: Places along each side at which room for a name is sought.
+GRID = 40
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,29 @@ class Profile:
         """Round factor, at least 1, that makes the movement visible."""
         size = float(np.max(self.high - self.low))
         return max(1.0, nice_number(VISIBLE * size / self.largest)) if self.largest > 0 else 1.0
+
+    def place_in(self, body: str) -> np.ndarray | None:
+        """Return where in a body, far from all outlines, its name fits; None if it is not seen."""
+        size = self.high - self.low
+        steps = (np.arange(GRID) + 0.5) / GRID
+        grid = self.low + size * np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+        grid = grid[_inside(grid, self.before[body])]
+        if not len(grid):
+            return None
+        middles = np.concatenate([lines.mean(axis=1) for lines in self.before.values()])
+        ends = np.concatenate([lines.reshape(-1, 2) for lines in self.before.values()])
+        room = cKDTree(np.concatenate([middles, ends])).query(grid)[0]
+        border = np.minimum(grid - self.low, self.high - grid).min(axis=1)
+        return np.asarray(grid[np.argmax(np.minimum(room, border))])
+
+
+def _inside(points: np.ndarray, lines: np.ndarray) -> np.ndarray:
+    """Tell which points lie inside closed outlines: rays to the right cross them an odd number of times."""
+    (x, y), first, second = points.T[..., None], lines[:, 0], lines[:, 1]
+    spans = (first[:, 1] > y) != (second[:, 1] > y)
+    rise = np.where(first[:, 1] == second[:, 1], 1.0, second[:, 1] - first[:, 1])
+    meets = first[:, 0] + (y - first[:, 1]) / rise * (second[:, 0] - first[:, 0])
+    return np.asarray(np.sum(spans & (meets > x), axis=1) % 2 == 1)
 
 
 def profiles(first: State, best: State, reach: float | None) -> list[Profile]:

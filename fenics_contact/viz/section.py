@@ -19,6 +19,8 @@ from fenics_contact.viz.view import Frame, View, frame_around, looking_along
 REACH = 5.0
 #: Width of a section by its height, unless the bodies end before.
 PROPORTION = 1.4
+#: Room around the bodies, relative to the half height.
+BORDER = 0.03
 
 #: Dark on a light border, to be seen on every colour.
 _OUTLINE = (("white", 6), (INK, 3))
@@ -84,10 +86,15 @@ def section_frame(view: View, spot: Spot, points: np.ndarray, reach: float | Non
         points: All nodes of the bodies, (n, 3).
         reach: How far it reaches up and down, [length]; by default five times the radius of the contact.
     """
-    bodies = frame_around(view, points)
+    bodies = frame_around(view, points, 0.0)
     middle = view.project(spot.centre[None])[0]
     half = (REACH * spot.radius if reach is None else reach) * np.array([PROPORTION, 1.0])
-    return Frame(np.maximum(middle - half, bodies.low), np.minimum(middle + half, bodies.high))
+    border = BORDER * min(float(half[1]), float(np.max(bodies.size)) / 2)
+    low, high = (
+        np.maximum(middle - half, bodies.low - border),
+        np.minimum(middle + half, bodies.high + border),
+    )
+    return Frame(low, high)
 
 
 def section_layers(

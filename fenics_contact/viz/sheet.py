@@ -21,13 +21,15 @@ from fenics_contact.viz.words import nice_number, written
 INCHES = 16.0
 #: Height of the band with the title, relative to the width of the sheet.
 TITLE = 0.035
+#: Size of the title, and the part of the width that it takes at most.
+HEADLINE, WIDEST = 18, 0.97
 
 _STYLE = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
-    "font.size": 13,
-    "axes.titlesize": 14,
-    "axes.labelsize": 13,
+    "font.size": 15,
+    "axes.titlesize": 16,
+    "axes.labelsize": 15,
     "axes.edgecolor": INK,
     "axes.labelcolor": INK,
     "axes.spines.top": False,
@@ -67,10 +69,11 @@ def sheet(
         FigureCanvasAgg(figure)
         if layout == "constrained":
             figure.get_layout_engine().set(w_pad=0.12, h_pad=0.12)
-            figure.suptitle(title, fontsize=16, fontweight="bold")
+            _shrink(figure.suptitle(title, fontsize=HEADLINE, fontweight="bold"), size[0])
         else:
             middle = 1 - TITLE / 2 * size[0] / size[1]
-            figure.text(0.5, middle, title, fontsize=16, fontweight="bold", ha="center", va="center")
+            look = {"fontsize": HEADLINE, "fontweight": "bold", "ha": "center", "va": "center"}
+            _shrink(figure.text(0.5, middle, title, **look), size[0])
         yield figure
         content = BytesIO()
         figure.savefig(content, dpi=dpi, format="png")
@@ -78,6 +81,13 @@ def sheet(
         write_file(path, content.getvalue())
     elif not isinstance(paper, str | Path):
         paper.write(content.getvalue())
+
+
+def _shrink(text: Any, width: int) -> None:
+    """Make a title smaller where it is wider than the sheet."""
+    wide = float(text.get_window_extent().width)
+    if wide > WIDEST * width:
+        text.set_fontsize(text.get_fontsize() * WIDEST * width / wide)
 
 
 def place_image(figure: Any, image: np.ndarray, left: int, top: int, title: str = "") -> Any:
@@ -113,9 +123,9 @@ def scale_bar(axes: Any, image: np.ndarray, width: float, unit: str) -> None:
         width: Width of what the image shows, [length].
         unit: Unit of length.
     """
-    length = nice_number(width / 5)
+    length = nice_number(width / 3)
     pixels = length / width * image.shape[1]
-    left, bottom = 0.04 * image.shape[1], 0.94 * image.shape[0]
+    left, bottom = 0.05 * image.shape[1], 0.94 * image.shape[0]
     axes.plot([left, left + pixels], [bottom, bottom], color=INK, linewidth=4, solid_capstyle="butt")
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 2}
     place = (left + pixels / 2, bottom - 0.02 * image.shape[0])

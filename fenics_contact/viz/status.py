@@ -80,7 +80,7 @@ def _draw(patches: Mapping[str, ContactPatch], paper: BinaryIO, title: str, unit
     rows = -(-len(patches) // columns)
     size = next(iter(patches.values()))
     proportion = float((size.high - size.low)[1] / (size.high - size.low)[0])
-    height = round((0.09 + rows * (0.075 + 0.9 * proportion / columns)) * width)
+    height = round((0.09 + rows * (0.09 + 0.9 * proportion / columns)) * width)
     with sheet(paper, (width, height), title, "constrained") as figure:
         panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
         for axes, (name, patch) in zip(panels, patches.items(), strict=False):
@@ -110,7 +110,12 @@ def draw_status(axes: Any, patch: ContactPatch, *, counted: bool = True) -> None
         axes.scatter(*places[chosen].T, label=label, zorder=3, linewidths=1.0, **look)
     slips = patch.status == Status.SLIP
     longest = float(np.linalg.norm(patch.slip[slips], axis=1).max(initial=0.0))
+    inside = np.all((places > patch.low) & (places < patch.high), axis=1)
     if longest > 0:
         reach = ARROW * float(np.max(patch.high - patch.low)) / longest
         arrows = {"angles": "xy", "scale_units": "xy", "scale": 1, "color": INK, "width": 0.004, "zorder": 4}
-        axes.quiver(*places[slips].T, *(reach * patch.slip[slips]).T, **arrows)
+        # Short arrows stay arrows: dots would hide the symbols.
+        arrows |= {"minlength": 0.0}
+        shown = slips & inside
+        drawn = axes.quiver(*places[shown].T, *(reach * patch.slip[shown]).T, clip_on=False, **arrows)
+        drawn.set_in_layout(False)  # its extent is not known before it is drawn

@@ -29,7 +29,8 @@ class ContactTrace:
         bound: The largest that friction allows, (n,).
         points: Numbers of the nodes that are contact points.
         status: Of the contact points.
-        slip: Largest slip of the last load step, [length].
+        slip: Of the contact points on the master in the last load step, in the direction of the places,
+            [length].
         force: Normal force of the pair, a unit of thickness.
         shear: Sum of the tangential forces on the slave, a unit of thickness.
         rubs: Whether the pair has friction.
@@ -44,7 +45,7 @@ class ContactTrace:
     bound: np.ndarray
     points: np.ndarray
     status: np.ndarray
-    slip: float
+    slip: np.ndarray
     force: float
     shear: float
     rubs: bool
@@ -75,12 +76,14 @@ def contact_trace(state: State, pair: int) -> ContactTrace:
     points = sorting[np.searchsorted(numbers, contact.points.slave[chosen], sorter=sorting)]
     shear = np.einsum("na,nad->nd", -contact.friction_force[chosen], contact.points.tangents[chosen])
     shear = np.einsum("nd,nd->n", shear, forward[points])
+    slip = np.einsum("na,nad->nd", contact.slip[chosen], contact.points.tangents[chosen])
+    slip = np.einsum("nd,nd->n", slip, forward[points])
     values = np.zeros((3, len(order)))
     area = contact.points.area[chosen]
     values[:, points] = np.stack([contact.normal_force[chosen], shear, contact.slip_bound[chosen]]) / area
     return ContactTrace(
         f"{slave.body}, {slave.name}", axis, places, starts[1:] - 1, values[0], values[1], values[2],
-        points, contact.status[chosen], float(np.abs(contact.slip[chosen]).max(initial=0.0)),
+        points, contact.status[chosen], slip,
         float(contact.normal_force[chosen].sum()), float(shear.sum()),
         state.scene.contacts[pair].has_friction,
     )  # fmt: skip

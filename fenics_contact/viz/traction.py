@@ -8,12 +8,16 @@ from typing import Any, BinaryIO
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
+from fenics_contact.contact import Status
 from fenics_contact.viz.colours import BLUE, GREY, INK, ORANGE, PALE
 from fenics_contact.viz.sheet import sheet
 from fenics_contact.viz.symbols import symbols_of
 from fenics_contact.viz.trace import ContactTrace
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.words import headline, written
+
+#: Length of the longest arrow, relative to the width, and how many are drawn at most.
+ARROW, MOST_ARROWS = 0.03, 40
 
 
 @dataclass(frozen=True)
@@ -66,8 +70,25 @@ def _draw_friction(axes: Any, trace: ContactTrace, units: Units) -> None:
     _symbols(axes, trace, trace.traction)
     axes.axhline(0.0, color=INK, lw=0.8)
     axes.set_ylabel(f"tangential traction ({units.stress})")
-    end = f", largest slip {written(trace.slip, 2)} {units.length}" if trace.slip > 0 else ", no slip"
-    axes.set_title(f"tangential traction, slip bound dashed{end}")
+    slips = trace.status == Status.SLIP
+    longest = float(np.abs(trace.slip[slips]).max(initial=0.0))
+    end = ", no slip"
+    if longest > 0:
+        _draw_slip(axes, trace, longest)
+        end = f"; arrows: slip on the master, largest {written(longest, 2)} {units.length}"
+    axes.set_title(f"tangential traction on the slave, slip bound dashed{end}")
+
+
+def _draw_slip(axes: Any, trace: ContactTrace, longest: float) -> None:
+    """Draw by arrows how far and which way points slip, of many points each so many."""
+    low, high = trace.window(None)
+    places = trace.places[trace.points]
+    seen = np.flatnonzero((trace.status == Status.SLIP) & (places > low) & (places < high))
+    seen = seen[np.argsort(places[seen])][:: -(-len(seen) // MOST_ARROWS)]
+    lengths = ARROW * trace.slip[seen] / longest
+    look = {"angles": "uv", "scale_units": "width", "scale": 1, "width": 0.0022, "minlength": 0.0}
+    heights = trace.traction[trace.points[seen]]
+    axes.quiver(places[seen], heights, lengths, 0 * lengths, color=INK, zorder=4, **look)
 
 
 def _curve(axes: Any, trace: ContactTrace, values: np.ndarray, colour: str) -> None:

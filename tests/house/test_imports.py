@@ -12,6 +12,7 @@ from tests.house.source import PACKAGE, Module, modules, room_of
 #: From the ground up; rooms on one floor do not know each other.
 FLOORS = [
     {"errors"},
+    {"progress"},
     {"_requirements", "timing", "checkpoint"},
     {"_dolfinx"},
     {"geometry", "linalg"},

@@ -35,7 +35,13 @@ def posed(name: str, comm: MPI.Comm, tolerance: float | AdaptiveTolerance | None
     return ShapeProblem(scene, cut, chain_designs(), TotalPotential(), comm, tolerance=tolerance)
 
 
-def minimised(name: str, problem: ShapeProblem, checkpoint: Checkpoint | None, **limits: Any) -> Result:
+def minimised(
+    name: str,
+    problem: ShapeProblem,
+    checkpoint: Checkpoint | None,
+    callback: Any = None,
+    **limits: Any,
+) -> Result:
     """Minimise within a box, with the volume kept to first order."""
     size, bound = problem.size, BOUND[name]
     _, by_volume = problem.volume(np.zeros(size))
@@ -45,6 +51,7 @@ def minimised(name: str, problem: ShapeProblem, checkpoint: Checkpoint | None, *
         BundleTrust(**{"max_evaluations": 15, **limits}),
         bounds=(np.full(size, -bound), np.full(size, bound)),
         constraints=LinearConstraints(np.zeros((0, size)), np.zeros(0), by_volume[None], np.zeros(1)),
+        callback=callback,
         checkpoint=checkpoint,
     )
 

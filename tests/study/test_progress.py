@@ -1,21 +1,14 @@
-"""Progress: remaining time from runs that are done, a bar on a terminal, lines elsewhere."""
+"""Progress of a study: remaining time from runs that are done, told as an event and as a line each."""
 
 from __future__ import annotations
 
-import io
 import logging
 
 import pytest
 
+from fenics_contact.progress import LOGGER_NAME, Event
 from fenics_contact.study import Parameters
-from fenics_contact.study.progress import Forecast, Progress, duration
-
-
-class Terminal(io.StringIO):
-    """A stream that says it is a terminal."""
-
-    def isatty(self) -> bool:
-        return True
+from fenics_contact.study.progress import Forecast, Progress
 
 
 def test_time_left_follows_the_growth_that_runs_have_shown() -> None:
@@ -27,42 +20,27 @@ def test_time_left_follows_the_growth_that_runs_have_shown() -> None:
     assert forecast.seconds([Parameters(8)]) == pytest.approx(64.0)
 
 
-@pytest.mark.parametrize(
-    ("seconds", "words"), [(None, "?"), (7.6, "8 s"), (200.0, "3 min"), (7200.0, "2.0 h")]
-)
-def test_durations_are_words(seconds: float | None, words: str) -> None:
-    assert duration(seconds) == words
-
-
-def test_without_a_terminal_there_are_lines(caplog: pytest.LogCaptureFixture) -> None:
+def test_there_is_a_line_about_every_run(caplog: pytest.LogCaptureFixture) -> None:
     runs = [Parameters(2), Parameters(2, tolerance=1e-3, solver="fixed point", subdomains=8)]
-    with caplog.at_level(logging.INFO), Progress(runs, "A study", io.StringIO()) as progress:
+    with caplog.at_level(logging.INFO), Progress(runs, "A study") as progress:
         for run in runs:
             progress.begin(run)
             progress.done(run, 5.0, "1.00 s")
     assert [record.message for record in caplog.records] == [
         "1/2 size 2, hexahedron, node, balanced: 1.00 s, 5 s left",
-        "2/2 size 2, hexahedron, node, 1e-03, fixed point, 8 subdomains: 1.00 s, 0 s left",
+        "2/2 size 2, hexahedron, node, 1e-03, fixed point, 8 subdomains: 1.00 s",
     ]
 
 
-def test_a_terminal_without_tqdm_gets_lines(
-    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with caplog.at_level(logging.INFO), Progress([Parameters(2)], "A study", Terminal()) as progress:
-        progress.done(Parameters(2), 5.0, "1.00 s")
-    assert [record.message for record in caplog.records] == [
-        "1/1 size 2, hexahedron, node, balanced: 1.00 s, 0 s left"
-    ]
-
-
-def test_on_a_terminal_there_is_a_bar_with_the_time_left() -> None:
-    stream, runs = Terminal(), [Parameters(2), Parameters(4)]
-    with Progress(runs, "A study", stream) as progress:
+def test_the_run_under_way_is_told_with_the_time_that_all_will_take(caplog: pytest.LogCaptureFixture) -> None:
+    runs = [Parameters(2), Parameters(4)]
+    with caplog.at_level(logging.DEBUG, LOGGER_NAME), Progress(runs, "A study") as progress:
         progress.begin(runs[0])
         progress.done(runs[0], 10.0, "")
         progress.begin(runs[1])
-    shown = stream.getvalue()
-    assert "A study 1/2 |" in shown
-    assert "size 4, hexahedron, node, balanced, 28 s left" in shown
+    events = [record.progress for record in caplog.records if hasattr(record, "progress")]
+    assert all(isinstance(event, Event) for event in events)
+    last = events[-2]
+    assert (last.what, last.number, last.total) == ("A study", 1, 2)
+    assert last.words == "size 4, hexahedron, node, balanced"
+    assert last.left == pytest.approx(28.3, abs=0.1)

@@ -80,6 +80,17 @@ def test_a_section_cuts_the_outline_where_it_is() -> None:
         assert ends[:, 1].max() == pytest.approx(points[:, 2].max(), abs=0.01)
 
 
+def test_names_stand_in_their_bodies() -> None:
+    scene = touching_blocks().scene
+    for profile in profiles(touching_blocks(), raised(3), None):
+        for name, body in scene.bodies.items():
+            place, z = profile.place_in(name), body.mesh.points[:, 2]
+            assert place is not None
+            assert z.min() + 0.1 * np.ptp(z) < place[1] < z.max() - 0.1 * np.ptp(z)
+        gone = replace(profile, low=profile.high + 1.0, high=profile.high + 2.0)
+        assert gone.place_in("lower") is None
+
+
 def test_the_title_says_by_how_much_the_objective_fell(monkeypatch: pytest.MonkeyPatch) -> None:
     titles: list[str] = []
     draw = before_after.sheet

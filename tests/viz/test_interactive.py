@@ -144,6 +144,7 @@ RANKS = """
 """
 
 
+@pytest.mark.slow
 def test_of_two_ranks_one_has_the_page_and_both_fall_back_together(
     mpirun: Callable[..., str], tmp_path: Path
 ) -> None:

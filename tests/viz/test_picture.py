@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -79,25 +78,3 @@ def test_a_rank_that_did_not_draw_shows_nothing() -> None:
     assert data == {"text/plain": ""}
     assert picture.size is None
     assert str(picture) == "line.png"
-
-
-RANKS = """
-    import sys
-    from pathlib import Path
-    from mpi4py import MPI
-    from fenics_contact.viz import plot_curves
-
-    comm, folder = MPI.COMM_WORLD, Path(sys.argv[1])
-    line = {"series": {"line": ([0.0, 1.0], [0.0, 2.0])}, "xlabel": "x", "ylabel": "y", "comm": comm}
-    shown = plot_curves(**line)
-    kept = plot_curves(**line, path=folder / "line.png")
-    answers = comm.gather((shown.png is not None, kept.png is not None, str(kept.path) == str(kept)))
-    if comm.rank == 0:
-        print(*answers, *(path.name for path in folder.glob("*.png")))
-"""
-
-
-def test_of_two_ranks_one_has_the_picture_and_both_know_its_file(
-    mpirun: Callable[..., str], tmp_path: Path
-) -> None:
-    assert mpirun(RANKS, 2, tmp_path).strip() == "(True, True, True) (False, False, True) line.png"

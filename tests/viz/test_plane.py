@@ -51,6 +51,11 @@ def test_the_trace_of_a_flat_surface_runs_over_x_and_holds_the_forces() -> None:
     assert trace.shear == pytest.approx(flat.sum())
     assert trace.shear < 0
     assert np.all(np.abs(trace.traction) <= trace.bound + 1e-6 * trace.bound.max())
+    # Points that slip move on the floor against the traction that they feel.
+    slips = trace.status == Status.SLIP
+    assert np.count_nonzero(slips) > 0
+    assert np.all(trace.slip[slips] * trace.traction[trace.points[slips]] < 0)
+    assert np.abs(trace.slip[slips]).max() == pytest.approx(np.abs(contact.slip[slips]).max())
 
 
 def test_the_window_of_a_trace_holds_what_is_closed() -> None:

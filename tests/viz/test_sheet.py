@@ -39,6 +39,17 @@ def test_an_image_is_placed_pixel_on_pixel(tmp_path: Path) -> None:
     np.testing.assert_allclose(pixels(tmp_path / "picture.png")[120:160, 100:160], image / 255, atol=1e-6)
 
 
+@pytest.mark.parametrize("layout", ["none", "constrained"])
+def test_a_title_that_is_too_long_is_made_smaller(layout: str, tmp_path: Path) -> None:
+    for words in ("short", "a title of very many words " * 6):
+        with sheet(tmp_path / "picture.png", (640, 200), words, layout):
+            pass
+        ink = np.flatnonzero(np.any(pixels(tmp_path / "picture.png") < 0.5, axis=(0, 2)))
+        assert ink.size > 20
+        assert 0.005 * 640 < ink.min()
+        assert ink.max() < 0.995 * 640
+
+
 def test_settings_of_the_user_neither_matter_nor_change(tmp_path: Path) -> None:
     with sheet(tmp_path / "plain.png", (320, 200), "title"):
         pass

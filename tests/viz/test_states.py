@@ -164,9 +164,14 @@ RANKS = """
     comm, folder = MPI.COMM_WORLD, Path(sys.argv[1])
     scene = two_blocks(Coulomb(0.4))
     state = solve_scene(scene, partitions(scene), comm, tolerance=1e-6)
-    plot_stress(state, folder / "stress.png", width=320, clim=(0, 4))
-    plot_contact_pressure(state, folder / "pressure.png", width=320, clim=(0, 8))
-    plot_decomposition(scene, partitions(scene), folder / "parts.png", width=320, comm=comm)
+    drawn = [
+        plot_stress(state, folder / "stress.png", width=320, clim=(0, 4)),
+        plot_contact_pressure(state, folder / "pressure.png", width=320, clim=(0, 8)),
+        plot_decomposition(scene, partitions(scene), folder / "parts.png", width=320, comm=comm),
+        plot_contact_pressure(state, width=320),
+    ]
+    shown = comm.gather([picture.png is not None for picture in drawn])
+    known = comm.gather([picture.path and picture.path.name for picture in drawn])
     (folder / "file").touch()
     comm.barrier()
     caught = None
@@ -176,7 +181,8 @@ RANKS = """
         caught = type(error).__name__
     everyone = comm.gather(caught)
     if comm.rank == 0:
-        print(*everyone)
+        names = ["stress.png", "pressure.png", "parts.png", None]
+        print(*everyone, shown == [[True] * 4, [False] * 4] and known == [names, names])
 """
 
 
@@ -184,7 +190,7 @@ def test_two_ranks_draw_the_same_pictures_and_share_their_errors(
     mpirun: Callable[..., str], tmp_path: Path
 ) -> None:
     answers = mpirun(RANKS, 2, tmp_path).split()
-    assert answers == ["FileExistsError", "RemoteError"]
+    assert answers == ["FileExistsError", "RemoteError", "True"], "or both ranks hold the same pictures"
     state = touching_blocks()
     plot_stress(state, tmp_path / "stress_1.png", width=SMALL, clim=(0, 4))
     plot_contact_pressure(state, tmp_path / "pressure_1.png", width=SMALL, clim=(0, 8))

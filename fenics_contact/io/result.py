@@ -1,0 +1,247 @@
+"""What came out of a computation, in one JSON file that another program can read years later."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fenics_contact.contact import State, Status
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.feti import DirectSystem
+from fenics_contact.io.described_scene import described_scene, readable
+from fenics_contact.io.json_file import write_json
+from fenics_contact.io.names import checked_name
+from fenics_contact.io.provenance import versions
+from fenics_contact.io.reading import FORMAT, FORMAT_VERSION
+from fenics_contact.scene import SolverKind
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from fenics_contact.optimize import Result
+    from fenics_contact.shape import ShapeProblem
+
+UNITS = (
+    "those of the input: a scene in N and mm has forces in N, stresses, moduli and pressures in N/mm², "
+    "energies in N mm; seconds are wall time of rank 0; residuals and errors are relative; plane bodies "
+    "have forces and energies a unit of thickness"
+)
+
+
+def write_result(
+    state: State,
+    folder: str | Path,
+    *,
+    name: str = "result",
+    more: Mapping[str, Any] | None = None,
+    errors: bool = False,
+) -> Path:
+    """Write what a state is, how it was found and what it was found with. Collective.
+
+    | entry | what it holds |
+    |---|---|
+    | ``format``, ``format_version``, ``kind`` | "fenics_contact result", 1, "state" |
+    | ``written``, ``ranks``, ``versions``, ``units`` | when (UTC), on how many ranks, with which libraries |
+    | ``scene`` | ``dimension``, ``bodies`` (cells, nodes, subdomains, bounding box, material with its \
+parameters), ``supports``, ``loads``, ``contacts`` and ``ties`` with all their parameters |
+    | ``plan`` | ``effects`` with the reason for each, ``cone``, ``memory_bytes`` as expected |
+    | ``solver`` | ``kind``, ``methods`` that took steps, ``tolerance``, ``reason`` for the stop; a state \
+that was read from a checkpoint says so and has no tolerance |
+    | ``counts`` | torn unknowns, multipliers, F-products, steps; `State.counts` |
+    | ``seconds`` | by phase |
+    | ``residuals`` | ``gluing``, ``natural``, ``equilibrium``; recomputed, relative |
+    | ``energies`` | ``strain``, ``load``, ``friction``, ``dual``, ``total_potential``, ``primal`` |
+    | ``errors`` | ``algebraic``, ``friction``, ``discretisation``, ``by_body``; None where not known |
+    | ``contact`` | one entry a pair: ``points``, ``open``, ``stick``, ``slip``, ``force`` on the slave, \
+``normal_force``, ``peak_pressure``, ``smallest_gap``, ``largest_slip`` in the last load step; without \
+friction closed points count as ``slip`` |
+    | ``more`` | what the caller adds |
+
+    Entries may be added without a new version; none changes its meaning or goes without one.
+
+    Args:
+        state: The state.
+        folder: Where to write; created.
+        name: Name of the file without ".json". A file of that name is replaced when the new one is complete.
+        more: Further results: numbers, text, arrays, by name.
+        errors: Ask the state for its errors also where it does not know them yet, which takes about as long
+            as some products; a state that was solved without a fixed tolerance knows them.
+
+    Returns:
+        The file; `read_result` reads it.
+
+    Raises:
+        InvalidInputError: If the name holds a folder, or ``more`` what JSON does not know; says where.
+
+    Example:
+        >>> write_result(state, "output", more={"drop_percent": 12.4})  # doctest: +SKIP
+    """
+    comm = state.torn.decomposition.comm
+    with together(comm):
+        record = {**_head("state", comm), **_state_record(state)}
+        target = checked_name(folder, name, ".json")
+    record["errors"] = _errors(state) if errors or _knows_errors(state) else None
+    return write_json(target, {**record, "more": dict(more or {})}, comm=comm)
+
+
+def write_optimisation_result(
+    result: Result,
+    problem: ShapeProblem,
+    folder: str | Path,
+    *,
+    name: str = "result",
+    more: Mapping[str, Any] | None = None,
+) -> Path:
+    """Write what an optimisation found and how. Collective.
+
+    The file has the entries of `write_result` for the state of the best design, with ``kind``
+    "optimisation", ``seconds`` and ``counts`` of the whole run, and
+
+    | entry | what it holds |
+    |---|---|
+    | ``optimisation.objective`` | ``type``, ``initial``, ``final``, ``drop_percent`` |
+    | ``optimisation.design`` | ``variables``, ``bodies``, ``values`` at the best point |
+    | ``optimisation.stop`` | ``converged``, ``reason``, ``iterations``, ``evaluations``, ``f_products`` |
+    | ``optimisation.history`` | one list for each attribute of `fenics_contact.optimize.Record`, one entry \
+an evaluation; None where a trial point was rejected as invalid |
+
+    Args:
+        result: What `minimize` returned.
+        problem: What it minimised.
+        folder: Where to write; created.
+        name: Name of the file without ".json".
+        more: Further results by name.
+
+    Returns:
+        The file; `read_result` reads it.
+
+    Raises:
+        InvalidInputError: As `write_result` does, or if the problem has not been evaluated.
+    """
+    first, best, comm = problem.first, problem.best, problem.comm
+    with together(comm):
+        target = checked_name(folder, name, ".json")
+        if first is None or best is None:
+            raise InvalidInputError(
+                "an optimisation's result needs designs that were evaluated, the problem has none: give the "
+                "problem that was handed to minimize"
+            )
+        record = {**_head("optimisation", comm), **_state_record(best.state)}
+        record["counts"]["f_products"] = problem.products
+        record["seconds"] = dict(problem.seconds)
+        record["optimisation"] = {
+            "objective": _objective(problem, first.value, best.value),
+            "design": {
+                "variables": problem.size,
+                "bodies": [design.body for design in problem.designs],
+                "values": np.asarray(result.x),
+            },
+            "stop": {
+                "converged": result.reason.success,
+                "reason": result.reason.value,
+                "iterations": result.iterations,
+                "evaluations": result.evaluations,
+                "f_products": problem.products,
+            },
+            "history": _history(result),
+        }
+    record["errors"] = _errors(best.state) if _knows_errors(best.state) else None
+    return write_json(target, {**record, "more": dict(more or {})}, comm=comm)
+
+
+def _head(kind: str, comm: MPI.Comm) -> dict[str, Any]:
+    return {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "kind": kind,
+        "written": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "ranks": comm.size,
+        "versions": versions(),
+        "units": UNITS,
+    }
+
+
+def _state_record(state: State) -> dict[str, Any]:
+    decomposition, solution = state.torn.decomposition, state.solution
+    parts = decomposition.partitions
+    plan = state.scene.plan(parts)
+    direct = isinstance(state.system, DirectSystem)
+    methods = list(dict.fromkeys(step.method for step in solution.history))
+    return {
+        "scene": described_scene(state.scene, {name: int(np.max(part)) + 1 for name, part in parts.items()}),
+        "plan": {
+            "effects": {effect.name.value: effect.reason for effect in plan.effects},
+            "cone": plan.cone.value,
+            "memory_bytes": round(plan.memory),
+        },
+        "solver": {
+            "kind": SolverKind.DIRECT.value if direct else "dual",
+            "methods": methods,
+            "tolerance": readable(state.tolerance),
+            "reason": solution.reason,
+        },
+        "counts": state.counts,
+        "seconds": dict(state.seconds),
+        "residuals": {
+            "gluing": readable(solution.gluing_residual),
+            "natural": readable(solution.natural_residual),
+            "equilibrium": readable(solution.coarse_residual),
+        },
+        "energies": {
+            key: getattr(state.energies, key)
+            for key in ("strain", "load", "friction", "dual", "total_potential", "primal")
+        },
+        "contact": [_pair(state, number) for number in range(len(state.scene.contacts))],
+    }
+
+
+def _pair(state: State, number: int) -> dict[str, Any]:
+    """Return what happens between the surfaces of one pair."""
+    contact = state.contact
+    mine = contact.on_pair(number)
+    known = {status.name.lower(): int(np.sum(contact.status[mine] == status)) for status in Status}
+    return {
+        "points": len(mine),
+        **known,
+        "force": contact.force[mine].sum(axis=0),
+        "normal_force": float(contact.normal_force[mine].sum()),
+        "peak_pressure": float(contact.pressure[mine].max(initial=0.0)),
+        "smallest_gap": float(contact.gap[mine].min()) if len(mine) else None,
+        "largest_slip": float(np.linalg.norm(contact.slip[mine], axis=1).max(initial=0.0)),
+    }
+
+
+def _knows_errors(state: State) -> bool:
+    """Tell whether the errors are there already: to find them takes products with F."""
+    return state.known_errors is not None or "errors" in vars(state)
+
+
+def _errors(state: State) -> dict[str, Any]:
+    """Return the errors of a state. Collective where it does not know them."""
+    found = state.errors
+    return {
+        "algebraic": readable(found.algebraic),
+        "friction": readable(found.friction),
+        "discretisation": readable(found.discretisation),
+        "by_body": readable(found.by_body),
+    }
+
+
+def _objective(problem: ShapeProblem, initial: float, final: float) -> dict[str, Any]:
+    return {
+        "type": type(problem.objective).__name__,
+        "initial": initial,
+        "final": final,
+        "drop_percent": (initial - final) / abs(initial) * 100.0 if initial else None,
+    }
+
+
+def _history(result: Result) -> dict[str, list[Any]]:
+    if not result.history:
+        return {}
+    names = list(vars(result.history[0]))
+    return {name: [readable(getattr(record, name)) for record in result.history] for name in names}

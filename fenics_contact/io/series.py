@@ -1,0 +1,224 @@
+"""Series of states for ParaView: load steps, designs of an optimisation."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_contact.contact import State
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.io.collection import Member, collection, read_collection, stem_of
+from fenics_contact.io.names import checked_name, file_of_each
+from fenics_contact.io.replacing import remove_abandoned, replacing
+from fenics_contact.io.temporal_xdmf import grid_of, temporal
+from fenics_contact.io.vtu import write_vtu
+from fenics_contact.io.vtx import require_vtx, write_vtx
+from fenics_contact.io.xdmf import write_xdmf
+
+if TYPE_CHECKING:
+    import xml.etree.ElementTree as ET
+
+    from fenics_contact.optimize import Record
+    from fenics_contact.shape import ShapeProblem
+
+FORMATS = ("vtu", "xdmf", "vtx")
+
+
+class ResultSeries:
+    """States that follow one another, in files that ParaView plays as a film.
+
+    | written | what to open |
+    |---|---|
+    | ``NAME.pvd``, with VTU files in the folder ``NAME/`` | always; all bodies, all fields of `write_vtu` |
+    | ``NAME_BODY.xdmf``, with HDF5 files in ``NAME/`` | with "xdmf": displacement and von Mises stress |
+    | ``NAME/NAME_0000_BODY_FIELD.bp`` | with "vtx" (ADIOS2): one folder a state, body and field |
+
+    Every member has its own mesh, so that designs may differ in shape. After each `add` all files are whole,
+    and the PVD and XDMF files name complete members alone; killed at any moment, a run leaves them so.
+
+    A run that goes on, from a checkpoint for example, goes on with the series: members are known by their
+    values. The first member that is added removes those that an earlier run has left at the same and at
+    higher values, which belong to a future that did not come to pass; those before stay. A value added twice
+    replaces its member.
+
+    Attributes:
+        path: The PVD file.
+
+    Example:
+        >>> series = ResultSeries("output", "history", comm)  # doctest: +SKIP
+        >>> for number, state in enumerate(solve_steps(scene, steps, None, comm)):  # doctest: +SKIP
+        ...     series.add(state, number, steps[number].name)
+    """
+
+    def __init__(
+        self, folder: str | Path, name: str, comm: MPI.Comm, *, formats: Sequence[str] = ("vtu",)
+    ) -> None:
+        """Look at what is there; nothing is written yet. Collective on ``comm``.
+
+        Args:
+            folder: Where to write; created with the first member.
+            name: Name of the series, what all names begin with.
+            comm: Communicator of the states.
+            formats: Of "vtu", "xdmf" and "vtx"; VTU files are written in any case.
+
+        Raises:
+            InvalidInputError: If the name holds a folder, a format is unknown or not there, or a PVD file of
+                that name is none of a series.
+        """
+        inherited: list[Member] = []
+        with together(comm):
+            self.path = checked_name(folder, name, ".pvd")
+            _check_formats(formats)
+            if comm.rank == 0 and self.path.exists():
+                inherited = read_collection(self.path)
+        self._name, self._comm, self._formats = name, comm, tuple(formats)
+        self._inherited: list[Member] = comm.bcast(inherited)
+        self._added: list[Member] = []
+        self._grids: dict[tuple[str, Member], ET.Element] = {}
+
+    path: Path
+
+    @property
+    def members(self) -> tuple[Member, ...]:
+        """All members in the order of their values, those of an earlier run included."""
+        return tuple(sorted([*self._inherited, *self._added]))
+
+    def add(
+        self,
+        state: State,
+        value: float,
+        label: str = "",
+        *,
+        cell_fields: Mapping[str, Mapping[str, np.ndarray]] | None = None,
+    ) -> Path:
+        """Write a state as the member at a value. Collective.
+
+        Args:
+            state: The state.
+            value: Time, load factor or number of the step or design; what ParaView shows as time.
+            label: What it is, in words: the name of the load step, for example.
+            cell_fields: Further fields of the VTU files, as for `write_vtu`.
+
+        Returns:
+            The PVD file.
+
+        Raises:
+            InvalidInputError: If the value is not finite or the label is no line of text.
+            OutputError: If a file cannot be written; the members before are as they were.
+        """
+        value = _checked(value, label)
+        number = self._make_room(value, state.scene.body_names)
+        stem, folder = stem_of(self._name, number), self.path.with_suffix("")
+        write_vtu(state, folder, stem, cell_fields=cell_fields)
+        if "xdmf" in self._formats:
+            write_xdmf(state, folder / f"{stem}.xdmf")
+        if "vtx" in self._formats:
+            write_vtx(state, folder, stem, value=value)
+        self._added.append(Member(value, number, label))
+        with together(self._comm):
+            if self._comm.rank == 0:
+                self._write_indices(state.scene.body_names)
+        return self.path
+
+    def follow(self, problem: ShapeProblem) -> Callable[[Record, np.ndarray], None]:
+        """Return a callback for `minimize` that adds the first design and every better one.
+
+        Their values are the numbers of the evaluations, their labels the objectives.
+
+        Args:
+            problem: What is minimised.
+
+        Example:
+            >>> minimize(problem, start, callback=series.follow(problem))  # doctest: +SKIP
+        """
+
+        def add(record: Record, best: np.ndarray) -> None:
+            point = problem.last
+            if record.kind.value in ("start", "serious") and point is not None:
+                self.add(point.state, record.evaluations, f"J = {record.value:.6g}")
+
+        return add
+
+    def _make_room(self, value: float, bodies: Sequence[str]) -> int:
+        """Take out the members that a value replaces and return the number of the new one. Collective."""
+        before = self.members
+        later = [] if self._added else [member for member in self._inherited if member.value >= value]
+        equal = [member for member in before if member.value == value]
+        gone = {*later, *equal}
+        self._inherited = [member for member in self._inherited if member not in gone]
+        self._added = [member for member in self._added if member not in gone]
+        self._grids = {key: grid for key, grid in self._grids.items() if key[1] not in gone}
+        with together(self._comm):
+            if self._comm.rank == 0 and self.path.parent.is_dir():
+                remove_abandoned(self.path.parent)
+                if gone:  # first what names the files, then the files
+                    self._write_indices(bodies)
+                if not self._added:
+                    self._remove_unnamed()
+        if equal:
+            return equal[0].number
+        return 1 + max((member.number for member in self.members), default=-1)
+
+    def _write_indices(self, bodies: Sequence[str]) -> None:
+        """Write what names the files of all members, the PVD file last."""
+        for body, target in file_of_each(bodies, self.path.parent, self._name, ".xdmf").items():
+            if "xdmf" in self._formats or target.exists():
+                self._write_temporal(body, target, bodies)
+        if not self.members:  # readers know no series without members
+            self.path.unlink(missing_ok=True)
+            return
+        with replacing(self.path) as (temporary,):
+            temporary.write_text(collection(self._name, self.members), encoding="utf-8")
+
+    def _write_temporal(self, body: str, target: Path, bodies: Sequence[str]) -> None:
+        folder, grids = self.path.with_suffix(""), []
+        for member in self.members:
+            part = file_of_each(bodies, folder, stem_of(self._name, member.number), ".xdmf")[body]
+            if (body, member) not in self._grids and part.exists():
+                self._grids[body, member] = grid_of(part, f"{folder.name}/", member.value)
+            if (body, member) in self._grids:
+                grids.append(self._grids[body, member])
+        if grids:
+            with replacing(target) as (temporary,):
+                temporary.write_text(temporal(body, grids), encoding="utf-8")
+        else:
+            target.unlink(missing_ok=True)
+
+    def _remove_unnamed(self) -> None:
+        """Remove the files of members that are no longer, or that a killed run did not complete."""
+        folder = self.path.with_suffix("")
+        named = {member.number for member in self.members}
+        pattern = re.compile(rf"{re.escape(self._name)}_(\d{{4,}})(_.*)?\.(vtm|vtu|xdmf|h5|bp)")
+        for path in folder.glob(f"{self._name}_*"):
+            match = pattern.fullmatch(path.name)
+            if match and int(match.group(1)) not in named:
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
+def _check_formats(formats: Sequence[str]) -> None:
+    unknown = [name for name in formats if name not in FORMATS]
+    if unknown or isinstance(formats, str):
+        raise InvalidInputError(
+            f"formats must be some of {list(FORMATS)}, got {formats!r}: give a tuple such as ('vtu', 'xdmf')"
+        )
+    if "vtx" in formats:
+        require_vtx()
+
+
+def _checked(value: float, label: str) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise InvalidInputError(
+            f"the value of a member must be finite, got {number}: give the time, the load factor or the "
+            "number of the step"
+        )
+    if not label.isprintable():
+        raise InvalidInputError(f"the label of a member must be one line of text, got {label!r}: shorten it")
+    return number

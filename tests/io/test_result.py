@@ -1,0 +1,262 @@
+"""A result's file says what was computed, how and with what, and is read back or refused in words."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.accuracy import Balanced
+from fenics_contact.contact import Status, solve_scene
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry import block
+from fenics_contact.io import read_result, write_optimisation_result, write_result
+from fenics_contact.io.described_scene import described_scene, readable
+from fenics_contact.optimize import Kind, Result
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    DistanceObstacle,
+    IsotropicElasticity,
+    Pressure,
+    Scene,
+    Support,
+    Surface,
+    Tie,
+    Tresca,
+    Ufl,
+)
+from fenics_contact.shape import ShapeProblem
+from tests.io.states import touching_blocks
+from tests.shape.resumed_cases import minimised, posed
+
+
+def test_a_state_is_told_with_its_scene_and_its_numbers(tmp_path: Path) -> None:
+    state = touching_blocks()
+    path = write_result(state, tmp_path / "new", more={"drop": np.float64(3.5)})
+    assert path == tmp_path / "new" / "result.json"
+    found = read_result(path)
+    assert (found["format"], found["format_version"], found["kind"]) == ("fenics_contact result", 1, "state")
+    assert found["ranks"] == 1
+    assert found["written"].endswith("+00:00")
+    assert found["versions"]["numpy"] == np.__version__
+    assert "N/mm²" in found["units"]
+    upper = found["scene"]["bodies"]["upper block"]
+    mesh = state.scene.bodies["upper block"].mesh
+    assert (upper["cells"], upper["nodes"], upper["subdomains"]) == (mesh.n_cells, mesh.n_nodes, 2)
+    assert upper["material"]["type"] == "IsotropicElasticity"
+    assert upper["material"]["young_modulus"] == 100.0
+    (pair,) = found["scene"]["contacts"]
+    assert pair["slave"] == {"body": "upper block", "surface": "z0"}
+    assert pair["friction"] == {"type": "Coulomb", "friction_coefficient": 0.4}
+    assert [load["type"] for load in found["scene"]["loads"]] == ["Traction", "BodyForce"]
+    assert found["plan"]["effects"]["Coulomb friction"].startswith("1 pair")
+    assert found["counts"] == state.counts
+    assert found["more"] == {"drop": 3.5}
+
+
+def test_energies_residuals_and_contact_are_the_states(tmp_path: Path) -> None:
+    state = touching_blocks()
+    found = read_result(write_result(state, tmp_path))
+    assert found["energies"]["total_potential"] == state.energies.total_potential != 0.0
+    assert found["residuals"]["gluing"] == state.solution.gluing_residual > 0.0
+    assert found["residuals"]["equilibrium"] == state.solution.coarse_residual
+    assert found["solver"]["tolerance"] == 1e-6
+    assert found["solver"]["methods"] == ["face Newton"]
+    assert sum(found["seconds"].values()) > 0.0
+    (pair,) = found["contact"]
+    assert [pair[status.name.lower()] for status in Status] == [state.contact.count(s) for s in Status]
+    assert pair["peak_pressure"] == state.contact.pressure.max() > 0.0
+    np.testing.assert_allclose(pair["force"], state.contact.force.sum(axis=0))
+    assert pair["force"][2] == pytest.approx(pair["normal_force"])
+    assert pair["largest_slip"] > 0.0
+
+
+def test_errors_are_told_where_they_are_known_or_asked_for(tmp_path: Path) -> None:
+    scene = Scene({"block": Body(block((0, 0, 0), (2, 1, 1), (4, 2, 2)), IsotropicElasticity(1e3, 0.3))},
+                  [Support("block", "x0")], [Pressure("block", "z1", 1.0)])  # fmt: skip
+    state = solve_scene(scene, None, MPI.COMM_SELF, tolerance=1e-8)
+    assert read_result(write_result(state, tmp_path))["errors"] is None
+    asked = read_result(write_result(state, tmp_path, errors=True))["errors"]
+    assert asked["discretisation"] == state.errors.discretisation > 0.0
+    assert read_result(write_result(state, tmp_path))["errors"] == asked, "now they are known"
+    direct = read_result(tmp_path)
+    assert direct["solver"]["kind"] == "sparse factorisation of one body"
+    assert direct["contact"] == []
+    parts = {"block": np.arange(16) // 8}
+    balanced = solve_scene(scene, parts, MPI.COMM_SELF, tolerance=Balanced(share=0.05))
+    found = read_result(write_result(balanced, tmp_path))
+    assert found["errors"]["by_body"]["block"] > 0.0
+    assert found["solver"]["tolerance"]["share"] == 0.05
+
+
+@dataclass(frozen=True)
+class Wall:
+    """A distance with a number in it."""
+
+    place: float
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        return points[:, 2] - self.place
+
+
+def deeper(x: np.ndarray) -> np.ndarray:
+    return 1.0 - x[:, 2]
+
+
+def test_functions_are_told_by_their_names_and_regions_by_theirs() -> None:
+    mesh = block((0, 0, 0), (2, 1, 1), (2, 1, 1))
+    mesh = replace(mesh, regions={"left": np.array([0]), "right": np.array([1])})
+    soft, stiff = IsotropicElasticity(1.0, 0.3), IsotropicElasticity(2.0, 0.3)
+    bodies = {"a": Body(mesh, {"left": soft, "right": stiff}), "b": Body(mesh, soft)}
+    scene = Scene(
+        bodies,
+        [Support("a", "x0", (None, deeper, 0.0))],
+        [Pressure("a", "z1", deeper), Pressure("b", "z1", Ufl(deeper))],
+        [ContactPair(Surface("a", "z0"), DistanceObstacle(Wall(-0.5)), Tresca(2.0))],
+        [Tie(Surface("a", "x1"), Surface("b", "x1"), sliding=True)],
+    )
+    found = described_scene(scene, {"a": 1, "b": 3})
+    json.dumps(found, allow_nan=False)
+    assert found["bodies"]["a"]["material"]["regions"]["right"]["young_modulus"] == 2.0
+    assert found["bodies"]["b"]["subdomains"] == 3
+    assert found["supports"][0]["value"] == [None, {"function": "deeper"}, 0.0]
+    assert found["loads"][0]["value"] == {"function": "deeper"}
+    assert found["loads"][1]["value"] == {"type": "Ufl", "function": {"function": "deeper"}}
+    assert found["contacts"][0]["master"]["function"] == {"type": "Wall", "place": -0.5}
+    assert found["contacts"][0]["friction"] == {"type": "Tresca", "traction": 2.0}
+    assert found["ties"][0]["sliding"] is True
+
+
+def test_anything_is_readable() -> None:
+    assert readable(np.float64("nan")) is None
+    assert readable({1: (np.int64(2), Kind.NULL)}) == {"1": [2, "null"]}
+    assert readable(partial(deeper)) == {"function": "deeper"}
+    assert readable(object()) == {"type": "object"}
+
+
+@lru_cache(maxsize=1)
+def a_minimisation() -> tuple[Result, ShapeProblem]:
+    problem = posed("block", MPI.COMM_SELF, 1e-6)
+    result = minimised("block", problem, None, max_evaluations=5, raise_on_failure=False)
+    assert result.value < result.history[0].value, "the objective falls"
+    return result, problem
+
+
+def test_an_optimisation_is_told_with_its_history_and_design(tmp_path: Path) -> None:
+    result, problem = a_minimisation()
+    found = read_result(write_optimisation_result(result, problem, tmp_path, name="run", more={"a": [1]}))
+    assert (tmp_path / "run.json").exists()
+    assert found["kind"] == "optimisation"
+    told = found["optimisation"]
+    assert told["objective"]["type"] == "ContactForces"
+    assert told["objective"]["final"] == result.value
+    assert told["objective"]["drop_percent"] > 0.0
+    assert told["design"]["values"] == result.x.tolist()
+    assert told["design"]["variables"] == problem.size
+    assert told["stop"]["converged"] is False
+    assert told["stop"]["reason"].startswith("max_evaluations evaluations were spent")
+    assert told["stop"]["evaluations"] == len(told["history"]["value"]) == 5
+    assert told["history"]["kind"] == [record.kind.value for record in result.history]
+    assert found["counts"]["f_products"] == problem.products > 0
+    assert found["seconds"]["adjoint"] > 0.0
+    assert found["more"] == {"a": [1]}
+
+
+def test_an_optimisation_that_did_not_happen_is_refused(tmp_path: Path) -> None:
+    result, _ = a_minimisation()
+    with pytest.raises(InvalidInputError, match="needs designs that were evaluated, the problem has none"):
+        write_optimisation_result(result, posed("block", MPI.COMM_SELF, 1e-6), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, r"cannot be read: No such file or directory; give the file that write_result returned"),
+        ("{\"format\": \"fenics", r"must be a whole JSON file, .* is none .*it was cut or edited"),
+        ("", r"must be a whole JSON file"),
+        ("[1, 2]", r"must say \"format\": 'fenics_contact result', .* says None: give a file that"),
+        ("{\"format\": \"other\"}", r"says 'other'"),
+        ("{\"format\": \"fenics_contact result\"}", r"format_version of 1 or more, .* has None"),
+        (
+            "{\"format\": \"fenics_contact result\", \"format_version\": 2}",
+            r"reads results up to format_version 1, .* has 2: read it with a newer version",
+        ),
+    ],
+)  # fmt: skip
+def test_what_is_no_result_is_refused(content: str | None, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "result.json"
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(InvalidInputError, match=message):
+        read_result(path)
+    with pytest.raises(InvalidInputError, match=message):
+        read_result(tmp_path)
+
+
+def test_a_result_cut_anywhere_is_refused(tmp_path: Path) -> None:
+    path = write_result(touching_blocks(), tmp_path)
+    content = path.read_bytes()
+    for length in np.linspace(1, len(content) - 3, 40).astype(int):
+        path.write_bytes(content[:length])
+        with pytest.raises(InvalidInputError, match="whole JSON file"):
+            read_result(path)
+
+
+@pytest.mark.parametrize("more", [{"a": float("nan")}, {"a": object()}])
+def test_what_json_does_not_know_is_refused_and_the_old_file_stays(
+    more: dict[str, Any], tmp_path: Path
+) -> None:
+    path = write_result(touching_blocks(), tmp_path)
+    before = path.read_bytes()
+    with pytest.raises(InvalidInputError, match=r"data\['more'\]\['a'\] must be"):
+        write_result(touching_blocks(), tmp_path, more=more)
+    assert path.read_bytes() == before
+
+
+def test_a_name_with_a_folder_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match="name must be the beginning of a file's name, got 'a/b'"):
+        write_result(touching_blocks(), tmp_path, name="a/b")
+
+
+RANKS = """
+    import sys
+    from mpi4py import MPI
+    from fenics_contact.contact import solve_scene
+    from fenics_contact.errors import InvalidInputError
+    from fenics_contact.io import read_result, write_result
+    from tests.contact.gallery import partitions
+    from tests.io.states import blocks
+
+    comm, scene = MPI.COMM_WORLD, blocks()
+    state = solve_scene(scene, partitions(scene), comm, tolerance=1e-6)
+    write_result(state, sys.argv[1], errors=True)
+    try:
+        write_result(state, sys.argv[1], name="nan", more={"a": float("nan")})
+    except InvalidInputError:
+        caught = comm.allreduce(1)
+        if comm.rank == 0:
+            print(caught)
+"""
+
+
+def test_two_ranks_write_one_file_with_the_same_answer(mpirun: Callable[..., str], tmp_path: Path) -> None:
+    assert mpirun(RANKS, 2, tmp_path).strip() == "2"
+    found = read_result(tmp_path / "result.json")
+    alone = read_result(write_result(touching_blocks(), tmp_path, name="alone", errors=True))
+    assert found["ranks"] == 2
+    for key in ("scene", "plan"):
+        assert found[key] == alone[key]
+    assert found["energies"]["strain"] == pytest.approx(alone["energies"]["strain"], rel=1e-5)
+    assert found["errors"]["discretisation"] == pytest.approx(alone["errors"]["discretisation"], rel=1e-3)
+    assert [found["contact"][0][key] for key in ("open", "stick", "slip")] == [
+        alone["contact"][0][key] for key in ("open", "stick", "slip")
+    ]
+    assert sorted(path.name for path in tmp_path.glob("*.json")) == ["alone.json", "result.json"]
