@@ -15,10 +15,11 @@
 #
 # ![Shortening over the angle of the fibres](../docs/pictures/notebooks/03_your_own_ufl_model.png)
 #
-# The package knows a few materials. This notebook adds one that it does not know, wood, in a few lines of
-# UFL (the form language of FEniCSx): an energy, from which stress and stiffness follow. Then come what the
-# package checks before it believes a model, loads in UFL, a stiffness that changes from place to place, and
-# a model whose kernel is not that of an elastic body. Everything is compared with a known answer.
+# The package brings a few materials; sooner or later one is missing. This notebook writes one, wood, in a
+# few lines of UFL (the form language of FEniCSx): an energy, from which stress and stiffness follow. Then
+# come what the package checks before it believes a model, loads in UFL, a stiffness that changes from place
+# to place, and a model whose kernel is not that of an elastic body. Everything is compared with a known
+# answer.
 #
 # It builds on [01 First contact](01_first_contact.ipynb). Units: mm, N, N/mm².
 

@@ -145,7 +145,8 @@ print(S.shape, "from 6 variables to 15 control points")
 #
 # One call evaluates a design: mesh, state, adjoint, subgradient. The adjoint is *one* linear system with
 # the transposed matrix of the state at its solution (who touches, who sticks, who slips is kept), whatever
-# the number of variables. With the adjoint $w$ [mm/N of J] the derivative by $\alpha_k$ is
+# the number of variables. With the adjoint $w$ (newtons of $J$ a newton of load) the derivative by
+# $\alpha_k$ is
 # $\partial J / \partial \alpha_k + \langle w, \text{change of the equilibrium along } V_k \rangle$, where
 # $V_k$ is the mesh motion of control point $k$ and UFL differentiates the forms.
 

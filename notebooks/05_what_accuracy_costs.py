@@ -26,8 +26,8 @@
 # %% [markdown]
 # ## A stored study
 #
-# Hertz's problem: a ball pressed on a block, of which theory knows force, radius of contact and largest
-# pressure, $p_0 = 3F / (2 \pi a^2)$ [N/mm²].
+# Hertz's problem: two round bodies pressed together, of which theory knows force, radius of contact and
+# largest pressure, $p_0 = 3F / (2 \pi a^2)$ [N/mm²].
 
 # %%
 from pathlib import Path
