@@ -33,6 +33,7 @@ class Ending(IntEnum):
     NO_EQUILIBRIUM = 4
     MISSING = 5
     INTERRUPTED = 130
+    STOPPED = 138
     TERMINATED = 143
 
 
@@ -44,6 +45,7 @@ MEANING = {
     Ending.NO_EQUILIBRIUM: "no equilibrium: nothing holds some body against its load",
     Ending.MISSING: "a library is missing or too old",
     Ending.INTERRUPTED: "interrupted from the keyboard",
+    Ending.STOPPED: "stopped by SIGUSR1, as batch systems send, where it can go on",
     Ending.TERMINATED: "terminated by a signal",
 }
 #: For the end of the help text.
