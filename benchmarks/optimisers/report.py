@@ -74,9 +74,9 @@ CONCLUSIONS = """\
   as the bundle method, after 11 evaluations instead of 4, which are few in either case. COBYLA comes lower
   still, by 3e-5, less than the tolerance of the others, for twenty times the products.
 - Where it has kinks, the bundle method goes on where the others stand still: on the coarse chain it ends
-  within 0.02 % of the best after 43 to 59 evaluations. SLSQP may be *faster to a rough answer* (5 % above the
-  best after two evaluations from the link as it is), but then it stops between 0.06 % and 2.5 % above the best
-  and says that it converged. trust-constr ends 0.2 % to 0.5 % above it, and is not done after 150 evaluations.
+  within 0.02 % of the best after 43 to 59 evaluations. SLSQP may be *faster to a rough answer* (5 % above
+  the best after two evaluations from the link as it is), but then it stops between 0.06 % and 2.5 % above the
+  best and says that it converged. trust-constr ends 0.2 % to 0.5 % above, not done after 150 evaluations.
 - COBYLA, without any derivative, beats SLSQP and trust-constr in one of three searches (0.07 %) and is the
   worst in the others (0.5 %, 3 %). For 28 variables it is no bad choice where there is no adjoint.
 - On the finer chain the difference grows: with more contact points the maximum has more kinks, and after 80
