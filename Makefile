@@ -21,7 +21,7 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demos notebooks test test-slow test-hard docs benchmark studies study-optimisation lint setup
+.PHONY: help demo demos notebooks test test-slow test-hard docs benchmark studies study-optimisation study-optimisers lint setup
 
 help: ## Show this list
 	@echo "Targets:"
@@ -60,6 +60,9 @@ docs: $(prepare) ## Build the documentation; output/docs/index.html
 
 study-optimisation: $(prepare) ## Measure what state tolerances do to an optimisation; docs/studies/
 	$(python) -m benchmarks.optimisation_tolerance $(if $(filter quick,$(BENCH)),--quick)
+
+study-optimisers: $(prepare) ## Compare SciPy's optimisers with the bundle method; docs/studies/
+	$(python) -m benchmarks.optimisers $(if $(filter quick,$(BENCH)),--quick)
 
 benchmark: $(prepare) ## Measure time, memory and products; results in benchmarks/
 	$(python) -m benchmarks $(if $(filter quick,$(BENCH)),--quick)

@@ -109,7 +109,7 @@ def _body(
     corners = corners_of(boundary, mesh.dim)
     surfaces = {}
     for surface, parts in facets.items():
-        found = [np.zeros(0, dtype=np.int64)]
+        found: list[np.ndarray] = [np.zeros(0, dtype=np.int64)]
         mine = [number[block] for block in parts.facets if block.shape[1] == corners.shape[1]]
         mine = [block[(block >= 0).all(axis=1)] for block in mine]
         if mine and (candidates := np.concatenate(mine)).size:

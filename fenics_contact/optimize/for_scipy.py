@@ -167,7 +167,8 @@ class ForScipy:
         except InvalidDesignError as error:
             return self._refused(x, error)
         self._keep(x, found.value)
-        return found.value / self._unit, self._problem.scale * found.subgradient / self._unit
+        slope = np.asarray(self._problem.scale * found.subgradient / self._unit, dtype=np.float64)
+        return found.value / self._unit, slope
 
     def value_alone(self, z: ArrayLike) -> float:
         """Return the scaled value at a point in SciPy's variables."""
@@ -203,8 +204,9 @@ class ForScipy:
         distance = float(np.linalg.norm(away))
         top = max(visit.value for visit in valid) / self._unit
         # Curved, so that the methods that estimate curvature find some.
-        slope = _SLOPE * (1.0 + distance)
-        return top + _SLOPE * (1.0 + 0.5 * distance) * distance, slope * away / max(distance, _TINY)
+        steep = _SLOPE * (1.0 + distance) / max(distance, _TINY)
+        wall = np.asarray(steep * away, dtype=np.float64)
+        return top + _SLOPE * (1.0 + 0.5 * distance) * distance, wall
 
     def _box(self, *, keep_feasible: bool) -> scipy.optimize.Bounds | None:
         allowed, scale = self._problem.allowed, self._problem.scale

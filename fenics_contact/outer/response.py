@@ -125,7 +125,7 @@ class Response(ABC):
                     f"{list(self.parameters)}, got {array.shape}: give them all in this order, or some by "
                     "name"
                 )
-            given = dict(zip(self.parameters, array.tolist(), strict=True))
+            given = {name: float(value) for name, value in zip(self.parameters, array, strict=True)}
         chosen = {**(given or {}), **named}
         unknown = [name for name in chosen if name not in self.nominal]
         if unknown:
