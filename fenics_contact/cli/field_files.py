@@ -89,16 +89,16 @@ def draw(path: Path, save: Path | None, look: tuple[str, float], *, window: bool
         return "no window without a display; --save picture.png draws the fields to a file"
     if save is not None and save.suffix != ".png":
         raise InvalidInputError(f"a picture must be a PNG file, got {save.name!r}: let it end in '.png'")
-    from fenics_contact.viz import check_renderer
+    from fenics_contact.viz.renderer import rendering
 
-    check_renderer()
-    plotter = _plotter(path, look, off_screen=save is not None)
-    if save is None:
-        plotter.show()
-        return "window closed"
-    save.parent.mkdir(parents=True, exist_ok=True)
-    plotter.screenshot(str(save))
-    plotter.close()
+    with rendering():
+        plotter = _plotter(path, look, off_screen=save is not None)
+        if save is None:
+            plotter.show()
+            return "window closed"
+        save.parent.mkdir(parents=True, exist_ok=True)
+        plotter.screenshot(str(save))
+        plotter.close()
     return f"picture in {save}"
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich.table import Table
 
 from fenics_contact.cli.desk import Desk, desk_of, facts
 from fenics_contact.cli.field_files import FIELD_FILES, draw, fields_in, newest_member
@@ -17,8 +18,8 @@ SHOWN = (
     "kind", "written", "ranks", "solver", "counts", "residuals", "energies", "errors", "seconds", "contact",
     "optimisation", "more",
 )  # fmt: skip
-#: Longest list that is written out.
-LONGEST = 8
+#: Longest list that is written out, and the most evaluations.
+LONGEST, MOST = 8, 20
 
 
 def add_to(app: typer.Typer) -> None:
@@ -95,14 +96,33 @@ def show_record(desk: Desk, record: dict[str, Any]) -> None:
         if value in (None, {}, []):
             continue
         if isinstance(value, dict):
-            desk.show(facts(dict(_flat(value)), name))
+            history = value.get("history")
+            rest = {key: part for key, part in value.items() if key != "history"}
+            desk.show(facts(dict(_flat(rest)), name))
             desk.say()
+            if history:
+                desk.show(evaluations(history))
+                desk.say()
         elif isinstance(value, list):
             for number, part in enumerate(value):
                 desk.show(facts(dict(_flat(part)), f"{name} {number}"))
             desk.say()
         else:
             desk.show(facts({name: value}))
+
+
+def evaluations(history: dict[str, list[Any]]) -> Table:
+    """Return a table of the evaluations of an optimisation, the first and the last ones."""
+    table = Table(box=None, pad_edge=False, title="evaluations", title_justify="left")
+    for column in ("evaluation", "step", "value", "best"):
+        table.add_column(column, justify="left" if column == "step" else "right")
+    rows = list(zip(*(history[name] for name in ("evaluations", "kind", "value", "best")), strict=True))
+    for number, row in enumerate(rows):
+        if number == 1 and len(rows) > MOST:
+            table.add_row("...")
+        if number == 0 or number > len(rows) - MOST:
+            table.add_row(*map(_number, row))
+    return table
 
 
 def _flat(value: Any, name: str = "") -> list[tuple[str, str]]:
@@ -117,4 +137,6 @@ def _flat(value: Any, name: str = "") -> list[tuple[str, str]]:
 
 
 def _number(value: Any) -> str:
+    if value is None:
+        return ""
     return f"{value:.6g}" if isinstance(value, float) else str(value)

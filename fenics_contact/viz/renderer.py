@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 
 from fenics_contact.errors import MissingRequirementError
@@ -20,7 +22,39 @@ window.Render()
 """
 
 #: What decides where VTK looks for OpenGL.
-_DECIDING = ("VTK_DEFAULT_OPENGL_WINDOW", "VTK_DEFAULT_EGL_DEVICE_INDEX", "DISPLAY", "LD_LIBRARY_PATH")
+_CHOICE = "VTK_DEFAULT_OPENGL_WINDOW"
+_DECIDING = (_CHOICE, "VTK_DEFAULT_EGL_DEVICE_INDEX", "DISPLAY", "LD_LIBRARY_PATH")
+_EGL = "vtkEGLRenderWindow"
+
+
+@contextmanager
+def rendering() -> Iterator[None]:
+    """Let VTK draw by EGL within the block where there is no display and nobody has chosen otherwise.
+
+    VTK itself tries X first and complains that there is none. The environment is as it was afterwards.
+
+    Raises:
+        MissingRequirementError: If this machine cannot render.
+    """
+    check_renderer()
+    if not _chooses_egl():
+        yield
+        return
+    os.environ[_CHOICE] = _EGL
+    try:
+        yield
+    finally:
+        del os.environ[_CHOICE]
+
+
+def _chooses_egl() -> bool:
+    if any(os.environ.get(name) for name in (_CHOICE, "DISPLAY", "WAYLAND_DISPLAY")):
+        return False
+    return not _probe((_EGL, *_deciding()[1:]))
+
+
+def _deciding() -> tuple[str | None, ...]:
+    return tuple(os.environ.get(name) for name in _DECIDING)
 
 
 def check_renderer() -> None:
@@ -29,9 +63,11 @@ def check_renderer() -> None:
     Raises:
         MissingRequirementError: If there is neither EGL nor OSMesa nor an X server to draw with.
     """
-    ending = _probe(tuple(os.environ.get(name) for name in _DECIDING))
+    if _chooses_egl():
+        return
+    ending = _probe(_deciding())
     if ending:
-        window = os.environ.get("VTK_DEFAULT_OPENGL_WINDOW", "not set")
+        window = os.environ.get(_CHOICE, "not set")
         raise MissingRequirementError(
             f"pictures need EGL, OSMesa or an X server to draw with, but a trial rendering {ending} "
             f"(VTK_DEFAULT_OPENGL_WINDOW is {window}): install EGL (Debian: apt-get install libegl1; "
@@ -42,10 +78,13 @@ def check_renderer() -> None:
 
 @lru_cache(maxsize=4)
 def _probe(environment: tuple[str | None, ...]) -> str:
-    """Return how the trial rendering ended, empty if well. ``environment`` only tells answers apart."""
+    """Return how the trial rendering ended, empty if well; all but the window only tells answers apart."""
+    variables = {name: value for name, value in os.environ.items() if name != _CHOICE}
+    if environment[0]:
+        variables[_CHOICE] = environment[0]
     try:
         ending = subprocess.run(
-            [sys.executable, "-c", _PROBE], capture_output=True, timeout=120.0, check=False
+            [sys.executable, "-c", _PROBE], env=variables, capture_output=True, timeout=120.0, check=False
         )
     except subprocess.TimeoutExpired:
         return "did not end within two minutes"

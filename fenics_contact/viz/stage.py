@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from fenics_contact.viz.renderer import check_renderer
+from fenics_contact.viz.renderer import rendering
 from fenics_contact.viz.view import Frame, View
 
 #: Pixels are averaged over squares of this many, which smooths edges on every machine alike.
@@ -92,21 +92,23 @@ def staged(layers: Iterable[Layer], view: View, frame: Frame, size: tuple[int, i
     Raises:
         MissingRequirementError: If this machine cannot render.
     """
-    check_renderer()
-    theme = pv.themes.DocumentTheme()
-    plotter = pv.Plotter(off_screen=True, window_size=list(size), theme=theme, lighting="none")
-    try:
-        plotter.background_color = "white"
-        # One lamp above the viewer's left shoulder: colours keep their brightness on all that is seen.
-        plotter.add_light(pv.Light(position=(-0.3, 0.35, 1.0), light_type="camera light"))
-        middle = np.zeros(3)
-        for layer in layers:
-            plotter.add_mesh(layer.mesh, **{"show_scalar_bar": False, "reset_camera": False, **layer.options})
-            middle = np.asarray(layer.mesh.center)
-        _aim(plotter, view, frame, middle)
-        yield plotter
-    finally:
-        plotter.close()
+    with rendering():
+        theme = pv.themes.DocumentTheme()
+        plotter = pv.Plotter(off_screen=True, window_size=list(size), theme=theme, lighting="none")
+        try:
+            plotter.background_color = "white"
+            # One lamp above the viewer's left shoulder: colours keep their brightness on all that is seen.
+            plotter.add_light(pv.Light(position=(-0.3, 0.35, 1.0), light_type="camera light"))
+            middle = np.zeros(3)
+            for layer in layers:
+                plotter.add_mesh(
+                    layer.mesh, **{"show_scalar_bar": False, "reset_camera": False, **layer.options}
+                )
+                middle = np.asarray(layer.mesh.center)
+            _aim(plotter, view, frame, middle)
+            yield plotter
+        finally:
+            plotter.close()
 
 
 def _aim(plotter: Any, view: View, frame: Frame, middle: np.ndarray) -> None:

@@ -11,7 +11,9 @@ from mpi4py import MPI
 
 from fenics_contact import cli
 from fenics_contact.cli.blas import Blas, loaded_blas, numpy_speed
+from fenics_contact.cli.desk import Desk
 from fenics_contact.cli.shipped import folder_of_demos, shipped
+from fenics_contact.cli.view import show_record
 from tests.conftest import ROOT
 from tests.scene_file.texts import GOOD
 
@@ -121,6 +123,24 @@ def test_view_shows_numbers_and_fields(result: Path, capsys: pytest.CaptureFixtu
     for words in ("torn_unknowns", "normal_force", "fields of state.vtm", "von_mises", "no window without"):
         assert words in printed
     assert run("view", result / "result.json", "--no-window") == 0
+
+
+def test_view_lists_the_first_and_the_last_evaluations(capsys: pytest.CaptureFixture[str]) -> None:
+    count = 50
+    history = {
+        "evaluations": list(range(1, count + 1)),
+        "kind": ["start"] + ["null"] * (count - 2) + ["rejected"],
+        "value": [float(-number) for number in range(count - 1)] + [None],
+        "best": [float(-number) for number in range(count - 1)] + [-48.0],
+        "aggregate_norm": [1.0] * count,
+    }
+    show_record(Desk(MPI.COMM_SELF), {"optimisation": {"stop": {"converged": True}, "history": history}})
+    told = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert ["stop.converged", "True"] in told
+    assert told.index(["1", "start", "0", "0"]) + 1 == told.index(["..."])
+    assert told.index(["..."]) + 1 == told.index(["31", "null", "-30", "-30"])
+    assert ["50", "rejected", "-48"] in told
+    assert "aggregate" not in str(told)
 
 
 def test_view_draws_to_a_file(result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,12 +3,27 @@
 from __future__ import annotations
 
 import importlib.util
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 
 import pytest
 
 from fenics_contact.errors import MissingRequirementError
 from fenics_contact.viz import check_libraries, check_renderer, renderer
+
+#: Draws a ball, and tells whether the environment is changed afterwards.
+DRAWN = """
+import os
+import numpy as np
+from fenics_contact.viz.stage import Layer, balls, render
+from fenics_contact.viz.view import Frame, face_on
+layers = [Layer(balls(np.zeros((1, 3)), 0.5))]
+frame = Frame(np.array([-2.0, -1.0]), np.array([2.0, 1.0]))
+image = render(layers, face_on(np.array([0.0, 0.0, 1.0])), frame, 40)
+print(image.shape, "VTK_DEFAULT_OPENGL_WINDOW" in os.environ)
+"""
 
 
 @pytest.fixture
@@ -48,6 +63,15 @@ def test_another_environment_is_probed_again(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setenv("DISPLAY", ":77")
     with pytest.raises(MissingRequirementError):
         check_renderer()
+
+
+def test_without_a_display_pictures_are_drawn_without_complaints(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "VTK_DEFAULT_OPENGL_WINDOW"):
+        monkeypatch.delenv(name, raising=False)
+    done = subprocess.run(
+        [sys.executable, "-c", DRAWN], env=dict(os.environ), capture_output=True, text=True, timeout=120
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "(20, 40, 3) False\n", "")
 
 
 @pytest.mark.parametrize("missing", ["pyvista", "matplotlib"])
