@@ -126,7 +126,7 @@ print(f"largest pressure {contact.pressure.max():8.1f} N/mm²")
 print(f"widest gap       {contact.gap.max():8.4f} mm")
 
 # %% [markdown]
-# The next picture shows the surface of contact from below, as the table sees it.
+# The next picture shows the surface of contact from below, as the table sees it: x runs to the left.
 
 # %%
 from fenics_contact.viz import plot_contact_pressure

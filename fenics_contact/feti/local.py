@@ -49,7 +49,8 @@ def interface_dofs(touched: np.ndarray, kernel: np.ndarray, points: np.ndarray) 
     """
     modes, _ = np.linalg.qr(kernel)
     trace = np.linalg.svd(modes[touched], compute_uv=False)
-    if np.count_nonzero(trace > RANK_TOLERANCE) < kernel.shape[1]:
+    # A body on an elastic bed may meet nothing at all; an interface without dofs is none.
+    if not touched.any() or np.count_nonzero(trace > RANK_TOLERANCE) < kernel.shape[1]:
         touched = touched.copy()
         touched.reshape(points.shape)[fixing_nodes(points)] = True
     return np.flatnonzero(touched)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,16 +46,18 @@ class Bedded(IsotropicElasticity):
         return rigid_body_modes(points)[:, :, [] if self.sideways else [0, 1, 5]]
 
 
-def pushed(material: Bedded, parts: tuple[int, int, int]) -> State:
+def pushed(material: Bedded, parts: tuple[int, int, int], *, on_floor: bool = True) -> State:
     mesh = block((0.0, 0.0, 0.0), (20.0, 20.0, 40.0), (3, 3, 6))
     floor = ContactPair(Surface("block", "z0"), RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
-    scene = Scene({"block": Body(mesh, material)}, [], [TotalForce("block", "z1", FORCE)], [floor])
-    return solve_scene(scene, {"block": box_partition(mesh, parts)}, MPI.COMM_SELF, tolerance=1e-9)
+    contacts = [floor] if on_floor else []
+    scene = Scene({"block": Body(mesh, material)}, [], [TotalForce("block", "z1", FORCE)], contacts)
+    return solve_scene(scene, {"block": box_partition(mesh, parts)}, MPI.COMM_WORLD, tolerance=1e-9)
 
 
+@pytest.mark.parametrize("on_floor", [True, False])
 @pytest.mark.parametrize("parts", [(1, 1, 1), (1, 1, 3)])
-def test_a_bed_balances_a_load_that_nothing_else_resists(parts: tuple[int, int, int]) -> None:
-    state = pushed(Bedded(1e3, 0.3), parts)
+def test_a_bed_balances_a_load_that_nothing_else_resists(parts: tuple[int, int, int], on_floor: bool) -> None:
+    state = pushed(Bedded(1e3, 0.3), parts, on_floor=on_floor)
     assert state.dual.problem.coarse.m == 0
     subdomains = state.torn.subdomains
     forces = [
@@ -64,7 +67,25 @@ def test_a_bed_balances_a_load_that_nothing_else_resists(parts: tuple[int, int, 
     reaction = np.concatenate(forces).reshape(-1, 3).sum(axis=0)  # strains have no resultant
     np.testing.assert_allclose(reaction, np.add(FORCE, state.contact.force.sum(axis=0)), atol=1e-6)
     assert reaction[0] == pytest.approx(FORCE[0])
-    assert 100.0 < state.contact.normal_force.sum() < 3200.0
+    pressed = state.contact.normal_force.sum()
+    assert 100.0 < pressed < 3200.0 if on_floor else pressed == 0.0
+
+
+ON_RANKS = """
+    from mpi4py import MPI
+    from tests.contact.test_bedded import Bedded, pushed
+
+    state = pushed(Bedded(1e3, 0.3), (1, 1, 3))
+    lowest = float(state.gather_displacement("block").min())
+    if MPI.COMM_WORLD.rank == 0:
+        print(lowest)
+"""
+
+
+def test_a_bed_is_the_same_on_two_ranks(mpirun: Callable[..., str]) -> None:
+    alone = float(pushed(Bedded(1e3, 0.3), (1, 1, 3)).gather_displacement("block").min())
+    assert alone < -0.1
+    assert float(mpirun(ON_RANKS, 2)) == pytest.approx(alone, rel=1e-8)
 
 
 def test_a_bed_that_acts_upwards_alone_does_not_hold_sideways() -> None:

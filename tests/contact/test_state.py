@@ -92,3 +92,14 @@ def test_counts_and_seconds_are_told() -> None:
     assert counts["solver_steps"] == len(state.solution.history) > 1
     assert {"decompose", "assemble", "factor", "solve", "state"} <= set(state.seconds)
     assert all(seconds >= 0 for seconds in state.seconds.values())
+
+
+def test_places_of_contact_points_are_those_of_their_slave_nodes() -> None:
+    state = solved(two_blocks(Coulomb(0.38)))
+    slave = state.scene.contacts[0].slave
+    mesh = state.scene.bodies[slave.body].mesh
+    wanted = mesh.points[np.unique(mesh.surfaces[slave.name])]
+    places = state.contact_places
+    assert places.shape == (state.contact.points.count, 3)
+    assert len(wanted) == len(places) > 10
+    np.testing.assert_array_equal(np.unique(places, axis=0), np.unique(wanted, axis=0))
