@@ -130,16 +130,16 @@ def test_view_lists_the_first_and_the_last_evaluations(capsys: pytest.CaptureFix
     history = {
         "evaluations": list(range(1, count + 1)),
         "kind": ["start"] + ["null"] * (count - 2) + ["rejected"],
-        "value": [float(-number) for number in range(count - 1)] + [None],
-        "best": [float(-number) for number in range(count - 1)] + [-48.0],
+        "value": [-1.0 - number for number in range(count - 1)] + [None],
+        "best": [-1.0 - number for number in range(count - 1)] + [-49.0],
         "aggregate_norm": [1.0] * count,
     }
     show_record(Desk(MPI.COMM_SELF), {"optimisation": {"stop": {"converged": True}, "history": history}})
     told = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert ["stop.converged", "True"] in told
-    assert told.index(["1", "start", "0", "0"]) + 1 == told.index(["..."])
-    assert told.index(["..."]) + 1 == told.index(["31", "null", "-30", "-30"])
-    assert ["50", "rejected", "-48"] in told
+    assert told.index(["1", "start", "-1", "-1"]) + 1 == told.index(["..."])
+    assert told.index(["..."]) + 1 == told.index(["31", "null", "-31", "-31"])
+    assert ["50", "rejected", "-49"] in told
     assert "aggregate" not in str(told)
 
 
