@@ -138,7 +138,7 @@ def test_view_lists_the_first_and_the_last_evaluations(capsys: pytest.CaptureFix
     told = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert ["stop.converged", "True"] in told
     assert told.index(["1", "start", "-1", "-1"]) + 1 == told.index(["..."])
-    assert told.index(["..."]) + 1 == told.index(["31", "null", "-31", "-31"])
+    assert told.index(["..."]) + 1 == told.index(["32", "null", "-32", "-32"])
     assert ["50", "rejected", "-49"] in told
     assert "aggregate" not in str(told)
 
