@@ -16,6 +16,7 @@ from fenics_contact.feti.gluing import GluingRows, gluing_rows, prescribed_displ
 from fenics_contact.feti.nodal_stiffness import cell_stiffness
 from fenics_contact.feti.subdomain import SubdomainMesh, cut_out
 from fenics_contact.geometry import check_face_connected
+from fenics_contact.linalg.threads import warn_of_threads
 from fenics_contact.scene import Scene
 
 
@@ -75,6 +76,8 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
     """
     with together(comm):
         _check_partitions(scene, partitions)
+        if comm.rank == 0:
+            warn_of_threads(comm.size)
     forms = FormLibrary(comm)
     forms.prepare(scene)
     with together(comm):

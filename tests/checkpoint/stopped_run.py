@@ -74,6 +74,8 @@ def optimisation(checkpoint: Checkpoint | None) -> dict[str, Any]:
 RUNS = {"steps": ("load steps", steps), "optimisation": ("optimisation", optimisation)}
 
 if __name__ == "__main__":
+    # Jobs in the background of a shell are started deaf to Ctrl-C, and so is what they start.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     kind, path, name, *more = sys.argv[1:]
     what, run = RUNS[kind]
     rank = next((int(word) for word in more if word.isdecimal()), 0)

@@ -37,16 +37,22 @@ GIVEN = {
     *CLASSES,
     "MPI",
     "alpha",
+    "bodies",
     "build",
     "comm",
+    "floor",
     "length",
     "links",
     "mesh",
+    "optuna",
     "partitions",
     "path",
     "pull",
+    "response",
     "start",
+    "steel",
     "weight",
+    "zinc",
 }
 
 
