@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ from rich import box
 from rich.table import Table
 
 from fenics_contact.contact import State, Status
+from fenics_contact.scene import ContactPair, Surface
 from fenics_contact.scene_file import SceneFile
 
 if TYPE_CHECKING:
@@ -41,19 +43,32 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
 def pairs(state: State, units: UnitNames) -> list[str]:
     """Return what happens at each contact pair."""
     contact, found = state.contact, []
-    for number in range(len(state.scene.contacts)):
+    for number, pair in enumerate(state.scene.contacts):
         mine = contact.on_pair(number)
         force = np.linalg.norm(contact.force[mine].sum(axis=0))
         pressure = contact.pressure[mine].max(initial=0.0)
-        kinds = ", ".join(
-            f"{int(np.count_nonzero(contact.status[mine] == status))} {status.name.lower()}"
-            for status in Status
-        )
         found.append(
-            f"{len(mine)} points: {kinds}; force {force:.6g} {units.force}, pressure up to {pressure:.5g} "
-            f"{units.stress}"
+            f"{_place(pair)}: {len(mine)} points, {_kinds(pair, contact.status[mine])}; "
+            f"force {force:.6g} {units.force}, pressure up to {pressure:.5g} {units.stress}"
         )
     return found
+
+
+def _kinds(pair: ContactPair, status: np.ndarray) -> str:
+    """Return how many points do what; without friction they are open or closed."""
+    counts = {kind.name.lower(): int(np.count_nonzero(status == kind)) for kind in Status}
+    if not pair.has_friction:
+        counts = {"open": counts["open"], "closed": len(status) - counts["open"]}
+    return ", ".join(f"{count} {name}" for name, count in counts.items())
+
+
+def _place(pair: ContactPair) -> str:
+    """Return where a pair touches: "upper z0 on lower z1", "block z0 on rigid plane"."""
+    slave, master = pair.slave, pair.master
+    if isinstance(master, Surface):
+        return f"{slave.body} {slave.name} on {master.body} {master.name}"
+    words = re.sub(r"(?<!^)(?=[A-Z])", " ", type(master).__name__).lower()
+    return f"{slave.body} {slave.name} on {words}"
 
 
 def step_row(number: int, name: str, state: State) -> tuple[str, ...]:

@@ -1,0 +1,29 @@
+"""What tables say of contact."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.cli.tables import pairs
+from fenics_contact.contact import solve_scene
+from fenics_contact.scene import Coulomb, Scene
+from fenics_contact.scene_file.units import UnitNames
+from tests.contact.gallery import partitions, pressed_block, two_blocks
+
+
+RUBBING = r"\w+ \w+ on \w+ \w+: \d+ points, \d+ open, \d+ stick, \d+ slip; force [1-9.]"
+SMOOTH = r"\w+ \w+ on rigid plane: \d+ points, \d+ open, [1-9]\d* closed; force [1-9.]"
+
+
+@pytest.mark.parametrize(
+    ("scene", "told"),
+    [(two_blocks(Coulomb(0.6)), RUBBING), (pressed_block(None), SMOOTH)],
+    ids=["two bodies with friction", "rigid plane without"],
+)
+def test_a_pair_is_told_by_its_surfaces_and_its_points_by_what_they_can_do(scene: Scene, told: str) -> None:
+    state = solve_scene(scene, partitions(scene), MPI.COMM_SELF)
+    (words,) = pairs(state, UnitNames())
+    assert re.match(told, words), words
