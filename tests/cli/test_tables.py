@@ -13,7 +13,6 @@ from fenics_contact.scene import Coulomb, Scene
 from fenics_contact.scene_file.units import UnitNames
 from tests.contact.gallery import partitions, pressed_block, two_blocks
 
-
 RUBBING = r"\w+ \w+ on \w+ \w+: \d+ points, \d+ open, \d+ stick, \d+ slip; force [1-9.]"
 SMOOTH = r"\w+ \w+ on rigid plane: \d+ points, \d+ open, [1-9]\d* closed; force [1-9.]"
 
