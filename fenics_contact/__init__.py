@@ -2,14 +2,16 @@
 
 The floors of the package, from the ground up; each imports only those before it:
 
+* `fenics_contact.progress`: how far long work is,
 * `fenics_contact.checkpoint`: files from which interrupted runs go on,
 * `fenics_contact.geometry`: chain links, blocks, Hertz bodies, partitions,
 * `fenics_contact.scene`: bodies, materials, supports, loads, contact pairs,
 * `fenics_contact.qp`: dual solvers for bounds and friction discs,
 * `fenics_contact.feti`: subdomains, gluing, contact rows, the dual problem,
+* `fenics_contact.accuracy`: how far off a state is,
 * `fenics_contact.contact`: scene → state,
 * `fenics_contact.shape`: design → value and subgradient,
-* `fenics_contact.optimize`: the bundle trust method.
+* `fenics_contact.optimize`: the bundle trust method; `fenics_contact.outer`: plain functions for other tools.
 
 Beside them: `fenics_contact.viz` (pictures), `fenics_contact.io` (files) and `fenics_contact.scene_file`
 (scenes as TOML files). On top: `fenics_contact.study` (what accuracy costs in time) and `fenics_contact.cli`
