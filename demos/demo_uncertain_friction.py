@@ -23,7 +23,7 @@ from scipy.stats import norm, qmc
 
 from fenics_contact.contact import Status
 from fenics_contact.geometry import rectangle_lattice
-from fenics_contact.io import write_json, write_vtu
+from fenics_contact.io import write_result, write_vtu
 from fenics_contact.outer import SceneResponse, served
 from fenics_contact.scene import (
     Body,
@@ -142,7 +142,6 @@ write_vtu(response.state, output, "last_held")
 
 ratio = pressure[~slides] / hertz[~slides]
 record = {
-    "ranks": comm.size,
     "samples": len(samples),
     "slide": int(np.count_nonzero(slides)),
     "probability_expected": probability,
@@ -153,7 +152,7 @@ record = {
     "stick_share_median": np.median(sticking[~slides] / closed[~slides]),
     "products": response.products,
 }
-write_json(output / "result.json", record, comm=comm)
+write_result(response.state, output, more=record)
 if comm.rank == 0:
     ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"
     print(f"a shoe under {len(samples)} uncertain loads and coefficients of friction, {ranks}")

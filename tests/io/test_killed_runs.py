@@ -50,7 +50,7 @@ def ended(kind: str, folder: Path, ranks: int = 1, moment: tuple[str, int, int] 
         return True
     killed = end.returncode in (-9, 137) or "signal 9" in end.stderr
     assert moment, end.stderr
-    assert killed, end.stderr
+    assert killed, f"exit status {end.returncode}: {end.stderr}"
     return False
 
 
