@@ -16,7 +16,7 @@ from fenics_contact._dolfinx.assembly import (
 )
 from fenics_contact._dolfinx.cells import CELL_TYPES, degree, dimension, facet_vertices, shape
 from fenics_contact._dolfinx.forms import CompiledForm
-from fenics_contact._dolfinx.loading import VERSION, dolfinx, jit
+from fenics_contact._dolfinx.loading import RELEASE, VERSION, dolfinx, jit
 from fenics_contact._dolfinx.meshes import local_mesh, rank_mesh
 from fenics_contact._dolfinx.numbering import (
     cell_dofs,
@@ -44,6 +44,7 @@ Function = dolfinx.fem.Function
 __all__ = [
     "CELL_TYPES",
     "HAS_VTX",
+    "RELEASE",
     "VERSION",
     "CompiledForm",
     "Constant",

@@ -38,8 +38,9 @@ with side_effects_undone():
     import dolfinx.mesh
     from dolfinx import cpp, jit
 
-__all__ = ["OLD", "VERSION", "cpp", "dolfinx", "jit", "side_effects_undone"]
+__all__ = ["OLD", "RELEASE", "VERSION", "cpp", "dolfinx", "jit", "side_effects_undone"]
 
-VERSION: tuple[int, ...] = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
+RELEASE: str = dolfinx.__version__
+VERSION: tuple[int, ...] = tuple(int(part) for part in RELEASE.split(".")[:2])
 #: The interface of dolfinx 0.5 and 0.6; later releases have the newer one.
 OLD = VERSION < (0, 7)

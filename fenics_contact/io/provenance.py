@@ -21,8 +21,7 @@ def versions() -> dict[str, str]:
     A library that is not installed, or that does not tell, says so instead.
     """
     found = {"fenics_contact": _installed("fenics_contact"), "python": platform.python_version()}
-    told = _installed("fenics-dolfinx")  # the name of its metadata; not every build leaves any
-    found["dolfinx"] = told if told[0].isdigit() else ".".join(map(str, _dolfinx.VERSION))
+    found["dolfinx"] = _dolfinx.RELEASE
     found["petsc"] = ".".join(map(str, PETSc.Sys.getVersion()))
     found["mpi"] = MPI.Get_library_version().partition(",")[0].strip("\x00 \n")
     return found | {name: _installed(name) for name in _MODULES}
