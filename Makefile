@@ -21,7 +21,7 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demos notebooks test test-slow test-hard docs benchmark studies study-optimisation study-optimisers lint setup
+.PHONY: help demo demos notebooks test test-slow test-hard test-claims mutants docs benchmark studies study-optimisation study-optimisers lint setup
 
 help: ## Show this list
 	@echo "Targets:"
@@ -53,6 +53,12 @@ test-slow: $(prepare) ## Run the tests that take long
 
 test-hard: $(prepare) ## Run the hard cases; writes docs/hard_cases.md
 	$(launch) 1 $(python) -m pytest tests/hard -m hard --hard-table docs/hard_cases.md
+
+test-claims: $(prepare) ## Run what claims rest on: effectivity under contact, certificates, hard cases once
+	$(launch) 1 $(python) -m pytest -n $(JOBS) -m claim
+
+mutants: $(prepare) ## Make mistakes in a copy of the package, which the quick tests must find
+	$(launch) 1 $(python) -m pytest tests/mutants -m slow
 
 docs: $(prepare) ## Build the documentation; output/docs/index.html
 	$(launch) 1 $(python) -m sphinx -W --keep-going -q -c docs -d output/docs-doctrees . output/docs

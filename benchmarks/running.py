@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.plan import Run
+from fenics_contact.launching import last_words
 
 ROOT = Path(__file__).resolve().parents[1]
 RAW = ROOT / "output" / "benchmarks" / "raw"
@@ -63,7 +64,7 @@ def measure(run: Run) -> Record:
     if not isinstance(record, dict):
         raise RunFailed(
             f"{run.name} must print one JSON object on its last line, got exit status {process.returncode} "
-            f"from {' '.join(command)} and:\n{(output + errors)[-3000:]}"
+            f"from {' '.join(command)} and:\n{last_words(command, output + errors, 3000)}"
         )
     return {**record, "load_average": load}
 

@@ -11,7 +11,7 @@
 # where the displacement $u$ [mm] solves the contact problem with Coulomb friction on the design
 # $\alpha$ [mm]: no point of link 2 enters link 1, contact forces press, and $\|\tau\| \le \mu \lambda_N$
 # with equality where the links slide. $J$ is not differentiable everywhere. The bundle method needs one
-# Clarke subgradient a step, which costs one adjoint solve for all 28 variables.
+# subgradient a step, which costs one adjoint solve for all 28 variables.
 #
 # Run it with `make demo` (66 528 unknowns in 32 subdomains, the size of the published experiment),
 # `make demo NP=2` (two MPI ranks), or `make demo SIZE=small` (less than half of the unknowns).

@@ -20,7 +20,7 @@ Beside them: `fenics_contact.viz` (pictures), `fenics_contact.io` (files) and `f
 
 from fenics_contact import _requirements
 
-_requirements.check()
+_requirements.check()  # that they are there; nothing is loaded or started before it is used
 
 __version__ = "0.1.0.dev0"
 __all__ = ["__version__"]

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 
-from mpi4py import MPI
+for _name in ("stdout", "stderr"):
+    if getattr(sys, _name) is None:  # closed by who started the program; UFL asks for it when imported
+        setattr(sys, _name, open(os.devnull, "w", encoding="utf-8"))
 
-from fenics_contact import cli
+from fenics_contact import cli  # noqa: E402
+from fenics_contact._libraries import MPI  # noqa: E402
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

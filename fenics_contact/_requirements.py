@@ -1,7 +1,8 @@
 """What the package stands on, checked by name before anything of it is used.
 
 dolfinx, petsc4py, mpi4py and gmsh come from the system and not from pip, so no installer has compared
-their versions with what the package needs.
+their versions with what the package needs. What is there, and in which version, is checked when the package
+is imported; what a library can do, when it is loaded.
 """
 
 from __future__ import annotations
@@ -10,11 +11,15 @@ import importlib
 import importlib.util
 import logging
 import re
+import sys
 from dataclasses import dataclass
 from importlib import metadata
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fenics_contact.errors import MissingRequirementError
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 _log = logging.getLogger(__name__)
 
@@ -57,18 +62,18 @@ class Requirement:
 
 _DEBIAN_FENICSX = "apt-get install --no-install-recommends python3-dolfinx-real"
 
-_FROM_SYSTEM = [
-    Requirement("mpi4py", "3.1", _DEBIAN_FENICSX, "conda install -c conda-forge mpi4py"),
-    Requirement("petsc4py", "3.18", _DEBIAN_FENICSX, 'conda install -c conda-forge petsc4py "petsc=*=real*"'),
-    Requirement(
-        "dolfinx",
-        "0.5",
-        _DEBIAN_FENICSX,
-        "conda install -c conda-forge fenics-dolfinx",
-        distribution="fenics-dolfinx",
-        tested=("0.5", "0.9"),
-    ),
-]
+_MPI4PY = Requirement("mpi4py", "3.1", _DEBIAN_FENICSX, "conda install -c conda-forge mpi4py")
+_PETSC4PY = Requirement(
+    "petsc4py", "3.18", _DEBIAN_FENICSX, 'conda install -c conda-forge petsc4py "petsc=*=real*"'
+)
+DOLFINX = Requirement(
+    "dolfinx",
+    "0.5",
+    _DEBIAN_FENICSX,
+    "conda install -c conda-forge fenics-dolfinx",
+    distribution="fenics-dolfinx",
+    tested=("0.5", "0.9"),
+)
 _NUMERICAL = [
     Requirement("numpy", "1.24", _DEBIAN_FENICSX, "conda install -c conda-forge numpy"),
     Requirement("scipy", "1.10", _DEBIAN_FENICSX, "conda install -c conda-forge scipy"),
@@ -84,17 +89,46 @@ _PYMETIS = Requirement("pymetis", "2025.2", "pip install pymetis", "conda instal
 
 
 def check() -> None:
-    """Check everything that every part of the package needs.
+    """Check that everything is there that every part of the package needs; loads and starts nothing of it.
 
     Raises:
-        MissingRequirementError: A library is missing, too old, cannot be loaded, or PETSc was built
-            with complex numbers or without a sparse Cholesky factorisation.
+        MissingRequirementError: A library is missing or too old.
     """
-    for requirement in _NUMERICAL + _FROM_SYSTEM:
+    for requirement in [*_NUMERICAL, _MPI4PY, _PETSC4PY, DOLFINX]:
         _check_installed(requirement)
-    mpi4py, petsc4py, _ = _FROM_SYSTEM
-    _load(mpi4py, "mpi4py.MPI")
-    _check_petsc(petsc4py, _load(petsc4py, "petsc4py.PETSc"))
+
+
+def load_mpi() -> Any:
+    """Return ``mpi4py.MPI``; starts MPI unless ``mpi4py.rc`` says otherwise.
+
+    Raises:
+        MissingRequirementError: mpi4py cannot be loaded.
+    """
+    return _load(_MPI4PY, "mpi4py.MPI")
+
+
+def petsc_is_started() -> bool:
+    """Tell whether PETSc can be used; starts nothing."""
+    petsc = sys.modules.get("petsc4py.PETSc")
+    return petsc is not None and bool(petsc.Sys.isInitialized())
+
+
+def load_petsc(world: MPI.Comm | None = None) -> Any:
+    """Return ``petsc4py.PETSc``; starts PETSc where nobody has.
+
+    Args:
+        world: Communicator on which it is started, which is collective; all ranks of MPI by default.
+
+    Raises:
+        MissingRequirementError: petsc4py cannot be loaded, or PETSc was built with complex numbers or
+            without a sparse Cholesky factorisation.
+    """
+    load_mpi()
+    if world is not None:
+        _load(_PETSC4PY, "petsc4py").init(comm=world)
+    petsc = _load(_PETSC4PY, "petsc4py.PETSc")
+    _check_petsc(_PETSC4PY, petsc)
+    return petsc
 
 
 def check_gmsh() -> None:
@@ -117,6 +151,11 @@ def load_pymetis() -> Any:
     """
     _check_installed(_PYMETIS)
     return _load(_PYMETIS, "pymetis")
+
+
+def pymetis_error(ending: str) -> MissingRequirementError:
+    """Return the error of a pymetis that is there and does not run."""
+    return _PYMETIS.error(f"{_PYMETIS.version() or 'one'} that {ending}")
 
 
 def _check_installed(requirement: Requirement) -> None:

@@ -196,8 +196,10 @@ assert abs(forwards - backwards) > 10.0
 
 # %% [markdown]
 # The two one-sided slopes differ, however small $h$ is: that is the kink, not an error. What the adjoint
-# returns there belongs to one branch. It is one *Clarke subgradient*, and all that a bundle method asks
-# for; a method for smooth functions, such as BFGS, could stop at such a place although it is no minimum.
+# returns there belongs to one branch. A *subgradient* is all that a bundle method asks for; a method for
+# smooth functions, such as BFGS, could stop at such a place although it is no minimum. (Of several points
+# on their switches one branch may give none: a `ShapeProblem` itself, handed to `minimize`, says so, and
+# the method looks beside such designs.)
 #
 # ## Cutting planes
 #

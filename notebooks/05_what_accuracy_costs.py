@@ -100,10 +100,10 @@ for quantity in hertz.scene.quantities:
 # ## What the error consists of
 #
 # Every state carries its own errors, relative and in energy norm: `state.errors.algebraic` is a
-# certificate, an upper bound of what the solver left; `state.errors.friction` is what is missing to
-# Coulomb's law; `state.errors.discretisation` estimates what the mesh cannot represent. By default the
-# solver stops as soon as its part is a tenth of that of the mesh. A case with friction, the cylinders of
-# Cattaneo and Mindlin:
+# certificate, an upper bound of what the solver left at the slip bounds of the state;
+# `state.errors.friction` estimates what is missing to Coulomb's law, `state.errors.discretisation` what
+# the mesh cannot represent. By default the solver stops as soon as its part is a tenth of that of the
+# mesh. A case with friction, the cylinders of Cattaneo and Mindlin:
 
 # %%
 figures.plot_parts(Errors(read_study(folder / "cattaneo_mindlin")))

@@ -24,13 +24,18 @@ class Room:
 
 #: From the ground up, as in the test of imports.
 FLOORS = [
-    [Room("errors", "what is needed, given, to do", "ground")],
-    [Room("progress", "how far work is", "ground")],
+    [Room("errors", "what is needed, given, to do; on all ranks", "ground")],
+    [
+        Room("progress", "how far work is", "ground"),
+        Room("fingerprint", "what was given, in words; the same on all ranks", "ground"),
+    ],
     [
         Room("_requirements", "libraries", "ground"),
+        Room("launching", "processes on ranks", "ground"),
         Room("timing", "seconds by phase", "ground"),
         Room("checkpoint", "whole files to go on from", "ground"),
     ],
+    [Room("_libraries", "MPI and PETSc, loaded when they are used", "ground")],
     [Room("_dolfinx", "the one room that knows the version of dolfinx", "ground")],
     [
         Room("geometry", "meshes, names, partitions", "model"),
@@ -60,7 +65,7 @@ FLOW = [
     ("2", "TornSystem", "subdomains on every rank: K, f, R, rows of B"),
     ("3", "DualProblem", "F, d, G, e → multipliers λ"),
     ("4", "State", "u, forces, status, energies, errors"),
-    ("5", "DesignPoint", "J and a Clarke subgradient"),
+    ("5", "DesignPoint", "J and a subgradient"),
     ("6", "Result", "the best design, its history"),
 ]
 

@@ -20,22 +20,7 @@ set -a
 set +a
 export PYTHONPATH=$root${PYTHONPATH:+:$PYTHONPATH} # so that a Python without the package installed finds it too
 
-mpirun_of() {
-  local prefix
-  for prefix in $("$1" -c 'import sys; print(sys.prefix, sys.base_prefix)'); do
-    if [ -x "$prefix/bin/mpirun" ]; then
-      echo "$prefix/bin/mpirun"
-      return
-    fi
-  done
-  command -v mpirun || {
-    echo "launch.sh needs mpirun for $ranks ranks, found none beside $1 or on PATH: install the MPI of its mpi4py" >&2
-    exit 2
-  }
-}
-
-if [ "$ranks" = 1 ]; then
-  exec "$python" "$@"
-fi
-mpirun=$(mpirun_of "$python")
-exec "$mpirun" -n "$ranks" "$python" "$@"
+# What MPI has left in the environment of the caller would make mpirun fail.
+start=$("$python" -P "$root/fenics_contact/launching.py" "$ranks") || exit 2
+mapfile -t start <<<"$start"
+exec "${start[@]}" "$python" "$@"

@@ -17,7 +17,6 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 LAUNCH = ROOT / "scripts" / "launch.sh"
-MPI_TRACES = ("OMPI_", "ORTE_", "PMI_", "PMIX_", "PRTE_")
 
 
 def read_environment(path: Path) -> dict[str, str]:
@@ -62,9 +61,6 @@ def launch(ranks: object, *arguments: object, timeout: float = 120.0) -> subproc
     Raises:
         subprocess.TimeoutExpired: It did not end in time; the exception holds its output.
     """
-    # MPI_Init has written into the environment of this process, though not into `os.environ`; ranks that
-    # find those traces, or those of an mpirun around this process, take themselves for parts of it.
-    environment = {name: value for name, value in os.environ.items() if not name.startswith(MPI_TRACES)}
     command = [str(LAUNCH), str(ranks), sys.executable, *map(str, arguments)]
     process = subprocess.Popen(
         command,
@@ -72,7 +68,6 @@ def launch(ranks: object, *arguments: object, timeout: float = 120.0) -> subproc
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env=environment,
         start_new_session=True,
     )
     try:

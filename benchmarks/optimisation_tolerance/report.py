@@ -40,8 +40,7 @@ converged. The adaptive one asks for what each step needs and confirms the last 
 A loose state may take a point that is about to close or to slip for one that does so already. Beside such a
 switch the subgradient is then off by the kink, not by the tolerance, but it is that of the other side or
 between both: an inexact Clarke subgradient, which is all that the bundle method needs
-(`tests/shape/test_inexact_states.py`). Weakly active points are told as such only by states of 1e-7 or
-better.
+(`tests/shape/test_inexact_states.py`). Points count as weakly active at the accuracy of the state.
 """
 
 

@@ -16,7 +16,7 @@ from fenics_contact._dolfinx.assembly import (
 )
 from fenics_contact._dolfinx.cells import CELL_TYPES, degree, dimension, facet_vertices, shape
 from fenics_contact._dolfinx.forms import CompiledForm
-from fenics_contact._dolfinx.loading import RELEASE, VERSION, dolfinx, jit
+from fenics_contact._dolfinx.loading import fem, jit, release, version
 from fenics_contact._dolfinx.meshes import local_mesh, rank_mesh
 from fenics_contact._dolfinx.numbering import (
     cell_dofs,
@@ -29,7 +29,7 @@ from fenics_contact._dolfinx.numbering import (
     scalar_space,
     update_coordinates,
 )
-from fenics_contact._dolfinx.output import HAS_VTX, write_vtx, write_xdmf
+from fenics_contact._dolfinx.output import has_vtx, write_vtx, write_xdmf
 from fenics_contact._dolfinx.templates import (
     cellwise_space,
     displacement_space,
@@ -38,17 +38,9 @@ from fenics_contact._dolfinx.templates import (
     template,
 )
 
-Constant = dolfinx.fem.Constant
-Function = dolfinx.fem.Function
-
 __all__ = [
     "CELL_TYPES",
-    "HAS_VTX",
-    "RELEASE",
-    "VERSION",
     "CompiledForm",
-    "Constant",
-    "Function",
     "assemble_csr",
     "assemble_matrix",
     "assemble_scalar",
@@ -61,8 +53,10 @@ __all__ = [
     "dimension",
     "displacement_space",
     "facet_vertices",
+    "fem",
     "field_symbols",
     "global_dofs",
+    "has_vtx",
     "input_cells",
     "jit",
     "local_mesh",
@@ -70,10 +64,12 @@ __all__ = [
     "nodal_space",
     "node_dofs",
     "rank_mesh",
+    "release",
     "scalar_space",
     "shape",
     "template",
     "update_coordinates",
+    "version",
     "write_vtx",
     "write_xdmf",
 ]

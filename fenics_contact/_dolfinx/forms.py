@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
-from fenics_contact._dolfinx.loading import OLD, cpp, dolfinx, jit, side_effects_undone
+from fenics_contact._dolfinx.loading import cpp, dolfinx, jit, old, side_effects_undone
 from fenics_contact._dolfinx.numbering import cell_count, table
+from fenics_contact._libraries import MPI
 from fenics_contact.progress import Task
 
 #: Cells or facets with one tag: cell numbers, or (cells, local facets).
@@ -24,7 +24,7 @@ class CompiledForm:
         """Compile ``form``. Collective on ``comm``: one rank compiles, the others read its cache."""
         self.form = form
         with Task("compile forms"), side_effects_undone():
-            build = jit.ffcx_jit if OLD else dolfinx.fem.compile_form
+            build = jit.ffcx_jit if old() else dolfinx.fem.compile_form
             self._compiled = build(comm, form, {}, {})
 
     def bind(
@@ -49,7 +49,7 @@ class CompiledForm:
             facets: Tag of a surface integral -> (cells, local facets), as `match_facets` returns them.
             cells: Tag of a volume integral -> cells of ``mesh``; no cell has two tags.
         """
-        if OLD:
+        if old():
             return self._bind_old(mesh, spaces, coefficients, constants, facets or {}, cells or {})
         kinds = dolfinx.fem.IntegralType
         surfaces = [(tag, np.column_stack(pair)) for tag, pair in sorted((facets or {}).items())]

@@ -1,4 +1,4 @@
-"""Importing dolfinx without its side effects; nothing else imports it first."""
+"""Importing dolfinx without its side effects, when something of it is first used; nothing else imports it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,11 @@ import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+from fenics_contact._libraries import Late
+from fenics_contact._requirements import DOLFINX, load_petsc
 
 
 @contextmanager
@@ -30,17 +35,35 @@ def side_effects_undone() -> Iterator[None]:
             logging.captureWarnings(False)
 
 
-with side_effects_undone():
-    import dolfinx
-    import dolfinx.fem
-    import dolfinx.fem.petsc
-    import dolfinx.io
-    import dolfinx.mesh
-    from dolfinx import cpp, jit
+def _load() -> Any:
+    """Import dolfinx with the parts that are used of it."""
+    load_petsc()  # names what is wrong with it; dolfinx would fail in its own words
+    with side_effects_undone():
+        import dolfinx
+        import dolfinx.fem
+        import dolfinx.fem.petsc
+        import dolfinx.io
+        import dolfinx.mesh
+    return dolfinx
 
-__all__ = ["OLD", "RELEASE", "VERSION", "cpp", "dolfinx", "jit", "side_effects_undone"]
 
-RELEASE: str = dolfinx.__version__
-VERSION: tuple[int, ...] = tuple(int(part) for part in RELEASE.split(".")[:2])
-#: The interface of dolfinx 0.5 and 0.6; later releases have the newer one.
-OLD = VERSION < (0, 7)
+dolfinx: Any = Late("dolfinx", _load)
+fem: Any = Late("dolfinx.fem", lambda: dolfinx.fem)
+cpp: Any = Late("dolfinx.cpp", lambda: dolfinx.cpp)
+jit: Any = Late("dolfinx.jit", lambda: dolfinx.jit)
+
+
+def release() -> str:
+    """Return the whole version of dolfinx."""
+    return str(dolfinx.__version__)
+
+
+@cache
+def version() -> tuple[int, ...]:
+    """Return the first two numbers of dolfinx's version."""
+    return tuple(int(part) for part in (DOLFINX.version() or dolfinx.__version__).split(".")[:2])
+
+
+def old() -> bool:
+    """Tell whether dolfinx has the interface of 0.5 and 0.6; later releases have the newer one."""
+    return version() < (0, 7)

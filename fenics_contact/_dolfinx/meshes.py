@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 import ufl
-from mpi4py import MPI
 
 from fenics_contact._dolfinx.cells import NODE_ORDER, dimension
-from fenics_contact._dolfinx.loading import OLD, cpp, dolfinx
+from fenics_contact._dolfinx.loading import cpp, dolfinx, old
 from fenics_contact._dolfinx.templates import vector_element
+from fenics_contact._libraries import MPI
 
 
 def _partitioner(destinations: Any) -> Any:
     """Send every cell to the ranks in its row of ``destinations``, the first of which owns it."""
-    if OLD:
+    if old():
         return lambda comm, parts, tdim, cells, ghost_mode: destinations
     return lambda comm, parts, cell_types, cells: destinations
 
@@ -45,7 +45,7 @@ def rank_mesh(comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, rank: np.nd
     bounds = np.linspace(0, len(points), comm.size + 1).astype(int)
     mine = np.flatnonzero(rank == comm.rank)
     destinations: Any = np.full((len(mine), 1), comm.rank, dtype=np.int32)
-    if OLD and comm.size > 1:
+    if old() and comm.size > 1:
         destinations = _with_ghosts(cells, rank, mine, comm)
     part = points[bounds[comm.rank] : bounds[comm.rank + 1]]
     return _create_mesh(comm, part, cells[mine], cell_type, destinations)
@@ -73,7 +73,7 @@ def _create_mesh(
     if isinstance(destinations, np.ndarray):
         destinations = cpp.graph.AdjacencyList_int32(destinations)
     element, partitioner = vector_element(cell_type), _partitioner(destinations)
-    if OLD:
+    if old():
         adjacency, ghost_mode = cpp.graph.AdjacencyList_int64(ordered), cpp.mesh.GhostMode.shared_facet
         return dolfinx.mesh.create_mesh(comm, adjacency, points, ufl.Mesh(element), ghost_mode, partitioner)
     return dolfinx.mesh.create_mesh(comm, cells=ordered, x=points, e=element, partitioner=partitioner)

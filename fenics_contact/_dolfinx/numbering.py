@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from fenics_contact._dolfinx.cells import cell_type_named, facet_vertices
-from fenics_contact._dolfinx.loading import OLD, dolfinx
+from fenics_contact._dolfinx.loading import dolfinx, old
 from fenics_contact._dolfinx.templates import cellwise_element, scalar_element, vector_element
 
 
 def _space(mesh: Any, element: Any) -> Any:
-    return dolfinx.fem.FunctionSpace(mesh, element) if OLD else dolfinx.fem.functionspace(mesh, element)
+    return dolfinx.fem.FunctionSpace(mesh, element) if old() else dolfinx.fem.functionspace(mesh, element)
 
 
 def cell_type_of_mesh(mesh: Any) -> str:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from fenics_contact._dolfinx.loading import OLD, dolfinx
+from fenics_contact._dolfinx.loading import dolfinx, old
 
-#: Whether this dolfinx was built with ADIOS2.
-HAS_VTX = hasattr(dolfinx.io, "VTXWriter")
+
+def has_vtx() -> bool:
+    """Tell whether this dolfinx was built with ADIOS2."""
+    return hasattr(dolfinx.io, "VTXWriter")
 
 
 def write_xdmf(path: Any, mesh: Any, functions: Sequence[Any]) -> None:
@@ -30,14 +32,14 @@ def write_vtx(path: Any, function: Any, value: float, *, cellwise: bool) -> None
             lowest degree that every version of dolfinx writes.
     """
     mesh = function.function_space.mesh
-    options = {} if OLD else {"engine": "BP4"}
+    options = {} if old() else {"engine": "BP4"}
     fields = [_discontinuous(function) if cellwise else function]
     with dolfinx.io.VTXWriter(mesh.comm, str(path), fields, **options) as file:
         file.write(value)
 
 
 def _discontinuous(function: Any) -> Any:
-    make = dolfinx.fem.FunctionSpace if OLD else dolfinx.fem.functionspace
+    make = dolfinx.fem.FunctionSpace if old() else dolfinx.fem.functionspace
     space = make(function.function_space.mesh, ("Discontinuous Lagrange", 1))
     finer = dolfinx.fem.Function(space, name=function.name)
     finer.interpolate(function)

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from fenics_contact._dolfinx.cells import NODE_ORDER
-from fenics_contact._dolfinx.loading import OLD, cpp, dolfinx
+from fenics_contact._dolfinx.loading import cpp, dolfinx, old
+from fenics_contact._libraries import MPI
 from fenics_contact.errors import InvalidInputError
 
 __all__ = ["MeshArrays", "TagArrays", "mesh_arrays", "read_mesh", "read_tags", "tag_arrays"]
@@ -151,6 +151,6 @@ def tag_arrays(mesh: Any, arrays: MeshArrays, tags: Any) -> TagArrays:
     topology = mesh.topology
     topology.create_connectivity(tags.dim, arrays.dim)
     topology.create_connectivity(arrays.dim, tags.dim)
-    core = mesh._mesh if OLD else mesh._cpp_object
+    core = mesh._mesh if old() else mesh._cpp_object
     rows = cpp.mesh.entities_to_geometry(core, tags.dim, np.asarray(tags.indices, dtype=np.int32), False)
     return TagArrays(arrays.node[np.asarray(rows).reshape(len(tags.indices), -1)], np.asarray(tags.values))

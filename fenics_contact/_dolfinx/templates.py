@@ -9,11 +9,11 @@ import ufl
 
 from fenics_contact._dolfinx.cells import degree, dimension
 from fenics_contact._dolfinx.cells import shape as shape_of
-from fenics_contact._dolfinx.loading import OLD
+from fenics_contact._dolfinx.loading import old
 
 
 def _element(cell_type: str, shape: tuple[int, ...]) -> Any:
-    if not OLD:
+    if not old():
         import basix.ufl
 
         return basix.ufl.element("Lagrange", shape_of(cell_type), degree(cell_type), shape=shape)
@@ -35,7 +35,7 @@ def scalar_element(cell_type: str) -> Any:
 
 def cellwise_element(cell_type: str) -> Any:
     """Return the element of scalars that are constant on each cell."""
-    if OLD:
+    if old():
         return ufl.FiniteElement("DG", ufl.Cell(shape_of(cell_type)), 0)
     import basix.ufl
 

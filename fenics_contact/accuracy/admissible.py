@@ -9,12 +9,15 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact.accuracy.nearest import nearest
 from fenics_contact.qp import CoarseSpace, ContactLayout, DualProblem, FeasibleSet, contact_step
 from fenics_contact.qp.face import Marks, face_basis
-from fenics_contact.qp.reductions import Vector
+from fenics_contact.qp.reductions import Vector, global_max
 
 #: Forces out of balance below this share of all forces are rounding.
 ROUNDING = 1e-13
+#: More out of balance than this share of all forces, and duality bounds nothing.
+UNBALANCED = 1e-9
 #: Rounds of projections on the cone and on equilibrium, one after the other.
 ROUNDS = 100
 #: A round that leaves more than this share of what was out of balance leads nowhere.
@@ -73,9 +76,10 @@ class Admissible:
     Attributes:
         multiplier: λ with λ_N ≥ 0, ‖τ‖ ≤ Ψ and G λ = e, owned.
         statuses: What contact does.
-        slip_bound: Ψ of the Tresca problem, shape (n_friction,), owned. It is the given one except where no
-            multiplier within it balances the load: at a load that all friction just resists the solver's
-            tolerance decides about that. It then is raised to the forces that were found.
+        slip_bound: Ψ of the Tresca problem, shape (n_friction,), owned. It is the given one except where this
+            follows the normal forces of a solution and no multiplier within it balances the load: at a load
+            that all friction just resists the solver's tolerance decides about that. It then is raised to the
+            forces that were found.
         unbalanced: What is left of G λ − e, measured in multipliers, relative to ‖λ‖.
     """
 
@@ -85,7 +89,9 @@ class Admissible:
     unbalanced: float
 
 
-def admissible(problem: DualProblem, slip_bound: Vector, multiplier: Vector, residual: Vector) -> Admissible:
+def admissible(
+    problem: DualProblem, slip_bound: Vector, follows: Marks, multiplier: Vector, residual: Vector
+) -> Admissible:
     """Find an admissible multiplier near a computed one. Collective; no product.
 
     Where the map w = λ − ρ r of the solver says open, the normal force is set to zero, where it says slip,
@@ -95,6 +101,8 @@ def admissible(problem: DualProblem, slip_bound: Vector, multiplier: Vector, res
     Args:
         problem: The dual problem.
         slip_bound: Ψ, shape (n_friction,), owned.
+        follows: Discs whose slip bound follows the normal force, shape (n_friction,), owned. That of the
+            others is given and never raised.
         multiplier: λ, owned.
         residual: r = F λ − d − Gᵀα, owned.
     """
@@ -108,12 +116,28 @@ def admissible(problem: DualProblem, slip_bound: Vector, multiplier: Vector, res
     start[layout.tangential[slip]] = (slip_bound[slip] / length[slip])[:, None] * wanted[slip]
     stick = (slip_bound > 0.0) & ~slip
     statuses = Statuses(problem, trial[layout.normal] > 0.0, stick, slip, start)
-    found, left = _balanced(statuses, FeasibleSet(layout, slip_bound), start)
+    feasible = FeasibleSet(layout, slip_bound)
+    found, left = _balanced(statuses, feasible, start)
     if left > ROUNDING:
-        endless = FeasibleSet(layout, np.full_like(slip_bound, ENDLESS))
+        found, left = _balanced_by_nearest(problem, feasible, start)
+    if left > UNBALANCED and global_max(problem.comm, float(follows.any())):
+        endless = FeasibleSet(layout, np.where(follows, ENDLESS, slip_bound))
         found, left = _balanced(statuses, endless, start)
-        slip_bound = np.maximum(slip_bound, np.linalg.norm(found[layout.tangential], axis=1))
+        raised = np.maximum(slip_bound, np.linalg.norm(found[layout.tangential], axis=1))
+        slip_bound = np.where(follows, raised, slip_bound)
     return Admissible(found, statuses, slip_bound, left)
+
+
+def _balanced_by_nearest(
+    problem: DualProblem, feasible: FeasibleSet, start: Vector
+) -> tuple[Vector, float]:
+    """Return the nearest multiplier of the cone in equilibrium, and how much is left of G λ − e. Collective.
+
+    Slower than `_balanced` and without its preferences, but it finds a multiplier wherever there is one:
+    projections in turns come to rest before they reach a narrow set.
+    """
+    found = nearest(problem, feasible, start, ROUNDING * _forces(problem, start))
+    return found, _unbalanced(problem, found)
 
 
 def _balanced(statuses: Statuses, feasible: FeasibleSet, start: Vector) -> tuple[Vector, float]:
@@ -162,7 +186,11 @@ def basis(
 
 
 def _unbalanced(problem: DualProblem, multiplier: Vector) -> float:
-    coarse = problem.coarse
-    size = max(problem.norm(multiplier), coarse.norm(coarse.load))
-    left = coarse.norm(coarse.residual(multiplier))
+    size = _forces(problem, multiplier)
+    left = problem.coarse.norm(problem.coarse.residual(multiplier))
     return left / size if size > 0.0 else 0.0
+
+
+def _forces(problem: DualProblem, multiplier: Vector) -> float:
+    """Return the size of all forces, [force]. Collective."""
+    return max(problem.norm(multiplier), problem.coarse.norm(problem.coarse.load))

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.accuracy.admissible import Admissible, admissible
-from fenics_contact.accuracy.lifted import ROUNDING, lift
+from fenics_contact.accuracy.admissible import UNBALANCED, Admissible, admissible
+from fenics_contact.accuracy.lifted import ROUNDING, Lifted, lift
 from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem
 from fenics_contact.qp import DualProblem, DualSolution
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
@@ -16,8 +16,6 @@ from fenics_contact.qp.reductions import Vector, global_max, global_sum
 UNMOVED = 1e-14
 #: Friction this near to its bound, relatively, is on it.
 ON_CIRCLE = 1e-13
-#: More out of balance than this, relative to all forces, and duality bounds nothing.
-UNBALANCED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +23,8 @@ class Certificate:
     """Bounds of the algebraic error of a state in energy norm, [√(force · length)].
 
     Attributes:
-        bound: Upper bound of ‖u − u⋆‖, infinite where no admissible pair was found.
+        bound: Upper bound of ‖u − u⋆‖ and of the same for the displacement that fields show; infinite where
+            no admissible pair was found.
         moved: The part of it by which the multiplier was moved to be admissible.
         gap: J(v) − θ(λ) of the admissible pair, [force · length].
         known: The admissible multiplier and its statuses.
@@ -40,7 +39,7 @@ class Certificate:
 
 
 def certify(system: DualSystem, solution: DualSolution) -> Certificate:
-    """Bound the algebraic error of a solution. Collective; at most one product and one application of S.
+    """Bound the algebraic error of a solution. Collective; at most one product and two applications of S.
 
     With an admissible multiplier λ (λ_N ≥ 0, ‖τ‖ ≤ Ψ, G λ = e), u = K⁺(f − Bᵀλ) + R α, and a displacement
     v = u + w that no row forbids, at given slip bounds
@@ -48,15 +47,22 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
         J(v) − θ(λ) = ½ wᵀK w + Σ λ_N (c − B v)_N + Σ (Ψ‖s‖ − τ·s),   s the slip of v,
 
     a sum of parts none of which is negative, and J(v) − θ(λ) ≥ ½‖v − u⋆‖² + ½‖u − u⋆‖² in energy norm,
-    u⋆ being the solution. As the difference of ‖w‖ and ‖u − u⋆‖ is at most ‖v − u⋆‖, ‖u − u⋆‖ is at most
-    (‖w‖ + √(4 gap − ‖w‖²))/2. What moved the multiplier of the solution into the cone, δ, counts with its own
-    energy δᵀF δ.
+    u⋆ being the solution. So u⋆ is in the ball around the middle u + ½w of radius ½√(4 gap − ‖w‖²), and no
+    displacement x is farther from it than ‖x − u − ½w‖ + ½√(4 gap − ‖w‖²). The bound is that of the farther
+    one of two: of u, and of what fields show, in which copies of nodes agree (`DualSystem.conforming`). What
+    moved the multiplier of the solution into the cone, δ, counts with its own energy δᵀF δ.
 
     The way w is that of the preconditioner, and the bound is as close as this is good: mostly within a factor
     of two of the error, for nearly incompressible bodies and thin plates of one of ten to thirty.
 
-    The bound is for Tresca's problem with the slip bounds of the solution. Where these follow the normal
-    forces see `friction_error` for the rest.
+    The bound is for Tresca's problem with the slip bounds of the solution. Where these are given, that is the
+    problem; and it is infinite where no multiplier within them balances the load. Where they follow the
+    normal forces it is not the bound of the distance to the solution of Coulomb's law, see `friction_error`
+    for the rest; and where these bounds are too small for the load, Tresca's problem has no solution and they
+    are raised, see `Admissible`.
+
+    It holds to rounding: energies and products are those of double precision, rows that are closed to 1e-9
+    of what was open count as closed, and so does a load that is balanced to 1e-9.
 
     Args:
         system: The dual system.
@@ -68,7 +74,8 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
         2008, chapter 3.
     """
     problem, residual, moved = system.problem, solution.residual, 0.0
-    known = admissible(problem, solution.slip_bound, solution.multiplier, residual)
+    follows = system.torn.friction_coefficient[system.owned_discs()] > 0.0
+    known = admissible(problem, solution.slip_bound, follows, solution.multiplier, residual)
     change = known.multiplier - solution.multiplier
     if problem.norm(change) > UNMOVED * problem.norm(solution.multiplier):
         product = system.apply(change)
@@ -77,10 +84,18 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
     lifted = lift(system, known, residual, _cancelled(problem, solution))
     rest = _pressed(problem, known, lifted.residual) + _rubbed(problem, known, lifted.residual)
     gap = 0.5 * lifted.energy + rest
-    bound = 0.5 * (np.sqrt(lifted.energy) + np.sqrt(lifted.energy + 4.0 * rest)) + moved
+    radius = 0.5 * float(np.sqrt(lifted.energy + 4.0 * rest))
+    bound = max(_distances(system, solution, lifted)) + radius + moved
     if lifted.left > ROUNDING or known.unbalanced > UNBALANCED:
         bound = np.inf
-    return Certificate(float(bound), moved, gap, known, change + lifted.multiplier)
+    return Certificate(bound, moved, gap, known, change + lifted.multiplier)
+
+
+def _distances(system: DualSystem, solution: DualSolution, lifted: Lifted) -> tuple[float, float]:
+    """Return how far from u + ½w the found displacement is, and the one that fields show. Collective."""
+    energy, _ = system.inverse.energy(system.sewn(solution.residual) - 0.5 * lifted.displacement)
+    shown = float(np.sqrt(global_sum(system.problem.comm, energy)[0]))
+    return 0.5 * float(np.sqrt(lifted.energy)), shown
 
 
 def direct_error(system: DirectSystem, solution: DirectSolution) -> float:

@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI
 from fenics_contact.accuracy.moduli import moduli
 from fenics_contact.accuracy.recovery import recovered_gradients
-from fenics_contact.accuracy.sites import find_sites, nodal_displacement
+from fenics_contact.accuracy.sites import find_sites
 from fenics_contact.accuracy.strain_energy import energy_of_difference
 from fenics_contact.accuracy.varying_moduli import compile_energy, energy_on_subdomain
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.feti import TornSystem
+from fenics_contact.feti import TornSystem, nodal_mean
 from fenics_contact.feti.subdomain import Subdomain
 from fenics_contact.feti.templates import Template
 from fenics_contact.scene import Body
@@ -69,14 +69,15 @@ def discretisation_error(torn: TornSystem, displacement: np.ndarray) -> Discreti
 
     Args:
         torn: The torn system.
-        displacement: This rank's torn displacement, shape (torn_size,), [length].
+        displacement: This rank's torn displacement, shape (torn_size,), [length]: that of a state is
+            `State.conforming_displacement`. Where copies of a node differ, their mean counts.
 
     Returns:
         The estimate.
     """
     scene, comm = torn.scene, torn.decomposition.comm
     energies = {name: _Energies(torn, body) for name, body in scene.bodies.items()}
-    nodal = nodal_displacement(torn, displacement)
+    nodal = nodal_mean(torn.decomposition, displacement)
     cells = {name: [np.zeros(0, dtype=np.int64)] for name in scene.bodies}
     squares = {name: [np.zeros(0)] for name in scene.bodies}
     for order in sorted({body.mesh.order for body in scene.bodies.values()}):

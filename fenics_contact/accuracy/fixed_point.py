@@ -18,9 +18,10 @@ def friction_error(system: DualSystem, solution: DualSolution, certificate: Cert
     friction then changes by μ δλ_N along its direction, which bends the bodies by about √Σ F_ii (μ δλ_i)².
     Where the preconditioner exaggerates, it is at most μ times the bound: the normal forces are no worse.
 
-    It is an estimate and no bound: Coulomb's law minimises nothing. It tells the difference to the solution
-    with Tresca's law and the present slip bounds, for which the certificate is an upper bound. Zero where
-    nothing slips, and where slip bounds do not follow the normal forces.
+    It is an estimate and no bound: Coulomb's law minimises nothing. It tells the distance from the solution
+    of Tresca's problem with the slip bounds of the certificate, for which this is an upper bound, to that of
+    Coulomb's law; what slip bounds were raised by for the certificate counts. Zero where nothing slips, and
+    where slip bounds do not follow the normal forces.
 
     Args:
         system: The dual system.

@@ -25,13 +25,15 @@ class Lifted:
     """A correction w of the interface after which all equality rows hold and no contact penetrates.
 
     Attributes:
-        energy: Upper bound of wᵀ S w, [force · length].
+        displacement: w, shape (n_interface,), [length].
+        energy: wᵀ S w, [force · length].
         residual: r after it, owned, [length]; rows that were closed hold exactly zero.
         multiplier: Estimate −M r of how far the multiplier is from the solution, owned, [force].
         left: Violation that is left, relative to the first one; more than rounding only if the rows
             contradict each other.
     """
 
+    displacement: Vector
     energy: float
     residual: Vector
     multiplier: Vector
@@ -66,7 +68,7 @@ def lift(system: DualSystem, known: Admissible, residual: Vector, cancelled: flo
     energy = float(global_sum(comm, energy)[0])
     after = closing.residual - closing.rows.spread(closing.rows.wanted(closing.residual))
     estimate = -system.preconditioner.lifting(closing.rows.restriction).multiplier(force)
-    return Lifted(energy, after, estimate, closing.left)
+    return Lifted(closing.displacement, energy, after, estimate, closing.left)
 
 
 @dataclass(frozen=True, eq=False)

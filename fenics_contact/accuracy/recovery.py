@@ -18,8 +18,8 @@ References:
 from __future__ import annotations
 
 import numpy as np
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI
 from fenics_contact.accuracy.patches import Moments, Patches, find_patches
 from fenics_contact.accuracy.sites import Sites
 

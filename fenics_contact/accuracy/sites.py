@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.accuracy.sharing import Sharing
 from fenics_contact.feti import TornSystem
+from fenics_contact.feti.sharing import Sharing
 
 
 @dataclass(frozen=True)
@@ -60,40 +60,10 @@ def find_sites(torn: TornSystem, order: int = 1) -> Sites:
     }
     node = key // kinds
     points = np.concatenate([body.mesh.points for body in scene.bodies.values()])[node]
-    several = np.flatnonzero(_on_several_ranks(torn)[node])
+    several = np.flatnonzero(tearing.on_several_ranks[node])
     sharing = Sharing(torn.decomposition.comm, key, several)
     neighbours, cells = _neighbours(list(of_cells.values()), len(key))
     return Sites(order, node, points, sharing, neighbours, of_cells, cells)
-
-
-def nodal_displacement(torn: TornSystem, displacement: np.ndarray) -> np.ndarray:
-    """Return the mean over the copies of each node, on this rank's nodes. Collective.
-
-    Args:
-        torn: The torn system.
-        displacement: This rank's torn displacement, shape (torn_size,), [length].
-
-    Returns:
-        Displacement of the nodes of all bodies, NaN on nodes that this rank does not hold, shape
-        (n_nodes, dim), [length].
-    """
-    decomposition = torn.decomposition
-    tearing = decomposition.tearing
-    of_block = np.concatenate([tearing.global_nodes(mesh.body, mesh.nodes) for mesh in decomposition.meshes])
-    nodes, place = np.unique(of_block, return_inverse=True)
-    share = sp.csr_matrix((np.ones(len(place)), (place.ravel(), np.arange(len(place)))))
-    total = share @ displacement.reshape(-1, tearing.dim)
-    sharing = Sharing(decomposition.comm, nodes, np.flatnonzero(_on_several_ranks(torn)[nodes]))
-    result = np.full((tearing.n_nodes, tearing.dim), np.nan)
-    result[nodes] = sharing.add_up(total) / tearing.multiplicity[nodes, None]
-    return result
-
-
-def _on_several_ranks(torn: TornSystem) -> np.ndarray:
-    """Return whether subdomains of different ranks hold a node, shape (n_nodes,)."""
-    tearing = torn.decomposition.tearing
-    rank, first = tearing.subdomain_rank[tearing.copy_subdomain], tearing.first_copy[:-1]
-    return np.asarray(np.minimum.reduceat(rank, first) != np.maximum.reduceat(rank, first))
 
 
 def _neighbours(of_cells: list[np.ndarray], count: int) -> tuple[sp.csr_matrix, np.ndarray]:

@@ -20,17 +20,21 @@ class StateErrors:
     """Errors of a state in energy norm, relative to that of the displacement, ‖u‖ = √(uᵀK u).
 
     Attributes:
-        algebraic: Upper bound of the error of the solver, by duality; with Coulomb's law that to the
-            solution with the state's own slip bounds, see `certify`.
-        friction: Estimate of the error by these slip bounds, see `friction_error`; zero without Coulomb's
-            law.
-        discretisation: Estimate of the error of the mesh, see `discretisation_error`.
+        algebraic: Upper bound of what the solver left in the displacement, by duality: of the one that
+            fields show, `State.conforming_displacement`, and of the one it found. Without Coulomb's law that
+            is the distance to the solution; with it, the distance to the solution of Tresca's problem with
+            the state's own slip bounds, and `friction` estimates the rest. Infinite where nothing is known,
+            see `certify`.
+        friction: Estimate, no bound, of the distance from there to the solution of Coulomb's law, see
+            `friction_error`; zero without it.
+        discretisation: Estimate, no bound, of the error of the mesh, see `discretisation_error`.
         norm: ‖u‖, [√(force · length)].
         by_body: Body name -> its part of `discretisation`; the sum of squares is its square.
+        own_bounds: Whether slip bounds follow normal forces, so that `algebraic` is for those of the state.
 
     Example:
         >>> print(state.errors)  # doctest: +SKIP
-        algebraic       0.0120 % (at most)
+        algebraic       0.0120 % (at most, at the slip bounds of the state)
         friction        0.0031 % (estimate)
         discretisation  4.2 % (estimate)
     """
@@ -40,6 +44,7 @@ class StateErrors:
     discretisation: float
     norm: float
     by_body: Mapping[str, float]
+    own_bounds: bool
     _estimate: DiscretisationError = field(repr=False)
 
     def by_cell(self, body: str) -> np.ndarray:
@@ -53,11 +58,11 @@ class StateErrors:
     def __str__(self) -> str:
         """Return one line for each error."""
         lines = {
-            "algebraic": (self.algebraic, "at most"),
+            "algebraic": (self.algebraic, f"at most{', at the slip bounds of the state' * self.own_bounds}"),
             "friction": (self.friction, "estimate"),
             "discretisation": (self.discretisation, "estimate"),
         }
-        return "\n".join(f"{name:15s} {100 * value:.2g} % ({kind})" for name, (value, kind) in lines.items())
+        return "\n".join(f"{name:15s} {_told(value, kind)}" for name, (value, kind) in lines.items())
 
 
 @dataclass(frozen=True)
@@ -67,14 +72,16 @@ class SolverErrors:
     Attributes:
         algebraic: Upper bound of its error at the slip bounds of its solution.
         friction: Estimate of the error by these slip bounds.
+        own_bounds: Whether slip bounds follow normal forces; else those of the solution are given.
     """
 
     algebraic: float
     friction: float
+    own_bounds: bool = False
 
     @property
     def together(self) -> float:
-        """The sum of both, which bounds or closely follows the distance to the solution."""
+        """The sum of both: a bound of the distance to the solution, with Coulomb's law an estimate of it."""
         return self.algebraic + self.friction
 
 
@@ -85,7 +92,8 @@ def solver_errors(system: DualSystem | DirectSystem, solution: DualSolution | Di
         return SolverErrors(direct_error(system, solution), 0.0)
     assert isinstance(solution, DualSolution)
     certificate = certify(system, solution)
-    return SolverErrors(certificate.bound, friction_error(system, solution, certificate))
+    own_bounds = bool(np.any(system.torn.friction_coefficient > 0.0))
+    return SolverErrors(certificate.bound, friction_error(system, solution, certificate), own_bounds)
 
 
 def state_errors(solver: SolverErrors, estimate: DiscretisationError, norm: float) -> StateErrors:
@@ -99,7 +107,12 @@ def state_errors(solver: SolverErrors, estimate: DiscretisationError, norm: floa
     by_body = {name: _ratio(value, norm) for name, value in estimate.by_body.items()}
     parts = (solver.algebraic, solver.friction, estimate.total)
     algebraic, friction, discretisation = (_ratio(part, norm) for part in parts)
-    return StateErrors(algebraic, friction, discretisation, norm, MappingProxyType(by_body), estimate)
+    names = MappingProxyType(by_body)
+    return StateErrors(algebraic, friction, discretisation, norm, names, solver.own_bounds, estimate)
+
+
+def _told(value: float, kind: str) -> str:
+    return f"{100 * value:.2g} % ({kind})" if np.isfinite(value) else "unknown"
 
 
 def _ratio(value: float, norm: float) -> float:

@@ -74,7 +74,7 @@ def energy_on_subdomain(
     _dolfinx.update_coordinates(mesh, subdomain.points[np.argsort(subdomain.mesh.nodes)])
     fields = []
     for values in (displacement, *(gradient[:, :, k] for k in range(dim))):
-        fields.append(_dolfinx.Function(space))
+        fields.append(_dolfinx.fem.Function(space))
         fields[-1].x.array.reshape(-1, dim)[blocks] = values
     of_cells = _dolfinx.scalar_space(mesh, 0)
     found = _dolfinx.assemble_vector(form.bind([of_cells], material.parameters, fields))

@@ -2,7 +2,6 @@
 
 from fenics_contact.checkpoint.archive import read_archive, write_archive
 from fenics_contact.checkpoint.checkpoint import Checkpoint, without_checkpoint
-from fenics_contact.checkpoint.fingerprint import described, differences
 from fenics_contact.checkpoint.interruption import (
     Interrupted,
     Interruption,
@@ -17,8 +16,6 @@ __all__ = [
     "CheckpointError",
     "Interrupted",
     "Interruption",
-    "described",
-    "differences",
     "interruptible",
     "put_whole",
     "read_archive",

@@ -7,7 +7,7 @@ dolfinx, which Debian's FEniCSx does without, and save nothing: a file that must
 
 | array | what it is |
 |---|---|
-| ``_format``, ``_version`` | "fenics_contact checkpoint", 1 |
+| ``_format``, ``_version`` | "fenics_contact checkpoint", 2 |
 | ``_kind`` | "load history" or "minimisation by the bundle trust method" |
 | ``_fingerprint`` | JSON text: parts of the problem by name with their descriptions, see `described` |
 | ``_digest`` | SHA-256, hexadecimal, of all other arrays in the order of their names: of each the text \
@@ -15,13 +15,13 @@ dolfinx, which Debian's FEniCSx does without, and save nothing: a file that must
 
 A load history has ``steps``, the number of steps done, and for each, numbered from 000000, ``NUMBER.step``
 (JSON text that describes it), ``NUMBER.multiplier`` (λ of all rows, [force]), ``NUMBER.origin`` (from where
-slip is measured, [length]) and ``NUMBER.motion`` (coefficients of the rigid motions); a state that was found
-without multipliers has the description alone.
+slip is measured, [length]), ``NUMBER.slid`` (the same of points without friction) and ``NUMBER.motion``
+(coefficients of the rigid motions); a state that was found without multipliers has the description alone.
 
 A minimisation has ``centre.*`` (best point ``x``, ``value``, ``subgradient``), ``bundle.*``, ``trust.*`` and
-``first_t`` (where the method stands), ``history.*`` (a list for each attribute of a `Record` of the
-optimiser) and ``fun.*``, what the function remembers: of a shape problem the states of the first, best and
-last design, and the one to start from.
+``first_t``, ``careful`` (where the method stands), ``history.*`` (a list for each attribute of a `Record` of
+the optimiser) and ``fun.*``, what the function remembers: of a shape problem the states of the first, best
+and last design, and the one to start from.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fenics_contact.checkpoint.fingerprint import differences
 from fenics_contact.checkpoint.whole_file import write_whole
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.fingerprint import differences
 
 FORMAT = "fenics_contact checkpoint"
-VERSION = 1
+VERSION = 2
 
 Arrays = dict[str, NDArray[Any]]
 

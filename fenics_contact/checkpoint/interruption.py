@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, tell
 
 if TYPE_CHECKING:  # the optimiser does without mpi4py
     from mpi4py import MPI
@@ -93,13 +93,13 @@ class Interruption:
         words = kept()
         message = f"stopped by {signal.Signals(number).name}" + (f": {words}" if words else "")
         if self.comm is None or self.comm.rank == 0:
-            _LOG.warning("%s", message)
+            tell(_LOG.warning, "%s", message)
         raise Interrupted(message, number)
 
     def _say(self, words: str, name: str) -> None:
         if self.comm is None or self.comm.rank == 0:
             # Those who start ranks may kill them a second later: what is kept is said now.
-            _LOG.warning(words, name, f"; so far {self._kept}" if self._kept else "")
+            tell(_LOG.warning, words, name, f"; so far {self._kept}" if self._kept else "")
 
 
 @contextmanager
@@ -164,5 +164,5 @@ def telling_what_is_kept(kept: Callable[[], str], comm: MPI.Comm | None) -> Iter
         words = kept()
         stop.add_note(words)
         if comm is None or comm.rank == 0:
-            _LOG.info("interrupted: %s", words)
+            tell(_LOG.info, "interrupted: %s", words)
         raise

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import logging
-import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,9 @@ from typer.core import TyperCommand
 from fenics_contact.cli import accuracy_options as options
 from fenics_contact.cli.desk import desk_of
 from fenics_contact.cli.endings import Terminated
+from fenics_contact.cli.streams import complain
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.io import only_run_in
 from fenics_contact.study.overview import write_overview
 from fenics_contact.study.parameters import Sweep, Tolerance
 from fenics_contact.study.report import write_report
@@ -108,8 +110,9 @@ def accuracy(
     folder = output or Path("output") / "studies" / study.name
     settings = Settings(ranks, repeats or (1 if quick else 3), limit)
     plan = prepare(scene, runs or folder / "runs", sweep=sweep, settings=settings)
-    status = 0 if report else _measure(plan)
-    words = _report(plan, folder, figures=not no_figures)
+    with nullcontext() if report else only_run_in(folder, desk.comm):
+        status = 0 if report else _measure(plan)
+        words = _report(plan, folder, figures=not no_figures)
     if page:
         write_overview(folder.parent)
     desk.say("\n".join([*words, f"results in {folder}/"]))
@@ -140,7 +143,7 @@ def _measure(plan: StudyPlan) -> int:
     try:
         measure_all(plan)
     except (KeyboardInterrupt, Terminated) as stop:
-        sys.stderr.write("interrupted: what is done is kept, and the same command goes on from there\n")
+        complain("interrupted: what is done is kept, and the same command goes on from there\n")
         return 143 if isinstance(stop, Terminated) else 130
     return 0
 

@@ -12,10 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from fenics_contact.checkpoint import Interrupted
 from fenics_contact.cli import accuracy, demos, info, optimize, run, schema, view
 from fenics_contact.cli.desk import Desk
 from fenics_contact.cli.endings import EPILOG, terminable, told
+from fenics_contact.cli.streams import complain, prepare_streams, say, unsaid
 from fenics_contact.io import versions
+from fenics_contact.progress.words import visible
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -40,7 +43,7 @@ class Program(TyperGroup):
         except (typer.Exit, typer.Abort, UsageProblem):
             raise
         except BaseException as error:
-            if isinstance(error, SystemExit):
+            if isinstance(error, Interrupted):
                 raise
             raise typer.Exit(int(told(error, ctx.obj.comm))) from None
 
@@ -64,7 +67,7 @@ for module in (run, optimize, demos, view, accuracy, info, schema):
 
 def _version(wanted: bool) -> None:
     if wanted:
-        sys.stdout.write(f"fenics_contact {versions()['fenics_contact']}\n")
+        say(f"fenics_contact {versions()['fenics_contact']}\n")
         raise typer.Exit()
 
 
@@ -89,23 +92,48 @@ def main(comm: MPI.Comm, arguments: Sequence[str] | None = None) -> int:
         comm: All ranks of the program.
         arguments: The command line, without the program's name; that of the process unless given.
     """
+    prepare_streams()
     _log_to_stderr(comm)
-    command = typer.main.get_command(app)
     given = list(sys.argv[1:] if arguments is None else arguments)
     # Ranks above 0 have nothing to say: neither help nor what demos might print.
     silence = contextlib.nullcontext() if comm.rank == 0 else contextlib.redirect_stdout(io.StringIO())
-    with silence:
-        try:
-            code = command.main(given, prog_name=PROGRAM, standalone_mode=False, obj=Desk(comm))
-        except UsageProblem as problem:
-            if comm.rank == 0:
-                problem.show(sys.stderr)  # type: ignore[attr-defined]
-            return int(problem.exit_code)  # type: ignore[attr-defined]
+    logger = logging.getLogger("fenics_contact")
+    level = logger.level
+    try:
+        with silence:
+            return _run(given, comm)
+    finally:
+        logger.setLevel(level)  # a command may say more than the program that called this function
+
+
+def _run(arguments: Sequence[str], comm: MPI.Comm) -> int:
+    command = typer.main.get_command(app)
+    try:
+        code = command.main(list(arguments), prog_name=PROGRAM, standalone_mode=False, obj=Desk(comm))
+        say("")  # what the library has written, as help does, goes out now
+    except UsageProblem as problem:
+        if comm.rank == 0:
+            words = io.StringIO()
+            problem.show(words)  # type: ignore[attr-defined]
+            complain(words.getvalue())
+        return int(problem.exit_code)  # type: ignore[attr-defined]
+    except BrokenPipeError:
+        return 0
+    except OSError as error:  # of the library: what it writes itself, as help, may find no room
+        return int(told(unsaid(error), comm))
     return code if isinstance(code, int) else 0
+
+
+class _Visible(logging.Formatter):
+    """Writes what a terminal shows and does not obey."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the line of a record."""
+        return visible(super().format(record))
 
 
 def _log_to_stderr(comm: MPI.Comm) -> None:
     """Send warnings of rank 0 to stderr; other ranks meet the same."""
     handler = logging.StreamHandler(sys.stderr) if comm.rank == 0 else logging.NullHandler()
-    handler.setFormatter(logging.Formatter("%(message)s"))
+    handler.setFormatter(_Visible("%(message)s"))
     logging.basicConfig(level=logging.WARNING, handlers=[handler])

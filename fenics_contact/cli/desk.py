@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 import typer
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderResult
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
+from fenics_contact.cli.streams import say
 from fenics_contact.progress.places import terminal_width
+from fenics_contact.progress.words import visible
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -49,16 +53,28 @@ class Desk:
             return
         width = terminal_width(sys.stdout)
         console = Console(
+            file=io.StringIO(),
             width=width or WIDTH,
             force_terminal=width is not None,
             no_color=True if width is None else None,
             highlight=False,
         )
-        with console.capture() as captured:
-            console.print(what, soft_wrap=isinstance(what, Text))
-        lines = captured.get().split("\n")
+        console.print(_Visible(what), soft_wrap=isinstance(what, Text))
+        lines = console.file.getvalue().split("\n")  # type: ignore[attr-defined]
         # Through sys.stdout itself: bars that are drawn at this moment stay below.
-        sys.stdout.write("\n".join(lines if width else [line.rstrip() for line in lines]))
+        say("\n".join(lines if width else [line.rstrip() for line in lines]))
+
+
+@dataclass(frozen=True)
+class _Visible:
+    """What is to be written, without what a terminal would obey in its texts."""
+
+    what: Table | Text
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Render the texts, with colours and alignment, and write anything else in them as escapes."""
+        for segment in console.render(self.what, options):
+            yield segment if segment.control else Segment(visible(segment.text), segment.style)
 
 
 def desk_of(context: typer.Context) -> Desk:

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
+from fenics_contact.cli.streams import complain
 from fenics_contact.errors import (
     ConvergenceError,
     FenicsContactError,
@@ -92,14 +93,13 @@ def told(error: BaseException, comm: MPI.Comm) -> Ending:
     code = ending_of(error)
     known = isinstance(error, FenicsContactError)
     if known and comm.rank == 0:
-        sys.stderr.write(f"error: {error}\n")
+        complain(f"error: {error}\n")
     if isinstance(error, KeyboardInterrupt | Terminated):
         if comm.rank == 0:
-            sys.stderr.write("interrupted\n" if isinstance(error, KeyboardInterrupt) else "terminated\n")
+            complain("interrupted\n" if isinstance(error, KeyboardInterrupt) else "terminated\n")
         _leave(comm, code)
     elif not known:
-        traceback.print_exception(error)
-        sys.stderr.flush()
+        complain("".join(traceback.format_exception(error)))
         if comm.size > 1:
             comm.Abort(int(code))
     return code

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from fenics_contact.checkpoint import Checkpoint, interruptible
 from fenics_contact.cli.desk import Desk
+from fenics_contact.cli.streams import complain
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError
 
 
@@ -39,5 +39,5 @@ def _telling(desk: Desk, checkpoint: Checkpoint | None) -> Iterator[None]:
         raise
     except (ConvergenceError, InfeasibleError):
         if desk.comm.rank == 0 and path.exists():
-            sys.stderr.write(f"what is done is kept in {path}; the same command goes on from there\n")
+            complain(f"what is done is kept in {path}; the same command goes on from there\n")
         raise

@@ -7,9 +7,9 @@ import os
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from mpi4py import MPI
 
 from fenics_contact import _dolfinx, _requirements
+from fenics_contact._libraries import MPI
 from fenics_contact.cli.blas import SLOW, loaded_blas, numpy_speed
 from fenics_contact.cli.desk import Desk, desk_of, facts
 from fenics_contact.errors import MissingRequirementError
@@ -62,14 +62,14 @@ def gathered(comm: MPI.Comm) -> dict[str, Any]:
         "NumPy's BLAS": f"{speed:.1f} GFLOP/s",
         "PETSc packages": ", ".join(_packages()),
         "pictures": _pictures(comm),
-        "VTX files": "yes (ADIOS2)" if _dolfinx.HAS_VTX else "no (dolfinx without ADIOS2)",
+        "VTX files": "yes (ADIOS2)" if _dolfinx.has_vtx() else "no (dolfinx without ADIOS2)",
     }
     slow = any(library.reference for library in libraries) or (bool(rates) and max(rates) < SLOW)
     return {"versions": versions(), "machine": machine, "advice": list(_advice(comm, slow))}
 
 
 def _packages() -> Iterator[str]:
-    from petsc4py import PETSc
+    from fenics_contact._libraries import PETSc
 
     for package in ("cholmod", "mumps"):
         yield f"{package} {'works' if _requirements.factors(PETSc, package) else 'is not there'}"

@@ -15,6 +15,7 @@ from fenics_contact.cli.options import (
     DryOption,
     OutputOption,
     PicturesOption,
+    PythonOption,
     ResumeOption,
     SceneArgument,
     SetOption,
@@ -25,7 +26,7 @@ from fenics_contact.cli.options import (
 from fenics_contact.cli.pictures import can_draw, draw_state
 from fenics_contact.cli.plans import show_outputs, show_plan
 from fenics_contact.cli.tables import pairs
-from fenics_contact.io import ResultSeries, write_optimisation_result
+from fenics_contact.io import ResultSeries, only_run_in, write_optimisation_result
 from fenics_contact.optimize import Result
 from fenics_contact.progress import shown
 from fenics_contact.scene_file import SceneFile, ShapeTask
@@ -45,11 +46,12 @@ def optimize(
     pictures: PicturesOption = True,
     resume: ResumeOption = None,
     dry_run: DryOption = False,
+    python: PythonOption = True,
 ) -> None:
     """Optimise the contact shape that the [design] of a scene file describes."""
     desk = desk_of(context)
     with shown(desk.comm):
-        file = read(desk, scene, output, tolerance, settings)
+        file = read(desk, scene, output, tolerance, settings, python)
         file.require_design()
         show_plan(desk, file, sensitivity=True)
         desk.say()
@@ -58,9 +60,10 @@ def optimize(
             return
         task = file.shape_task()
         desk.say(f"{task.problem.size} design variables, objective {file.document.design.objective}")  # type: ignore[union-attr]
-        result = _minimised(desk, file, task, resume)
-        desk.show(facts(_facts(file, task, result)))
-        drawn = _draw(desk, file, task, result) if pictures and can_draw(desk) else []
+        with only_run_in(file.folder, desk.comm):
+            result = _minimised(desk, file, task, resume)
+            desk.show(facts(_facts(file, task, result)))
+            drawn = _draw(desk, file, task, result) if pictures and can_draw(desk) else []
     names = ", ".join(["result.json", *_films(file), *(path.name for path in drawn)])
     desk.say(f"results in {file.folder}/: {names}")
     if not result.reason.success:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 import typer
 
 from fenics_contact.checkpoint import Checkpoint
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.progress.words import is_visible
 from fenics_contact.scene_file import SceneFile, read_scene_file
 
 if TYPE_CHECKING:
@@ -48,20 +50,35 @@ ResumeOption: TypeAlias = Annotated[
     ),
 ]
 DryOption: TypeAlias = Annotated[
-    bool, typer.Option("--dry-run", help="Only say what would be built and written.")
+    bool,
+    typer.Option(
+        "--dry-run",
+        help="Only say what would be built and written. Python files that the scene names are run.",
+    ),
+]
+PythonOption: TypeAlias = Annotated[
+    bool,
+    typer.Option("--python/--no-python", help='Run Python files that the scene names ("file.py:Name").'),
 ]
 
 
 def read(
-    desk: Desk, scene: Path, output: Path | None, tolerance: str | None, settings: list[str] | None
+    desk: Desk,
+    scene: Path,
+    output: Path | None,
+    tolerance: str | None,
+    settings: list[str] | None,
+    python: bool = True,
 ) -> SceneFile:
     """Read a scene file with what the options say instead. Collective."""
     overrides = list(settings or ())
     if tolerance is not None:
         overrides.append(f"solver.tolerance={tolerance}")
     if output is not None:
-        overrides.append(f"output.folder={json.dumps(str(output))}")
-    return read_scene_file(scene, desk.comm, overrides=overrides)
+        if not is_visible(str(output)):
+            raise InvalidInputError(f"--output must be a path that can be shown, got {str(output)!r}")
+        overrides.append(f"output.folder={json.dumps(str(output), ensure_ascii=False)}")
+    return read_scene_file(scene, desk.comm, overrides=overrides, python=python)
 
 
 def checkpoint_of(file: SceneFile, resume: bool | None) -> Checkpoint | None:

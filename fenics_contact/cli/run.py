@@ -15,6 +15,7 @@ from fenics_contact.cli.options import (
     DryOption,
     OutputOption,
     PicturesOption,
+    PythonOption,
     ResumeOption,
     SceneArgument,
     SetOption,
@@ -26,7 +27,7 @@ from fenics_contact.cli.pictures import can_draw, draw_state
 from fenics_contact.cli.plans import show_outputs, show_plan
 from fenics_contact.cli.tables import state_facts, step_row, step_table
 from fenics_contact.contact import State
-from fenics_contact.io import ResultSeries, write_result, write_vtu, write_vtx, write_xdmf
+from fenics_contact.io import ResultSeries, only_run_in, write_result, write_vtu, write_vtx, write_xdmf
 from fenics_contact.progress import shown
 from fenics_contact.scene_file import SceneFile
 
@@ -48,18 +49,20 @@ def run(
     pictures: PicturesOption = True,
     resume: ResumeOption = None,
     dry_run: DryOption = False,
+    python: PythonOption = True,
 ) -> None:
     """Find the equilibrium of a scene file, or go through its load steps."""
     desk = desk_of(context)
     with shown(desk.comm):
-        file = read(desk, scene, output, tolerance, settings)
+        file = read(desk, scene, output, tolerance, settings, python)
         show_plan(desk, file)
         desk.say()
         if dry_run:
             show_outputs(desk, file, draws=pictures)
             return
-        states = _through_steps(desk, file, resume) if file.steps else _at_once(desk, file)
-        drawn = draw_state(desk, file, states) if pictures and _wanted(file) and can_draw(desk) else []
+        with only_run_in(file.folder, desk.comm):
+            states = _through_steps(desk, file, resume) if file.steps else _at_once(desk, file)
+            drawn = draw_state(desk, file, states) if pictures and _wanted(file) and can_draw(desk) else []
     names = ", ".join(["result.json", *_files(file), *(path.name for path in drawn)])
     desk.say(f"results in {file.folder}/: {names}")
 

@@ -32,6 +32,8 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
     }
     for number, words in enumerate(pairs(state, units)):
         rows[f"contact {number}"] = words
+    if state.unheld:
+        rows["held by nothing"] = " and ".join(map(str, state.unheld)) + ": stays where it is"
     if state.known_errors is not None:
         for line in str(state.known_errors).splitlines():
             name, _, value = line.partition(" ")

@@ -58,9 +58,13 @@ def view(
 
 
 def _view(desk: Desk, result: Path, save: Path | None, look: tuple[str, float], *, window: bool) -> None:
-    if not result.exists():
+    try:
+        there, reason = result.exists(), "nothing is there"
+    except OSError as error:
+        there, reason = False, error.strerror or str(error)
+    if not there:
         raise InvalidInputError(
-            f"a result needs a folder or file that exists, got '{result}': correct the path"
+            f"a result needs a folder or file that exists, got '{result}' ({reason}): correct the path"
         )
     if result.suffix in FIELD_FILES:
         fields: Path | None = result

@@ -10,6 +10,7 @@ from fenics_contact.contact.slip_bounds import Damping
 from fenics_contact.contact.state import State
 from fenics_contact.contact.steps import LoadSequence, solve_steps
 from fenics_contact.contact.stored import restored_state, stored_state
+from fenics_contact.contact.unheld import UnheldMotion
 
 __all__ = [
     "ContactResult",
@@ -20,6 +21,7 @@ __all__ = [
     "LoadSequence",
     "State",
     "Status",
+    "UnheldMotion",
     "check_held",
     "contact_fields",
     "find_state",

@@ -130,7 +130,8 @@ class Rounds:
         return balanced.satisfied(self.errors, self.estimate.total)
 
     def _estimate(self) -> None:
-        self.estimate = discretisation_error(self._system.torn, self.displacement)
+        system = self._system
+        self.estimate = discretisation_error(system.torn, system.conforming(self.displacement))
         self._doubted = self.errors.together > DOUBTED * self.estimate.total
 
     def within(self, tolerance: float) -> bool:

@@ -47,7 +47,11 @@ class Energies:
 
 
 def compute_energies(
-    system: DualSystem | DirectSystem, displacement: np.ndarray, multiplier: np.ndarray, friction: float
+    system: DualSystem | DirectSystem,
+    displacement: np.ndarray,
+    multiplier: np.ndarray,
+    friction: float,
+    rigid: np.ndarray | float = 0.0,
 ) -> Energies:
     """Compute all energies. Collective.
 
@@ -56,10 +60,12 @@ def compute_energies(
         displacement: Torn displacement of this rank, [length].
         multiplier: λ, owned, [force].
         friction: Σ Ψ ‖slip‖ of all ranks.
+        rigid: Rigid motions R α in the displacement: they strain nothing, but forces that are a little out of
+            balance work along them.
     """
     torn = system.torn
     internal = torn.load - system.force(multiplier)  # = K u
-    mine = np.array([0.5 * internal @ displacement, torn.load @ displacement, multiplier @ torn.right])
+    strained = 0.5 * internal @ (displacement - rigid)
+    mine = np.array([strained, torn.load @ displacement, multiplier @ torn.right])
     strain, load, prescribed = (float(total) for total in torn.numbering.comm.allreduce(mine))
-    # Of the displacement only K⁺(f − Bᵀλ) meets a force in equilibrium, rigid motions do no work.
     return Energies(strain, load, friction, -strain - prescribed)

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI, check_not_forked
 from fenics_contact.contact.coulomb import FixedPoint
 from fenics_contact.contact.energies import compute_energies
 from fenics_contact.contact.held import check_held
@@ -16,7 +16,7 @@ from fenics_contact.contact.result import ContactResult, Status, no_contact
 from fenics_contact.contact.state import State
 from fenics_contact.contact.tolerance import Tolerance, checked_tolerance
 from fenics_contact.contact.warm_start import carried_over
-from fenics_contact.errors import together
+from fenics_contact.errors import collectively, together
 from fenics_contact.feti import (
     Decomposition,
     DirectSystem,
@@ -25,6 +25,7 @@ from fenics_contact.feti import (
     build_torn_system,
     decompose,
 )
+from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, ProjectedCG, Smalse, contact_step, solve
 from fenics_contact.scene import Scene, SolverKind, choose_solver
 from fenics_contact.timing import PhaseTimer
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 LINEAR_TOLERANCE = 1e-10
 
 
+@collectively("solve_scene", lambda scene, partitions, comm, **_: comm)
 def solve_scene(
     scene: Scene,
     partitions: Mapping[str, np.ndarray] | None,
@@ -81,6 +83,7 @@ def decomposed(
         return decompose(scene, cut, comm), timer
 
 
+@collectively("find_state", lambda scene, decomposition, **_: decomposition.comm)
 def find_state(
     scene: Scene,
     decomposition: Decomposition,
@@ -108,9 +111,12 @@ def find_state(
         sensitivity: Whether derivatives of the state are wanted, which live on the dual system.
         timer: Collects the seconds.
     """
+    check_not_forked()
     timer = timer or PhaseTimer()
+    check_same_input(decomposition.comm, scene, solver=solver, tolerance=tolerance)
     with together(decomposition.comm):
         tolerance = checked_tolerance(tolerance)
+        kind = choose_solver(scene, decomposition.tearing.n_subdomains, sensitivity=sensitivity)
     with timer.phase("assemble"):
         torn = build_torn_system(
             scene,
@@ -119,11 +125,11 @@ def find_state(
             previous=None if previous is None else previous.torn,
         )
         if slip_from is not None:
-            torn = torn.with_slip_from(slip_from.torn.relative(slip_from.torn_displacement))
+            earlier, moved = slip_from.torn, slip_from.torn_displacement
+            torn = torn.with_slip_from(earlier.relative(moved), earlier.sliding(moved))
         same = previous is not None and torn.points is previous.torn.points
         if previous is None or not same or torn.scene.loads != previous.scene.loads:
             check_held(torn)
-    kind = choose_solver(scene, decomposition.tearing.n_subdomains, sensitivity=sensitivity)
     if solver is None and kind is SolverKind.DIRECT:
         return _found_directly(torn, previous, timer)
     chosen = solver or default_solver(kind)
@@ -181,9 +187,10 @@ def state_of(
 ) -> State:
     """Return the state of a solution with its torn displacement. Collective."""
     with timer.phase("state"):
-        contact = contact_result(system, solution)
+        contact = contact_result(system, solution, displacement)
         friction = float(np.sum(contact.slip_bound * np.linalg.norm(contact.slip, axis=1)))
-        energies = compute_energies(system, displacement, solution.multiplier, friction)
+        rigid = system.kernel @ solution.alpha
+        energies = compute_energies(system, displacement, solution.multiplier, friction, rigid)
     return State(system, solution, displacement, contact, energies, dict(timer.seconds))
 
 
@@ -224,7 +231,7 @@ def solve_dual(
     return solve(system.problem, tresca, solver, start, friction_coefficient=coefficient)
 
 
-def contact_result(system: DualSystem, solution: DualSolution) -> ContactResult:
+def contact_result(system: DualSystem, solution: DualSolution, displacement: np.ndarray) -> ContactResult:
     """Gather forces, gaps and status of all contact points on every rank. Collective."""
     torn, problem = system.torn, system.problem
     rows = np.concatenate([torn.normal_rows, torn.tangential_rows.ravel()])
@@ -240,9 +247,9 @@ def contact_result(system: DualSystem, solution: DualSolution) -> ContactResult:
     sticks = (np.linalg.norm(trial_tangential, axis=1) < bound) & (trial_normal[frictional] > 0)
     status[frictional[sticks]] = Status.STICK
 
-    def spread(values: np.ndarray) -> np.ndarray:
-        full = np.zeros((count, *values.shape[1:]))
-        full[frictional] = values
+    def spread(values: np.ndarray, others: float | np.ndarray = 0.0) -> np.ndarray:
+        full = np.empty((count, *values.shape[1:]))
+        full[frictional], full[torn.frictionless] = values, others
         return full
 
     origin = torn.numbering.gather(torn.right + torn.supported, torn.tangential_rows.ravel())
@@ -252,7 +259,7 @@ def contact_result(system: DualSystem, solution: DualSolution) -> ContactResult:
         spread(tau),
         spread(bound),
         gap,
-        spread(-minus_slip),
-        spread(origin.reshape(-1, torn.dim - 1)),
+        spread(-minus_slip, torn.sliding(displacement) - torn.slid),
+        spread(origin.reshape(-1, torn.dim - 1), torn.slid),
         status,
     )

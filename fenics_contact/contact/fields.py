@@ -8,10 +8,12 @@ import numpy as np
 import ufl
 
 from fenics_contact import _dolfinx
+from fenics_contact._libraries import MPI
+from fenics_contact.errors import together
 from fenics_contact.feti import Decomposition
 from fenics_contact.feti.composition import Composition, integrate
 from fenics_contact.feti.temperature import Temperature, stress_in_space
-from fenics_contact.feti.templates import Template, volume_measure
+from fenics_contact.feti.templates import Template, Written, volume_measure
 from fenics_contact.scene import Body, Material
 
 
@@ -21,28 +23,6 @@ def body_mesh(decomposition: Decomposition, name: str, body: Body) -> Any:
     first = tearing.subdomain_offset[tearing.body_names.index(name)]
     rank = tearing.subdomain_rank[first + decomposition.partitions[name]]
     return _dolfinx.rank_mesh(decomposition.comm, mesh.points, mesh.cells, rank, mesh.cell_type)
-
-
-def nodal_displacement(decomposition: Decomposition, name: str, body: Body, torn: np.ndarray) -> np.ndarray:
-    """Average this rank's copies of each node.
-
-    Args:
-        decomposition: Meshes and numbering.
-        name: Name of the body.
-        body: The body.
-        torn: Torn displacement of this rank, shape (torn_size,).
-
-    Returns:
-        Displacement of every node of the body, NaN on nodes that this rank does not hold, (n_nodes, dim).
-    """
-    dim = body.mesh.points.shape[1]
-    total, count = np.zeros((body.mesh.n_nodes, dim)), np.zeros(body.mesh.n_nodes)
-    blocks = torn.reshape(-1, dim)
-    for mesh, start in zip(decomposition.meshes, decomposition.block_offset[:-1], strict=True):
-        if mesh.body == name:
-            total[mesh.nodes] += blocks[start : start + len(mesh.nodes)]
-            count[mesh.nodes] += 1
-    return total / np.where(count, count, np.nan)[:, None]
 
 
 def displacement_function(mesh: Any, values: np.ndarray) -> Any:
@@ -67,28 +47,48 @@ def nodal_function(mesh: Any, name: str, values: np.ndarray) -> Any:
         name: Name of the Function.
         values: One for each node of the body, on every rank, shape (at least n_nodes,).
     """
-    function = _dolfinx.Function(_dolfinx.scalar_space(mesh, 1), name=name)
+    function = _dolfinx.fem.Function(_dolfinx.scalar_space(mesh, 1), name=name)
     nodes, dofs = _dolfinx.node_dofs(function.function_space)
     function.x.array[dofs] = values[nodes]
     function.x.scatter_forward()
     return function
 
 
-def von_mises(displacement: Any, body: Body, temperature: Temperature = Temperature()) -> Any:
+def von_mises(
+    displacement: Any, body: Body, comm: MPI.Comm, temperature: Temperature = Temperature()
+) -> Any:
     """Return the von Mises stress averaged over each cell, [force / length²], a piecewise constant Function.
 
     The stress is that in space: of plane bodies with what the material carries normal to the plane.
-    Collective on the mesh.
+    Collective on ``comm``.
 
     Args:
         displacement: The displacement Function of the body.
         body: Gives the materials.
+        comm: Communicator of the state.
         temperature: Temperature change of the body, whose share is taken off.
     """
     mesh, cell_type = displacement.function_space.mesh, body.mesh.cell_type
     parts = _composition(mesh, body)
-    (u,) = _dolfinx.field_symbols(cell_type, 1)
     q = ufl.TestFunction(_dolfinx.cellwise_space(cell_type))
+    with together(comm):
+        form, constants, coefficients = _weighted(parts.materials, cell_type, q, temperature)
+        functions = [displacement, *temperature.fields(mesh, body.mesh.points)]
+    weighted = Template(mesh.comm, form, constants, coefficients)
+    volume = Template(mesh.comm, q * volume_measure(cell_type, 2), ())
+    space = _dolfinx.scalar_space(mesh, 0)
+    result = _dolfinx.fem.Function(space, name="von_mises")
+    values = (*temperature.numbers, *parts.parameters)
+    above = _dolfinx.assemble_vector(weighted.bind([space], values, functions, cells=parts.cells))
+    below = _dolfinx.assemble_vector(volume.bind([space], ()))
+    result.x.array[: len(above)] = above / below
+    result.x.scatter_forward()
+    return result
+
+
+def _weighted(materials: tuple[Material, ...], cell_type: str, q: Any, temperature: Temperature) -> Written:
+    """Return ∫ σ_M q dx (a form), its constants and its coefficients."""
+    (u,) = _dolfinx.field_symbols(cell_type, 1)
     change, numbers, fields = temperature.write(cell_type)
 
     def density(material: Material, constants: Any) -> Any:
@@ -96,19 +96,8 @@ def von_mises(displacement: Any, body: Body, temperature: Temperature = Temperat
         deviator = stress - ufl.tr(stress) / 3 * ufl.Identity(3)
         return ufl.sqrt(1.5 * ufl.inner(deviator, deviator)) * q
 
-    dx = volume_measure(cell_type, 2)
-    form, constants = integrate(parts.materials, cell_type, density, dx)
-    weighted = Template(mesh.comm, form, (*numbers, *constants), [u, *fields])
-    volume = Template(mesh.comm, q * dx, ())
-    space = _dolfinx.scalar_space(mesh, 0)
-    result = _dolfinx.Function(space, name="von_mises")
-    values = (*temperature.numbers, *parts.parameters)
-    functions = [displacement, *temperature.fields(mesh, body.mesh.points)]
-    above = _dolfinx.assemble_vector(weighted.bind([space], values, functions, cells=parts.cells))
-    below = _dolfinx.assemble_vector(volume.bind([space], ()))
-    result.x.array[: len(above)] = above / below
-    result.x.scatter_forward()
-    return result
+    form, constants = integrate(materials, cell_type, density, volume_measure(cell_type, 2))
+    return form, (*numbers, *constants), [u, *fields]
 
 
 def _composition(mesh: Any, body: Body) -> Composition:

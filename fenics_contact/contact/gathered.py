@@ -60,7 +60,6 @@ def contact_fields(state: State, body: str) -> dict[str, np.ndarray]:
     count = state.scene.bodies[body].mesh.n_nodes
     nodes = contact.points.slave - start
     mine = np.flatnonzero((nodes >= 0) & (nodes < count))
-    slip = np.einsum("na,nad->nd", contact.slip, contact.points.tangents)
 
     def summed(values: np.ndarray) -> np.ndarray:
         field = np.zeros((count, *values.shape[1:]))
@@ -73,7 +72,7 @@ def contact_fields(state: State, body: str) -> dict[str, np.ndarray]:
         "contact_status": status,
         "contact_pressure": summed(contact.pressure),
         "contact_force": summed(contact.force),
-        "contact_slip": summed(slip),
+        "contact_slip": summed(contact.slip_in_space),
     }
 
 

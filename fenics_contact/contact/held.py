@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact.contact.unheld import motion_in_words
 from fenics_contact.errors import ConvergenceError, InfeasibleError, together
 from fenics_contact.feti import ContactPoints, TornSystem
 from fenics_contact.feti.dual import BALANCED
@@ -40,7 +41,8 @@ def check_held(torn: TornSystem) -> None:
         InfeasibleError: Names the body and the motion, and says so if it is held only just.
     """
     comm = torn.numbering.comm
-    bodies = [_RigidBody(torn, index) for index in range(len(torn.scene.bodies))]
+    with together(comm):
+        bodies = [_RigidBody(torn, index) for index in range(len(torn.scene.bodies))]
     loads = comm.allreduce(np.array([body.load_wrench(torn) for body in bodies]))
     loads[np.abs(loads) <= BALANCED * comm.allreduce(np.abs(torn.load).sum())] = 0.0
     with together(comm):
@@ -57,12 +59,13 @@ def _check_balance(torn: TornSystem, bodies: list[_RigidBody], loads: np.ndarray
     tied = sp.vstack([body.tie_wrenches(torn) for body in bodies])
     reactions, right = sp.hstack([support, tied]), -loads.ravel() / scale
     contact = sp.vstack([body.contact_wrenches(torn) for body in bodies])
-    ray = _unresisted_motion(reactions, contact, right, torn, 1.0 - MARGIN)
+    bound = torn.tresca_bound / scale
+    ray = _unresisted_motion(reactions, contact, right, torn, (1.0 - MARGIN, bound))
     if ray is None:
         return
-    without_margin = _unresisted_motion(reactions, contact, right, torn, 1.0)
+    without_margin = _unresisted_motion(reactions, contact, right, torn, (1.0, bound))
     motion = (ray if without_margin is None else without_margin).reshape(len(bodies), -1)
-    raise InfeasibleError(_describe(motion, bodies, loads, torn.dim, only_just=without_margin is None))
+    raise InfeasibleError(_describe(motion, bodies, loads, only_just=without_margin is None))
 
 
 class _RigidBody:
@@ -136,7 +139,11 @@ def _both(supports: np.ndarray, material: np.ndarray) -> np.ndarray:
 
 
 def _unresisted_motion(
-    support: sp.spmatrix, contact: sp.spmatrix, right: np.ndarray, torn: TornSystem, friction: float
+    support: sp.spmatrix,
+    contact: sp.spmatrix,
+    right: np.ndarray,
+    torn: TornSystem,
+    friction: tuple[float, np.ndarray],
 ) -> np.ndarray | None:
     """Find x = (reactions, λ_N, τ) in its cones with the smallest ‖[support contact] x − right‖.
 
@@ -146,8 +153,9 @@ def _unresisted_motion(
         support: Wrenches that act in both directions, shape (n_wrenches, n).
         contact: Wrenches of unit contact forces, shape (n_wrenches, n_contact + (dim - 1) n_friction).
         right: The wrench to balance, shape (n_wrenches,).
-        torn: Gives friction coefficients and bounds.
-        friction: The part of the friction that may be used.
+        torn: Gives friction coefficients.
+        friction: The part of the friction that may be used, and Tresca bounds in the unit of force of
+            ``right``, shape (n_friction,).
 
     Returns:
         None if nothing is left, else the rigid motion that nothing resists, shape (n_wrenches,).
@@ -180,11 +188,15 @@ def _unresisted_motion(
 
 
 def _admissible(
-    reactions: int, torn: TornSystem, friction: float
+    reactions: int, torn: TornSystem, friction: tuple[float, np.ndarray]
 ) -> tuple[np.ndarray, sp.csr_matrix, np.ndarray, list[Any]]:
     """Return which unknowns are normal forces, and A, b and cones with b − A x in the cones."""
     import clarabel
 
+    part, tresca_bound = friction
+    # Surfaces that supports hold apart cannot be pressed together, whatever the supports would bear.
+    pressed = ~torn.relations[1].held(torn.decomposition.fixed)[torn.frictional]
+    coefficient = part * pressed * torn.friction_coefficient
     n_normal, discs, width = torn.points.count, len(torn.frictional), torn.dim
     size = reactions + n_normal + (width - 1) * discs
     coulomb = torn.tresca_bound == 0.0
@@ -193,10 +205,10 @@ def _admissible(
     tau = reactions + n_normal + np.arange((width - 1) * discs).reshape(-1, width - 1)
     rows = np.concatenate([disc[coulomb], (disc[:, None] + 1 + np.arange(width - 1)).ravel()])
     columns = np.concatenate([reactions + torn.frictional[coulomb], tau.ravel()])
-    values = np.concatenate([-friction * torn.friction_coefficient[coulomb], -np.ones(tau.size)])
+    values = np.concatenate([-coefficient[coulomb], -np.ones(tau.size)])
     cone = sp.csr_matrix((values, (rows, columns)), shape=(width * discs, size))
     bound = np.zeros((discs, width))
-    bound[:, 0] = friction * torn.tresca_bound
+    bound[:, 0] = part * tresca_bound
     normal = np.zeros(size)
     normal[reactions : reactions + n_normal] = 1.0
     press = -sp.identity(size, format="csr")[normal > 0]
@@ -205,19 +217,12 @@ def _admissible(
     return normal, sp.vstack([press, cone], format="csr"), limit, cones
 
 
-def _describe(
-    motion: np.ndarray, bodies: list[_RigidBody], loads: np.ndarray, dim: int, *, only_just: bool
-) -> str:
+def _describe(motion: np.ndarray, bodies: list[_RigidBody], loads: np.ndarray, *, only_just: bool) -> str:
     # The certificate points against the right side, which is minus the load. Bodies may be taken along by the
     # one that is pushed: the load works most on that one.
     pushed = int(np.argmax(np.einsum("bm,bm->b", motion, loads)))
     free = np.round(motion[pushed] / np.abs(motion[pushed]).max(), 3) + 0.0  # no -0
-    parts = [("translation", free[:dim]), ("rotation", free[dim:])]
-    words = " with ".join(
-        f"{kind} ({', '.join(f'{component:.2g}' for component in part)})"
-        for kind, part in parts
-        if np.any(part)
-    )
+    words = motion_in_words(free)
     name = repr(bodies[pushed].name)
     if only_just:
         return (

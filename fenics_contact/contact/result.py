@@ -32,8 +32,8 @@ class ContactResult:
             acts on the master; the slave feels the opposite.
         slip_bound: Largest friction force, shape (n,), [force].
         gap: Distance after deformation, shape (n,), [length].
-        slip: Relative tangential displacement in the points' tangents since the last load step, shape
-            (n, dim - 1), [length].
+        slip: Relative tangential displacement in the points' tangents since the last load step, with and
+            without friction, open points too, shape (n, dim - 1), [length].
         slip_before: The same of all load steps before, shape (n, dim - 1), [length].
         status: `Status` of each point, shape (n,). A closed point without friction slips.
     """
@@ -55,9 +55,17 @@ class ContactResult:
     @property
     def force(self) -> np.ndarray:
         """Force on the slave at each point in space, n λ_N − t τ, shape (n, dim), [force]."""
-        points = self.points
-        sliding = np.einsum("na,nad->nd", self.friction_force, points.tangents)
-        return self.normal_force[:, None] * points.normal - sliding
+        normal = self.points.normal
+        return self.normal_force[:, None] * normal - self._in_space(self.friction_force)
+
+    @property
+    def slip_in_space(self) -> np.ndarray:
+        """Slip of the last load step as vectors in space, shape (n, dim), [length]."""
+        return self._in_space(self.slip)
+
+    def _in_space(self, tangential: np.ndarray) -> np.ndarray:
+        """Return as vectors in space what is given in the points' tangents."""
+        return np.asarray(np.einsum("na,nad->nd", tangential, self.points.tangents))
 
     @property
     def total_slip(self) -> np.ndarray:

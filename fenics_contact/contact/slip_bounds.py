@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI
 from fenics_contact.qp.reductions import Vector, global_sum
 
 #: Slip bounds have returned to earlier ones when these are so much closer than the last ones.

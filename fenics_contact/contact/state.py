@@ -9,19 +9,21 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from fenics_contact._libraries import MPI
 from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.fields import (
     body_mesh,
     cell_values,
     displacement_function,
-    nodal_displacement,
     nodal_function,
     von_mises,
 )
+from fenics_contact.contact.gathered import contact_fields
 from fenics_contact.contact.result import ContactResult
 from fenics_contact.contact.tolerance import Tolerance
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem, TornSystem
+from fenics_contact.contact.unheld import UnheldMotion, unheld_motions
+from fenics_contact.errors import InvalidInputError, collectively
+from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem, TornSystem, nodal_mean
 from fenics_contact.feti.temperature import temperature_of
 from fenics_contact.progress import Task
 from fenics_contact.qp import DualSolution
@@ -29,6 +31,10 @@ from fenics_contact.scene import Scene
 
 if TYPE_CHECKING:
     from fenics_contact.accuracy import StateErrors
+
+
+def _comm(state: State, *_: Any, **__: Any) -> MPI.Comm:
+    return state.torn.decomposition.comm
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +46,8 @@ class State:
     Attributes:
         system: The system that was solved: a dual one, or that of a body that needs none.
         solution: Multiplier, residuals and history of the solver.
-        torn_displacement: This rank's torn displacement, shape (torn_size,), [length].
+        torn_displacement: This rank's torn displacement as the solver found it, shape (torn_size,), [length];
+            that of whole bodies is `conforming_displacement`.
         contact: What happens on the contact surfaces, replicated.
         energies: Energies of all bodies.
         seconds: Wall time of this rank by phase, of all work up to this state that shares its timer.
@@ -97,6 +104,7 @@ class State:
         return self.torn.scene
 
     @cached_property
+    @collectively("State.errors", _comm)
     def errors(self) -> StateErrors:
         """Errors of the state by solver, friction law and mesh, in energy norm. Collective on first use."""
         if self.known_errors is not None:
@@ -105,8 +113,13 @@ class State:
 
         with Task("errors"):
             solver = solver_errors(self.system, self.solution)
-            estimate = discretisation_error(self.torn, self.torn_displacement)
+            estimate = discretisation_error(self.torn, self.conforming_displacement)
             return state_errors(solver, estimate, self.energies.norm)
+
+    @cached_property
+    def unheld(self) -> tuple[UnheldMotion, ...]:
+        """Rigid motions that nothing holds and nothing loads; the bodies stay. Collective on first use."""
+        return unheld_motions(self.system) if isinstance(self.system, DualSystem) else ()
 
     @cached_property
     def contact_places(self) -> np.ndarray:
@@ -115,51 +128,76 @@ class State:
         return np.asarray(places[self.contact.points.slave])
 
     @cached_property
+    @collectively("State.conforming_displacement", _comm)
+    def conforming_displacement(self) -> np.ndarray:
+        """Displacement of whole bodies, which all fields show, shape (torn_size,), [length].
+
+        A solver glues subdomains and holds supports as well as its tolerance asks for. Here copies of a node
+        agree, being their mean weighted by stiffness, and what supports prescribe is met; distances and slips
+        of the contact points are those of `torn_displacement`. Collective on first use.
+        """
+        return self.system.conforming(self.torn_displacement)
+
+    @cached_property
+    @collectively("State.displacement", _comm)
     def displacement(self) -> dict[str, Any]:
         """Displacement of each body as a Function on its own mesh, [length]. Collective on first use."""
         decomposition = self.torn.decomposition
-        fields = {}
-        for name, body in self.scene.bodies.items():
-            values = nodal_displacement(decomposition, name, body, self.torn_displacement)
-            fields[name] = displacement_function(body_mesh(decomposition, name, body), values)
-        return fields
-
-    @cached_property
-    def von_mises(self) -> dict[str, Any]:
-        """Von Mises stress of each body, constant on cells, [force / length²]. Collective on first use."""
         return {
-            name: von_mises(self.displacement[name], body, temperature_of(self.scene.loads, name))
+            name: displacement_function(body_mesh(decomposition, name, body), self._at_nodes(name))
             for name, body in self.scene.bodies.items()
         }
 
     @cached_property
+    @collectively("State.von_mises", _comm)
+    def von_mises(self) -> dict[str, Any]:
+        """Von Mises stress of each body, constant on cells, [force / length²]. Collective on first use."""
+        return {
+            name: von_mises(
+                self.displacement[name], body, _comm(self), temperature_of(self.scene.loads, name)
+            )
+            for name, body in self.scene.bodies.items()
+        }
+
+    @cached_property
+    @collectively("State.contact_pressure", _comm)
     def contact_pressure(self) -> dict[str, Any]:
         """Contact pressure of each body as a Function on its own mesh, [force / length²].
 
         Its values are those of the contact points in the nodes of the slave surfaces; it is zero in all other
         nodes, on masters too. Collective on first use.
         """
-        tearing, contact = self.torn.decomposition.tearing, self.contact
-        values = np.bincount(contact.points.slave, contact.pressure, minlength=int(tearing.node_offset[-1]))
-        starts = dict(zip(tearing.body_names, tearing.node_offset[:-1], strict=True))
+        key = "contact_pressure"
         return {
-            name: nodal_function(u.function_space.mesh, "contact_pressure", values[int(starts[name]) :])
+            name: nodal_function(u.function_space.mesh, key, contact_fields(self, name)[key])
             for name, u in self.displacement.items()
         }
 
+    @collectively("State.gather_displacement", _comm)
     def gather_displacement(self, body: str) -> np.ndarray:
         """Return the displacement of a body's nodes on every rank, (n_nodes, dim), [length]. Collective."""
-        decomposition = self.torn.decomposition
-        mine = nodal_displacement(decomposition, body, self.scene.bodies[body], self.torn_displacement)
+        comm, mine = self.torn.decomposition.comm, self._at_nodes(body)
         known = ~np.isnan(mine[:, 0])
-        total = decomposition.comm.allreduce(np.where(known[:, None], mine, 0.0))
-        count = decomposition.comm.allreduce(known.astype(float))
+        total = comm.allreduce(np.where(known[:, None], mine, 0.0))
+        count = comm.allreduce(known.astype(float))
         return np.asarray(total / count[:, None])
 
+    def _at_nodes(self, body: str) -> np.ndarray:
+        """Return the displacement of a body's nodes, NaN where this rank holds none. Collective at first."""
+        tearing = self.torn.decomposition.tearing
+        nodes = tearing.global_nodes(body, np.arange(self.scene.bodies[body].mesh.n_nodes))
+        return np.asarray(self._nodal_displacement[nodes])
+
+    @cached_property
+    def _nodal_displacement(self) -> np.ndarray:
+        return nodal_mean(self.torn.decomposition, self.conforming_displacement)
+
+    @collectively("State.gather_von_mises", _comm)
     def gather_von_mises(self, body: str) -> np.ndarray:
         """Return the von Mises stress of a body's cells on every rank, shape (n_cells,). Collective."""
         return cell_values(self.von_mises[body], self.scene.bodies[body].mesh.cells)
 
+    @collectively("State.to_pyvista", _comm)
     def to_pyvista(self, deformed: float = 0.0) -> Any:
         """Return all bodies with their fields for pyvista, the same on every rank. Collective.
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI
 from fenics_contact.checkpoint import Checkpoint, safe_point, telling_what_is_kept
 from fenics_contact.contact.equilibrium import decomposed, find_state
 from fenics_contact.contact.state import State
 from fenics_contact.contact.steps_done import StepsDone
 from fenics_contact.contact.tolerance import Tolerance
+from fenics_contact.errors import collectively, together
 from fenics_contact.feti import Decomposition
+from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.progress import Task
 from fenics_contact.qp import DualSolver
 from fenics_contact.scene import LoadStep, Scene
@@ -52,7 +54,7 @@ class LoadSequence:
         checkpoint: Checkpoint | None = None,
         count: int | None = None,
     ) -> None:
-        """Start unloaded; arguments as for `solve_scene`.
+        """Start unloaded; arguments as for `solve_scene`. Collective on ``comm``.
 
         Args:
             scene: Bodies, contact pairs, and the supports and loads that the steps do not give.
@@ -64,11 +66,15 @@ class LoadSequence:
             count: How many steps there will be, which progress tells; not needed.
 
         Raises:
-            InvalidInputError: If the checkpoint cannot be read or is one of another scene.
+            InvalidInputError: If the checkpoint cannot be read or is one of another scene, or if some ranks
+                have one and others none.
         """
         self.scene, self.state = scene, None
+        kept = None if checkpoint is None else (checkpoint.every, checkpoint.resume)
+        require_alike(comm, described({"count": count, "checkpoint (every, resume)": kept}, "steps"))
         if checkpoint is not None and partitions is None:
-            partitions = scene.partition(comm.size)
+            with together(comm):
+                partitions = scene.partition(comm.size)
         problem = {"scene": scene, "partitions": partitions, "solver": solver, "tolerance": tolerance}
         self._done = StepsDone(checkpoint, problem, comm)
         self._partitions, self._comm = partitions, comm
@@ -79,6 +85,7 @@ class LoadSequence:
 
     state: State | None
 
+    @collectively("LoadSequence.advance", lambda self, *_, **__: self._comm)
     def advance(self, step: LoadStep) -> State:
         """Find the state at the end of the next step. Collective.
 
@@ -115,7 +122,8 @@ class LoadSequence:
         return self._done.kept(self._number, self._count)
 
     def _advanced(self, step: LoadStep) -> State:
-        scene = step.applied_to(self.scene)
+        with together(self._comm):
+            scene = step.applied_to(self.scene)
         if self._decomposition is None:
             self._decomposition, self._timer = decomposed(scene, self._partitions, self._comm)
         state = self._done.recalled(step, scene, self._decomposition, self.state, self._timer)
@@ -128,6 +136,7 @@ class LoadSequence:
         self.scene, self.state = scene, state
         return state
 
+    @collectively("LoadSequence.finish", lambda self: self._comm)
     def finish(self) -> None:
         """Write the steps that the checkpoint does not hold yet, if it is written less often. Collective."""
         self._done.write()

@@ -8,13 +8,14 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
-from fenics_contact.checkpoint import Checkpoint, CheckpointError, described, differences, without_checkpoint
+from fenics_contact._libraries import MPI
+from fenics_contact.checkpoint import Checkpoint, CheckpointError, without_checkpoint
 from fenics_contact.contact.state import State
 from fenics_contact.contact.stored import restored_state, stored_state
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti import Decomposition
+from fenics_contact.fingerprint import described, differences
 from fenics_contact.scene import LoadStep, Scene
 from fenics_contact.timing import PhaseTimer
 
@@ -77,12 +78,13 @@ class StepsDone:
             return None
         names = [name for name in self._arrays if name.startswith(self._prefix)]
         stored = {name.removeprefix(self._prefix): self._arrays[name] for name in names}
-        unlike = differences(json.loads(str(stored.pop("step"))), described(step, "step"))
-        if unlike:
-            raise InvalidInputError(
-                f"step {self._here} of the checkpoint is another one; there and here differ "
-                f"{'; '.join(unlike)}: give the same steps to go on, or a new name to start anew"
-            )
+        with together(self._comm):
+            unlike = differences(json.loads(str(stored.pop("step"))), described(step, "step"))
+            if unlike:
+                raise InvalidInputError(
+                    f"step {self._here} of the checkpoint is another one; there and here differ "
+                    f"{'; '.join(unlike)}: give the same steps to go on, or a new name to start anew"
+                )
         self._here += 1
         return restored_state(scene, decomposition, stored, previous=previous, timer=timer)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from fenics_contact.contact.equilibrium import find_state, state_of
 from fenics_contact.contact.state import State
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, collectively
 from fenics_contact.feti import Decomposition, DirectSystem, DualSystem, build_torn_system
 from fenics_contact.qp import Coulomb, CountedOperator, DualSolution, SlipLaw, Tresca
 from fenics_contact.qp.iterate import iterate_at
@@ -23,8 +23,8 @@ def stored_state(state: State) -> dict[str, np.ndarray]:
 
     Returns:
         ``multiplier`` λ and ``origin``, from which slip is measured, of all rows in their order, shape
-        (n_rows,), and ``motion``, the coefficients α of the rigid motions; all replicated. Nothing for a
-        state that was found without multipliers.
+        (n_rows,), ``slid``, the same for points without friction, and ``motion``, the coefficients α of the
+        rigid motions; all replicated. Nothing for a state that was found without multipliers.
     """
     if isinstance(state.system, DirectSystem):
         return {}
@@ -33,10 +33,12 @@ def stored_state(state: State) -> dict[str, np.ndarray]:
     return {
         "multiplier": torn.numbering.gather(solution.multiplier, rows),
         "origin": torn.numbering.gather(torn.right + torn.supported, rows),
+        "slid": torn.slid,
         "motion": np.asarray(solution.alpha),
     }
 
 
+@collectively("restored_state", lambda scene, decomposition, *_, **__: decomposition.comm)
 def restored_state(
     scene: Scene,
     decomposition: Decomposition,
@@ -72,7 +74,7 @@ def restored_state(
                 f"a stored state needs {torn.numbering.total} multipliers, got "
                 f"{stored['multiplier'].size}: give the scene and the partition that it was found with"
             )
-        torn = torn.with_slip_from(stored["origin"][owned])
+        torn = torn.with_slip_from(stored["origin"][owned], stored["slid"])
     earlier = previous.system if previous is not None and isinstance(previous.system, DualSystem) else None
     system = DualSystem(torn, timer, previous=earlier)
     with timer.phase("state"):

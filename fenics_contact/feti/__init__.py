@@ -5,6 +5,7 @@ from fenics_contact.feti.decomposition import Decomposition, decompose
 from fenics_contact.feti.direct import DirectSolution, DirectSystem
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.inverse import LocalKind
+from fenics_contact.feti.nodal_mean import nodal_mean
 from fenics_contact.feti.torn import TornSystem, build_torn_system
 
 __all__ = [
@@ -17,4 +18,5 @@ __all__ = [
     "TornSystem",
     "build_torn_system",
     "decompose",
+    "nodal_mean",
 ]

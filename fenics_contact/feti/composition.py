@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fenics_contact.errors import calling
 from fenics_contact.feti.templates import scalar_constants
 from fenics_contact.scene import Body, Material
 
@@ -77,7 +78,9 @@ def integrate(
     form = None
     for number, material in enumerate(materials):
         constants = scalar_constants(cell_type, len(material.parameters))
-        part = integrand(material, constants) * (measure if len(materials) == 1 else measure(number + 1))
+        with calling(f"the UFL of material {type(material).__name__}"):
+            density = integrand(material, constants)
+        part = density * (measure if len(materials) == 1 else measure(number + 1))
         form = part if form is None else form + part
         all_constants.extend(constants)
     return form, tuple(all_constants)

@@ -8,8 +8,8 @@ from functools import lru_cache
 
 import numpy as np
 import scipy.sparse as sp
-from petsc4py import PETSc
 
+from fenics_contact._libraries import PETSc
 from fenics_contact.feti.factor import symmetric_matrix
 from fenics_contact.linalg import dispose_with
 
@@ -48,10 +48,13 @@ class Condensation:
 
     def __call__(self, stiffness: sp.csr_matrix) -> np.ndarray:
         """Return S of a matrix with the pattern, shape (n_b, n_b), Fortran order."""
-        self._matrix.setValuesCSR(*self._structure, stiffness.data)
+        # MUMPS takes pivots below some 1e-16 for zeros here: answers would depend on the units of length and
+        # force. A power of two changes no digit.
+        unit = 2.0 ** np.round(np.log2(stiffness.diagonal().max()))
+        self._matrix.setValuesCSR(*self._structure, stiffness.data / unit)
         self._matrix.assemble()
         self._pc.setUp()
-        return self._schur_complement()
+        return unit * self._schur_complement()
 
     def _schur_complement(self) -> np.ndarray:
         # petsc4py has no name for this yet, PETSc's own library has.

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
+
+#: Weights of nodes below this part of all are rounding: what supports hold but for them is held.
+HELD = 1e-6
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,9 @@ class ContactPoints:
         facet: Facet of the master surface that a node projects on; −1 on a rigid obstacle and where a point
             stands for a mean over facets, shape (n,).
         local: Local coordinates on it, shape (n, dim - 1).
+        axes: Coordinate axis that the first tangent leans to, as a unit vector, shape (n, dim).
+        symmetric: Components across a plane of symmetry that cuts both surfaces there: what the mirror images
+            do is equal and opposite, and neither slips across the plane, shape (n, dim).
     """
 
     pair: np.ndarray
@@ -37,6 +43,8 @@ class ContactPoints:
     area: np.ndarray
     facet: np.ndarray
     local: np.ndarray
+    axes: np.ndarray
+    symmetric: np.ndarray
 
     @property
     def count(self) -> int:
@@ -57,7 +65,8 @@ def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> Conta
         integer = np.zeros(0, dtype=np.int64)
         return ContactPoints(
             integer, integer, sp.csr_matrix((0, n_nodes)), np.zeros((0, dim)), np.zeros((0, dim - 1, dim)),
-            np.zeros(0), np.zeros(0), integer, np.zeros((0, dim - 1)),
+            np.zeros(0), np.zeros(0), integer, np.zeros((0, dim - 1)), np.zeros((0, dim)),
+            np.zeros((0, dim), dtype=bool),
         )  # fmt: skip
 
     def strung(name: str) -> np.ndarray:
@@ -66,6 +75,7 @@ def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> Conta
     return ContactPoints(
         strung("pair"), strung("slave"), sp.vstack([part.master for part in parts], format="csr"),
         strung("normal"), strung("tangents"), strung("gap"), strung("area"), strung("facet"), strung("local"),
+        strung("axes"), strung("symmetric"),
     )  # fmt: skip
 
 
@@ -75,14 +85,47 @@ def reference_axes(normals: np.ndarray) -> np.ndarray:
     return np.eye(normals.shape[1])[np.argmin(np.round(np.abs(normals), 6), axis=1)]
 
 
-def tangent_frames(normals: np.ndarray) -> np.ndarray:
+def movable(points: ContactPoints, fixed: np.ndarray) -> np.ndarray:
+    """Return which components of the relative displacement supports leave free, shape (n_points, dim).
+
+    Args:
+        points: The points.
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+    """
+    squares = points.jump.multiply(points.jump).tocsr()
+    free, every = squares @ (~fixed).astype(float), squares @ np.ones(fixed.shape)
+    return np.asarray((free > HELD**2 * every) & ~points.symmetric)
+
+
+def in_free_frames(points: ContactPoints, fixed: np.ndarray) -> ContactPoints:
+    """Return points whose second tangent is the way that they can slip where supports leave but one.
+
+    Where one component is held, closed points slip across that axis and the normal alone.
+
+    Args:
+        points: Points in frames of the normals alone.
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+    """
+    if points.normal.shape[1] == 2:
+        return points
+    held = ~movable(points, fixed)
+    single = (held.sum(axis=1) == 1) & (np.einsum("nd,nd->n", held, points.normal**2) < 0.5)
+    axes = np.where(single[:, None], held.astype(float), points.axes)
+    return replace(points, axes=axes, tangents=tangent_frames(points.normal, axes))
+
+
+def tangent_frames(normals: np.ndarray, axes: np.ndarray | None = None) -> np.ndarray:
     """Return the unit tangents of each unit normal, shape (n, dim - 1, dim).
 
     In space (t1, t2, n) is right-handed, in the plane (t, n).
+
+    Args:
+        normals: Unit normals, shape (n, dim).
+        axes: Axes that the first tangents lean to, shape (n, dim); `reference_axes` by default.
     """
     if normals.shape[1] == 2:
         return np.stack([normals[:, 1], -normals[:, 0]], axis=1)[:, None]
-    axes = reference_axes(normals)
+    axes = reference_axes(normals) if axes is None else axes
     first = axes - np.einsum("nd,nd->n", axes, normals)[:, None] * normals
     first = first / np.linalg.norm(first, axis=1)[:, None]
     return np.stack([first, np.cross(normals, first)], axis=1)

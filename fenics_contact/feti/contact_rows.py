@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact.feti.contact_points import ContactPoints
+from fenics_contact.feti.contact_points import HELD, ContactPoints, movable
 from fenics_contact.feti.copies import Tearing
 from fenics_contact.feti.rows import Rows
 from fenics_contact.scene import Tie
 
-#: A row with no larger share of free components is determined by supports. On a plane of symmetry averaged
-#: normals are tilted a little: slip across the plane would look free, and be redundant.
-HELD = 0.02
+#: Directions are parallel whose sine is below.
+PARALLEL = 1e-6
 
 
 @dataclass(frozen=True)
@@ -25,11 +24,14 @@ class Relations:
         points: Contact or tied points.
         which: Point of each row, shape (n_rows,).
         directions: d of each row, shape (n_rows, dim).
+        resting: Marks of rows of friction along which supports prescribe no slip, shape (n_rows,); None for
+            rows of other kinds.
     """
 
     points: ContactPoints
     which: np.ndarray
     directions: np.ndarray
+    resting: np.ndarray | None = None
 
     @property
     def count(self) -> int:
@@ -46,17 +48,31 @@ class Relations:
         return np.asarray(np.einsum("rd,rd->r", self.directions, moved[self.which]))
 
     def held(self, fixed: np.ndarray) -> np.ndarray:
-        """Return which rows supports determine alone, or but for a slight tilt, shape (n_rows,).
+        """Return which rows supports determine, alone or together with the normal row, shape (n_rows,).
+
+        What supports leave of a direction across the plane of two rollers is a part of the normal: along it a
+        closed point cannot slip, and an open one opens. Such a row is left to the normal one unless it has
+        the larger part of the motion, or supports drive the point along it: then it slips.
 
         Args:
             fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
         """
-        squares = self.points.jump.multiply(self.points.jump).tocsr()
-        free = (squares @ (~fixed).astype(float))[self.which]
-        every = (squares @ np.ones(fixed.shape))[self.which]
-        directions = self.directions**2
-        moving, whole = (np.einsum("rd,rd->r", directions, part) for part in (free, every))
-        return np.asarray(moving <= HELD**2 * whole)
+        left = self._left(self.directions, fixed)
+        mine = np.einsum("rd,rd->r", left, left)
+        if self.resting is None:
+            return np.asarray(mine <= HELD**2)
+        normal = self._left(self.points.normal[self.which], fixed)
+        other = np.einsum("rd,rd->r", normal, normal)
+        across = mine * other - np.einsum("rd,rd->r", left, normal) ** 2
+        tilted = (across <= PARALLEL**2 * mine * other) & (mine < other)
+        return np.asarray((mine <= HELD**2) | (self.resting & tilted))
+
+    def freedom(self, fixed: np.ndarray) -> np.ndarray:
+        """Return the length of what supports leave of each direction, from 0 to 1, shape (n_rows,)."""
+        return np.asarray(np.linalg.norm(self._left(self.directions, fixed), axis=1))
+
+    def _left(self, directions: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+        return np.where(movable(self.points, fixed)[self.which], directions, 0.0)
 
     def rows(self, tearing: Tearing, fixed: np.ndarray) -> Rows:
         """Return the part of these rows of B that acts on free components, with an empty right side.
@@ -92,15 +108,18 @@ def normal_relations(points: ContactPoints) -> Relations:
     return Relations(points, np.arange(points.count), -points.normal)
 
 
-def tangential_relations(points: ContactPoints, frictional: np.ndarray) -> Relations:
+def tangential_relations(points: ContactPoints, frictional: np.ndarray, prescribed: np.ndarray) -> Relations:
     """Return the slip t_a·(u_slave − u_master): dim − 1 consecutive rows for each frictional point.
 
     Args:
         points: All contact points.
         frictional: Numbers of the points that have friction.
+        prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
     """
     dim = points.normal.shape[1]
-    return Relations(points, np.repeat(frictional, dim - 1), points.tangents[frictional].reshape(-1, dim))
+    which, directions = np.repeat(frictional, dim - 1), points.tangents[frictional].reshape(-1, dim)
+    rows = Relations(points, which, directions)
+    return replace(rows, resting=rows.of_supports(prescribed) == 0.0)
 
 
 def tied_relations(points: ContactPoints, ties: Sequence[Tie], fixed: np.ndarray) -> Relations:

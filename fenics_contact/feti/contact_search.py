@@ -2,24 +2,39 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 
-from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.feti.contact_points import ContactPoints, join_points, tangent_frames
+from fenics_contact._libraries import MPI
+from fenics_contact.errors import InvalidInputError, tell, together
+from fenics_contact.feti.contact_points import (
+    ContactPoints,
+    in_free_frames,
+    join_points,
+    reference_axes,
+    tangent_frames,
+)
 from fenics_contact.feti.copies import Tearing
 from fenics_contact.feti.facet_areas import nodal_areas
 from fenics_contact.feti.projection import Projection, join, project
 from fenics_contact.feti.surface import FacetedSurface, faceted_surface, shape_functions
-from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie
+from fenics_contact.fingerprint import described, require_alike
+from fenics_contact.geometry import coordinate_rounding
+from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie, asked
+from fenics_contact.scene.mirrors import mirrored
+
+#: A gap of so many roundings of coordinates is none: a few operations lie between the two.
+ROUNDING = 8
+
+_LOG = logging.getLogger(__name__)
 
 
 def find_contact_points(
-    scene: Scene, tearing: Tearing, fixed: np.ndarray, comm: MPI.Comm = MPI.COMM_SELF
+    scene: Scene, tearing: Tearing, fixed: np.ndarray, comm: MPI.Comm | None = None
 ) -> ContactPoints:
     """Find where the slave surface of every contact pair meets its master. Collective on ``comm``.
 
@@ -30,31 +45,43 @@ def find_contact_points(
         scene: The scene.
         tearing: Node numbering.
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
-        comm: Communicator of the ranks that share the work.
+        comm: Communicator of the ranks that share the work; this rank alone by default.
 
     Raises:
         InvalidInputError: If no node of a slave surface finds its master.
     """
-    return _points_of_pairs(scene, scene.contacts, tearing, fixed, comm)
+    return _points_of_pairs(scene, scene.contacts, tearing, fixed, comm or MPI.COMM_SELF)
 
 
 def find_tied_points(
-    scene: Scene, tearing: Tearing, fixed: np.ndarray, comm: MPI.Comm = MPI.COMM_SELF
+    scene: Scene, tearing: Tearing, fixed: np.ndarray, comm: MPI.Comm | None = None
 ) -> ContactPoints:
     """Find where tied surfaces meet, as `find_contact_points` does; ``pair`` counts the ties. Collective."""
-    return _points_of_pairs(scene, scene.ties, tearing, fixed, comm)
+    return _points_of_pairs(scene, scene.ties, tearing, fixed, comm or MPI.COMM_SELF)
 
 
 def surface_of(scene: Scene, surface: Surface) -> FacetedSurface:
     """Return a named surface with its averaged normals: linear facets through its nodes."""
     mesh = scene.bodies[surface.body].mesh
-    found = faceted_surface(mesh.points, scene.facets(surface))
+    found = faceted_surface(mesh.points, scene.facets(surface), mirrored(scene, surface.body))
     if mesh.order == 1:
         return found
     # The area of a node is the force that a unit pressure puts there, which is not what linear facets say.
     facets = mesh.surfaces[surface.name]
     areas = np.bincount(facets.ravel(), nodal_areas(mesh.points, facets).ravel(), minlength=mesh.n_nodes)
     return replace(found, areas=areas[found.nodes])
+
+
+def without_rounding(gap: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return gaps, zero where surfaces touch but for the rounding of their coordinates.
+
+    Bodies that only touch would else press each other apart by that rounding, in units of their own.
+
+    Args:
+        gap: Gaps, shape (n,), [length].
+        points: Coordinates of one of the surfaces, shape (m, dim), [length].
+    """
+    return np.where(np.abs(gap) <= ROUNDING * coordinate_rounding(points), 0.0, gap)
 
 
 @dataclass(frozen=True)
@@ -86,24 +113,52 @@ def _points_of_pairs(
         slave = _Side.of(scene, pair.slave, tearing)
         movable = ~fixed[slave.nodes].all(axis=1)
         if not isinstance(pair.master, Surface):
-            points = _on_obstacle(slave, movable, pair.master)
+            with together(comm):
+                points = _on_obstacle(slave, movable, pair.master)
+            name = f"what ContactPair {index} asks its obstacle, {type(pair.master).__name__}"
+            require_alike(comm, described((points.slave, points.normal, points.gap), name))
         else:
             find = _by_mortar if pair.discretisation == "mortar" else _by_projection
-            points = find(slave, movable, _Side.of(scene, pair.master, tearing), comm)
+            master = _Side.of(scene, pair.master, tearing)
+            points = find(slave, movable, master, comm)
+            points = replace(points, symmetric=_symmetric(points, slave, master))
+        if comm.rank == 0 and not movable.all():
+            tell(
+                _LOG.info,
+                "%d of %d nodes of %s %d are left out as supports hold them in all directions",
+                np.count_nonzero(~movable), len(movable), type(pair).__name__, index,
+            )  # fmt: skip
         if points.count == 0:
             raise InvalidInputError(
                 f"{type(pair).__name__} {index} needs slave nodes that face the master, but none of the "
                 f"{np.count_nonzero(movable)} movable nodes of {pair.slave.name!r} meets it: check the "
                 "surfaces' names and where the bodies lie"
             )
-        parts.append(replace(points, pair=np.full(points.count, index)))
+        gap = without_rounding(points.gap, slave.surface.points)
+        parts.append(in_free_frames(replace(points, pair=np.full(points.count, index), gap=gap), fixed))
     return join_points(parts, scene.dim, len(fixed))
+
+
+def _symmetric(points: ContactPoints, slave: _Side, master: _Side) -> np.ndarray:
+    """Return the components across planes of symmetry that cut both surfaces at a point, (n_points, dim)."""
+    place = np.zeros((slave.n_nodes, points.normal.shape[1]))
+    cut = np.zeros(place.shape, dtype=bool)
+    for side in (slave, master):
+        place[side.nodes], cut[side.nodes] = side.surface.points, side.surface.mirrored
+    met = points.master.tocoo()
+    node, other = points.slave[met.row], met.col
+    same = np.abs(place[node] - place[other]) <= coordinate_rounding(place)
+    found = np.zeros(points.normal.shape, dtype=bool)
+    np.logical_or.at(found, met.row, cut[node] & cut[other] & same)
+    return found
 
 
 def _by_projection(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm) -> ContactPoints:
     """Let each slave node meet the master facet that it projects on. Collective."""
     candidates = np.flatnonzero(movable)
     hit = _shared_projection(slave.surface, candidates, master.surface, comm)
+    if len(hit.lost) and comm.rank == 0:
+        _tell_of_lost(slave.surface.points[candidates[hit.lost]], len(candidates))
     values, _ = shape_functions(hit.local, master.surface.corners)
     corners = master.nodes[master.surface.facets[hit.facet]]
     row = np.repeat(np.arange(len(hit.point)), master.surface.corners)
@@ -111,6 +166,16 @@ def _by_projection(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.C
     weight = sp.csr_matrix((values.ravel(), (row, corners.ravel())), shape=shape)
     chosen = candidates[hit.point]
     return replace(_points(slave, chosen, hit.normal, hit.gap, weight), facet=hit.facet, local=hit.local)
+
+
+def _tell_of_lost(places: np.ndarray, count: int) -> None:
+    where = ", ".join(f"{x:.6g}" for x in places[0])
+    tell(
+        _LOG.warning,
+        "%d of %d slave nodes face their master, but no point of it was found for them, the first at (%s): "
+        "nothing keeps them out of it; refine the master there, or let the other surface be the slave",
+        len(places), count, where,
+    )  # fmt: skip
 
 
 def _by_mortar(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm) -> ContactPoints:
@@ -129,10 +194,10 @@ def _by_mortar(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm)
 def _on_obstacle(slave: _Side, movable: np.ndarray, obstacle: RigidObstacle) -> ContactPoints:
     """Let each slave node that faces a rigid obstacle meet it."""
     candidates = np.flatnonzero(movable)
-    normals = obstacle.normals(slave.surface.points[candidates])
+    normals = asked(obstacle, "normals", slave.surface.points[candidates])
     facing = np.einsum("nd,nd->n", slave.surface.normals[candidates], normals) < 0
     chosen = candidates[facing]
-    gap = obstacle.distance(slave.surface.points[chosen])
+    gap = asked(obstacle, "distance", slave.surface.points[chosen])
     return _points(slave, chosen, normals[facing], gap, sp.csr_matrix((len(chosen), slave.n_nodes)))
 
 
@@ -140,10 +205,11 @@ def _points(
     slave: _Side, chosen: np.ndarray, normal: np.ndarray, gap: np.ndarray, weight: sp.csr_matrix
 ) -> ContactPoints:
     """Return points on chosen nodes of a slave, not yet numbered by pair and on no facet."""
-    count = len(chosen)
+    count, axes = len(chosen), reference_axes(normal)
     return ContactPoints(
-        np.zeros(count, dtype=np.int64), slave.nodes[chosen], weight, normal, tangent_frames(normal), gap,
-        slave.surface.areas[chosen], np.full(count, -1), np.zeros((count, normal.shape[1] - 1)),
+        np.zeros(count, dtype=np.int64), slave.nodes[chosen], weight, normal, tangent_frames(normal, axes),
+        gap, slave.surface.areas[chosen], np.full(count, -1), np.zeros((count, normal.shape[1] - 1)), axes,
+        np.zeros(normal.shape, dtype=bool),
     )  # fmt: skip
 
 
@@ -156,5 +222,5 @@ def _shared_projection(
     with together(comm):
         chosen = movable[mine]
         hit = project(slave.points[chosen], slave.normals[chosen], master)
-        found = replace(hit, point=mine[hit.point])
+        found = replace(hit, point=mine[hit.point], lost=mine[hit.lost])
     return join([part for part in comm.allgather(found) if part is not None])

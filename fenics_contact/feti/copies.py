@@ -61,6 +61,12 @@ class Tearing:
             np.add.reduceat(self.copy_stiffness, self.first_copy[:-1]), self.multiplicity
         )
 
+    @cached_property
+    def on_several_ranks(self) -> np.ndarray:
+        """Whether subdomains of different ranks hold a node, shape (n_nodes,)."""
+        rank, first = self.subdomain_rank[self.copy_subdomain], self.first_copy[:-1]
+        return np.asarray(np.minimum.reduceat(rank, first) != np.maximum.reduceat(rank, first))
+
     @property
     def n_subdomains(self) -> int:
         """Number of subdomains of all bodies."""

@@ -6,14 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI, start
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.condensation import Condensations
 from fenics_contact.feti.copies import Tearing, tear
 from fenics_contact.feti.forms import FormLibrary
 from fenics_contact.feti.gluing import GluingRows, gluing_rows, prescribed_displacements
 from fenics_contact.feti.nodal_stiffness import cell_stiffness
+from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.feti.subdomain import SubdomainMesh, cut_out
 from fenics_contact.geometry import check_face_connected
 from fenics_contact.linalg.threads import warn_of_threads
@@ -71,9 +72,11 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
         comm: Communicator.
 
     Raises:
-        InvalidInputError: If a partition does not fit its body, a subdomain does not hang together, or
-            there are more ranks than subdomains.
+        InvalidInputError: If a partition does not fit its body, a subdomain does not hang together, there are
+            more ranks than subdomains, or scene or partitions differ from rank to rank.
     """
+    start(comm)
+    check_same_input(comm, scene, partitions=partitions)
     with together(comm):
         _check_partitions(scene, partitions)
         if comm.rank == 0:

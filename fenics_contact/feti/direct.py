@@ -6,9 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.timing import PhaseTimer
+
+#: Largest error of a solution in energy norm, relative to it.
+WRONG = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +68,11 @@ class DirectSystem:
             self._factor = Factor(body.stiffness[self._free][:, self._free].tocsr())
 
     def solve(self) -> DirectSolution:
-        """Return the displacement under the present load, refined once."""
+        """Return the displacement under the present load, refined once.
+
+        Raises:
+            ConvergenceError: The residual says that more than `WRONG` of the displacement is rounding.
+        """
         (body,) = self.torn.subdomains
         stiffness, load, free = body.stiffness, self.torn.load, self._free
         displacement = np.zeros(body.mesh.size)
@@ -76,6 +84,13 @@ class DirectSystem:
             displacement[free] += correction
         missing = load - stiffness @ displacement
         scale = max(np.linalg.norm(load), np.linalg.norm(moved), np.finfo(float).tiny)
+        error, norm = self.energy_of_residual(displacement), float(displacement @ (stiffness @ displacement))
+        if not error <= WRONG**2 * max(norm, 0.0):
+            raise ConvergenceError(
+                f"a factored stiffness needs an error below {WRONG:g} in energy norm, the residual shows "
+                f"{np.sqrt(abs(error) / (norm or 1.0)):.1e} after refinement: the body is too slender, its "
+                "cells are too flat, or its materials too different for double precision"
+            )
         return DirectSolution(
             displacement, missing[self._fixed], float(np.linalg.norm(missing[free]) / scale)
         )
@@ -87,6 +102,10 @@ class DirectSystem:
         correction = np.empty(len(self._free))
         self._factor.solve(missing, correction)
         return float(missing @ correction)
+
+    def conforming(self, displacement: np.ndarray) -> np.ndarray:
+        """Return the displacement itself: no node has copies."""
+        return displacement
 
     def force(self, multiplier: np.ndarray) -> np.ndarray:
         """Return Bᵀλ, the reactions on all components, shape (torn_size,), [force]."""

@@ -6,10 +6,11 @@ from dataclasses import replace
 from typing import cast
 
 import numpy as np
+import scipy.linalg
 import scipy.sparse as sp
-from mpi4py import MPI
 
-from fenics_contact.errors import together
+from fenics_contact._libraries import MPI
+from fenics_contact.errors import InfeasibleError, together
 from fenics_contact.feti.dirichlet import DirichletPreconditioner
 from fenics_contact.feti.inverse import LocalKind, TornInverse, kernel_matrix
 from fenics_contact.feti.kernel_basis import whole_motions
@@ -25,6 +26,8 @@ STIFF = 1e-6
 UNFELT = 1e-13
 #: A resultant below this fraction of the loads' sum is rounding: the loads balance each other.
 BALANCED = 1e-13
+#: Work of the loads on a motion that nothing holds, relative to their sum, that is more than rounding.
+UNBALANCED = 1e-8
 
 
 class DualSystem:
@@ -33,7 +36,9 @@ class DualSystem:
     Attributes:
         torn: The torn system.
         inverse: K⁺ and the interface operators of the subdomains.
-        kernel: This rank's R, shape (torn_size, n_modes).
+        kernel: This rank's R, shape (torn_size, n_modes), less what `unheld` spans.
+        unheld: This rank's part of the motions that no row of B feels, as columns, shape (torn_size, k):
+            loads must not drive them, and they stay where they are.
         problem: What the dual solvers see.
         products: F-products so far.
     """
@@ -41,6 +46,8 @@ class DualSystem:
     inverse: TornInverse
     problem: DualProblem
     kernel: sp.csr_matrix
+    unheld: sp.csr_matrix
+    _bent: np.ndarray
     _B_interface: sp.csr_matrix
     _Bt_interface: sp.csr_matrix
 
@@ -74,8 +81,9 @@ class DualSystem:
             self._take_over(previous, timer)
         else:
             self._set_up(timer)
-        d = self.jump(self.inverse(torn.load)) - torn.right
-        self.problem = replace(self.problem, rhs=d)
+        bent = self.inverse(torn.load)
+        self._bent = bent[self.inverse.interface]
+        self.problem = replace(self.problem, rhs=self.jump(bent) - torn.right)
 
     def _is_that_of(self, previous: DualSystem) -> bool:
         """Tell whether F and G are those of an earlier system. Collective."""
@@ -85,12 +93,15 @@ class DualSystem:
     def _take_over(self, previous: DualSystem, timer: PhaseTimer) -> None:
         """Use the operators of an earlier system with the present load. Collective."""
         self._B_interface, self._Bt_interface = previous._B_interface, previous._Bt_interface
-        self.kernel = previous.kernel
+        self.kernel, self.unheld = previous.kernel, previous.unheld
+        self._require_unloaded()
         with timer.phase("coarse space"):
             coarse = previous.problem.coarse.with_load(self._resultants(self.torn.numbering.comm))
             scaling = previous.problem.scaling
             scaling = None if scaling is None else scaling.with_load(coarse.load)
-        self.problem = replace(previous.problem, operator=self.apply, coarse=coarse, scaling=scaling)
+        self.problem = replace(
+            previous.problem, operator=self.apply, coarse=coarse, scaling=scaling, reach=self.reach
+        )
 
     def _set_up(self, timer: PhaseTimer) -> None:
         """Build coarse space and preconditioner. Collective."""
@@ -99,7 +110,7 @@ class DualSystem:
         self._Bt_interface = self._B_interface.T.tocsr()
         with timer.phase("coarse space"):
             self.kernel = self._kernel(comm)
-            coarse = CoarseSpace(comm, self._coarse_columns(), self._resultants(comm))
+            coarse = self._without_unheld(CoarseSpace(comm, self._coarse_columns(), self._resultants(comm)))
         with timer.phase("preconditioner"):
             preconditioner = DirichletPreconditioner(
                 self.inverse, self._B_interface, self._compliance(), torn.numbering, torn.n_gluing
@@ -108,7 +119,7 @@ class DualSystem:
             scaling = self._scaling(coarse)
         nothing = np.zeros(len(torn.numbering.owned))
         self.problem = DualProblem(
-            comm, self.apply, nothing, coarse, self._layout(), diagonal, preconditioner, scaling
+            comm, self.apply, nothing, coarse, self._layout(), diagonal, preconditioner, scaling, self.reach
         )
 
     def apply(self, multiplier: np.ndarray) -> np.ndarray:
@@ -117,6 +128,13 @@ class DualSystem:
         numbering = self.torn.numbering
         force = self._Bt_interface @ numbering.to_local(multiplier)
         return numbering.to_owned(self._B_interface @ self.inverse.flex(force))
+
+    def reach(self, multiplier: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+        """Return abs(B) abs(u), how far the displacements go at each row, owned, [length]. Collective."""
+        numbering = self.torn.numbering
+        force = self._Bt_interface @ numbering.to_local(multiplier)
+        moved = self._bent - self.inverse.flex(force) + self.kernel[self.inverse.interface] @ alpha
+        return numbering.to_owned(abs(self._B_interface) @ np.abs(moved))
 
     def force(self, multiplier: np.ndarray) -> np.ndarray:
         """Return Bᵀλ on this rank's torn dofs, [force]. Collective."""
@@ -136,8 +154,51 @@ class DualSystem:
         return cast(DirichletPreconditioner, self.problem.preconditioner)
 
     def displacement(self, multiplier: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-        """Return u = K⁺(f − Bᵀλ) + R α on this rank's torn dofs, [length]. Collective."""
-        return self.inverse(self.torn.load - self.force(multiplier)) + self.kernel @ alpha
+        """Return u = K⁺(f − Bᵀλ) + R α on this rank's torn dofs, [length]. Collective.
+
+        Of motions that nothing holds u has no part: its mean over the nodes, in the sense of least squares.
+        """
+        found = self.inverse(self.torn.load - self.force(multiplier)) + self.kernel @ alpha
+        return self._at_rest(found)
+
+    def _at_rest(self, found: np.ndarray) -> np.ndarray:
+        """Take the part of motions that nothing holds off a torn displacement. Collective."""
+        if self.unheld.shape[1] == 0:
+            return found
+        tearing, here = self.torn.decomposition.tearing, self.torn.decomposition.copy_block
+        weight = np.empty(len(found) // tearing.dim)
+        weight[here[here >= 0]] = 1.0 / tearing.multiplicity[tearing.copy_node[here >= 0]]
+        weighted = self.unheld.T @ sp.diags(np.repeat(weight, tearing.dim))
+        sums = np.column_stack([(weighted @ self.unheld).toarray(), weighted @ found])
+        sums = self.torn.numbering.comm.allreduce(sums)
+        return found - self.unheld @ np.linalg.solve(sums[:, :-1], sums[:, -1])
+
+    def sewn(self, residual: np.ndarray) -> np.ndarray:
+        """Return the interface displacement that makes copies of nodes agree and meets supports. Collective.
+
+        The copies of a node move to their mean, weighted by the stiffness that each feels, those that
+        supports prescribe to the prescribed value.
+
+        Args:
+            residual: r = c − B u of the displacement, owned, [length].
+
+        Returns:
+            Shape (n_interface,), [length].
+        """
+        nothing = sp.csr_matrix((len(residual), 0))
+        return self.preconditioner.lifting(nothing).jump(residual)
+
+    def conforming(self, displacement: np.ndarray) -> np.ndarray:
+        """Return a torn displacement as one of whole bodies, in which the copies of a node agree. Collective.
+
+        Copies move as `sewn` says; the inside of each subdomain follows with the least energy, as it would
+        under forces on its interface alone. Without that the mean would bend one layer of cells.
+
+        Args:
+            displacement: This rank's torn displacement, shape (torn_size,), [length].
+        """
+        sewn = self.sewn(self.torn.right - self.jump(displacement))
+        return self._at_rest(displacement + self.inverse.extend(sewn))
 
     def positions(self, rows: np.ndarray) -> np.ndarray:
         """Return where owned rows lie in this rank's owned vector, −1 for rows of other ranks."""
@@ -158,6 +219,40 @@ class DualSystem:
         mine = offset[[subdomain.mesh.number for subdomain in self.torn.subdomains]]
         own = kernel_matrix(self.torn.subdomains, int(offset[-1]), mine)
         return (own @ whole_motions(self.torn, offset)).tocsr()
+
+    def _without_unheld(self, coarse: CoarseSpace) -> CoarseSpace:
+        """Take the motions that no row feels out of R, and their rows out of G. Collective.
+
+        They are none of the unknowns: rounding would load them, on every face anew, and nothing answers.
+
+        Raises:
+            InfeasibleError: The load drives one of them.
+        """
+        unfelt, k = coarse.gram.null_space, coarse.gram.null_space.shape[1]
+        # Without one mode of each, the others still reach every motion that is felt.
+        order = scipy.linalg.qr(unfelt.T, mode="r", pivoting=True)[-1] if k else np.arange(coarse.m)
+        # Each in terms of its own mode: then motions of bodies that do not meet have no entries in common.
+        unfelt = unfelt @ np.linalg.inv(unfelt[order[:k]])
+        unfelt[np.abs(unfelt) <= UNFELT * np.abs(unfelt).max(initial=0.0)] = 0.0
+        self.unheld = (self.kernel @ sp.csr_matrix(unfelt)).tocsr()
+        if k == 0:
+            return coarse
+        self._require_unloaded()
+        kept = np.sort(order[k:])
+        self.kernel = self.kernel[:, kept]
+        return CoarseSpace(coarse.comm, coarse.matrix[kept], coarse.load[kept])
+
+    def _require_unloaded(self) -> None:
+        """Refuse loads on motions that no row feels. Collective."""
+        if self.unheld.shape[1] == 0:
+            return
+        work = np.append(self.unheld.T @ self.torn.load, np.abs(self.torn.load).sum())
+        *driven, loads = self.torn.numbering.comm.allreduce(work)
+        if np.abs(driven).max() > UNBALANCED * loads:
+            raise InfeasibleError(
+                "every loaded body must be held by supports, ties or contact, but the load works "
+                f"{max(driven, key=abs):.3e} on a rigid motion that nothing resists: support that body"
+            )
 
     def _resultants(self, comm: MPI.Comm) -> np.ndarray:
         """Return e = Rᵀ f, replicated; what is only rounding of balanced loads is set to zero."""

@@ -11,9 +11,8 @@ from fenics_contact.feti.condensation import Condensations
 from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.subdomain import Subdomain
 
-#: Roundings of its largest entry by which wᵀ S w, computed in single precision, may be wrong: the rows of S
-#: decay away from the diagonal, their sums are a few diagonal entries.
-ROUNDINGS = 16
+#: Entries of S below this part of those of K are rounding.
+ROUNDED = 1e-12
 
 
 class ExplicitOperator:
@@ -42,11 +41,11 @@ class ExplicitOperator:
         schur = condensations.schur_complement(stiffness, interface)
         self._unit = float(np.abs(schur).max(initial=0.0)) or 1.0
         self._stiff, _ = lapack.strttp((schur / self._unit).astype(np.float32, order="F"), uplo="L")
-        self._flexible = _packed_inverse(schur, subdomain.kernel[interface])
+        self._flexible = _packed_inverse(schur, subdomain.kernel[interface], subdomain.typical_stiffness)
         self._size = len(interface)
         self._inside = np.setdiff1d(np.arange(subdomain.mesh.size), interface, assume_unique=True)
         rows = stiffness[self._inside]
-        self._K_ib = rows[:, interface].tocsr()
+        self._K_ib, self._K_bb = rows[:, interface].tocsr(), stiffness[interface][:, interface].tocsr()
         self._inner = Factor(rows[:, self._inside].tocsr()) if len(self._inside) else None
 
     def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
@@ -66,13 +65,15 @@ class ExplicitOperator:
         force[:] = blas.sspmv(self._size, 1.0, self._stiff, scaled, lower=1)
         force *= self._unit * size
 
-    @property
-    def stiffening_error(self) -> float:
-        """By how much wᵀ S w may be wrong for w of length one: S is rounded, and so are all sums with it."""
-        start = np.arange(self._size)
-        diagonal = self._stiff[start * (2 * self._size - start + 1) // 2]
-        largest = self._unit * float(diagonal.max(initial=0.0))
-        return ROUNDINGS * float(np.finfo(np.float32).eps) * largest
+    def extend(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the displacement of least energy for one of the interface, and S times the latter.
+
+        By the sparse stiffness and the factor of the inside: S itself is there in single precision only.
+        """
+        whole = np.empty(self._size + len(self._inside))
+        whole[self._interface] = displacement
+        whole[self._inside] = inner = -self._solve_inside(self._K_ib @ displacement)
+        return whole, self._K_bb @ displacement + self._K_ib.T @ inner
 
     def invert(self, right: np.ndarray) -> np.ndarray:
         """Return K⁺ times a vector, shape (n,)."""
@@ -105,10 +106,16 @@ class ExplicitOperator:
         return solution
 
 
-def _packed_inverse(schur: np.ndarray, kernel: np.ndarray) -> np.ndarray:
-    """Return the packed lower triangle of (S + ρ Q Qᵀ)⁻¹, overwriting ``schur``."""
+def _packed_inverse(schur: np.ndarray, kernel: np.ndarray, typical: float) -> np.ndarray:
+    """Return the packed lower triangle of (S + ρ Q Qᵀ)⁻¹, overwriting ``schur``.
+
+    ρ is the largest diagonal entry of S. Where that is rounding beside the typical stiffness, every
+    displacement of the interface is a rigid motion, as in a body that is held statically determinate.
+    """
     modes, _ = np.linalg.qr(kernel)
-    filled = blas.dsyrk(schur.diagonal().max(), modes, beta=1.0, c=schur, lower=1, overwrite_c=1)
+    largest = schur.diagonal().max()
+    rho = largest if largest > ROUNDED * typical else typical
+    filled = blas.dsyrk(rho, modes, beta=1.0, c=schur, lower=1, overwrite_c=1)
     factor, failed = lapack.dpotrf(filled, lower=1, overwrite_a=1)
     if failed:
         raise InvalidInputError(

@@ -6,8 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 import scipy.sparse as sp
-from petsc4py import PETSc
 
+from fenics_contact._libraries import PETSc, check_not_forked
 from fenics_contact.linalg import dispose_with
 
 #: Enough nodes to fix all rigid motions of a body that is not a line, few enough to keep the factor sparse.
@@ -38,6 +38,7 @@ class Factor:
 
     def solve(self, right: np.ndarray, out: np.ndarray) -> None:
         """Write the solution for one right side, shape (n,), into ``out``."""
+        check_not_forked()
         self._right.array_w[:] = right
         self._factor.solve(self._right, self._left)
         out[:] = self._left.array_r

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 import ufl
-from mpi4py import MPI
 
 from fenics_contact import _dolfinx
+from fenics_contact._libraries import MPI
+from fenics_contact.errors import together
 from fenics_contact.feti.composition import Composition, integrate, possible
 from fenics_contact.feti.facet_areas import quadrature_areas
 from fenics_contact.feti.load_forms import Symbol, fields_of, load_key, load_name, load_parameters, load_work
@@ -43,7 +44,7 @@ class FormLibrary:
 
     def __init__(self, comm: MPI.Comm) -> None:
         """Start empty; `prepare` fills it."""
-        self._templates = Templates(comm)
+        self._comm, self._templates = comm, Templates(comm)
         self._typical_modulus: dict[tuple[Material, str], float] = {}
 
     @property
@@ -67,8 +68,10 @@ class FormLibrary:
             cell_type = body.mesh.cell_type
             for materials in possible(body):
                 self._prepare_stiffness(materials, cell_type)
-            for material in body.materials:
-                self._check(material, cell_type)
+        with together(self._comm):
+            for body in scene.bodies.values():
+                for material in body.materials:
+                    self._check(material, body.mesh.cell_type)
         for load in as_tractions(scene):
             body = scene.bodies[load.body]
             for materials in possible(body):

@@ -26,7 +26,7 @@ class ImplicitOperator:
         self._interface = interface
         self._factor = Factor(regularised(stiffness, subdomain.kernel, subdomain.points))
         self._right, self._left = np.zeros(size), np.zeros(size)
-        inside = np.setdiff1d(np.arange(size), interface, assume_unique=True)
+        self._rest = inside = np.setdiff1d(np.arange(size), interface, assume_unique=True)
         rows = stiffness[interface]
         self._K_bb, self._K_bi = rows[:, interface].tocsr(), rows[:, inside].tocsr()
         self._K_ib = self._K_bi.T  # shares its memory
@@ -46,10 +46,13 @@ class ImplicitOperator:
             self._inside.solve(self._K_ib @ displacement, self._inner)
             force -= self._K_bi @ self._inner
 
-    @property
-    def stiffening_error(self) -> float:
-        """None beyond the rounding of double precision."""
-        return 0.0
+    def extend(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the displacement of least energy for one of the interface, and S times the latter."""
+        self.stiffen(displacement, force := np.empty_like(displacement))
+        whole = np.empty(len(self._right))
+        whole[self._interface] = displacement
+        whole[self._rest] = -self._inner
+        return whole, force
 
     def invert(self, right: np.ndarray) -> np.ndarray:
         """Return K⁺ times a vector, shape (n,)."""

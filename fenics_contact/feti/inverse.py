@@ -95,14 +95,14 @@ class TornInverse:
         return self._each(lambda operator: operator.stiffen, displacement)
 
     def energy(self, displacement: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return an upper bound of wᵀ S w and S w itself, shape (n_interface,).
+        """Return wᵀ S w of this rank and S w, shape (n_interface,), both in double precision.
 
-        Rigid motions have no energy; they are taken off before S, which may be rounded, is applied.
+        Rigid motions have no energy; they are taken off first, so that nothing of them cancels.
 
         Args:
             displacement: w, shape (n_interface,).
         """
-        bound, force = 0.0, np.zeros_like(displacement)
+        energy, force = 0.0, np.zeros_like(displacement)
         each = zip(self._subdomains, self.operators, self._local, self._parts, strict=True)
         for subdomain, operator, local, part in each:
             moved = displacement[part]
@@ -110,10 +110,22 @@ class TornInverse:
                 continue
             modes, _ = np.linalg.qr(subdomain.kernel[local])
             bent = moved - modes @ (modes.T @ moved)
-            operator.stiffen(bent, found := np.empty_like(bent))
-            bound += float(bent @ found) + operator.stiffening_error * float(bent @ bent)
-            force[part] = found
-        return max(bound, 0.0), force
+            _, force[part] = operator.extend(bent)
+            energy += float(bent @ force[part])
+        return max(energy, 0.0), force
+
+    def extend(self, displacement: np.ndarray) -> np.ndarray:
+        """Return the torn displacement of least energy for one of the interface, shape (torn_size,).
+
+        Args:
+            displacement: w, shape (n_interface,).
+        """
+        whole = np.zeros(self.offset[-1])
+        each = zip(self.operators, self._parts, self.offset[:-1], self.offset[1:], strict=True)
+        for operator, part, start, stop in each:
+            if displacement[part].any():
+                whole[start:stop], _ = operator.extend(displacement[part])
+        return whole
 
     def row_flexibility(self, rows: sp.csr_matrix) -> np.ndarray:
         """Return bᵀ K⁺ b for each row b of a matrix with interface columns, shape (n_rows,)."""

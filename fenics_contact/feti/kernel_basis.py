@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact.errors import together
 from fenics_contact.feti.subdomain import Subdomain, common_kernel
 from fenics_contact.feti.torn import TornSystem
 
@@ -29,12 +30,12 @@ def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:
     Returns:
         Coefficients of the new basis vectors in the old ones as columns, (n_modes, n_modes), replicated.
     """
-    bodies = {name: torn.scene.bodies[name] for name in {part.mesh.body for part in torn.subdomains}}
-    modes = {name: common_kernel(body.materials, body.mesh.points) for name, body in bodies.items()}
-    mine = {part.mesh.number: _coefficients(part, modes[part.mesh.body]) for part in torn.subdomains}
-    parts = {
-        number: found for share in torn.numbering.comm.allgather(mine) for number, found in share.items()
-    }
+    comm = torn.numbering.comm
+    with together(comm):
+        bodies = {name: torn.scene.bodies[name] for name in {part.mesh.body for part in torn.subdomains}}
+        modes = {name: common_kernel(body.materials, body.mesh.points) for name, body in bodies.items()}
+        mine = {part.mesh.number: _coefficients(part, modes[part.mesh.body]) for part in torn.subdomains}
+    parts = {number: found for share in comm.allgather(mine) for number, found in share.items()}
     total, first = int(offset[-1]), torn.decomposition.tearing.subdomain_offset
     kept, rows, columns, values = np.ones(total), [], [], []
     for start, end in pairwise(first):

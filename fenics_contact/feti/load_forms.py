@@ -9,7 +9,7 @@ import numpy as np
 import ufl
 
 from fenics_contact import _dolfinx
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, calling
 from fenics_contact.feti.composition import Composition, integrate
 from fenics_contact.feti.templates import scalar_constants, surface_measure, volume_measure
 from fenics_contact.scene import BodyForce, Load, Material, Pressure, ThermalStrain, Ufl, strain
@@ -60,8 +60,9 @@ def from_ufl(load: Load, value: Ufl, cell_type: str) -> Any:
     """Return a value given as `Ufl`, written on the template, after a check of its shape."""
     dim = _dolfinx.dimension(cell_type)
     shape = () if is_scalar(load) else (dim,)
-    found = value.function(ufl.SpatialCoordinate(_dolfinx.template(cell_type)))
-    found = ufl.as_vector(list(found)) if isinstance(found, list | tuple) else ufl.as_ufl(found)
+    with calling(f"the function given as Ufl of {type(load).__name__} on body {load.body!r}"):
+        found = value.function(ufl.SpatialCoordinate(_dolfinx.template(cell_type)))
+        found = ufl.as_vector(list(found)) if isinstance(found, list | tuple) else ufl.as_ufl(found)
     if found.ufl_shape != shape:
         raise InvalidInputError(
             f"the UFL value of {type(load).__name__} on body {load.body!r} must have shape {shape}, got "
@@ -92,7 +93,7 @@ def fields_of(load: Load, space: Any, points: np.ndarray) -> tuple[Any, ...]:
     dim = points.shape[1]
     shape = () if is_scalar(load) else (dim,)
     name = f"{type(load).__name__} on body {load.body!r}"
-    field = _dolfinx.Function(space, name="load")
+    field = _dolfinx.fem.Function(space, name="load")
     field.x.array.reshape(-1, 1 if is_scalar(load) else dim)[dofs] = evaluate(
         name, load.value, points[nodes], shape
     ).reshape(len(nodes), -1)

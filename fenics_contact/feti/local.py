@@ -26,9 +26,18 @@ class LocalOperator(Protocol):
     def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
         """Write S, or a close approximation, times an interface displacement into ``force``."""
 
-    @property
-    def stiffening_error(self) -> float:
-        """By how much wᵀ S w may be wrong for a displacement w of length one, [force / length]."""
+    def extend(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the displacement of least energy for one of the interface, and the interface force for it.
+
+        Both in double precision.
+
+        Args:
+            displacement: w of the interface, shape (n_b,).
+
+        Returns:
+            The displacement, w itself on the interface and −K_ii⁻¹ K_ib w inside, shape (n,), and S w, shape
+            (n_b,).
+        """
 
     def invert(self, right: np.ndarray) -> np.ndarray:
         """Return K⁺ times a vector, shape (n,)."""

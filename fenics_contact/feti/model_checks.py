@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fenics_contact import _dolfinx
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, calling
 from fenics_contact.geometry import CELL_TYPES
 from fenics_contact.scene import Material
 
@@ -96,14 +96,27 @@ def check_kernel(stiffness: Any, kernel: np.ndarray, what: str) -> None:
         )
 
 
-def _checked_kernel(material: Material, points: np.ndarray) -> np.ndarray:
-    name, modes = type(material).__name__, np.asarray(material.kernel(points))
+def kernel_of(material: Material, points: np.ndarray) -> np.ndarray:
+    """Return the modes without energy of a material at points, shape (n, dim, n_modes).
+
+    Raises:
+        InvalidInputError: If the material returns something else.
+        UserCodeError: If it raises.
+    """
+    name = type(material).__name__
+    with calling(f"the kernel of material {name}"):
+        modes = np.asarray(material.kernel(points), dtype=np.float64)
     if modes.ndim != 3 or modes.shape[:2] != points.shape or not np.isfinite(modes).all():
         raise InvalidInputError(
             f"kernel(points) of {name} must return finite modes of shape {points.shape} + (n_modes,), got "
-            f"shape {modes.shape}: one displacement a point and mode"
+            f"{'NaN or infinity' if modes.shape[:2] == points.shape else f'shape {modes.shape}'}: one "
+            "displacement a point and mode"
         )
-    R = modes.reshape(points.size, -1)
+    return modes
+
+
+def _checked_kernel(material: Material, points: np.ndarray) -> np.ndarray:
+    name, R = type(material).__name__, kernel_of(material, points).reshape(points.size, -1)
     if np.linalg.matrix_rank(R, tol=1e-8 * max(np.abs(R).max(initial=0.0), 1e-300)) < R.shape[1]:
         raise InvalidInputError(
             f"the modes in the kernel of {name} must be independent, the {R.shape[1]} given are not: leave "

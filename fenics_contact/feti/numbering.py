@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
-from petsc4py import PETSc
 
+from fenics_contact._libraries import MPI, PETSc
 from fenics_contact.linalg import dispose_with
 
 

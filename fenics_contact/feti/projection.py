@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from fenics_contact.feti.surface import FacetedSurface, outside, shape_functions
+from fenics_contact.geometry import coordinate_rounding
 
 #: Facets tried for each point in the first round, nearest centroids first.
 NEAREST = 9
@@ -17,8 +18,11 @@ REACH = 1.1
 NEWTON_STEPS = 25
 #: After so many steps a point that is still a facet's width away belongs to another facet.
 PATIENCE = 8
-#: How far outside a facet a projection may lie, in local coordinates: rounding on shared edges, no more.
+#: How far outside a facet a projection may lie, in local coordinates: rounding on shared edges, no more. Far
+#: from the origin the rounding of coordinates is added.
 EDGE_TOLERANCE = 1e-9
+#: What Newton's method may leave, relative to the facet and the gap.
+RESIDUAL = 1e-10
 #: How far beyond the outer edges of the surface. Where a plane of symmetry cuts two round bodies the averaged
 #: normals lean a little out of that plane, and nodes of one body would just miss the other.
 MARGIN = 0.1
@@ -34,6 +38,8 @@ class Projection:
         local: Local coordinates on it, shape (n, dim − 1).
         gap: Signed distance along the normal, positive outside, shape (n,), [length].
         normal: Interpolated outward unit normal there, shape (n, dim).
+        beside: How far outside its facet it lies, in local coordinates, shape (n,); 0 for rounding.
+        lost: Points that look at a facet without a projection being found, ascending, shape (n_lost,).
     """
 
     point: np.ndarray
@@ -41,17 +47,15 @@ class Projection:
     local: np.ndarray
     gap: np.ndarray
     normal: np.ndarray
+    beside: np.ndarray
+    lost: np.ndarray
 
     def part(self, chosen: np.ndarray) -> Projection:
         """Return some of the projections, by number or by a mask."""
-        return Projection(
-            self.point[chosen], self.facet[chosen], self.local[chosen], self.gap[chosen], self.normal[chosen]
-        )
+        return replace(self, **{name: getattr(self, name)[chosen] for name in _EACH})
 
-    def beside(self, corners: int) -> np.ndarray:
-        """Return how far outside their facets they lie, in local coordinates, shape (n,); 0 for rounding."""
-        distance = outside(self.local, corners)
-        return np.where(distance <= EDGE_TOLERANCE, 0.0, distance)
+
+_EACH = ("point", "facet", "local", "gap", "normal", "beside")
 
 
 def interpolated_normal(weights: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -103,12 +107,13 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
     corners = master.points[master.facets]
     centroids = corners.mean(axis=1)
     radius = np.linalg.norm(corners - centroids[:, None], axis=2).max(axis=1)
-    tree = cKDTree(centroids)
-    near = _solve(points, normals, master, *_nearest(tree, points))
-    first = _best(near.part(near.beside(master.corners) == 0.0), master.corners)
-    waiting = np.setdiff1d(np.arange(len(points)), first.point)
-    reached = _solve(points, normals, master, *_within_reach(tree, radius, points, waiting))
-    return join([first, _best(reached, master.corners)])
+    tree, rounding = cKDTree(centroids), coordinate_rounding(master.points)
+    near = _solve(points, normals, master, *_nearest(tree, points), rounding)
+    near = _best(near.part(near.beside == 0.0), rounding)
+    waiting = np.setdiff1d(np.arange(len(points)), near.point)
+    reached = _solve(points, normals, master, *_within_reach(tree, radius, points, waiting), rounding)
+    found = join([near, _best(reached, rounding)])
+    return replace(found, lost=np.setdiff1d(found.lost, found.point))
 
 
 def _nearest(tree: cKDTree, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -134,11 +139,19 @@ def _within_reach(
 
 
 def _solve(
-    points: np.ndarray, normals: np.ndarray, master: FacetedSurface, point: np.ndarray, facet: np.ndarray
+    points: np.ndarray,
+    normals: np.ndarray,
+    master: FacetedSurface,
+    point: np.ndarray,
+    facet: np.ndarray,
+    rounding: float,
 ) -> Projection:
     """Solve for each (point, facet) pair by Newton's method; keep answers in a facet or barely beside it."""
     nodes = master.facets[facet]
-    corners, corner_normals, target = master.points[nodes], master.normals[nodes], points[point]
+    # Seen from the facet's own corner all is as exact far from the origin as near it.
+    start = master.points[nodes[:, 0]]
+    corners, target = master.points[nodes] - start[:, None], points[point] - start
+    corner_normals = master.normals[nodes]
     size = np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).max(axis=1)
     local = np.full((len(point), master.dim - 1), 1 / 3 if master.corners == 3 else 0.0)
     gap = np.zeros(len(point))
@@ -154,13 +167,25 @@ def _solve(
         at = at[moving]
         if len(at) == 0:
             break
-    values, _ = shape_functions(local, master.corners)
-    normal, _ = interpolated_normal(values, corner_normals)
+    values, derivatives = shape_functions(local, master.corners)
+    normal, length = interpolated_normal(values, corner_normals)
     residual = np.einsum("nk,nkd->nd", values, corners) + gap[:, None] * normal - target
-    good = np.linalg.norm(residual, axis=1) < 1e-10 * (size + np.abs(gap))
-    good &= outside(local, master.corners) <= MARGIN * (0.5 if master.corners == 3 else 1.0)
-    good &= np.einsum("nd,nd->n", normal, normals[point]) < 0
-    return Projection(point, facet, local, gap, normal).part(good)
+    matrix = newton_matrix(corners, corner_normals, derivatives, gap, normal, length)
+    solved = np.linalg.norm(residual, axis=1) < RESIDUAL * (size + np.abs(gap))
+    beside = outside(local, master.corners)
+    beside = np.where(beside <= EDGE_TOLERANCE + _local_rounding(matrix, rounding), 0.0, beside)
+    facing = np.einsum("nd,nd->n", normal, normals[point]) < 0
+    near = facing & (beside <= MARGIN * (0.5 if master.corners == 3 else 1.0))
+    lost = np.unique(point[near & ~solved])
+    return Projection(point, facet, local, gap, normal, beside, lost).part(near & solved)
+
+
+def _local_rounding(matrix: np.ndarray, rounding: float) -> np.ndarray:
+    """Return how far rounding moves local coordinates at most, shape (n,)."""
+    # No entry of the inverse is larger than the product of the columns but one over the determinant.
+    tangents = np.linalg.norm(matrix[:, :, :-1], axis=1)
+    cofactor = tangents.max(axis=1) if matrix.shape[1] == 3 else np.ones(len(matrix))
+    return np.asarray(rounding * cofactor / np.maximum(np.abs(np.linalg.det(matrix)), 1e-300))
 
 
 def _newton_step(
@@ -181,19 +206,26 @@ def _newton_step(
     return np.where(regular[:, None], -np.linalg.solve(matrix, residual[:, :, None])[:, :, 0], 0.0)
 
 
-def _best(found: Projection, corners: int) -> Projection:
-    """Keep of each point what lies least beside its facet; then the smallest |gap|, then the lowest facet."""
-    rounded = np.round(np.abs(found.gap), 12)
-    order = np.lexsort((found.facet, rounded, found.beside(corners), found.point))
+def _best(found: Projection, rounding: float) -> Projection:
+    """Keep of each point what lies least beside its facet; then the smallest |gap|, then the lowest facet.
+
+    Args:
+        found: Projections, several of a point.
+        rounding: By how much coordinates are rounded; gaps over an edge of two facets are alike but for it.
+    """
+    distance = np.abs(found.gap)
+    order = np.lexsort((distance, found.beside, found.point))
+    _, first, group = np.unique(found.point[order], return_index=True, return_inverse=True)
+    nearest = order[first][group.ravel()]  # of the same point, for each in their order
+    alike = distance[order] - distance[nearest] <= rounding + coordinate_rounding(distance)
+    order = order[alike & (found.beside[order] == found.beside[nearest])]
+    order = order[np.lexsort((found.facet[order], found.point[order]))]
     _, first = np.unique(found.point[order], return_index=True)
     return found.part(order[first])
 
 
 def join(parts: Sequence[Projection]) -> Projection:
     """Return the projections of several groups of points, ascending by point."""
-    point = np.concatenate([part.point for part in parts])
-    order = np.argsort(point)
-    joined = [
-        np.concatenate([getattr(p, n) for p in parts])[order] for n in ("facet", "local", "gap", "normal")
-    ]
-    return Projection(point[order], *joined)
+    order = np.argsort(np.concatenate([part.point for part in parts]))
+    joined = {name: np.concatenate([getattr(part, name) for part in parts])[order] for name in _EACH}
+    return Projection(**joined, lost=np.unique(np.concatenate([part.lost for part in parts])))

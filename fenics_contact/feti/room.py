@@ -9,6 +9,9 @@ from fenics_contact.feti.contact_points import ContactPoints
 from fenics_contact.feti.contact_rows import Relations
 from fenics_contact.scene import Scene
 
+#: Supports hold a point along its normal if they leave no larger part of it free: normals of facets are
+#: tilted a little, and what only slips down that tilt makes no room.
+SLIGHT = 0.02
 #: Penetration that faceting explains, relative to the size of a slave facet.
 FACETING = 0.1
 
@@ -43,7 +46,7 @@ def gap_with_room(normal: Relations, fixed: np.ndarray, prescribed: np.ndarray) 
         InvalidInputError: If supports press surfaces into one another.
     """
     points = normal.points
-    missing = np.where(normal.held(fixed), normal.of_supports(prescribed) - points.gap, 0.0)
+    missing = np.where(normal.freedom(fixed) <= SLIGHT, normal.of_supports(prescribed) - points.gap, 0.0)
     pressed = missing > _explained(points)
     if pressed.any():
         raise InvalidInputError(

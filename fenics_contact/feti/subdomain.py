@@ -13,9 +13,9 @@ from fenics_contact import _dolfinx
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.composition import Composition, composition
 from fenics_contact.feti.forms import FormLibrary
-from fenics_contact.feti.model_checks import check_kernel
+from fenics_contact.feti.model_checks import check_kernel, kernel_of
 from fenics_contact.geometry import corners_of
-from fenics_contact.scene import Body, Load, Material, SurfaceLoad
+from fenics_contact.scene import Body, Load, Material, SurfaceLoad, Ufl
 
 
 @dataclass(frozen=True)
@@ -161,11 +161,12 @@ def assemble(
     elif earlier.loads == acting:
         return earlier
     force = np.zeros(mesh.size)
-    if acting:
-        _dolfinx.update_coordinates(mesh.space.mesh, points[order])
     for load in acting:
         facets = mesh.facets_of(body, load.surface) if isinstance(load, SurfaceLoad) else None
         form = forms.load(load, parts, body.mesh.cell_type, mesh.space, points[order], facets)
+        absolute = isinstance(load.value, Ufl) or _varies(parts, body, forms)
+        coordinates = points[order] if absolute else _from_own_origin(points[order])
+        _dolfinx.update_coordinates(mesh.space.mesh, coordinates)
         force += _dolfinx.assemble_vector(form)
     _check_finite(force, mesh)
     return replace(earlier, loads=acting, load=force)
@@ -187,6 +188,8 @@ def _with_stiffness(
     """Return the subdomain without loads."""
     space, cell_type = mesh.space, body.mesh.cell_type
     by_input_node = points[np.argsort(mesh.nodes)]
+    if not _varies(parts, body, forms):
+        by_input_node = _from_own_origin(by_input_node)
 
     def stiffness() -> sp.csr_matrix:
         _dolfinx.update_coordinates(space.mesh, by_input_node)
@@ -202,12 +205,20 @@ def _with_stiffness(
     return Subdomain(mesh, parts, (), points, np.zeros(mesh.size), kernel, typical, matrix)
 
 
+def _varies(parts: Composition, body: Body, forms: FormLibrary) -> bool:
+    """Tell whether the materials of a mesh depend on the place."""
+    return any(forms.varies(material, body.mesh.cell_type) for material in parts.materials)
+
+
+def _from_own_origin(points: np.ndarray) -> np.ndarray:
+    """Return coordinates that count from one of the points: as exact far from the origin as near it."""
+    return np.asarray(points - points[0])
+
+
 def common_kernel(materials: Sequence[Material], points: np.ndarray) -> np.ndarray:
     """Return the modes without energy of a body of several materials at points, (n, dim, n_modes)."""
     # A motion without energy has none in any of the materials.
-    return min(
-        (np.asarray(material.kernel(points)) for material in materials), key=lambda modes: modes.shape[-1]
-    )
+    return min((kernel_of(material, points) for material in materials), key=lambda modes: modes.shape[-1])
 
 
 def _check_finite(values: np.ndarray, mesh: SubdomainMesh) -> None:

@@ -11,6 +11,9 @@ from fenics_contact.errors import InvalidInputError
 #: Local coordinates of the corners of quadrilaterals.
 _S, _T = np.array([-1.0, 1.0, 1.0, -1.0]), np.array([-1.0, -1.0, 1.0, 1.0])
 
+#: A surface is cut by a plane of symmetry if so much of its normal lies in that plane.
+CUT = 0.5
+
 
 def shape_values(local: np.ndarray, corners: int) -> np.ndarray:
     """Evaluate the shape functions alone, at points of any leading shape; see `shape_functions`.
@@ -103,6 +106,7 @@ class FacetedSurface:
         points: Coordinates of the nodes, shape (n, dim), [length].
         normals: Outward unit normals at the nodes, shape (n, dim).
         areas: Area, in the plane length, that belongs to each node, shape (n,), [length²] or [length].
+        mirrored: Components that the normals lack on planes of symmetry, shape (n, dim).
     """
 
     nodes: np.ndarray
@@ -110,6 +114,7 @@ class FacetedSurface:
     points: np.ndarray
     normals: np.ndarray
     areas: np.ndarray
+    mirrored: np.ndarray
 
     @property
     def corners(self) -> int:
@@ -122,12 +127,18 @@ class FacetedSurface:
         return int(self.points.shape[1])
 
 
-def faceted_surface(points: np.ndarray, facets: np.ndarray) -> FacetedSurface:
+def faceted_surface(
+    points: np.ndarray, facets: np.ndarray, mirrored: np.ndarray | None = None
+) -> FacetedSurface:
     """Build the surface from the coordinates of a body and rows of its node numbers.
+
+    On a plane of symmetry the facets of the mirror image belong to the average, too: the normals lie in it.
 
     Args:
         points: Coordinates, shape (n_nodes, 3), or (n_nodes, 2) where the facets are edges, [length].
         facets: Node numbers of triangles, quadrilaterals or edges, shape (n_facets, 3, 4 or 2).
+        mirrored: Which nodes lie on a plane of symmetry across each axis, shape (n_nodes, dim); by default
+            none does.
 
     Raises:
         InvalidInputError: If coordinates and facets are not of the same dimension.
@@ -144,9 +155,14 @@ def faceted_surface(points: np.ndarray, facets: np.ndarray) -> FacetedSurface:
     products = corner_products(own, local)
     summed = np.zeros_like(own)
     np.add.at(summed, local, products)
+    flat = np.zeros(own.shape, dtype=bool) if mirrored is None else mirrored[nodes]
+    within = np.where(flat, 0.0, summed)
+    # A surface that lies in the plane itself is none that the plane cuts.
+    flat &= (np.linalg.norm(within, axis=1) > CUT * np.linalg.norm(summed, axis=1))[:, None]
+    summed[flat] = 0.0
     areas = np.zeros(len(nodes))
     # The corner products of a quadrilateral add up to four times its area vector, those of a triangle to six,
     # those of an edge to two.
     share = np.linalg.norm(products.sum(axis=1), axis=1) / {2: 2, 3: 6, 4: 4}[corners] / corners
     np.add.at(areas, local, np.broadcast_to(share[:, None], local.shape))
-    return FacetedSurface(nodes, local, own, summed / np.linalg.norm(summed, axis=1)[:, None], areas)
+    return FacetedSurface(nodes, local, own, summed / np.linalg.norm(summed, axis=1)[:, None], areas, flat)

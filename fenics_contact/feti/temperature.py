@@ -56,7 +56,7 @@ class Temperature:
             return ()
         space = _dolfinx.scalar_space(mesh, 1)
         nodes, dofs = _dolfinx.node_dofs(space)
-        field = _dolfinx.Function(space, name="temperature")
+        field = _dolfinx.fem.Function(space, name="temperature")
         for load in self._of_position:
             field.x.array[dofs] += evaluate("temperature_change", load.value, points[nodes], ())
         return (field,)

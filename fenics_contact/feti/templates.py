@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import ufl
-from mpi4py import MPI
 from ufl.algorithms.analysis import extract_type
+from ufl.constantvalue import FloatValue
 
 from fenics_contact import _dolfinx
+from fenics_contact._libraries import MPI
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.fingerprint import require_alike
 
 #: Gauss rule of the volume by shape: two points a direction on tensor-product cells, one on simplices suit
 #: linear elasticity; quadratic cells get twice the degree.
@@ -58,7 +62,7 @@ class Template:
         """
         mesh = spaces[0].mesh if mesh is None else mesh
         constants = {
-            symbol: _dolfinx.Constant(mesh, np.float64(value))
+            symbol: _dolfinx.fem.Constant(mesh, np.float64(value))
             for symbol, value in zip(self._constants, values, strict=True)
         }
         coefficients = dict(zip(self._coefficients, functions, strict=True))
@@ -93,21 +97,42 @@ class Templates:
         return key in self._by_key
 
     def get(self, key: Hashable, name: tuple[Any, ...], write: Callable[[], Written]) -> Template:
-        """Return the template under ``key``. Collective when it is new.
+        """Return the template under ``key``. Collective when it is new, on all ranks or on none.
 
         Args:
             key: All that the form depends on.
             name: What it is called among `names`.
             write: Gives form, constants and coefficients.
+
+        Raises:
+            InvalidInputError: If ranks write different forms, or a number in it is not finite.
         """
         if key not in self._by_key:
-            form, constants, coefficients = write()
-            text = _text(form, constants, coefficients)
+            what = f"the form of {', '.join(map(_called, name))}"
+            with together(self._comm):
+                form, constants, coefficients = write()
+                _check_numbers(form, what)
+                text = _text(form, constants, coefficients)
+            require_alike(self._comm, {what: hashlib.sha256(repr(text).encode()).hexdigest()[:16]})
             if text not in self._by_text:
                 self._by_text[text] = Template(self._comm, form, constants, coefficients)
                 self._names.append(name)
             self._by_key[key] = self._by_text[text]
         return self._by_key[key]
+
+
+def _check_numbers(form: Any, what: str) -> None:
+    """Refuse numbers in a form that no compiler takes."""
+    bad = [number for number in extract_type(form, FloatValue) if not np.isfinite(float(number))]
+    if bad:
+        raise InvalidInputError(
+            f"numbers in UFL must be finite, got {float(bad[0])} in {what}: check what stresses, energies "
+            "and loads in UFL are made of"
+        )
+
+
+def _called(part: Any) -> str:
+    return part.__name__ if isinstance(part, type) else str(part)
 
 
 def _text(form: Any, constants: Sequence[Any], coefficients: Sequence[Any]) -> Hashable:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.errors import together
+from fenics_contact.errors import tell, together
 from fenics_contact.feti.contact_points import ContactPoints, join_points
 from fenics_contact.feti.contact_rows import (
     Relations,
@@ -20,11 +21,14 @@ from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.forms import as_tractions
 from fenics_contact.feti.friction import friction_data
 from fenics_contact.feti.gluing import prescribed_displacements
+from fenics_contact.feti.nodal_means import nodal_means
 from fenics_contact.feti.numbering import DualNumbering
 from fenics_contact.feti.room import check_no_penetration, gap_with_room
 from fenics_contact.feti.rows import Rows, stack
 from fenics_contact.feti.subdomain import Subdomain, assemble
 from fenics_contact.scene import Scene
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,8 @@ class TornSystem:
         supported: What prescribed displacements contribute to the owned rows of ties and contacts, shape
             (n_owned,), zero on other rows, [length].
         right: c of the owned rows less what supports contribute, shape (n_owned,), [length].
+        slid: Tangential displacement of the points without friction, which have no such rows, at the place
+            that slip is measured from, replicated, shape (n_contact − n_friction, dim − 1), [length].
     """
 
     scene: Scene
@@ -67,6 +73,7 @@ class TornSystem:
     B: sp.csr_matrix
     supported: np.ndarray
     right: np.ndarray
+    slid: np.ndarray
 
     def jump(self, displacement: np.ndarray) -> np.ndarray:
         """Return B u for a torn displacement of this rank, owned, [length]. Collective."""
@@ -76,14 +83,45 @@ class TornSystem:
         """Return B u with what supports contribute, owned, [length]. Collective."""
         return self.jump(displacement) + self.supported
 
-    def with_slip_from(self, relative: np.ndarray) -> TornSystem:
+    def with_slip_from(self, relative: np.ndarray, slid: np.ndarray) -> TornSystem:
         """Return the system in which slip is measured from an earlier displacement.
 
         Args:
             relative: What `relative` gave for it, owned, shape (n_owned,), [length].
+            slid: What `sliding` gave for it, replicated, shape (n_contact − n_friction, dim − 1), [length].
         """
         tangential = self.numbering.owned >= self.n_equality + self.points.count
-        return replace(self, right=np.where(tangential, relative - self.supported, self.right))
+        right = np.where(tangential, relative - self.supported, self.right)
+        return replace(self, right=right, slid=slid)
+
+    @property
+    def frictionless(self) -> np.ndarray:
+        """Numbers of the contact points without friction, shape (n_contact − n_friction,)."""
+        return np.setdiff1d(np.arange(self.points.count), self.frictional, assume_unique=True)
+
+    def sliding(self, displacement: np.ndarray) -> np.ndarray:
+        """Return how far points without friction moved along their tangents, [length]. Collective.
+
+        Args:
+            displacement: Torn displacement of this rank, shape (torn_size,), [length].
+
+        Returns:
+            Shape (n_contact − n_friction, dim − 1), replicated.
+        """
+        chosen = self.frictionless
+        jump = self.points.jump[chosen]
+        nodes = np.unique(jump.indices)
+        relative = jump[:, nodes] @ nodal_means(self.decomposition, displacement, nodes)
+        return np.asarray(np.einsum("nad,nd->na", self.points.tangents[chosen], relative))
+
+    def driven_as(self, prescribed: np.ndarray) -> bool:
+        """Tell whether supports drive the same frictional points as in this system.
+
+        Args:
+            prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
+        """
+        rows = self.relations[2]
+        return rows.resting is not None and np.array_equal(rows.of_supports(prescribed) == 0.0, rows.resting)
 
     @property
     def dim(self) -> int:
@@ -143,11 +181,11 @@ def build_torn_system(
     with together(comm):
         prescribed = prescribed_displacements(scene, decomposition.tearing)
         right = decomposition.gluing.right_side(prescribed)
-    if previous is not None and _meets_alike(scene, previous.scene):
+    if previous is not None and _meets_alike(scene, previous.scene) and previous.driven_as(prescribed):
         # Only loads and prescribed values changed: B stays the same object, which tells that F stays too.
         system = replace(previous, scene=scene, subdomains=subdomains)
     else:
-        system = _joined(scene, decomposition, subdomains, start_geometry, previous)
+        system = _joined(scene, decomposition, subdomains, start_geometry, previous, prescribed)
     with together(comm):
         gap = gap_with_room(system.relations[1], decomposition.fixed, prescribed)
     supported = np.concatenate([relation.of_supports(prescribed) for relation in system.relations])
@@ -155,7 +193,8 @@ def build_torn_system(
     supported = np.concatenate([np.zeros(len(right)), supported])
     owned = system.numbering.owned
     right = np.concatenate([right, tied, gap, slip]) - supported
-    return replace(system, supported=supported[owned], right=right[owned])
+    slid = np.zeros((len(system.frictionless), system.dim - 1))
+    return replace(system, supported=supported[owned], right=right[owned], slid=slid)
 
 
 def _meets_alike(scene: Scene, other: Scene) -> bool:
@@ -171,6 +210,7 @@ def _joined(
     subdomains: tuple[Subdomain, ...],
     start_geometry: bool,
     previous: TornSystem | None,
+    prescribed: np.ndarray,
 ) -> TornSystem:
     """Search for contact and build B; the right side is left empty. Collective."""
     points, ties = _meeting_points(scene, decomposition, start_geometry)
@@ -178,13 +218,23 @@ def _joined(
     frictional = np.flatnonzero(has_friction)
     gluing, tearing, fixed = decomposition.gluing.rows, decomposition.tearing, decomposition.fixed
     tied = tied_relations(ties, scene.ties, fixed)
-    relations = (tied, normal_relations(points), tangential_relations(points, frictional))
+    relations = (tied, normal_relations(points), tangential_relations(points, frictional, prescribed))
+    if decomposition.comm.rank == 0:
+        _tell_of_held(relations[2], fixed)
     rows = stack([gluing, *(relation.rows(tearing, fixed) for relation in relations)])
     numbering, B = _own_part(rows, decomposition, None if previous is None else previous.numbering)
     return TornSystem(
         scene, decomposition, subdomains, points, ties, gluing.count + tied.count, frictional,
         coefficient[frictional], tresca[frictional], numbering, relations, B, np.zeros(0), np.zeros(0),
+        np.zeros((0, scene.dim - 1)),
     )  # fmt: skip
+
+
+def _tell_of_held(rows: Relations, fixed: np.ndarray) -> None:
+    held = int(rows.held(fixed).sum())
+    if held:
+        words = "%d of %d friction rows are left to the supports, which hold slip there"
+        tell(_LOG.info, words, held, rows.count)
 
 
 def _meeting_points(

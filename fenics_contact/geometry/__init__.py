@@ -31,6 +31,7 @@ from fenics_contact.geometry.partition import (
 from fenics_contact.geometry.quadratic import quadratic
 from fenics_contact.geometry.rectangle import rectangle, rectangle_lattice, split_quadrilaterals
 from fenics_contact.geometry.ring import LinkShape
+from fenics_contact.geometry.rounding import coordinate_rounding
 from fenics_contact.geometry.shape_functions import quadrature, shape_gradients, shape_values
 from fenics_contact.geometry.structured import split_hexahedra
 from fenics_contact.geometry.touch import (
@@ -67,6 +68,7 @@ __all__ = [
     "check_one_piece",
     "check_penetration",
     "combine",
+    "coordinate_rounding",
     "corners_of",
     "default_partition",
     "drilled_plate",

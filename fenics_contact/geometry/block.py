@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry.arguments import LARGEST, check_count, shown
 from fenics_contact.geometry.faces import boundary_faces, vector_areas
 from fenics_contact.geometry.mesh import BodyMesh
-from fenics_contact.geometry.structured import check_cell_type, check_count, split_hexahedra, structured_cells
+from fenics_contact.geometry.room import require_room
+from fenics_contact.geometry.structured import check_cell_type, split_hexahedra, structured_cells
 
 SIDES = ("x0", "x1", "y0", "y1", "z0", "z1")
 
@@ -40,13 +43,57 @@ def block(
         >>> mesh.n_cells, sorted(mesh.surfaces)
         (16, ['x0', 'x1', 'y0', 'y1', 'z0', 'z1'])
     """
-    low, high = np.asarray(lower, dtype=np.float64), np.asarray(upper, dtype=np.float64)
-    if low.shape != (3,) or high.shape != (3,) or not np.all(high > low):
+    check_cell_type(cell)
+    low, high = checked_corners(lower, upper, "xyz")
+    return box_lattice(even_ticks(low, high, checked_counts(counts, "xyz")), cell)
+
+
+def checked_corners(lower: ArrayLike, upper: ArrayLike, axes: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners of a box along the axes, (dim,) each, that span one.
+
+    Raises:
+        InvalidInputError: If they do not.
+    """
+    try:
+        low, high = np.asarray(lower, dtype=np.float64), np.asarray(upper, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        low = high = np.zeros(0)
+    fitting = low.shape == high.shape == (len(axes),)
+    small = fitting and max(np.abs(low).max(), np.abs(high).max()) < LARGEST
+    if not small or not np.all(high > low):
+        given = [list(corner) if isinstance(corner, Sequence) else corner for corner in (lower, upper)]
         raise InvalidInputError(
-            f"upper must exceed lower in x, y and z, got lower {list(lower)} and upper {list(upper)}: swap "
-            "or correct the corners"
+            f"upper must exceed lower in {_listed(axes)}, got lower {shown(given[0])} and upper "
+            f"{shown(given[1])}: swap or correct the corners"
         )
-    return box_lattice([np.linspace(low[d], high[d], _count(counts, d) + 1) for d in range(3)], cell)
+    return low, high
+
+
+def checked_counts(counts: Sequence[int], axes: str) -> list[int]:
+    """Return the numbers of cells along every axis, of which there is room for all.
+
+    Raises:
+        InvalidInputError: If one is no count, or they are too many.
+    """
+    known = np.ndim(counts) == 1 or isinstance(counts, str)
+    if not known or len(counts) != len(axes):
+        number = "three" if len(axes) == 3 else "two"
+        raise InvalidInputError(
+            f"counts must be {number} integers, got {shown(counts)}: give one for each of {_listed(axes)}"
+        )
+    for direction, count in enumerate(counts):
+        check_count(count, f"counts[{direction}]")
+    require_room(*counts)
+    return [int(count) for count in counts]
+
+
+def _listed(axes: str) -> str:
+    return f"{', '.join(axes[:-1])} and {axes[-1]}"
+
+
+def even_ticks(low: np.ndarray, high: np.ndarray, counts: Sequence[int]) -> list[np.ndarray]:
+    """Divide the sides of a box into equal cells; the coordinates of their ends along every axis."""
+    return [np.linspace(*each) for each in zip(low, high, [count + 1 for count in counts], strict=True)]
 
 
 def box_lattice(ticks: Sequence[np.ndarray], cell: str = "hexahedron") -> BodyMesh:
@@ -63,6 +110,7 @@ def box_lattice(ticks: Sequence[np.ndarray], cell: str = "hexahedron") -> BodyMe
         InvalidInputError: If coordinates do not ascend or the cell type is unknown.
     """
     check_cell_type(cell)
+    require_room(*(len(tick) - 1 for tick in ticks))
     points = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 3)
     n1, n2, n3 = (len(t) - 1 for t in ticks)
     cells, grid = structured_cells((n1, n2, n3))
@@ -87,12 +135,3 @@ def box_sides(points: np.ndarray, cells: np.ndarray) -> dict[str, np.ndarray]:
     upper = np.take_along_axis(areas, direction[:, None], axis=1)[:, 0] > 0
     side = 2 * direction + upper
     return {name: facets[side == s] for s, name in enumerate(SIDES[: 2 * dim])}
-
-
-def _count(counts: Sequence[int], direction: int) -> int:
-    if len(counts) != 3:
-        raise InvalidInputError(
-            f"counts must be three integers, got {counts!r}: give one for each of x, y, z"
-        )
-    check_count(counts[direction], f"counts[{direction}]")
-    return int(counts[direction])

@@ -6,12 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry.arguments import MOST, check_count, check_numbers, check_row
 from fenics_contact.geometry.coincidence import merge_duplicate_nodes
 from fenics_contact.geometry.extrusion import extrude
 from fenics_contact.geometry.faces import boundary_faces
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.rectangle import rectangle_lattice
-from fenics_contact.geometry.structured import check_count, structured_cells
+from fenics_contact.geometry.room import require_room
+from fenics_contact.geometry.structured import structured_cells
 
 CORE = 0.5
 """Half the width of the square in the middle of a round bar over the bar's radius."""
@@ -46,6 +48,8 @@ def drilled_plate(
     n_radial = n if n_radial is None else n_radial
     check_count(n, "n")
     check_count(n_radial, "n_radial")
+    check_numbers(hole=hole, half_width=half_width)
+    check_row(ends, "ends", 2)
     left, right = ends
     if not (0 < hole < half_width and left <= -half_width and half_width <= right):
         raise InvalidInputError(
@@ -58,7 +62,8 @@ def drilled_plate(
     across = half_width * square[: n + 1, 1]
     for near, far in ((half_width, right), (left, -half_width)):
         if far > near:
-            count = max(1, round((far - near) / (half_width / n)))
+            count = max(1, round(min(n * (far - near) / half_width, 2 * MOST)))
+            check_count(count, "cells as long as wide along the strip")
             strip = rectangle_lattice([np.linspace(near, far, count + 1), across])
             parts.append((strip.points, strip.cells))
     section = _section(
@@ -97,6 +102,9 @@ def bolt(
         InvalidInputError: If sizes do not fit into each other or a count cannot be used.
     """
     n_radial = n if n_radial is None else n_radial
+    check_row(layers, "layers", 2)
+    check_row(grip, "grip", 2)
+    check_numbers(shank=shank, head=head, head_height=head_height)
     for count, name in ((n, "n"), (n_radial, "n_radial"), (layers[0], "layers[0]"), (layers[1], "layers[1]")):
         check_count(count, name)
     if not (0 < shank < head and grip[0] < grip[1] and head_height > 0):
@@ -164,6 +172,7 @@ def _half_turn(n: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _rings(inner: np.ndarray, outer: np.ndarray, layers: int) -> tuple[np.ndarray, np.ndarray]:
     """Quadrilaterals between two curves with equally many points, counter-clockwise."""
+    require_room(layers, len(inner) - 1)
     share = np.linspace(0, 1, layers + 1)[:, None, None]
     points = ((1 - share) * inner + share * outer).reshape(-1, 2)
     return points, structured_cells((layers, len(inner) - 1))[0]

@@ -13,6 +13,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry.link import Link, chain_link
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.ring import LinkShape
+from fenics_contact.geometry.room import require_room
 from fenics_contact.geometry.touch import PULL_AXIS, check_fit, check_penetration, mutual_clearance
 
 if TYPE_CHECKING:
@@ -78,6 +79,8 @@ def chain(shapes: Sequence[LinkShape], *, gap: float = 0.0, comm: MPI.Comm | Non
         )
     for number, (one, other) in enumerate(pairwise(shapes), 1):
         check_fit(one, other, (f"link {number}", f"link {number + 1}"))
+    longest = max(shapes, key=lambda shape: shape.n_around)
+    require_room(len(shapes) * longest.n_around, longest.n_a, longest.n_b)
     faceting = max(shape.faceting for shape in shapes)
     check_penetration(gap, faceting)
     built = {shape: chain_link(shape, comm) for shape in dict.fromkeys(shapes)}

@@ -8,9 +8,10 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry.rounding import coordinate_rounding
 
 TOLERANCE = 1e-10
-"""Nodes coincide that are closer than this part of the bounding box's diagonal."""
+"""Nodes coincide that are closer than this part of the bounding box's diagonal, and their rounding."""
 
 
 def coincident_pairs(points: np.ndarray, tolerance: float = TOLERANCE) -> np.ndarray:
@@ -18,13 +19,14 @@ def coincident_pairs(points: np.ndarray, tolerance: float = TOLERANCE) -> np.nda
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2).
-        tolerance: Distance over the diagonal of the bounding box up to which nodes coincide.
+        tolerance: Distance over the diagonal of the bounding box up to which nodes coincide; far from the
+            origin the rounding of their coordinates is added.
 
     Returns:
         (n_pairs, 2) node numbers, each pair and the list ascending.
     """
-    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    pairs = cKDTree(points).query_pairs(tolerance * diagonal, output_type="ndarray")
+    reach = tolerance * float(np.linalg.norm(np.ptp(points, axis=0))) + coordinate_rounding(points)
+    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
     return np.asarray(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], dtype=np.int64)
 
 

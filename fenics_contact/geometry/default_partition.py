@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry.arguments import check_count
 from fenics_contact.geometry.graph_partition import graph_partition
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.partition import box_partition, check_face_connected, check_one_piece
-from fenics_contact.geometry.structured import check_count
 
 TARGET_NODES = {3: 700, 2: 1000}
 """Nodes of a subdomain by dimension: about 2000 displacements in both.

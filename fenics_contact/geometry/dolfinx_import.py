@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fenics_contact._libraries import start
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.geometry.bodies import bodies_of
 from fenics_contact.geometry.cell_types import CELL_TYPES, QUADRATIC_FILE
@@ -81,6 +82,7 @@ def read_xdmf(
     if comm is None:
         return bodies_of(_read(Path(path), facets, names), bodies, surfaces)
     read = None
+    start(comm)  # dolfinx starts PETSc, on one rank it would wait for the others
     with together(comm):
         read = _read(Path(path), facets, names) if comm.rank == 0 else None
     return bodies_of(comm.bcast(read, root=0), bodies, surfaces)

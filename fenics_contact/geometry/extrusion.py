@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry.arguments import shown
 from fenics_contact.geometry.faces import boundary_faces, match_faces
 from fenics_contact.geometry.mesh import BodyMesh
+from fenics_contact.geometry.room import require_room
 
 
 def extrude(section: BodyMesh, heights: ArrayLike, *, present: ArrayLike | None = None) -> BodyMesh:
@@ -33,12 +35,16 @@ def extrude(section: BodyMesh, heights: ArrayLike, *, present: ArrayLike | None 
             f"extrude needs a section of quadrilaterals, got cells of type {section.cell_type}: mesh the "
             "plane with quadrilaterals"
         )
-    z = np.asarray(heights, dtype=np.float64)
+    try:
+        z = np.asarray(heights, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        z = np.zeros(0)
     if z.ndim != 1 or z.size < 2 or not np.all(np.diff(z) > 0):
         raise InvalidInputError(
-            f"heights must be at least two ascending numbers, got {heights!r}: give the z of every plane "
-            "between layers, and of both ends"
+            f"heights must be at least two ascending numbers, got {shown(heights)}: give the z of every "
+            "plane between layers, and of both ends"
         )
+    require_room(section.n_cells, z.size - 1, 1)
     there = _checked_presence(present, (z.size - 1, section.n_cells))
     layer, cell = np.nonzero(there)
     below = section.cells[cell] + section.n_nodes * layer[:, None]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.geometry.bodies import bodies_of
+from fenics_contact.geometry.files import require_file
 from fenics_contact.geometry.gmsh_elements import tagged_mesh_of
 from fenics_contact.geometry.gmsh_session import gmsh_model, running_gmsh
 from fenics_contact.geometry.mesh import BodyMesh
@@ -98,8 +99,7 @@ def from_gmsh_model(bodies: Bodies | None = None, surfaces: Surfaces | None = No
 
 
 def _read(path: Path) -> TaggedMesh:
-    if not path.is_file():
-        raise InvalidInputError(f"there must be a file '{path}', there is none: check the name and folder")
+    require_file(path)
     with path.open("rb") as file:
         start = file.read(11)
     # gmsh would run any other file as a script.

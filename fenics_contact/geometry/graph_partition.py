@@ -14,14 +14,12 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import breadth_first_order
 
-from fenics_contact._requirements import load_pymetis
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry.arguments import check_count
 from fenics_contact.geometry.faces import neighbours
 from fenics_contact.geometry.mesh import BodyMesh
+from fenics_contact.geometry.metis import part_graph
 from fenics_contact.geometry.partition import check_one_piece, merge_pieces
-from fenics_contact.geometry.structured import check_count
-
-_SEED = 1
 
 
 def graph_partition(mesh: BodyMesh, parts: int, body: str = "") -> np.ndarray:
@@ -50,7 +48,8 @@ def graph_partition(mesh: BodyMesh, parts: int, body: str = "") -> np.ndarray:
     if parts == 1:
         return np.zeros(mesh.n_cells, dtype=np.int64)
     graph = _dual_graph(mesh)
-    return merge_pieces(mesh, _without_empty_parts(graph, _metis(graph, parts), parts), body)
+    partition = part_graph(graph.indptr, graph.indices, parts)
+    return merge_pieces(mesh, _without_empty_parts(graph, partition, parts), body)
 
 
 def _dual_graph(mesh: BodyMesh) -> csr_matrix:
@@ -62,14 +61,6 @@ def _dual_graph(mesh: BodyMesh) -> csr_matrix:
     ).tocsr()
     graph.sort_indices()
     return graph
-
-
-def _metis(graph: csr_matrix, parts: int) -> np.ndarray:
-    """Return METIS's part of every vertex."""
-    pymetis = load_pymetis()
-    adjacency = pymetis.CSRAdjacency(graph.indptr, graph.indices)
-    answer = pymetis.part_graph(parts, adjacency, options=pymetis.Options(seed=_SEED))
-    return np.asarray(answer.vertex_part, dtype=np.int64)
 
 
 def _without_empty_parts(graph: csr_matrix, partition: np.ndarray, parts: int) -> np.ndarray:

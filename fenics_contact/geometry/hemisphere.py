@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry.arguments import check_count, check_numbers
 from fenics_contact.geometry.block import box_lattice, box_sides
 from fenics_contact.geometry.mesh import BodyMesh
-from fenics_contact.geometry.structured import check_count
+from fenics_contact.geometry.room import require_room
 
 CORE = 0.5
 """Size of the core over the radius."""
@@ -107,7 +108,8 @@ def half_cylinder(
     """
     _check(radius, n, grading, symmetry, ("x", ""))
     check_count(n_length, "n_length")
-    if not 0.0 < length < np.inf:
+    check_numbers(length=length)
+    if length <= 0.0:
         raise InvalidInputError(f"length must be positive, got {length}: give the size along the axis")
     along = np.linspace(0.0, length, n_length + 1)
     upwards = np.linspace(-1.0, 0.0, (n + 1) // 2 + 1)
@@ -130,6 +132,7 @@ def _wrap(core: BodyMesh, round_sides: list[str], frame: _Frame, layers: int, gr
         The body with named surfaces, lifted by the radius.
     """
     facets = np.concatenate([core.surfaces[side] for side in round_sides])
+    require_room(layers, len(facets), 1)
     below = np.concatenate([np.full(core.surfaces[side].shape[0], side == "z0") for side in round_sides])
     skin, local = np.unique(facets, return_inverse=True)
     local = local.reshape(facets.shape)
@@ -175,6 +178,7 @@ def _lateral(n: int, grading: float, symmetric: bool) -> np.ndarray:
 
 def _check(radius: float, n: int, grading: float, symmetry: str, known: tuple[str, ...]) -> None:
     check_count(n, "n", 2)
+    check_numbers(radius=radius, grading=grading)
     if not 0.0 < radius < np.inf:
         raise InvalidInputError(f"radius must be positive, got {radius}: give the radius of the body")
     if not 0.0 <= grading <= 8.0:
@@ -182,7 +186,7 @@ def _check(radius: float, n: int, grading: float, symmetry: str, known: tuple[st
             f"grading must lie between 0 and 8, got {grading}: 0 gives equal cells, 3 makes the smallest 20 "
             "times smaller than the largest"
         )
-    if symmetry not in known:
+    if not isinstance(symmetry, str) or symmetry not in known:
         raise InvalidInputError(
             f"symmetry must be one of {known}, got {symmetry!r}: name the planes at which the body is cut"
         )

@@ -13,6 +13,7 @@ from fenics_contact.geometry.faces import orient
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.ring import LinkShape, crown_indices, ring_lattice, stations
 from fenics_contact.geometry.ring_gmsh import mesh_ring
+from fenics_contact.geometry.room import require_room
 from fenics_contact.geometry.structured import split_hexahedra, structured_cells
 
 if TYPE_CHECKING:
@@ -90,6 +91,7 @@ def chain_link(shape: LinkShape | None = None, comm: MPI.Comm | None = None) -> 
         Collective on ``comm`` if given.
     """
     shape = LinkShape() if shape is None else shape
+    require_room(shape.n_around, shape.n_a, shape.n_b)
     if comm is None:
         points, facets = _lattice_from_gmsh(shape)
     else:

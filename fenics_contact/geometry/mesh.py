@@ -48,7 +48,7 @@ class BodyMesh:
     Raises:
         InvalidInputError: If an array has the wrong shape or type, a coordinate is not finite, a node
             number is out of range or unused, a cell is inverted, nodes coincide, a facet is not an outward
-            boundary face, or the regions overlap or leave out a cell.
+            boundary face or is listed twice, or the regions overlap or leave out a cell.
 
     Example:
         A square of two triangles, whose lower edge is named.

@@ -18,6 +18,7 @@ from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.geometry.abaqus_sets import with_element_sets
 from fenics_contact.geometry.bodies import bodies_of
 from fenics_contact.geometry.dolfinx_import import Bodies, Surfaces, read_xdmf
+from fenics_contact.geometry.files import require_file
 from fenics_contact.geometry.gmsh_import import read_msh
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.meshio_cells import cells_of
@@ -135,8 +136,7 @@ def _other_reader(path: Path, labels: str | None) -> Callable[..., dict[str, Bod
 
 
 def _read(path: Path, tagged: Callable[..., TaggedMesh], file_format: str | None) -> TaggedMesh:
-    if not path.is_file():
-        raise InvalidInputError(f"there must be a file '{path}', there is none: check the name and folder")
+    require_file(path)
     import meshio
 
     known = meshio.extension_to_filetypes

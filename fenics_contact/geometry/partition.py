@@ -14,9 +14,13 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry.arguments import check_count
 from fenics_contact.geometry.faces import neighbours
 from fenics_contact.geometry.mesh import BodyMesh
-from fenics_contact.geometry.structured import check_count
+from fenics_contact.geometry.rounding import coordinate_rounding
+
+LAYER = 1e-12
+"""Cells whose centres differ by less than this part of the body's extent lie in one layer."""
 
 
 def box_partition(mesh: BodyMesh, boxes: tuple[int, ...]) -> np.ndarray:
@@ -40,7 +44,7 @@ def box_partition(mesh: BodyMesh, boxes: tuple[int, ...]) -> np.ndarray:
             "box_partition needs a structured mesh, this one has grid None: use `graph_partition(mesh, "
             "parts)`"
         )
-    if len(boxes) != mesh.dim:
+    if not isinstance(boxes, Sequence | np.ndarray) or np.shape(boxes) != (mesh.dim,):
         number = {2: "two", 3: "three"}[mesh.dim]
         raise InvalidInputError(
             f"boxes must be {number} integers, got {boxes!r}: give one for each grid direction"
@@ -79,6 +83,9 @@ def bisection_partition(mesh: BodyMesh, parts: int) -> np.ndarray:
             f"parts must be at most the {mesh.n_cells} cells, got {parts}: take fewer parts"
         )
     centres = mesh.points[mesh.cells].mean(axis=1)
+    # Counted in units that rounding does not reach: layers of cells are not split by the last bits.
+    unit = LAYER * float(np.ptp(mesh.points, axis=0).max()) + coordinate_rounding(mesh.points)
+    centres = np.round((centres - mesh.points.min(axis=0)) / unit)
     partition = np.zeros(mesh.n_cells, dtype=np.int64)
     pending: list[tuple[np.ndarray, int, int]] = [(np.arange(mesh.n_cells), 0, parts)]
     while pending:
@@ -87,7 +94,7 @@ def bisection_partition(mesh: BodyMesh, parts: int) -> np.ndarray:
             partition[cells] = first
             continue
         extent = centres[cells].max(axis=0) - centres[cells].min(axis=0)
-        order = cells[np.argsort(centres[cells, np.argmax(extent)].round(12), kind="stable")]
+        order = cells[np.argsort(centres[cells, np.argmax(extent)], kind="stable")]
         left = count // 2
         cut = cells.size * left // count
         pending += [(order[:cut], first, left), (order[cut:], first + left, count - left)]

@@ -8,9 +8,10 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry.cell_types import cell_type_of
 from fenics_contact.geometry.faces import cell_faces, corners_of, number_faces, start_at_smallest
 from fenics_contact.geometry.quality import jacobians
+from fenics_contact.geometry.rounding import coordinate_rounding
 
 FLAT = 1e-10
-"""A mesh is plane whose z coordinates differ by less than this part of its size."""
+"""A mesh is plane whose z coordinates differ by less than this part of its size and their rounding."""
 
 _MIRRORED = {
     "triangle": [0, 2, 1],
@@ -45,7 +46,7 @@ def flattened(points: np.ndarray, used: np.ndarray, source: str) -> np.ndarray:
     if points.shape[1] == 2:
         return points
     extent = np.ptp(points[used], axis=0)
-    if extent[2] > FLAT * np.linalg.norm(extent):
+    if extent[2] > FLAT * np.linalg.norm(extent) + coordinate_rounding(points[used]):
         raise InvalidInputError(
             f"plane cells must lie in a plane of constant z, those of {source} reach over {extent[2]:.6g} in "
             "z: put a plane body into the x-y plane; of a solid save the volume cells too (gmsh -3)"

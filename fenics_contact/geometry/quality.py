@@ -16,6 +16,9 @@ HEXAHEDRON_LATTICE = np.stack(np.meshgrid(*3 * [[0.0, 0.5, 1.0]], indexing="ij")
 
 The determinant is quadratic in each coordinate, so these 27 values fix it everywhere."""
 
+FLAT = 1e-14
+"""A Jacobian below this part of the bounding box's diagonal to the power of the dimension is rounding."""
+
 _BEST_CORNER = {3: np.sqrt(2.0), 2: 2.0 / np.sqrt(3.0)}
 """One over the corner determinant of unit edge vectors in a regular simplex, by dimension."""
 
@@ -120,15 +123,13 @@ def volume(points: np.ndarray, cells: np.ndarray) -> float:
     return float(cell_volumes(points, cells).sum())
 
 
-def is_inverted(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Find the cells whose Jacobian is not clearly positive.
-
-    "Clearly" leaves room for rounding only: 1e-14 of the cell's bounding-box diagonal to the power of the
-    dimension.
+def thickness(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Compare the smallest Jacobian of every cell with the area (length) of its bounding box's diagonal.
 
     Returns:
-        (n_cells,) bool.
+        (n_cells,) [length]; 0 where a cell is inverted or flat, else a part of the diagonal.
     """
     corners = points[cells]
     size = np.linalg.norm(corners.max(axis=1) - corners.min(axis=1), axis=1)
-    return np.asarray(jacobians(points, cells).min(axis=1) <= 1e-14 * size ** points.shape[1])
+    smallest = jacobians(points, cells).min(axis=1) / np.maximum(size, 1e-100) ** points.shape[1]
+    return np.asarray(np.where(smallest <= FLAT, 0.0, smallest) * size)

@@ -7,14 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry.block import box_sides
+from fenics_contact.geometry.block import box_sides, checked_corners, checked_counts, even_ticks
 from fenics_contact.geometry.mesh import BodyMesh
-from fenics_contact.geometry.structured import (
-    check_cell_type,
-    check_count,
-    repeated_regions,
-    structured_cells,
-)
+from fenics_contact.geometry.room import require_room
+from fenics_contact.geometry.structured import check_cell_type, repeated_regions, structured_cells
 
 
 def rectangle(
@@ -38,17 +34,9 @@ def rectangle(
     Raises:
         InvalidInputError: If the rectangle has no area, a count is not positive or the cell type is unknown.
     """
-    low, high = np.asarray(lower, dtype=np.float64), np.asarray(upper, dtype=np.float64)
-    if low.shape != (2,) or high.shape != (2,) or not np.all(high > low):
-        raise InvalidInputError(
-            f"upper must exceed lower in x and y, got lower {list(lower)} and upper {list(upper)}: swap or "
-            "correct the corners"
-        )
-    if len(counts) != 2:
-        raise InvalidInputError(f"counts must be two integers, got {counts!r}: give one for each of x and y")
-    for d in range(2):
-        check_count(counts[d], f"counts[{d}]")
-    return rectangle_lattice([np.linspace(low[d], high[d], counts[d] + 1) for d in range(2)], cell)
+    check_cell_type(cell, 2)
+    low, high = checked_corners(lower, upper, "xy")
+    return rectangle_lattice(even_ticks(low, high, checked_counts(counts, "xy")), cell)
 
 
 def rectangle_lattice(ticks: Sequence[np.ndarray], cell: str = "quadrilateral") -> BodyMesh:
@@ -62,6 +50,7 @@ def rectangle_lattice(ticks: Sequence[np.ndarray], cell: str = "quadrilateral") 
         As `rectangle`.
     """
     check_cell_type(cell, 2)
+    require_room(*(len(tick) - 1 for tick in ticks))
     points = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 2)
     cells, grid = structured_cells((len(ticks[0]) - 1, len(ticks[1]) - 1))
     mesh = BodyMesh(points, cells, box_sides(points, cells), grid)

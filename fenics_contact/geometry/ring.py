@@ -13,8 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry.arguments import check_count, check_numbers
 from fenics_contact.geometry.section import WireSection
-from fenics_contact.geometry.structured import check_cell_type, check_count
+from fenics_contact.geometry.structured import check_cell_type
+
+#: How many times one size of a link may be another: gmsh meshes no other ring.
+ALIKE = 1000
+#: Least roundness of its section, whose arcs would be straight lines to gmsh.
+FLATTEST = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,8 +55,10 @@ class LinkShape:
 
     def __post_init__(self) -> None:
         """Refuse what is not a ring."""
+        given = {name: getattr(self, name) for name in ("inner_radius", "straight", "thickness", "width")}
+        check_numbers(**given)
         for name in ("inner_radius", "straight"):
-            if not 0.0 < getattr(self, name) < np.inf:
+            if getattr(self, name) <= 0.0:
                 raise InvalidInputError(
                     f"{name} must be positive, got {getattr(self, name)}: a link has two half circles and "
                     "two legs"
@@ -65,6 +73,16 @@ class LinkShape:
         check_count(self.n_b, "n_b", 2)
         check_cell_type(self.cell)
         _ = self.section
+        sizes = [float(size) for size in given.values()]
+        if max(sizes) > ALIKE * min(sizes):
+            raise InvalidInputError(
+                f"inner_radius, straight, thickness and width must differ by less than a factor of {ALIKE}, "
+                f"got {sizes}: give them in one unit of length"
+            )
+        if self.roundness < FLATTEST:
+            raise InvalidInputError(
+                f"roundness must be at least {FLATTEST:g}, got {self.roundness}: 0.01 is a square to the eye"
+            )
 
     @property
     def section(self) -> WireSection:

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry.arguments import check_numbers
 
 
 @dataclass(frozen=True)
@@ -35,14 +36,15 @@ class WireSection:
 
     def __post_init__(self) -> None:
         """Refuse what has no such shape."""
-        if not (0.0 < self.thickness < np.inf and 0.0 < self.width < np.inf):
+        check_numbers(thickness=self.thickness, width=self.width, roundness=self.roundness)
+        if not (0.0 < self.thickness and 0.0 < self.width):
             raise InvalidInputError(
                 f"thickness and width must be positive, got {self.thickness} and {self.width}: give the size "
                 "of the wire in both directions"
             )
         if not 0.0 < self.roundness < 1.0:
             raise InvalidInputError(
-                f"roundness must lie between 0 (square) and 1 (disc, whose corner cells are flat), got "
+                "roundness must lie between 0 (square) and 1 (disc, whose corner cells are flat), got "
                 f"{self.roundness}: take for example 0.9"
             )
         if min(self.corner) <= 0.0:

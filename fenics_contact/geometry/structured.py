@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry.arguments import shown
 from fenics_contact.geometry.cell_types import CELL_TYPES
 from fenics_contact.geometry.faces import boundary_faces, match_faces, orient
 from fenics_contact.geometry.mesh import BodyMesh
@@ -23,16 +24,8 @@ REFLECTIONS = np.array(
 def check_cell_type(cell: str, dim: int = 3) -> None:
     """Refuse a cell type that the structured meshes do not offer."""
     known = tuple(name for name, kind in CELL_TYPES.items() if kind.dim == dim)
-    if cell not in known:
-        raise InvalidInputError(f"cell must be one of {known}, got {cell!r}: choose one of them")
-
-
-def check_count(value: int, name: str, least: int = 1) -> None:
-    """Refuse a count that is not an integer of at least ``least``."""
-    if not isinstance(value, (int, np.integer)) or isinstance(value, bool) or value < least:
-        raise InvalidInputError(
-            f"{name} must be an integer of at least {least}, got {value!r}: choose another count"
-        )
+    if not isinstance(cell, str) or cell not in known:
+        raise InvalidInputError(f"cell must be one of {known}, got {shown(cell)}: choose one of them")
 
 
 def structured_cells(counts: tuple[int, ...], closed: bool = False) -> tuple[np.ndarray, np.ndarray]:

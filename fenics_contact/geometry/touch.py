@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry.arguments import check_numbers
 from fenics_contact.geometry.link import Link, chain_link
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.ring import LinkShape
@@ -97,8 +98,7 @@ def check_penetration(clearance: float, faceting: float) -> None:
     Raises:
         InvalidInputError: Saying by how much they penetrate.
     """
-    if not np.isfinite(clearance):
-        raise InvalidInputError(f"gap must be finite, got {clearance}: give the distance between the crowns")
+    check_numbers(gap=clearance)
     if clearance < -faceting:
         raise InvalidInputError(
             f"links must not penetrate each other by more than the faceting of {faceting:.3g} at the start, "

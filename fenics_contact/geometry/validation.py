@@ -8,25 +8,35 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.geometry.arguments import LARGEST, shown
 from fenics_contact.geometry.cell_types import cell_type_of
 from fenics_contact.geometry.faces import boundary_faces, corners_of, match_faces, start_at_smallest
-from fenics_contact.geometry.quality import is_inverted, jacobian_ratio
+from fenics_contact.geometry.quality import jacobian_ratio, thickness
+from fenics_contact.geometry.rounding import coordinate_rounding
+
+RESOLVED = 1e3
+"""Cells must be so many times thicker than their coordinates are rounded."""
 
 
 def checked_points(points: ArrayLike, shape: tuple[int, ...] | None = None) -> np.ndarray:
     """Return finite coordinates, (n_nodes, 3 | 2) float64, as a read-only copy."""
-    array = np.array(points, dtype=np.float64)
+    try:
+        array = np.array(points, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidInputError(
+            f"points must be numbers, got {shown(points)} ({error}): give an array of coordinates"
+        ) from error
     if array.ndim != 2 or array.shape[1] not in (2, 3) or (shape is not None and array.shape != shape):
         needed = "(n_nodes, 3) or (n_nodes, 2)" if shape is None else str(shape)
         raise InvalidInputError(
             f"points must have shape {needed}, got {array.shape}: give all coordinates of every node, three "
             "for a solid, two for a plane body"
         )
-    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    bad = np.flatnonzero(~(np.abs(array) < LARGEST).all(axis=1))
     if bad.size:
         raise InvalidInputError(
-            f"points must be finite, {bad.size} of {array.shape[0]} are not, first node {bad[0]} at "
-            f"{array[bad[0]].tolist()}: a NaN comes from whatever computed these coordinates"
+            f"points must be finite and below {LARGEST:g}, {bad.size} of {array.shape[0]} are not, first "
+            f"node {bad[0]} at {array[bad[0]].tolist()}: a NaN comes from whatever computed these coordinates"
         )
     array.setflags(write=False)
     return array
@@ -68,7 +78,7 @@ def checked_cells(cells: ArrayLike, n_nodes: int, dim: int) -> np.ndarray:
 
 
 def check_jacobians(points: np.ndarray, cells: np.ndarray, remedy: str) -> None:
-    """Refuse a mesh with an inverted or degenerate cell.
+    """Refuse a mesh with an inverted or degenerate cell, or so far from the origin that rounding bends cells.
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2).
@@ -76,10 +86,12 @@ def check_jacobians(points: np.ndarray, cells: np.ndarray, remedy: str) -> None:
         remedy: What to do about it; ends the message.
 
     Raises:
-        InvalidInputError: Naming how many cells, the worst one and its Jacobian ratio.
+        InvalidInputError: Naming how many cells, the worst one and its Jacobian ratio or its place.
     """
-    inverted = np.flatnonzero(is_inverted(points, cells))
+    thick = thickness(points, cells)
+    inverted = np.flatnonzero(thick <= 0.0)
     if inverted.size == 0:
+        _check_resolved(points, thick)
         return
     ratios = jacobian_ratio(points, cells[inverted])
     worst = int(np.argmin(ratios))
@@ -89,6 +101,17 @@ def check_jacobians(points: np.ndarray, cells: np.ndarray, remedy: str) -> None:
         f"flat; the worst is cell {inverted[worst]} at ({centre}) with a "
         f"Jacobian ratio (smallest over largest) of {ratios[worst]:.3g}: {remedy}"
     )
+
+
+def _check_resolved(points: np.ndarray, thick: np.ndarray) -> None:
+    rounding = coordinate_rounding(points)
+    coarse = np.count_nonzero(thick < RESOLVED * rounding)
+    if coarse:
+        raise InvalidInputError(
+            f"coordinates must resolve the cells, but up to {np.abs(points).max():.3g} from the origin they "
+            f"are rounded by {rounding:.1e}, and {coarse} of {len(thick)} cells are as thin as "
+            f"{thick.min():.1e}: move all bodies nearer to the origin"
+        )
 
 
 def checked_surfaces(
@@ -124,6 +147,7 @@ def _facets_found(name: str, facets: np.ndarray, boundary: np.ndarray, dim: int)
             f"are not, first facet {lost[0]} with nodes {facets[lost[0]].tolist()}: take them from "
             f"`boundary_faces(cells, dim={dim})`"
         )
+    _check_once(name, facets, found)
     there = boundary[found]
     wrong = np.flatnonzero((np.sort(facets, axis=1) != np.sort(there, axis=1)).any(axis=1))
     if wrong.size:
@@ -143,6 +167,18 @@ def _facets_found(name: str, facets: np.ndarray, boundary: np.ndarray, dim: int)
             f"{facets[first].tolist()}: order them with `orient(cells, facets, dim={dim})`"
         )
     return found
+
+
+def _check_once(name: str, facets: np.ndarray, found: np.ndarray) -> None:
+    """Refuse a facet that is listed twice, also in another order: its area would count twice."""
+    _, first, counts = np.unique(found, return_index=True, return_counts=True)
+    twice = np.flatnonzero(counts > 1)
+    if twice.size:
+        raise InvalidInputError(
+            f"surface '{name}' must list every facet once, {twice.size} of {first.size} are listed more "
+            f"often, among them the one with nodes {facets[first[twice[0]]].tolist()}: keep one of each "
+            "(numpy.unique(numpy.sort(facets, axis=1), axis=0, return_index=True))"
+        )
 
 
 def checked_grid(grid: ArrayLike | None, n_cells: int, dim: int) -> np.ndarray | None:

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry.cell_types import QUADRATIC_FILE
+from fenics_contact.geometry.files import require_file
 
 _FACETS = {
     "tetrahedron": ("triangle",),
@@ -58,8 +59,7 @@ def grids_of(path: Path) -> list[Grid]:
         InvalidInputError: If the file is missing, is no XDMF file, or its cells are no linear ones of one
             type.
     """
-    if not path.is_file():
-        raise InvalidInputError(f"there must be a file '{path}', there is none: check the name and folder")
+    require_file(path)
     try:
         root = ElementTree.parse(path).getroot()
     except ElementTree.ParseError as reason:

@@ -7,10 +7,8 @@ import platform
 from importlib import metadata
 from types import ModuleType
 
-from mpi4py import MPI
-from petsc4py import PETSc
-
 from fenics_contact import _dolfinx
+from fenics_contact._libraries import MPI, PETSc
 
 _MODULES = ("numpy", "scipy", "mpi4py", "petsc4py", "gmsh", "clarabel", "pyvista", "vtk")
 
@@ -21,7 +19,7 @@ def versions() -> dict[str, str]:
     A library that is not installed, or that does not tell, says so instead.
     """
     found = {"fenics_contact": _installed("fenics_contact"), "python": platform.python_version()}
-    found["dolfinx"] = _dolfinx.RELEASE
+    found["dolfinx"] = _dolfinx.release()
     found["petsc"] = ".".join(map(str, PETSc.Sys.getVersion()))
     found["mpi"] = MPI.Get_library_version().partition(",")[0].strip("\x00 \n")
     return found | {name: _installed(name) for name in _MODULES}

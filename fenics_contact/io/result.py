@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fenics_contact.contact import State, Status
-from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.contact import State, Status, UnheldMotion
+from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.feti import DirectSystem
 from fenics_contact.io.described_scene import described_scene, readable
 from fenics_contact.io.json_file import write_json
@@ -32,6 +32,7 @@ UNITS = (
 )
 
 
+@collectively("write_result", lambda state, *_, **__: state.torn.decomposition.comm)
 def write_result(
     state: State,
     folder: str | Path,
@@ -59,6 +60,7 @@ that was read from a checkpoint says so and has no tolerance |
     | ``contact`` | one entry a pair: ``points``, ``open``, ``stick``, ``slip``, ``force`` on the slave, \
 ``normal_force``, ``peak_pressure``, ``smallest_gap``, ``largest_slip`` in the last load step; without \
 friction closed points count as ``slip`` |
+    | ``unheld`` | rigid motions that nothing holds and nothing loads, in words; `State.unheld` |
     | ``more`` | what the caller adds |
 
     Entries may be added without a new version; none changes its meaning or goes without one.
@@ -80,14 +82,15 @@ friction closed points count as ``slip`` |
     Example:
         >>> write_result(state, "output", more={"drop_percent": 12.4})  # doctest: +SKIP
     """
-    comm = state.torn.decomposition.comm
+    comm, unheld = state.torn.decomposition.comm, state.unheld
     with together(comm):
-        record = {**_head("state", comm), **_state_record(state)}
+        record = {**_head("state", comm), **_state_record(state, unheld)}
         target = checked_name(folder, name, ".json")
     record["errors"] = _errors(state) if errors or _knows_errors(state) else None
     return write_json(target, {**record, "more": dict(more or {})}, comm=comm)
 
 
+@collectively("write_optimisation_result", lambda result, problem, *_, **__: problem.comm)
 def write_optimisation_result(
     result: Result,
     problem: ShapeProblem,
@@ -123,6 +126,7 @@ an evaluation; None where a trial point was rejected as invalid |
         InvalidInputError: As `write_result` does, or if the problem has not been evaluated.
     """
     first, best, comm = problem.first, problem.best, problem.comm
+    unheld = () if best is None else best.state.unheld
     with together(comm):
         target = checked_name(folder, name, ".json")
         if first is None or best is None:
@@ -130,7 +134,7 @@ an evaluation; None where a trial point was rejected as invalid |
                 "an optimisation's result needs designs that were evaluated, the problem has none: give the "
                 "problem that was handed to minimize"
             )
-        record = {**_head("optimisation", comm), **_state_record(best.state)}
+        record = {**_head("optimisation", comm), **_state_record(best.state, unheld)}
         record["counts"]["f_products"] = problem.products
         record["seconds"] = dict(problem.seconds)
         record["optimisation"] = {
@@ -165,7 +169,7 @@ def _head(kind: str, comm: MPI.Comm) -> dict[str, Any]:
     }
 
 
-def _state_record(state: State) -> dict[str, Any]:
+def _state_record(state: State, unheld: Sequence[UnheldMotion]) -> dict[str, Any]:
     decomposition, solution = state.torn.decomposition, state.solution
     parts = decomposition.partitions
     plan = state.scene.plan(parts)
@@ -196,6 +200,7 @@ def _state_record(state: State) -> dict[str, Any]:
             for key in ("strain", "load", "friction", "dual", "total_potential", "primal")
         },
         "contact": [_pair(state, number) for number in range(len(state.scene.contacts))],
+        "unheld": [str(motion) for motion in unheld],
     }
 
 

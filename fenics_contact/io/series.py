@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.io.collection import Member, collection, read_collection, stem_of

@@ -10,7 +10,7 @@ import meshio
 import numpy as np
 
 from fenics_contact.contact import State, gathered_fields, in_space
-from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.io.names import checked_name, file_of_each
 from fenics_contact.io.replacing import replacing
 
@@ -25,6 +25,7 @@ _MESHIO_NAMES = {
 }
 
 
+@collectively("write_vtu", lambda state, *_, **__: state.torn.decomposition.comm)
 def write_vtu(
     state: State,
     folder: str | Path,

@@ -7,12 +7,13 @@ from pathlib import Path
 
 from fenics_contact import _dolfinx
 from fenics_contact.contact import State
-from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.io.names import checked_name, file_of_each
 from fenics_contact.io.replacing import replacing_together
 from fenics_contact.io.xdmf import parallel_size
 
 
+@collectively("write_vtx", lambda state, *_, **__: state.torn.decomposition.comm)
 def write_vtx(
     state: State, folder: str | Path, name: str = "state", *, value: float = 0.0
 ) -> dict[str, tuple[Path, Path]]:
@@ -56,8 +57,8 @@ def require_vtx() -> None:
     Raises:
         InvalidInputError: Says which formats there are instead.
     """
-    if not _dolfinx.HAS_VTX:
-        version = ".".join(map(str, _dolfinx.VERSION))
+    if not _dolfinx.has_vtx():
+        version = ".".join(map(str, _dolfinx.version()))
         raise InvalidInputError(
             f"VTX files need a dolfinx that was built with ADIOS2, this one ({version}) was not: use the "
             "formats 'vtu' and 'xdmf', which every dolfinx has; dolfinx of Debian 13 and of conda-forge has "

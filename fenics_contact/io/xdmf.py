@@ -6,12 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from fenics_contact import _dolfinx
+from fenics_contact._libraries import MPI
 from fenics_contact.contact import State
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, collectively
 from fenics_contact.io.names import file_of_each
 from fenics_contact.io.replacing import replacing_together
 
 
+@collectively("write_xdmf", lambda state, *_, **__: state.torn.decomposition.comm)
 def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
     """Write displacement and von Mises stress of every body to XDMF, all ranks together. Collective.
 
@@ -35,7 +37,7 @@ def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
         )
     files = file_of_each(state.displacement, base.parent, base.stem, ".xdmf")
     for name, target in files.items():
-        _write(target, state.displacement[name], state.von_mises[name])
+        _write(state.torn.decomposition.comm, target, state.displacement[name], state.von_mises[name])
     return files
 
 
@@ -44,11 +46,11 @@ def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
 _XINCLUDE, _UNKNOWN = "http://www.w3.org/2001/XInclude", "https://www.w3.org/2001/XInclude"
 
 
-def _write(target: Path, displacement: Any, von_mises: Any) -> None:
+def _write(comm: MPI.Comm, target: Path, displacement: Any, von_mises: Any) -> None:
     mesh = displacement.function_space.mesh
     # The XDMF file names its HDF5 file: both keep their names and are written in a folder of their own.
     replacing_together(
-        mesh.comm,
+        comm,
         [target.with_suffix(".h5"), target],
         lambda hidden: _dolfinx.write_xdmf(hidden / target.name, mesh, [displacement, von_mises]),
         size=parallel_size(mesh),

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import weakref
 from collections import Counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from mpi4py import MPI
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 #: Size of the communicator and place in the order of registration there: the same on all its ranks.
 Key = tuple[int, int]
@@ -20,18 +21,19 @@ _waiting: dict[Key, tuple[tuple[Any, ...], Any]] = {}
 _registered: Counter[int] = Counter()
 
 
-def dispose_with(owner: Any, *objects: Any, comm: MPI.Comm = MPI.COMM_SELF, keep: Any = None) -> None:
+def dispose_with(owner: Any, *objects: Any, comm: MPI.Comm | None = None, keep: Any = None) -> None:
     """Destroy PETSc objects when their owner is no longer used.
 
     Args:
         owner: The Python object that holds them.
         *objects: PETSc objects. They must not refer to the owner.
-        comm: Communicator they live on: that of the scene or of its first ranks. Objects of one rank are
-            destroyed at once, others by `sweep`; they must be registered by all ranks in the same order.
+        comm: Communicator they live on: that of the scene or of its first ranks, or None for this rank alone.
+            Objects of one rank are destroyed at once, others by `sweep`; they must be registered by all ranks
+            in the same order.
         keep: What has to live as long as the objects, such as the mesh whose communicator they use.
     """
     finalizer: Any
-    if comm.size == 1:
+    if comm is None or comm.size == 1:
         finalizer = weakref.finalize(owner, _destroy, objects, keep)
     else:
         _registered[comm.size] += 1

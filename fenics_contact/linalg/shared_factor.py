@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
-from mpi4py import MPI
-from petsc4py import PETSc
 
+from fenics_contact._libraries import MPI, PETSc, check_not_forked, start
 from fenics_contact.linalg.disposal import dispose_with
 
 Vector = npt.NDArray[np.float64]
@@ -41,6 +40,7 @@ class SharedFactor:
                 replicated.
             holders: Ranks that hold the factors; one for every `ROWS_PER_RANK` rows by default.
         """
+        start(comm)
         self._comm, self.size, self._scale = comm, share.shape[0], scale
         wanted = -(-self.size // ROWS_PER_RANK) if holders is None else holders
         self.holders = max(1, min(comm.size, wanted))
@@ -58,6 +58,7 @@ class SharedFactor:
             right: Right side, the same on every rank.
             refine: Correct for the shift.
         """
+        check_not_forked()
         solution = np.empty(self.size)
         if self._holds:
             start, stop = self._bounds[self._comm.rank : self._comm.rank + 2]

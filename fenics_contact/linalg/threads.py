@@ -6,6 +6,8 @@ import logging
 import os
 from functools import lru_cache
 
+from fenics_contact.errors import tell
+
 _LOG = logging.getLogger(__name__)
 
 #: What tells OpenBLAS, MKL and OpenMP how many threads to start.
@@ -22,7 +24,8 @@ def warn_of_threads(ranks: int) -> None:
         ranks: Number of ranks.
     """
     if ranks > 1 and not any(os.environ.get(name) for name in SETTINGS):
-        _LOG.warning(
+        tell(
+            _LOG.warning,
             "%d ranks share the cores, and the BLAS of each may start threads on all of them, which can take "
             "several times as long: export OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 before Python starts",
             ranks,

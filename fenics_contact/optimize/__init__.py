@@ -8,7 +8,7 @@ from fenics_contact.optimize.bundle_trust import BundleTrust
 from fenics_contact.optimize.constraints import Bounds, LinearConstraints, nearest_feasible
 from fenics_contact.optimize.for_scipy import ForScipy, Visit
 from fenics_contact.optimize.minimization import minimize
-from fenics_contact.optimize.objective import Inexact
+from fenics_contact.optimize.objective import Inexact, Kinked
 from fenics_contact.optimize.problem import Problem, pose
 from fenics_contact.optimize.progress import Resumable
 from fenics_contact.optimize.quadratic_program import SubproblemError
@@ -23,6 +23,7 @@ __all__ = [
     "Inexact",
     "InvalidDesignError",
     "Kind",
+    "Kinked",
     "LinearConstraints",
     "NotConvergedError",
     "Problem",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ class Bundle:
         noise: Error e_i of the value that plane i was found with, shape (m,), units of J. A plane may lie too
             high by e_i, seen from a centre whose value is too low by e_0, and is pushed down by both: an
             inexact plane promises no less decrease than there may be.
+        doubtful: Marks of planes whose slope may be no subgradient, see `Kinked`, shape (m,).
 
     References:
         K. C. Kiwiel, Methods of Descent for Nondifferentiable Optimization, Lecture Notes in
@@ -42,12 +43,15 @@ class Bundle:
     distances: Array
     locality: float
     noise: Array
+    doubtful: NDArray[np.bool_]
 
     @classmethod
-    def of_centre(cls, gradient: Array, locality: float, noise: float = 0.0) -> Bundle:
+    def of_centre(
+        cls, gradient: Array, locality: float, noise: float = 0.0, doubtful: bool = False
+    ) -> Bundle:
         """Return the bundle that holds the centre's own plane alone."""
         zero = np.zeros(1)
-        return cls(gradient[None], zero, zero, locality, np.array([noise]))
+        return cls(gradient[None], zero, zero, locality, np.array([noise]), np.array([doubtful]))
 
     @property
     def size(self) -> int:
@@ -65,7 +69,9 @@ class Bundle:
         """Return the predicted change of J, max_i (g_i·y - β_i), for a step y of shape (n,)."""
         return float(np.max(self.gradients @ step - self.measures))
 
-    def with_cut(self, gradient: Array, error: float, distance: float, noise: float = 0.0) -> Bundle:
+    def with_cut(
+        self, gradient: Array, error: float, distance: float, noise: float = 0.0, doubtful: bool = False
+    ) -> Bundle:
         """Return the bundle with one more plane at the end."""
         return Bundle(
             np.vstack([self.gradients, gradient]),
@@ -73,19 +79,22 @@ class Bundle:
             np.append(self.distances, distance),
             self.locality,
             np.append(self.noise, noise),
+            np.append(self.doubtful, doubtful),
         )
 
-    def refined(self, gradient: Array, change: float, noise: float) -> Bundle:
+    def refined(self, gradient: Array, change: float, noise: float, doubtful: bool = False) -> Bundle:
         """Return the bundle after its centre was evaluated again.
 
         Args:
             gradient: The centre's subgradient, shape (n,), scaled variables.
             change: Change of the centre's value.
             noise: Its error now.
+            doubtful: Whether its subgradient may be none.
         """
         gradients, errors, noises = self.gradients.copy(), self.errors + change, self.noise.copy()
-        gradients[0], errors[0], noises[0] = gradient, 0.0, noise
-        return Bundle(gradients, errors, self.distances, self.locality, noises)
+        doubts = self.doubtful.copy()
+        gradients[0], errors[0], noises[0], doubts[0] = gradient, 0.0, noise, doubtful
+        return Bundle(gradients, errors, self.distances, self.locality, noises, doubts)
 
     def moved(self, step: Array, change: float, locality: float) -> Bundle:
         """Return the bundle seen from a new centre, whose own plane is the last one.
@@ -102,7 +111,9 @@ class Bundle:
         distances = self.distances + np.linalg.norm(step)
         errors[-1] = distances[-1] = 0.0
         order = np.roll(np.arange(self.size), 1)
-        return Bundle(self.gradients[order], errors[order], distances[order], locality, self.noise[order])
+        return replace(
+            self.chosen(order), errors=errors[order], distances=distances[order], locality=locality
+        )
 
     def reduced(self, weights: Array, room: int) -> Bundle:
         """Return a bundle with at most ``room`` planes that has the same solution of the step's programme.
@@ -132,10 +143,16 @@ class Bundle:
             float(share @ self.errors),
             float(share @ self.distances),
             float(share @ self.noise),
+            bool(np.any(self.doubtful & carrying)),
         )
 
     def chosen(self, rows: NDArray[np.intp]) -> Bundle:
         """Return the bundle of some planes, given by their numbers."""
         return Bundle(
-            self.gradients[rows], self.errors[rows], self.distances[rows], self.locality, self.noise[rows]
+            self.gradients[rows],
+            self.errors[rows],
+            self.distances[rows],
+            self.locality,
+            self.noise[rows],
+            self.doubtful[rows],
         )

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.errors import InvalidDesignError, InvalidInputError
+from fenics_contact.errors import InvalidDesignError, InvalidInputError, tell
 from fenics_contact.optimize.bundle import Bundle
+from fenics_contact.optimize.care import surely, without_doubt
 from fenics_contact.optimize.inexactness import Demand, again, demand
 from fenics_contact.optimize.objective import Accuracy, Evaluation, can_be_inexact, evaluate
 from fenics_contact.optimize.problem import Problem
@@ -31,6 +32,8 @@ _RADIUS_LEAST = 1e-8  # least one, in lengths of the problem
 _T_LEAST, _T_MOST = 1e-10, 1e4  # range of t, in units of the first t
 _FIRST_SUBGRADIENT = 0.01  # relative error that the first subgradient of an inexact function may have
 _SLOPE_SHARE = 0.1  # part of the predicted decrease by which an inexact subgradient may be wrong along a step
+_OF_THE_MODEL = (Reason.CONVERGED, Reason.STATIONARY, Reason.NO_DESCENT)  # what subgradients alone say
+_BESIDE = "a gradient from beside, as the centre lies on a kink"
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,10 @@ class BundleTrust:
     A function that can be evaluated inexactly (`Inexact`) is asked for no more accuracy than the predicted
     decrease needs. The centre is evaluated again where that has fallen so far that its error counts, and once
     more before the method stops: at the end value and subgradient are as good as ε asks.
+
+    A function may know points at which it returns something that may be no subgradient (`Kinked`). Where the
+    method would stop on such a thing, the centre is given the gradient beside it, planes of other such points
+    are dropped, and the method goes on; from then on such points are given the gradient beside them at once.
 
     Attributes:
         tolerance: ε, relative stopping tolerance.
@@ -149,7 +156,7 @@ class BundleTrust:
             try:
                 state, reason = _iterated(self, problem, state)
             except SubproblemError as error:
-                _LOG.warning("%s", error)
+                tell(_LOG.warning, "%s", error)
                 reason = Reason.STEP_FAILED
             if reason is None:
                 progress.evaluated(state)
@@ -165,7 +172,8 @@ def _start(method: BundleTrust, problem: Problem) -> MethodState:
     gradient = centre.subgradient * problem.scale
     norm = float(np.linalg.norm(gradient))
     t = method.first_step * problem.length / (norm or 1.0)
-    bundle = Bundle.of_centre(gradient, method.locality * norm / problem.length, centre.error)
+    locality = method.locality * norm / problem.length
+    bundle = Bundle.of_centre(gradient, locality, centre.error, centre.doubtful)
     radius = _RADIUS * problem.length
     trust = Trust(t, radius, _T_LEAST * t, _T_MOST * t, _RADIUS_LEAST * problem.length)
     record = Record(0, Kind.START, centre.value, centre.value, 0.0, t, 0.0, norm, 0.0, 1, 1, centre.error)
@@ -186,9 +194,17 @@ def _iterated(method: BundleTrust, problem: Problem, state: MethodState) -> tupl
     wanted = _wanted(method, problem, state, step, test, claim=reason is not None and reason.success)
     if wanted is not None and state.evaluations < method.max_evaluations:
         return _refined(problem, state, step, wanted), None
+    if reason in _OF_THE_MODEL and state.bundle.doubtful.any():
+        return _reconsidered(method, problem, state, step)
     if reason is not None:
         return state, reason
     return _advanced(method, problem, state, step, _demand(method, state, step, test)), None
+
+
+def _evaluated(problem: Problem, state: MethodState, x: Array, accuracy: Accuracy) -> Evaluation:
+    """Call the function, and once more beside x where that is called for."""
+    found = evaluate(problem.fun, x, state.evaluations + 1, accuracy)
+    return surely(problem, found, state.evaluations + 1) if state.careful else found
 
 
 def _guarded_step(problem: Problem, state: MethodState) -> tuple[Step, Trust]:
@@ -228,9 +244,22 @@ def _wanted(
 def _refined(problem: Problem, state: MethodState, step: Step, accuracy: Accuracy) -> MethodState:
     """Evaluate the centre again, more accurately."""
     centre = state.centre
-    found = again(centre, evaluate(problem.fun, centre.x, state.evaluations + 1, accuracy))
-    bundle = state.bundle.refined(found.subgradient * problem.scale, found.value - centre.value, found.error)
+    found = again(centre, _evaluated(problem, state, centre.x, accuracy))
+    change = found.value - centre.value
+    bundle = state.bundle.refined(found.subgradient * problem.scale, change, found.error, found.doubtful)
     return replace(state, centre=found, bundle=bundle, history=_recorded(state, step, Kind.REFINED, found))
+
+
+def _reconsidered(
+    method: BundleTrust, problem: Problem, state: MethodState, step: Step
+) -> tuple[MethodState, Reason | None]:
+    """Put aside the doubtful subgradients on which the method would stop, and look again."""
+    if not state.centre.doubtful:
+        return _iterated(method, problem, without_doubt(problem, state))
+    if state.evaluations >= method.max_evaluations:
+        return state, Reason.EVALUATION_LIMIT
+    sure = without_doubt(problem, state)
+    return replace(sure, history=_recorded(state, step, Kind.REFINED, sure.centre, _BESIDE)), None
 
 
 def _reason_to_stop(
@@ -257,15 +286,15 @@ def _advanced(
     x = problem.allowed.project(state.centre.x + problem.scale * step.move)
     step = replace(step, move=(x - state.centre.x) / problem.scale)
     try:
-        found = evaluate(problem.fun, x, state.evaluations + 1, needed.asked)
+        found = _evaluated(problem, state, x, needed.asked)
     except InvalidDesignError as error:
-        _LOG.info("trial design %d is invalid: %s", state.evaluations + 1, error)
+        tell(_LOG.info, "trial design %d is invalid: %s", state.evaluations + 1, error)
         trust = state.trust.after_rejection(step.length)
         return replace(state, trust=trust, history=_recorded(state, step, Kind.REJECTED, None, str(error)))
     gradient = found.subgradient * problem.scale
     change, slope = found.value - state.centre.value, float(gradient @ step.move)
     bundle = state.bundle.reduced(step.weights, method.max_bundle - 1)
-    bundle = bundle.with_cut(gradient, slope - change, step.length, found.error)
+    bundle = bundle.with_cut(gradient, slope - change, step.length, found.error, found.doubtful)
     trial = Trial(step, change, slope, float(bundle.measures[-1]))
     if change > -method.descent * step.decrease:
         history = _recorded(state, step, Kind.NULL, found)

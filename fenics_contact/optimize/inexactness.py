@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -74,12 +74,4 @@ def again(centre: Evaluation, found: Evaluation) -> Evaluation:
     size = float(np.linalg.norm(found.subgradient))
     change = float(np.linalg.norm(found.subgradient - centre.subgradient))
     turned = change / size if size > 0.0 else (0.0 if change == 0.0 else np.inf)
-    return Evaluation(
-        found.x,
-        found.value,
-        found.subgradient,
-        found.error,
-        found.asked_value,
-        found.asked_subgradient,
-        float(turned),
-    )
+    return replace(found, turned=float(turned))

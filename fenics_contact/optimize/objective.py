@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
@@ -9,10 +10,12 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidDesignError, InvalidInputError, tell
 
 Array = NDArray[np.float64]
 Fun = Callable[[Array], tuple[float, ArrayLike]]
+
+_LOG = logging.getLogger(__name__)
 
 
 @runtime_checkable
@@ -33,6 +36,32 @@ class Inexact(Protocol):
             x: Point, shape (n,).
             value: Largest error of the value, units of J; inf where anything will do.
             subgradient: Largest error of the subgradient, relative to it.
+        """
+
+
+@runtime_checkable
+class Kinked(Protocol):
+    """A function made of smooth pieces, which knows where it cannot tell on which of them a point lies.
+
+    What it returns there is the gradient of some combination of pieces, which no point nearby need have: it
+    may be no subgradient. The method believes it until it would stop on it; then it asks for the gradient
+    beside the point.
+    """
+
+    def __call__(self, x: Array) -> tuple[float, ArrayLike]:
+        """Return value and subgradient, or what may be one."""
+
+    def doubtful(self, x: Array) -> bool:
+        """Tell whether what was returned last, at x, may be no subgradient."""
+
+    def beside(self, x: Array, end: Array) -> ArrayLike:
+        """Return a gradient from a point on the way from x to end, as near to x as a piece can be told.
+
+        Raises `InvalidDesignError` where the function does not exist there.
+
+        Args:
+            x: Point, shape (n,).
+            end: A feasible point near x, in no special direction, shape (n,).
         """
 
 
@@ -62,6 +91,7 @@ class Evaluation:
         asked_subgradient: Relative error of the subgradient that was allowed.
         turned: By how much the subgradient differs from that of a less accurate evaluation of the same point,
             relative to it: 0 for an exact function, inf where there is nothing to compare with.
+        doubtful: Whether the subgradient may be none, see `Kinked`.
     """
 
     x: Array
@@ -71,6 +101,7 @@ class Evaluation:
     asked_value: float = 0.0
     asked_subgradient: float = 0.0
     turned: float = 0.0
+    doubtful: bool = False
 
 
 def can_be_inexact(fun: Fun) -> bool:
@@ -95,16 +126,36 @@ def evaluate(fun: Fun, x: Array, number: int, accuracy: Accuracy | None = None) 
         InvalidDesignError: If the function raises it.
     """
     if accuracy is None or not (isinstance(fun, Inexact) and fun.inexact):
-        return _checked(fun(x.copy()), x, f"at evaluation {number}")
-    value, subgradient, error = fun.within(x.copy(), accuracy.value, accuracy.subgradient)
-    found = _checked((value, subgradient), x, f"at evaluation {number}")
-    return replace(
-        found,
-        error=float(error),
-        asked_value=accuracy.value,
-        asked_subgradient=accuracy.subgradient,
-        turned=float(np.inf),
-    )
+        found = _checked(fun(x.copy()), x, f"at evaluation {number}")
+    else:
+        value, subgradient, error = fun.within(x.copy(), accuracy.value, accuracy.subgradient)
+        found = replace(
+            _checked((value, subgradient), x, f"at evaluation {number}"),
+            error=float(error),
+            asked_value=accuracy.value,
+            asked_subgradient=accuracy.subgradient,
+            turned=float(np.inf),
+        )
+    return replace(found, doubtful=isinstance(fun, Kinked) and bool(fun.doubtful(x.copy())))
+
+
+def beside(fun: Fun, found: Evaluation, end: Array, number: int) -> Evaluation:
+    """Return a doubtful evaluation with the gradient beside it for a subgradient; any other as it is.
+
+    Where the function does not exist beside the point, what it returned at the point must do.
+
+    Raises:
+        InvalidInputError: If the answer is not n finite numbers.
+    """
+    if not (found.doubtful and isinstance(fun, Kinked)):
+        return found
+    try:
+        gradient = fun.beside(found.x.copy(), end.copy())
+    except InvalidDesignError as error:
+        tell(_LOG.warning, "the subgradient of evaluation %d may be none: %s", number, error)
+        return replace(found, doubtful=False)
+    checked = _checked((found.value, gradient), found.x, f"beside evaluation {number}")
+    return replace(found, subgradient=checked.subgradient, doubtful=False)
 
 
 def _checked(answer: Any, x: Array, where: str) -> Evaluation:

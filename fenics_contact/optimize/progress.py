@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenics_contact.checkpoint import (
     Checkpoint,
-    described,
     safe_point,
     telling_what_is_kept,
     without_checkpoint,
 )
+from fenics_contact.errors import collective
+from fenics_contact.fingerprint import described
 from fenics_contact.optimize.problem import Problem
 from fenics_contact.optimize.result import Record
 from fenics_contact.optimize.state import MethodState
@@ -131,7 +132,9 @@ class Progress:
         """
         self._tell(state)
         if self._callback is not None:
-            self._callback(state.history[-1], state.centre.x.copy())
+            # What it does may be collective, as the writing of a state is.
+            with nullcontext() if self.comm is None else _asking(self.comm):
+                self._callback(state.history[-1], state.centre.x.copy())
         self.keep(state)
         safe_point(self._kept, lambda: self.keep(state, last=True), self.comm)
 
@@ -168,6 +171,10 @@ class Progress:
             return without_checkpoint(_evaluations(0 if self._state is None else self._state.evaluations))
         written = max(self._written, 0)
         return self._checkpoint.way_on(written, _evaluations(written))
+
+
+def _asking(comm: MPI.Comm) -> AbstractContextManager[None]:
+    return collective(comm, "the callback of a minimisation", closed=True, users=True)
 
 
 def _evaluations(number: int) -> str:

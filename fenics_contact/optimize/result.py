@@ -58,7 +58,7 @@ class Kind(Enum):
     NULL = "null"
     #: The objective does not exist there.
     REJECTED = "rejected"
-    #: The centre, evaluated again with a smaller error.
+    #: The centre, evaluated again with a smaller error, or given the gradient beside it, as it is on a kink.
     REFINED = "refined"
 
 
@@ -79,7 +79,7 @@ class Record:
         bundle_size: Cutting planes in the model that made the step.
         evaluations: Evaluations up to and with this one.
         error: Estimated error of `value`; 0 for a function that is exact or does not tell.
-        note: Why a trial point was rejected; empty for any other.
+        note: Why a trial point was rejected, or that a gradient is from beside; empty for any other.
     """
 
     iteration: int

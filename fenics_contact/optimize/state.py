@@ -27,6 +27,7 @@ class MethodState:
         trust: Proximal parameter and trust region.
         first_t: Proximal parameter that the method began with.
         history: One record for each evaluation, oldest first.
+        careful: Whether doubtful subgradients are replaced at once, see `fenics_contact.optimize.care`.
     """
 
     centre: Evaluation
@@ -34,6 +35,7 @@ class MethodState:
     trust: Trust
     first_t: float
     history: tuple[Record, ...]
+    careful: bool = False
 
     @property
     def iterations(self) -> int:
@@ -53,7 +55,7 @@ class MethodState:
             for part, value in parts.items()
             for field in fields(value)
         }
-        stored["first_t"] = np.asarray(self.first_t)
+        stored["first_t"], stored["careful"] = np.asarray(self.first_t), np.asarray(self.careful)
         for field in fields(Record):
             column = [getattr(record, field.name) for record in self.history]
             stored[f"history.{field.name}"] = np.array(
@@ -78,4 +80,5 @@ class MethodState:
             trust=part(Trust, "trust"),
             first_t=float(stored["first_t"]),
             history=tuple(Record(*row) for row in zip(*columns, strict=True)),
+            careful=bool(stored["careful"]),
         )

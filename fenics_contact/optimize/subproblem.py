@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fenics_contact.errors import tell
 from fenics_contact.optimize.bundle import Bundle
 from fenics_contact.optimize.constraints import Surroundings
 from fenics_contact.optimize.quadratic_program import (
@@ -95,7 +96,7 @@ def _solved(bundle: Bundle, near: Surroundings, t: float, lengths: Array) -> tup
         try:
             return _step(bundle, near, solve(_program(bundle, near, t, unit)), t, unit), unit
         except SubproblemError as error:
-            _LOG.debug("step's programme not solved in units of %g: %s", unit, error)
+            tell(_LOG.debug, "step's programme not solved in units of %g: %s", unit, error)
     return _step(bundle, near, solve(_program(bundle, near, t, units[-1])), t, units[-1]), units[-1]
 
 

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import ArrayLike
 
+from fenics_contact._libraries import MPI
 from fenics_contact.contact import State, find_state
 from fenics_contact.errors import (
     ConvergenceError,
     InfeasibleError,
     InvalidDesignError,
     InvalidInputError,
+    calling,
+    collective,
+    collectively,
     together,
 )
 from fenics_contact.feti import Decomposition, decompose
@@ -66,6 +69,7 @@ class Response(ABC):
     def quantities(self) -> tuple[str, ...]:
         """Names of the quantities of interest, in the order of arrays."""
 
+    @collectively("a response", lambda self, *_, **__: self.comm)
     def __call__(self, parameters: Parameters | None = None, **named: float) -> Answer:
         """Answer at a set of parameters; what is not given is nominal. Collective.
 
@@ -204,7 +208,7 @@ class SceneResponse(Response):
         return tuple(self._of_state)
 
     def _answer(self, values: dict[str, float]) -> tuple[dict[str, float], dict[str, np.ndarray], int]:
-        with together(self.comm):
+        with together(self.comm), calling("the function that builds the scene of a response"):
             scene = self._build(**values)
         decomposition = self._decomposition(scene)
         state = find_state(
@@ -216,10 +220,13 @@ class SceneResponse(Response):
 
     def _decomposition(self, scene: Scene) -> Decomposition:
         """Return the decomposition, a new one where topology or supported components changed. Collective."""
-        if self._decomposed is None or not _alike(scene, self._decomposed[0]):
+        with together(self.comm):
+            kept = self._decomposed is not None and _alike(scene, self._decomposed[0])
+        if not kept:
             with together(self.comm):
                 cut = scene.partition(self.comm.size) if self._partitions is None else self._partitions
             self._decomposed, self.state = (scene, decompose(scene, cut, self.comm)), None
+        assert self._decomposed is not None
         return self._decomposed[1]
 
 
@@ -269,16 +276,30 @@ def evaluated(quantities: Mapping[str, Quantity], state: State, comm: MPI.Comm) 
 
     Raises:
         InvalidInputError: If one of them is no number.
+        Exception: What a quantity raises on all ranks.
+        UserCodeError: If it raises on some of them only.
     """
-    found = {name: np.asarray(quantity(state)) for name, quantity in quantities.items()}
-    with together(comm):
-        wrong: Sequence[str] = [name for name, value in found.items() if value.size != 1]
-        if wrong:
-            raise InvalidInputError(
-                f"a quantity must be one number, {wrong[0]!r} has shape {found[wrong[0]].shape}: take its "
-                "largest entry or a norm, or make a quantity of each entry"
-            )
-    return {name: float(value.item()) for name, value in found.items()}
+    found: dict[str, float] = {}
+    for name, quantity in quantities.items():
+        with collective(comm, f"quantity {name!r} of a response", closed=True, users=True):
+            found[name] = _number(name, quantity(state))
+    return found
+
+
+def _number(name: str, value: Any) -> float:
+    """Return the value of a quantity as a number, refuse what is none."""
+    array = np.asarray(value)
+    if array.size != 1:
+        raise InvalidInputError(
+            f"a quantity must be one number, {name!r} has shape {array.shape}: take its largest entry or a "
+            "norm, or make a quantity of each entry"
+        )
+    try:
+        return float(array.item())
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(
+            f"a quantity must be one number, {name!r} is {value!r}: return a float, the same on every rank"
+        ) from error
 
 
 def _alike(scene: Scene, other: Scene) -> bool:

@@ -8,9 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
-from mpi4py import MPI
-
-from fenics_contact.errors import InvalidInputError, RemoteError, agree
+from fenics_contact._libraries import MPI
+from fenics_contact.errors import InvalidInputError, RemoteError, agree, collective
 
 _CALL, _STOP = "call", "stop"
 
@@ -121,14 +120,8 @@ def _called(
 ) -> Any:
     """Call the function on this rank; all ranks raise if one does. Collective."""
     agree(comm, earlier)  # a rank that cannot serve says so before anybody waits for it
-    error: Exception | None = None
-    value = None
-    try:
-        value = function(*arguments, **named)
-    except Exception as caught:
-        error = caught
-    agree(comm, error)
-    return value
+    with collective(comm, "the served function", closed=True):
+        return function(*arguments, **named)
 
 
 def _serve(function: Callable[..., Any], comm: MPI.Comm, left: BaseException | None) -> None:
@@ -140,7 +133,7 @@ def _serve(function: Callable[..., Any], comm: MPI.Comm, left: BaseException | N
             break
         try:
             _called(function, comm, request[1], request[2], mine)
-        except Exception:  # rank 0 has it, and decides whether to go on
+        except BaseException:  # rank 0 has it, and decides whether to go on
             continue
     _, kind, arguments = request
     if kind is not None:

@@ -6,6 +6,7 @@ import logging
 from types import TracebackType
 from typing import Any
 
+from fenics_contact.errors import tell
 from fenics_contact.progress.event import Event, Kind
 
 #: Through this logger everything is reported.
@@ -125,4 +126,4 @@ class Task:
 
     def _tell(self, kind: Kind, **found: Any) -> None:
         event = Event(task=id(self), what=self.what, kind=kind, **{**self._known, **found})
-        _LOGGER.debug("%s", event, extra={"progress": event})
+        tell(_LOGGER.debug, "%s", event, extra={"progress": event})

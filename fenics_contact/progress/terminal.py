@@ -16,6 +16,7 @@ from rich.text import Text
 from fenics_contact.progress.places import terminal_width
 from fenics_contact.progress.presenter import Presenter
 from fenics_contact.progress.tracker import Tracker, Work, summary
+from fenics_contact.progress.words import visible
 
 #: How often the bars are drawn, [1/s]: rank 0 draws while others compute.
 RATE = 4
@@ -72,7 +73,7 @@ class Terminal(Presenter):
 
     def finished(self, work: Work) -> None:
         """Leave a line above the bars."""
-        self._console.out(summary(work), highlight=False)
+        self._console.out(visible(summary(work)), highlight=False)
 
     def _drawn(self) -> RenderableType:
         rows = self._tracker.rows(time.time())
@@ -89,8 +90,9 @@ class Terminal(Presenter):
         )
         for depth, row in enumerate(rows):
             bar = "" if row.fraction is None else ProgressBar(total=1.0, completed=row.fraction, width=BAR)
-            words = (Text(text) for text in (row.details, row.left_in_words, _clock(row.spent)))
-            table.add_row(Text("  " * depth + row.what), bar, *words)
+            details, what = visible(row.details), visible(row.what)
+            words = (Text(text) for text in (details, row.left_in_words, _clock(row.spent)))
+            table.add_row(Text("  " * depth + what), bar, *words)
         return table
 
 

@@ -1,6 +1,12 @@
-"""Numbers as readers want them."""
+"""Numbers and texts as readers want them."""
 
 from __future__ import annotations
+
+import re
+
+#: What a terminal obeys instead of showing it: control characters but for the new line and the tab, breaks of
+#: lines and paragraphs, changes of the direction of writing, halves of characters.
+_OBEYED = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
 def duration(seconds: float | None) -> str:
@@ -26,3 +32,13 @@ def joined(*parts: str) -> str:
 def scientific(value: float) -> str:
     """Write a tolerance as briefly as two digits allow: 1e-06, 2.5e-03."""
     return f"{value:.1e}".replace(".0e", "e")
+
+
+def is_visible(text: str) -> bool:
+    """Tell whether a text holds nothing that a terminal obeys instead of showing it."""
+    return not _OBEYED.search(text)
+
+
+def visible(text: str) -> str:
+    """Return a text with everything that a terminal would obey written as Python's escapes."""
+    return _OBEYED.sub(lambda found: found.group().encode("unicode_escape").decode("ascii"), text)

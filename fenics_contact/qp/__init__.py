@@ -15,6 +15,7 @@ from fenics_contact.qp.face_newton import FaceNewton
 from fenics_contact.qp.face_system import FaceSystem, FaceSystems
 from fenics_contact.qp.feasible import FeasibleSet
 from fenics_contact.qp.gmres import projected_gmres
+from fenics_contact.qp.iterate import apply_unless_zero
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.linear import ProjectedCG
 from fenics_contact.qp.mpgp import Mpgp
@@ -51,6 +52,7 @@ __all__ = [
     "SolverStep",
     "Stop",
     "Tresca",
+    "apply_unless_zero",
     "classify",
     "contact_step",
     "find_equilibrium",

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fenics_contact.qp.iterate import Iterate, iterate_at
+import numpy as np
+
+from fenics_contact.qp.iterate import Iterate, answer_at
 from fenics_contact.qp.problem import DualProblem, Operator
-from fenics_contact.qp.reductions import Vector
+from fenics_contact.qp.reductions import Vector, global_sum
 from fenics_contact.qp.slip_law import SlipLaw
 from fenics_contact.qp.solution import DualSolution, SmalseMemory, SolverStep
 
@@ -64,5 +66,20 @@ def certify(
     """
     product = operator(multiplier)
     alpha = problem.coarse.coefficients(product - problem.rhs - residual)
-    iterate = iterate_at(problem, law, multiplier, product, alpha)
+    iterate = answer_at(problem, law, multiplier, product, alpha)
     return Certificate(iterate, alpha, law.bound(multiplier))
+
+
+def count_status(problem: DualProblem, multiplier: Vector, slip_bound: Vector) -> tuple[int, int, int]:
+    """Count closed contacts, sticking and slipping discs by the multiplier alone. Collective."""
+    layout = problem.layout
+    length = np.linalg.norm(multiplier[layout.tangential], axis=1)
+    slip = length >= slip_bound * (1.0 - 1e-9)
+    counts = global_sum(
+        problem.comm,
+        np.count_nonzero(multiplier[layout.normal] > 0.0),
+        np.count_nonzero(~slip),
+        np.count_nonzero(slip & (slip_bound > 0.0)),
+    )
+    closed, stick, slipping = (round(float(count)) for count in counts)
+    return closed, stick, slipping

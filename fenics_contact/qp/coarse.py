@@ -8,8 +8,8 @@ from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.qp.gram import GramInverse
 from fenics_contact.qp.reductions import Vector, global_sum

@@ -12,6 +12,9 @@ from fenics_contact.qp.face_system import FaceSystem
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 from fenics_contact.qp.square_inverse import SquareInverse, invert_square
 
+#: Motions that only offsets resist are to be told from those that nothing resists.
+LEAST_DAMPING = 1e-4
+
 
 @dataclass(frozen=True, eq=False)
 class ObliqueProjector:
@@ -49,6 +52,30 @@ class ObliqueProjector:
 
 
 @dataclass(frozen=True, eq=False)
+class DampedEquilibrium:
+    """Keeps G Z y with little motion of the offsets of slipping discs that κ holds in place.
+
+    Next to no normal force, κ is a million times the flexibility of other rows and more. Moved as far as all
+    others to keep equilibrium, such offsets would drown the rest of a residual in κ times as much.
+
+    Attributes:
+        damping: D, that of the face down to `LEAST_DAMPING`, shape (n_face,), owned.
+        coarse: G Z D.
+    """
+
+    damping: Vector
+    coarse: CoarseSpace
+
+    def project(self, v: Vector) -> Vector:
+        """Return v − D² ZᵀGᵀ (G Z D² ZᵀGᵀ)⁻¹ G Z v. Collective."""
+        return self.damping * self.coarse.project(v / self.damping)
+
+    def bearing(self, resultant: Vector) -> Vector:
+        """Return the shortest y in the norm of D⁻¹ with G Z y = resultant. Collective."""
+        return self.damping * self.coarse.transpose(self.coarse.solve(resultant))
+
+
+@dataclass(frozen=True, eq=False)
 class CoupledSystem:
     """(Wᵀ F Z + κ) y = Wᵀ d + (G W)ᵀ α on {G Z y = load}, unsymmetric where discs slip.
 
@@ -61,16 +88,24 @@ class CoupledSystem:
         tested: W, shape (n_owned, n_face).
         moving: Z, shape (n_owned, n_face).
         oblique: Projector that keeps G Z y and ignores what rigid motions absorb.
+        damped: How equilibrium is kept where offsets are held in place; None where it is kept by all alike.
     """
 
     system: FaceSystem
     tested: sp.csr_matrix
     moving: sp.csr_matrix
     oblique: ObliqueProjector
+    damped: DampedEquilibrium | None = None
 
     @classmethod
     def build(
-        cls, system: FaceSystem, coarse: CoarseSpace, tested: sp.csr_matrix, moving: sp.csr_matrix
+        cls,
+        system: FaceSystem,
+        coarse: CoarseSpace,
+        tested: sp.csr_matrix,
+        moving: sp.csr_matrix,
+        *,
+        damped: bool = False,
     ) -> CoupledSystem | None:
         """Join both bases; None where the face does not hold every body. Collective.
 
@@ -79,9 +114,15 @@ class CoupledSystem:
             coarse: Equilibrium of all multipliers.
             tested: W, shape (n_owned, n_face).
             moving: Z, shape (n_owned, n_face).
+            damped: Whether to spare offsets that κ holds in place: for systems that must be solved to the
+                last digits, beside switches of the contact law as well.
         """
         oblique = ObliqueProjector.build(sp.csr_matrix(coarse.matrix @ tested), coarse.restricted(moving))
-        return None if oblique is None else cls(system, tested, moving, oblique)
+        if oblique is None or not damped:
+            return None if oblique is None else cls(system, tested, moving, oblique)
+        damping = np.maximum(system.face.damping, LEAST_DAMPING)
+        spared = coarse.restricted(sp.csr_matrix(moving @ sp.diags(damping)))
+        return cls(system, tested, moving, oblique, DampedEquilibrium(damping, spared))
 
     def operate(self, z: Vector, full: Vector) -> Vector:
         """Return (Wᵀ F Z + κ) z, shape (n_face,), where full = F Z z."""
@@ -93,11 +134,14 @@ class CoupledSystem:
 
     def precondition(self, residual: Vector) -> Vector:
         """Apply the symmetric preconditioner and return to equilibrium, G Z z = 0. Collective."""
-        return self.oblique.moving.project(self.system.precondition(residual))
+        equilibrium = self.damped or self.oblique.moving
+        return equilibrium.project(self.system.precondition(residual))
 
     def balanced(self, y: Vector, load: Vector) -> Vector:
         """Return y moved so that G Z y = load, shape (n_face,). Collective."""
         missing = self.oblique.moving.apply(y) - load
+        if self.damped is not None:
+            return y - self.damped.bearing(missing)
         return y - self.oblique.tested.T @ self.oblique.solve(missing)
 
 

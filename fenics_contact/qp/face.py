@@ -14,6 +14,10 @@ from fenics_contact.qp.reductions import Vector
 
 Marks = npt.NDArray[np.bool_]
 
+#: Overshoot beyond which a slipping disc keeps its direction: the stiffness κ against a turn would leave no
+#: digits to the others, and a step that forgets the turn errs by the inverse of this.
+STEEP = 1e6
+
 
 @dataclass(frozen=True, eq=False)
 class Face:
@@ -21,8 +25,8 @@ class Face:
 
     Free on the face are the equality multipliers, the normal ones of closed contacts, both components of
     sticking discs, and for a slipping disc τ = Ψ ŵ + s t̂ the offset s along the circle (none in two
-    dimensions). The columns of Z are orthonormal. Everything else is fixed: λ_N = 0 where open, τ = 0 where
-    the disc is pinned (Ψ = 0).
+    dimensions, nor where the overshoot is beyond `STEEP`). The columns of Z are orthonormal. Everything else
+    is fixed: λ_N = 0 where open, τ = 0 where the disc is pinned (Ψ = 0).
 
     Attributes:
         layout: Positions of normal and tangential multipliers.
@@ -47,7 +51,7 @@ class Face:
     @cached_property
     def restriction(self) -> sp.csr_matrix:
         """Z with orthonormal columns, shape (size, n_face), owned rows and columns."""
-        return face_basis(self.layout, self.closed, self.stick, self.slip, self.direction)
+        return face_basis(self.layout, self.closed, self.stick, self._turning, self.direction)
 
     @property
     def n_face(self) -> int:
@@ -119,7 +123,17 @@ class Face:
     @property
     def _sliding(self) -> npt.NDArray[np.int64]:
         """Slipping discs that have a tangent to move along; none in two dimensions."""
-        return np.flatnonzero(self.slip) if self.layout.tangential.shape[1] == 2 else np.zeros(0, np.int64)
+        return turning_discs(self.layout, self._turning)
+
+    @property
+    def _turning(self) -> Marks:
+        """Marks of slipping discs whose direction is free."""
+        return self.slip & (self.overshoot <= STEEP)
+
+
+def turning_discs(layout: ContactLayout, turning: Marks) -> npt.NDArray[np.int64]:
+    """Return which discs can turn: in two dimensions there is nowhere to turn to."""
+    return np.flatnonzero(turning) if layout.tangential.shape[1] == 2 else np.zeros(0, np.int64)
 
 
 def face_basis(
@@ -135,7 +149,7 @@ def face_basis(
         direction: Unit vectors of these discs, shape (n_friction, t).
     """
     single = np.concatenate([layout.equality, layout.normal[closed], layout.tangential[stick].ravel()])
-    across = np.flatnonzero(sliding) if layout.tangential.shape[1] == 2 else np.zeros(0, np.int64)
+    across = turning_discs(layout, sliding)
     tangents = np.stack([-direction[across, -1], direction[across, 0]], axis=1)
     pairs = layout.tangential[across]
     rows = np.concatenate([single, pairs.ravel()])

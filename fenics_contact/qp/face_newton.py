@@ -9,6 +9,7 @@ from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp.certify import Certificate, certify
 from fenics_contact.qp.iterate import Iterate, Start
 from fenics_contact.qp.newton_steps import NewtonSteps
+from fenics_contact.qp.not_held import require_contact, require_friction_enough
 from fenics_contact.qp.problem import CountedOperator, DualProblem
 from fenics_contact.qp.rescue import DIVERGED, rescue
 from fenics_contact.qp.slip_law import SlipLaw
@@ -21,6 +22,11 @@ UNBALANCED = 1e-6
 HARDLY = 1e-2
 #: Steps in which nothing sticks, one after the other: a single one happens on the way to states that stick.
 SLIDING = 5
+#: The rescue before which it is asked whether friction can suffice at all, and by forces of which tolerance.
+DOUBT, ROUGH = 4, 1e-3
+#: After so many steps without progress each further one solves its face better by that factor: where forces
+#: vanish in the end, residuals relative to them say nothing of how far gaps can be trusted.
+CARELESS, CARE = 2, 0.25
 
 
 @dataclass(frozen=True)
@@ -74,6 +80,7 @@ class FaceNewton:
         """Solve from ``start``; called by `solve`. Collective.
 
         Raises:
+            InfeasibleError: Some body is held by nothing but contacts that stay open, or too little friction.
             ConvergenceError: Steps or products were used up; carries the history.
         """
         operator, memory = start.operator, start.memory
@@ -81,21 +88,27 @@ class FaceNewton:
         history: list[SolverStep] = []
         first = start.iterate if start.cold else newton.settled(start.iterate)
         iterate = best = first
-        since_best, budget = 0, self.rescue_products
+        since_best, budget, care, rescues = 0, self.rescue_products, 1.0, 0
         rescued: Iterate | None = None
         origin: Iterate | None = None
         while len(history) < self.max_steps and operator.products < self.max_products:
-            iterate, line = newton.step(iterate, len(history))
+            iterate, line = newton.step(iterate, len(history), care)
             history.append(line)
             start.reached(line)
             iterate, answer = self._checked(problem, law, operator, iterate)
             if answer is not None:
                 return answer.solution(problem, history, operator.products, memory)
+            require_contact(history, self.patience)
             before, after = best.residuals, iterate.residuals
             progress = after.worst_beside(before) < 0.5 * before.worst_beside(after)
             best, since_best = (iterate, 0) if progress else (best, since_best + 1)
+            care = 1.0 if progress else care * CARE if since_best > CARELESS else care
             if since_best < self.patience and after.worst_beside(before) < DIVERGED:
                 continue
+            rescues += 1
+            if rescues == DOUBT:
+                without = replace(self, tolerance=ROUGH, max_products=10 * self.rescue_products)
+                require_friction_enough(problem, law, without)
             # Where Newton could do nothing with the last rescue, the next one must go further.
             origin, last = _sound(problem, best, first), origin
             budget = 2 * budget if best is rescued or origin is last else self.rescue_products

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI
 from fenics_contact.qp.coarse import CoarseSpace, gram_matrix
 from fenics_contact.qp.face import Face
 from fenics_contact.qp.problem import DualProblem, FacePreconditioner, Operator

@@ -8,6 +8,9 @@ from fenics_contact.qp.coupled import CoupledSystem
 from fenics_contact.qp.pcg import FaceStep, Stop
 from fenics_contact.qp.reductions import Vector, global_sum
 
+#: A recomputed residual this many times the tolerance is not the one that the recursion told.
+FALSE_HOPE = 10.0
+
 
 def projected_gmres(
     coupled: CoupledSystem, gradient: Vector, weights: Vector, tolerance: float, max_iterations: int
@@ -51,12 +54,18 @@ def projected_gmres(
             stop = Stop.STAGNATION
             break
         if column[-1] == 0.0:
+            # The whole Krylov space is known: what is left lies outside of the operator's range.
+            stop = Stop.CONVERGED if small.residual <= tolerance else Stop.NO_CURVATURE
             break
         vector = image / column[-1]
     factors = small.solution()
     step, product = factors @ basis.directions, factors @ basis.products
     residual = coupled.oblique(gradient + coupled.operate(step, product))
-    return FaceStep(step, product, residual, basis.count, small.residual, stop)
+    left = float(np.sqrt(global_sum(comm, (weights * residual) @ (weights * residual))[0]))
+    if stop is Stop.CONVERGED and left > FALSE_HOPE * tolerance:
+        # Rounding passed for the image of a direction that has none.
+        stop = Stop.NO_CURVATURE
+    return FaceStep(step, product, residual, basis.count, max(left, small.residual), stop)
 
 
 def _orthogonalised(comm: object, vectors: Vector, image: Vector) -> tuple[Vector, Vector]:
@@ -117,7 +126,8 @@ class _LeastSquares:
             upper, lower = column[i], column[i + 1]
             column[i], column[i + 1] = cosine * upper + sine * lower, cosine * lower - sine * upper
         length = float(np.hypot(column[-2], column[-1]))
-        cosine, sine = (float(column[-2] / length), float(column[-1] / length)) if length > 0 else (1.0, 0.0)
+        # A direction without an image leaves the residual what it is: its row changes places with the rest.
+        cosine, sine = (float(column[-2] / length), float(column[-1] / length)) if length > 0 else (0.0, 1.0)
         column[-2] = length
         self._columns.append(column[:-1])
         self._rotations.append((cosine, sine))

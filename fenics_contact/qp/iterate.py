@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -62,6 +62,22 @@ def iterate_at(
     residual = product - problem.rhs - problem.coarse.transpose(alpha)
     residuals = measure(problem, law.feasible(multiplier), multiplier, product, residual)
     return Iterate(multiplier, product, residual, residuals)
+
+
+def answer_at(
+    problem: DualProblem, law: SlipLaw, multiplier: Vector, product: Vector, alpha: Vector
+) -> Iterate:
+    """Return the iterate with its jumps judged beside the displacements where those are known. Collective.
+
+    On the way to an answer jumps are compared with B K⁺(Bᵀλ − f), which costs nothing more. That says little
+    where loads go straight into supports or press thin pieces that are held: alone they would move far.
+    """
+    iterate = iterate_at(problem, law, multiplier, product, alpha)
+    if problem.reach is None:
+        return iterate
+    # Over all rows: those of supports may not move at all.
+    reach = problem.norm(problem.reach(multiplier, alpha))
+    return replace(iterate, residuals=iterate.residuals.beside(reach))
 
 
 def apply_unless_zero(problem: DualProblem, operator: Operator, x: Vector) -> Vector:

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI
 from fenics_contact.qp.feasible import FeasibleSet
 from fenics_contact.qp.problem import Operator
 from fenics_contact.qp.reductions import Vector, global_min, global_sum

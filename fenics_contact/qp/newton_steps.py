@@ -71,8 +71,14 @@ class NewtonSteps:
         alpha = alpha + self._settling(iterate.multiplier, iterate.residual, self._rho)
         return iterate_at(problem, self._law, iterate.multiplier, iterate.product, alpha)
 
-    def step(self, iterate: Iterate, number: int) -> tuple[Iterate, SolverStep]:
-        """Classify, solve the face, and return the new iterate with its line of history. Collective."""
+    def step(self, iterate: Iterate, number: int, care: float = 1.0) -> tuple[Iterate, SolverStep]:
+        """Classify, solve the face, and return the new iterate with its line of history. Collective.
+
+        Args:
+            iterate: Where to start.
+            number: Number of the step in the history.
+            care: Factor on the inner tolerance, at most one.
+        """
         face = self._next_face(iterate)
         self._earlier = [self._face, *self._earlier[: LONGEST_CYCLE - 1]] if self._face else []
         changes = 0 if self._face is None else face.changes(self._face)
@@ -83,7 +89,8 @@ class NewtonSteps:
         entered = linear.enter(iterate.multiplier)
         moved = apply_unless_zero(self._problem, self._operator, entered - iterate.multiplier)
         product = iterate.product + moved
-        solved = self._solve(system, coupled, entered, product, iterate.residuals, changes)
+        forcing = care * self._forcing(changes)
+        solved = self._solve(system, coupled, entered, product, iterate.residuals, forcing)
         multiplier, product = entered + linear.advance(solved.step), product + solved.product
         alpha = self._motions(system, linear, iterate, multiplier, product)
         after = iterate_at(self._problem, self._law, multiplier, product, alpha)
@@ -137,6 +144,11 @@ class NewtonSteps:
         residual = product - problem.rhs - coarse.transpose(alpha)
         return np.asarray(alpha + self._settling(multiplier, residual, self._rho), dtype=np.float64)
 
+    def _forcing(self, changes: int) -> float:
+        """Return the inner tolerance relative to the residual. Collective."""
+        changed = global_sum(self._problem.comm, changes)[0] > 0.0
+        return self._parameters.forcing if changed else min(self._parameters.forcing, self._mismatch)
+
     def _solve(
         self,
         system: FaceSystem,
@@ -144,10 +156,8 @@ class NewtonSteps:
         multiplier: Vector,
         product: Vector,
         residuals: Residuals,
-        changes: int,
+        forcing: float,
     ) -> FaceStep:
-        changed = global_sum(self._problem.comm, changes)[0] > 0.0
-        forcing = self._parameters.forcing if changed else min(self._parameters.forcing, self._mismatch)
         wanted = min(self._parameters.loosest, forcing * residuals.worst)
         tolerance = max(wanted, 0.3 * self._parameters.tolerance)
         gradient = system.gradient(multiplier, product - self._problem.rhs)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI
 from fenics_contact.qp.problem import Operator
 from fenics_contact.qp.reductions import Vector, global_sum
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI
 from fenics_contact.errors import InfeasibleError, InvalidInputError, together
 from fenics_contact.progress import Task
 from fenics_contact.qp.coarse import CoarseSpace
@@ -50,6 +50,8 @@ class DualProblem:
         diagonal: Approximate positive diagonal of F, owned, shape (size,); only contact rows are used.
         preconditioner: Approximation of F⁻¹, symmetric positive definite, owned to owned, collective.
         scaling: Factors of multipliers between parts of different stiffness, or None.
+        reach: (λ, α) ↦ abs(B) abs(u), how far the displacements of these go at each row, owned,
+            collective; what the jumps of an answer are compared with. None where displacements are not known.
     """
 
     comm: MPI.Comm
@@ -60,6 +62,7 @@ class DualProblem:
     diagonal: Vector
     preconditioner: Operator | None = None
     scaling: Scaling | None = None
+    reach: Callable[[Vector, Vector], Vector] | None = None
 
     @cached_property
     def evened(self) -> DualProblem:

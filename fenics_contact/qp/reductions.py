@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from mpi4py import MPI
+
+from fenics_contact._libraries import MPI
 
 Vector = npt.NDArray[np.float64]
 

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 REDUCTION = 0.1
 #: Stiffness of the springs of a proximal point in units of 1/diag F: soft for Newton, stiff for the centre.
 SPRINGS = 10.0
+#: Where a centre takes no more steps than this, the springs of the next are stiffer by that factor: springs
+#: that stay the same move the centre by ever the same small part of its way to the solution.
+FEW, STIFFER = 2, 4.0
 #: Newton steps of a rescue by proximal points.
 PROXIMAL_STEPS = 60
 #: The centre moves once the residual with springs is this small, or so much smaller than that without.
@@ -86,7 +89,8 @@ def _by_proximal_points(
     problem: DualProblem, law: SlipLaw, start: Start, parameters: FaceNewton, limit: int, further: bool
 ) -> tuple[Iterate, SolverStep]:
     """Take Newton steps with springs, and move their centre whenever they come to rest. Collective."""
-    point = ProximalPoint.build(problem, law, start.operator, SPRINGS).centred(start.iterate.multiplier)
+    stiffness, since = SPRINGS, 0
+    point = ProximalPoint.build(problem, law, start.operator, stiffness).centred(start.iterate.multiplier)
     careful = replace(
         parameters, forcing=min(parameters.forcing, FORCING), loosest=min(parameters.loosest, LOOSEST)
     )
@@ -102,9 +106,17 @@ def _by_proximal_points(
             break
         if found.residuals.within(parameters.tolerance):
             break
+        since += 1
         if current.residuals.worst < max(CENTRED, AHEAD * found.residuals.worst):
-            point = point.centred(point.force(current))
-            steps.move(point.problem, point.frozen)
+            force = point.force(current)
+            if since <= FEW:
+                stiffness, since = STIFFER * stiffness, 0
+                point = ProximalPoint.build(problem, law, start.operator, stiffness).centred(force)
+                steps = NewtonSteps(point.problem, point.frozen, point.operator, careful, springs=True)
+            else:
+                since = 0
+                point = point.centred(force)
+                steps.move(point.problem, point.frozen)
             current = point.enter(found)
     return found, replace(line, method="proximal rescue")
 

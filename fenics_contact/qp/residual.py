@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from fenics_contact.qp.reductions import Vector, global_max, global_sum
 
 FORCE_FLOOR = 1e-10
 #: Errors of contact forces below this fraction of the largest of all forces are rounding, and count as none.
-ROUNDING = 1e-14
+ROUNDING = 1e-14  # the same for jumps beside those that the loads alone would open
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Residuals:
     Attributes:
         natural: ‖λ − P_Λ(λ − ρ r)‖ over the contact rows, relative to ‖λ_N‖.
         gluing: ‖r‖ over the equality rows, relative to the displacements that cancel there,
-            max(‖(F λ − d)_E‖, ‖d_E‖).
+            max(‖(F λ − d)_E‖, ‖d_E‖), or of an answer to the displacements themselves, if they are smaller.
         coarse: Distance of λ from equilibrium, ‖Gᵀ(G Gᵀ)⁻¹(G λ − e)‖, relative to ‖λ‖.
         violation: Largest violation of a bound or disc, relative to ‖λ_N‖.
         force_scale: The force by which `natural` and `violation` were divided.
@@ -39,7 +39,7 @@ class Residuals:
 
     @property
     def worst(self) -> float:
-        """The largest of the natural, gluing and coarse residual, which steers the iteration."""
+        """The largest residual, which steers the iteration: the natural one is at least the violation."""
         return max(self.natural, self.gluing, self.coarse)
 
     @property
@@ -56,6 +56,12 @@ class Residuals:
         gluing = min(self.gluing_scale, other.gluing_scale) or max(self.gluing_scale, other.gluing_scale)
         natural = _ratio(self.natural * self.force_scale, force)
         return max(natural, _ratio(self.gluing * self.gluing_scale, gluing), self.coarse)
+
+    def beside(self, reach: float) -> Residuals:
+        """Return the residuals with the gluing residual relative to displacements that are smaller."""
+        if not 0.0 < reach < self.gluing_scale:
+            return self
+        return replace(self, gluing=self.gluing * self.gluing_scale / reach, gluing_scale=reach)
 
     def within(self, tolerance: float) -> bool:
         """Tell whether every residual is at most ``tolerance``; NaN is not."""
@@ -111,7 +117,7 @@ def measure(
     violation = global_max(problem.comm, feasible.violation(multiplier))
     return Residuals(
         natural=_ratio(distance if distance > rounding else 0.0, force_scale),
-        gluing=_ratio(jump, gluing_scale),
+        gluing=_ratio(jump if jump > ROUNDING * load else 0.0, gluing_scale),
         coarse=_ratio(unbalanced, max(everything, problem.coarse.norm(problem.coarse.load))),
         violation=_ratio(violation if violation > rounding else 0.0, force_scale),
         force_scale=force_scale,

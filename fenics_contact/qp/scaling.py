@@ -16,9 +16,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.qp.coarse import CoarseSpace
+from fenics_contact.qp.iterate import answer_at
 from fenics_contact.qp.problem import DualProblem, FacePreconditioner, Operator
 from fenics_contact.qp.reductions import Vector
-from fenics_contact.qp.residual import measure
 from fenics_contact.qp.slip_law import SlipLaw
 from fenics_contact.qp.solution import DualSolution
 
@@ -71,7 +71,7 @@ class Scaling:
 
     def applied_to(self, problem: DualProblem) -> DualProblem:
         """Return the problem for μ, see `DualProblem.evened`."""
-        s, precondition = self.factor, problem.preconditioner
+        s, precondition, reach = self.factor, problem.preconditioner, problem.reach
         return replace(
             problem,
             operator=lambda x: s * problem.operator(s * x),
@@ -80,6 +80,7 @@ class Scaling:
             diagonal=s**2 * problem.diagonal,
             preconditioner=None if precondition is None else _scaled(precondition, s),
             scaling=None,
+            reach=None if reach is None else lambda x, alpha: s * reach(s * x, alpha),
         )
 
     def bound(self, problem: DualProblem, slip_bound: Vector | None) -> Vector | None:
@@ -102,15 +103,14 @@ class Scaling:
     def solution(self, problem: DualProblem, law: SlipLaw, found: DualSolution) -> DualSolution:
         """Return the solution for λ, with its residuals. Collective."""
         s = self.factor
-        multiplier, product, residual = s * found.multiplier, found.product / s, found.residual / s
-        feasible = law.feasible(multiplier)
-        residuals = measure(problem, feasible, multiplier, product, residual)
+        multiplier, product = s * found.multiplier, found.product / s
+        judged = answer_at(problem, law, multiplier, product, found.alpha)
         return replace(
             found,
             problem=problem,
             multiplier=multiplier,
             product=product,
-            residual=residual,
-            slip_bound=feasible.slip_bound,
-            residuals=residuals,
+            residual=judged.residual,
+            slip_bound=law.bound(multiplier),
+            residuals=judged.residuals,
         )

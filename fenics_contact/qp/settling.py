@@ -16,12 +16,16 @@ from fenics_contact.qp.slip_law import SlipLaw
 
 #: Imbalance relative to the sum of all forces at which bodies count as settled.
 BALANCED = 1e-11
-#: The same where the bounds of friction were refreshed as often as allowed.
+#: Imbalance relative to the multipliers of the whole problem that is rounding.
+ROUNDING = 1e-14
+#: The first again, where the bounds of friction were refreshed as often as allowed.
 NEARLY = 1e-6
 #: Steps of Newton's method, coupled or with frozen bounds, and refreshes of frozen bounds.
 COUPLED_STEPS, FROZEN_STEPS, REFRESHES = 30, 60, 30
 #: Motions that contact resists less than this, relative to the others, stay what they are.
 UNRESISTED = 1e-10
+#: What a row feels of a motion of length one, relative to all that it feels of motions, that is rounding.
+UNFELT = 1e-13
 
 
 class Settling:
@@ -50,6 +54,9 @@ class Settling:
         self._problem, self._law = problem, law
         self.motions = _floating_motions(problem)
         self._rows = np.asarray(problem.coarse.matrix.T @ self.motions)
+        # Against forces of rounding a body would have to move as far as their rows are rounding.
+        felt = np.sqrt(problem.coarse.matrix.power(2).sum(axis=0)).reshape(-1, 1)
+        self._rows[np.abs(self._rows) <= UNFELT * np.asarray(felt)] = 0.0
 
     def with_law(self, law: SlipLaw) -> Settling:
         """Return the same bodies under another law."""
@@ -78,6 +85,7 @@ class Settling:
             step=step,
             rows=self._rows @ units,
             load=units.T @ (self.motions.T @ self._problem.coarse.load),
+            forces=self._problem.norm(multiplier),
         )
         return np.asarray(
             self.motions @ (units @ _rest(springs, self._law.bound(multiplier))), dtype=np.float64
@@ -138,6 +146,7 @@ class _Springs:
         step: ρ, the stiffness of the springs, owned.
         rows: Gᵀ N in the coordinates z, shape (n_owned, k).
         load: Nᵀ e in the coordinates z, shape (k,).
+        forces: ‖λ‖ over all rows of the problem.
     """
 
     problem: DualProblem
@@ -146,6 +155,7 @@ class _Springs:
     step: Vector
     rows: Vector
     load: Vector
+    forces: float
 
     def at(self, z: Vector, bound: Vector | None = None) -> _Balance:
         """Return the balance at a motion, with a frozen bound or that of the trial force. Collective."""
@@ -160,7 +170,15 @@ class _Springs:
         sums = global_sum(self.problem.comm, self.rows[contact].T @ p, energy)
         return _Balance(z, trial, bound, sums[:-1] - self.load, float(sums[-1] - self.load @ z))
 
-    def scale(self, balance: _Balance) -> float:
+    def target(self, balance: _Balance) -> float:
+        """Return the imbalance at which bodies count as settled. Collective.
+
+        That is small beside the forces that act on them. Where next to none do, it is rounding of the others.
+        """
+        largest = global_max(self.problem.comm, float(np.abs(self.rows).max(initial=0.0)))
+        return max(BALANCED * self._scale(balance), ROUNDING * largest * self.forces)
+
+    def _scale(self, balance: _Balance) -> float:
         """Return the size of all forces taken together. Collective."""
         contact = self.problem.layout.contact
         force = FeasibleSet(self.problem.layout, balance.bound).project(balance.trial)
@@ -206,7 +224,7 @@ def _rest(springs: _Springs, bound: Vector) -> Vector:
         bound: Friction that bodies may use while their trial forces say that they are apart, owned.
     """
     begin = springs.at(np.zeros(len(springs.load)))
-    target = BALANCED * springs.scale(begin)
+    target = springs.target(begin)
     balance = _coupled(springs, begin, target)
     if balance.size <= target:
         return balance.motion

@@ -9,12 +9,12 @@ import numpy as np
 
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.qp.augmented import AugmentedLagrangian
-from fenics_contact.qp.certify import certify
+from fenics_contact.qp.certify import certify, count_status
 from fenics_contact.qp.feasible import FeasibleSet
 from fenics_contact.qp.iterate import Start
 from fenics_contact.qp.mpgp import Mpgp, minimise
 from fenics_contact.qp.problem import DualProblem
-from fenics_contact.qp.reductions import Vector, global_sum
+from fenics_contact.qp.reductions import Vector
 from fenics_contact.qp.residual import Residuals, measure
 from fenics_contact.qp.slip_law import SlipLaw, Tresca
 from fenics_contact.qp.solution import DualSolution, SmalseMemory, SolverStep
@@ -144,18 +144,3 @@ def outer_iterations(
         yield SmalseState(x, residual, residuals, memory, minimum.iterations, feasible.slip_bound)
         caution *= 0.3 if minimum.iterations == 0 else 1.0
         floor = lagrangian.floor(residuals, parameters.tolerance)
-
-
-def count_status(problem: DualProblem, multiplier: Vector, slip_bound: Vector) -> tuple[int, int, int]:
-    """Count closed contacts, sticking and slipping discs by the multiplier alone. Collective."""
-    layout = problem.layout
-    length = np.linalg.norm(multiplier[layout.tangential], axis=1)
-    slip = length >= slip_bound * (1.0 - 1e-9)
-    counts = global_sum(
-        problem.comm,
-        np.count_nonzero(multiplier[layout.normal] > 0.0),
-        np.count_nonzero(~slip),
-        np.count_nonzero(slip & (slip_bound > 0.0)),
-    )
-    closed, stick, slipping = (round(float(count)) for count in counts)
-    return closed, stick, slipping

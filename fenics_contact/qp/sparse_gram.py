@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI
 from fenics_contact.linalg import SharedFactor
 from fenics_contact.qp.gram import RANK_TOLERANCE
 from fenics_contact.qp.reductions import Vector, global_sum

@@ -7,9 +7,9 @@ from typing import Protocol
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
-from mpi4py import MPI
 from scipy.linalg import lapack
 
+from fenics_contact._libraries import MPI
 from fenics_contact.linalg import SharedFactor
 from fenics_contact.qp.coarse import summed_if_small
 from fenics_contact.qp.reductions import Vector

@@ -36,6 +36,7 @@ from fenics_contact.scene.obstacles import (
     RigidObstacle,
     RigidPlane,
     RigidSphere,
+    asked,
 )
 from fenics_contact.scene.pairs import ContactPair, Coulomb, Discretisation, Friction, Surface, Tie, Tresca
 from fenics_contact.scene.plan import ConeKind, Plan, SolverKind, choose_solver
@@ -85,6 +86,7 @@ __all__ = [
     "Tresca",
     "Ufl",
     "VolumeLoad",
+    "asked",
     "bodies_from",
     "can_expand",
     "choose_solver",

@@ -9,10 +9,12 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import BodyMesh
+from fenics_contact.scene.checked import checked
 from fenics_contact.scene.materials import Material
 
 
 @dataclass(frozen=True)
+@checked("material")
 class Body:
     """A mesh and what it is made of.
 

@@ -11,14 +11,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.scene.checked import checked
 from fenics_contact.scene.values import ScalarValue, VectorValue, checked_scalar, checked_vector
 from fenics_contact.scene.vectors import Vector
 
 
 @dataclass(frozen=True)
+@checked("value")
 class Traction:
     """Dead surface load.
 
@@ -43,6 +43,7 @@ class Traction:
 
 
 @dataclass(frozen=True)
+@checked("value")
 class TotalForce:
     """Dead surface load given by its resultant, spread evenly over the surface of the undeformed body.
 
@@ -68,6 +69,7 @@ class TotalForce:
 
 
 @dataclass(frozen=True)
+@checked("value")
 class Pressure:
     """Dead load normal to the undeformed surface; positive presses on the body, traction = −p n.
 
@@ -87,6 +89,7 @@ class Pressure:
 
 
 @dataclass(frozen=True)
+@checked("value")
 class BodyForce:
     """Dead load on the volume; for weight see `gravity`.
 
@@ -104,6 +107,7 @@ class BodyForce:
 
 
 @dataclass(frozen=True)
+@checked("temperature_change")
 class ThermalStrain:
     """A temperature change that would strain the body if nothing held it: σ = C : (ε(u) − ΔT α).
 
@@ -145,4 +149,10 @@ def gravity(body: str, density: float, acceleration: Sequence[float]) -> BodyFor
         density: Mass a volume, in the scene's units, for steel in N, mm, s: 7.85e-9.
         acceleration: Of gravity, [length / time²], for instance (0, 0, -9810).
     """
-    return BodyForce(body, tuple(float(component) for component in density * np.asarray(acceleration)))
+    mass, direction = checked_scalar("density", density), checked_vector("acceleration", acceleration)
+    if callable(mass) or callable(direction):
+        raise InvalidInputError(
+            f"gravity needs numbers, got {density!r} and {acceleration!r}: give a BodyForce for what depends "
+            "on the place"
+        )
+    return BodyForce(body, tuple(mass * component for component in direction))

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, calling
+from fenics_contact.scene.checked import checked
 from fenics_contact.scene.vectors import Vector, unit_vector
 
-#: Step of a central difference, relative to the extent of the points.
+#: Step of a central difference, relative to the extent of the points: the smallest one. Far from the origin
+#: it is the one at which the rounding of the values is as large as what the difference leaves out.
 DIFFERENCE = 1e-5
 #: By how much the gradient of a distance may miss the length one.
 SLOPE_TOLERANCE = 0.05
@@ -31,7 +33,40 @@ class RigidObstacle(Protocol):
         """Return the second derivatives of the distance, (n, dim) -> (n, dim, dim), [1 / length]."""
 
 
+Quantity: TypeAlias = Literal["distance", "normals", "curvatures"]
+
+
+def asked(obstacle: RigidObstacle, what: Quantity, points: np.ndarray) -> np.ndarray:
+    """Ask an obstacle, and refuse what it must not answer.
+
+    Args:
+        obstacle: The obstacle.
+        what: Which of its members.
+        points: Where, shape (n, dim), [length].
+
+    Returns:
+        Its answer, shape (n,), (n, dim) or (n, dim, dim).
+
+    Raises:
+        InvalidInputError: If the answer has another shape or is not finite.
+        UserCodeError: If it raises.
+    """
+    name = f"the {what} of obstacle {type(obstacle).__name__}"
+    with calling(name):
+        values = np.asarray(getattr(obstacle, what)(points), dtype=np.float64)
+    order = ("distance", "normals", "curvatures").index(what)
+    shape = (len(points), *[points.shape[1]] * order)
+    if values.shape != shape or not np.isfinite(values).all():
+        given = f"shape {values.shape}" if values.shape != shape else "NaN or infinity"
+        raise InvalidInputError(
+            f"{name} must be finite numbers of shape {shape} for points of shape {points.shape}, got "
+            f"{given}: it gets all points at once, a row each"
+        )
+    return values
+
+
 @dataclass(frozen=True)
+@checked()
 class RigidPlane:
     """A half space, in the plane a half plane.
 
@@ -105,6 +140,7 @@ class _Round:
 
 
 @dataclass(frozen=True)
+@checked()
 class RigidSphere(_Round):
     """A ball, in the plane a disc; or everything outside it.
 
@@ -133,6 +169,7 @@ class RigidSphere(_Round):
 
 
 @dataclass(frozen=True)
+@checked()
 class RigidCylinder(_Round):
     """An endless round bar in space; or everything outside it.
 
@@ -168,6 +205,7 @@ class RigidCylinder(_Round):
 
 
 @dataclass(frozen=True)
+@checked()
 class DistanceObstacle:
     """An obstacle given by a function.
 
@@ -197,12 +235,17 @@ class DistanceObstacle:
         """Return the gradient at unit length.
 
         Raises:
-            InvalidInputError: If its length is not one: the function is no distance.
+            InvalidInputError: If its length is not one: the function is no distance; or of another shape.
         """
         slope = _differences(self.distance, points) if self.gradient is None else self.gradient(points)
-        slope = np.asarray(slope, dtype=np.float64).reshape(points.shape)
+        slope = np.asarray(slope, dtype=np.float64)
+        if slope.shape != points.shape:
+            raise InvalidInputError(
+                f"the gradient of an obstacle's distance must have shape {points.shape} like the points, got "
+                f"{slope.shape}: write it for an array of points, (n, dim) -> (n, dim)"
+            )
         length = np.linalg.norm(slope, axis=1)
-        if len(length) and np.abs(length - 1.0).max() > SLOPE_TOLERANCE:
+        if len(length) and not np.abs(length - 1.0).max() <= SLOPE_TOLERANCE:  # NaN is none, either
             worst = int(np.argmax(np.abs(length - 1.0)))
             raise InvalidInputError(
                 "an obstacle needs the signed distance to its surface, whose gradient has length one, got "
@@ -221,7 +264,9 @@ def _differences(function: Callable[[np.ndarray], np.ndarray], points: np.ndarra
     """Return central differences along each axis, stacked last."""
     if len(points) == 0:
         return np.zeros((*np.shape(function(points)), points.shape[1]))
-    step = DIFFERENCE * max(float(np.ptp(points, axis=0).max()), float(np.abs(points).max()), 1e-300)
+    far = float(np.abs(points).max()) or 1.0
+    extent = float(np.ptp(points, axis=0).max()) or far
+    step = max(DIFFERENCE * extent, float(np.cbrt(np.finfo(float).eps * far * extent**2)))
     shifts = step * np.eye(points.shape[1])
     slopes = [(function(points + shift) - function(points - shift)) / (2 * step) for shift in shifts]
     return np.stack(slopes, axis=-1)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias
 
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.scene.checked import checked
 from fenics_contact.scene.obstacles import RigidObstacle
 
 #: Where the contact conditions are asked: at the slave's nodes, or weighted by its shape functions (mortar).
@@ -15,6 +16,7 @@ Discretisation: TypeAlias = Literal["node", "mortar"]
 
 
 @dataclass(frozen=True)
+@checked()
 class Surface:
     """A named surface of a named body.
 
@@ -28,6 +30,7 @@ class Surface:
 
 
 @dataclass(frozen=True)
+@checked()
 class Coulomb:
     """Coulomb friction: ‖τ‖ ≤ friction_coefficient · λ_N.
 
@@ -47,6 +50,7 @@ class Coulomb:
 
 
 @dataclass(frozen=True)
+@checked()
 class Tresca:
     """Friction with a slip bound that does not depend on the pressure.
 
@@ -73,6 +77,7 @@ Friction: TypeAlias = Coulomb | Tresca | None
 
 
 @dataclass(frozen=True)
+@checked()
 class ContactPair:
     """Two surfaces that may touch. The slave is kept out of the master.
 
@@ -106,7 +111,6 @@ class ContactPair:
                 f"contact of body {self.slave.body!r} with itself is not supported: "
                 "slave and master must belong to different bodies; split the body if its parts may touch"
             )
-        _require_discretisation(self.discretisation)
 
     @property
     def has_friction(self) -> bool:
@@ -118,6 +122,7 @@ class ContactPair:
 
 
 @dataclass(frozen=True)
+@checked()
 class Tie:
     """Two surfaces that stay together: they neither part nor, unless they may slide, shift.
 
@@ -142,10 +147,3 @@ class Tie:
                 f"body {self.slave.body!r} cannot be tied to itself: a tie joins two bodies; mesh its parts "
                 "together, or as two bodies"
             )
-        _require_discretisation(self.discretisation)
-
-
-def _require_discretisation(given: str) -> None:
-    known = get_args(Discretisation)
-    if given not in known:
-        raise InvalidInputError(f"discretisation must be one of {list(known)}, got {given!r}")

@@ -10,6 +10,7 @@ import numpy as np
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import default_partition
 from fenics_contact.scene.body import Body
+from fenics_contact.scene.checked import checked
 from fenics_contact.scene.effects import Effect, effects_of
 from fenics_contact.scene.loads import Load, SurfaceLoad, ThermalStrain
 from fenics_contact.scene.materials import can_expand
@@ -20,6 +21,7 @@ from fenics_contact.scene.supports import Support
 
 
 @dataclass(frozen=True)
+@checked()
 class Scene:
     """Elastic bodies that may touch.
 

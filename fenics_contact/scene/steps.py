@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from fenics_contact.scene.checked import checked
 from fenics_contact.scene.loads import Load
 from fenics_contact.scene.scene import Scene
 from fenics_contact.scene.supports import Support
 
 
 @dataclass(frozen=True)
+@checked()
 class LoadStep:
     """Loads and supports at the end of a step; what is not given stays as it was.
 

@@ -8,13 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, calling
+from fenics_contact.scene.checked import checked
 
 #: A function of points, shape (n, dim), [length], with a row (a vector) or a number (a scalar) for each.
 OfPosition = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
+@checked()
 class Ufl:
     """A value written in UFL: compiled into the form and evaluated at its quadrature points.
 
@@ -90,8 +92,10 @@ def evaluate(name: str, function: OfPosition, points: np.ndarray, shape: tuple[i
 
     Raises:
         InvalidInputError: If it returns another shape or something that is no number.
+        UserCodeError: If it raises.
     """
-    found = _floats(function(points.copy()))
+    with calling(f"the function given as {name}"):
+        found = _floats(function(points.copy()))
     wanted = (len(points), *shape)
     if found is None or found.shape != wanted:
         given = "something that is no finite number" if found is None else f"shape {found.shape}"

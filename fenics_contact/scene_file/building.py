@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.scene import Body, Material, Scene
 from fenics_contact.scene_file.document import Document
-from fenics_contact.scene_file.expression import Expression, VectorExpression
+from fenics_contact.scene_file.evaluation import check_formulas
 from fenics_contact.scene_file.mistakes import Mistake, SceneFileError
 from fenics_contact.scene_file.names import Reference, surface_parts
 from fenics_contact.scene_file.places import Path, written
@@ -19,6 +19,9 @@ from fenics_contact.scene_file.source import Source
 
 if TYPE_CHECKING:
     from mpi4py import MPI
+
+#: Where parts have formulas.
+_FORMULAS = {"supports": ("value",), "loads": ("value",), "contacts": ("master", "formula")}
 
 
 class Builder:
@@ -96,9 +99,10 @@ class Builder:
             for number, part in enumerate(getattr(document, key)):
                 with self._at(key, number):
                     one = part.build(dim) if key == "supports" else part.build()
-                    _check_coordinates(one, dim)
                     _refuse(empty, {key: (one,)})
                     built[key].append(one)
+                    with self._at(key, number, *_FORMULAS.get(key, ())):
+                        check_formulas(one, bodies)
         self._check()
         return Scene(bodies, **built)
 
@@ -135,16 +139,3 @@ def located(source: Source, path: Path, error: InvalidInputError) -> Mistake:
 def _refuse(empty: Scene, part: dict[str, Any]) -> None:
     """Refuse a part that does not suit the bodies of a scene."""
     replace(empty, **part)
-
-
-def _check_coordinates(part: Any, dim: int) -> None:
-    """Refuse formulas in z where bodies lie in the plane."""
-    if dim == 3:
-        return
-    value = getattr(part, "value", None)
-    entries = value.components if isinstance(value, VectorExpression) else value
-    for entry in entries if isinstance(entries, tuple) else (entries,):
-        if isinstance(entry, Expression) and "z" in entry.names:
-            raise InvalidInputError(
-                f"the formula {entry.text!r} depends on z, but the bodies lie in the plane: use x and y"
-            )

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.scene_file.places import shortened
 
 #: Coordinates by name, in the order of the columns of points.
 COORDINATES = ("x", "y", "z")
@@ -42,7 +45,8 @@ _COMPARED: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Gt: np.greater,
     ast.GtE: np.greater_equal,
 }
-#: Longest formula that is read, and deepest nesting.
+#: Longest formula that is read, and how many operations may lie inside of each other; those of a sum or a
+#: product, which are done from left to right, lie beside each other.
 LONGEST, DEEPEST = 2000, 50
 ALLOWED = (
     f"numbers, {', '.join(COORDINATES)}, {', '.join(CONSTANTS)}, + - * / **, comparisons with < <= > >=, and "
@@ -79,10 +83,15 @@ class Expression:
                 "write a Python function and a scene in Python for it"
             )
         try:
-            return ast.parse(self.text.strip(), mode="eval").body
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # Python's own, of what is refused in a moment
+                if "#" in self.text:
+                    raise ValueError("what follows # would be left out")
+                return ast.parse(self.text.strip(), mode="eval").body
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
             raise InvalidInputError(
-                f"a formula must be arithmetic such as '0.1 * x**2', got {self.text!r}: write {ALLOWED}"
+                "a formula must be arithmetic such as '0.1 * x**2', got "
+                f"{shortened(self.text)!r}: write {ALLOWED}"
             ) from error
 
     @property
@@ -101,18 +110,28 @@ class Expression:
             A number for each, shape (n,).
 
         Raises:
-            InvalidInputError: If the formula depends on z and the points lie in the plane.
+            InvalidInputError: If the formula depends on z and the points lie in the plane, or has no finite
+                value somewhere.
         """
         values = {name: points[:, axis] for axis, name in enumerate(COORDINATES[: points.shape[1]])}
         missing = self.names - set(values)
         if missing:
             raise InvalidInputError(
-                f"the formula {self.text!r} depends on {', '.join(sorted(missing))}, but the bodies lie in "
-                "the plane: use x and y"
+                f"the formula {shortened(self.text)!r} depends on {', '.join(sorted(missing))}, but the "
+                "bodies lie in the plane: use x and y"
             )
-        with np.errstate(all="ignore"):  # whoever uses the values refuses those that are not finite
-            found = _value(self._tree, {**CONSTANTS, **values})
-        return np.broadcast_to(np.asarray(found, dtype=np.float64), (len(points),)).copy()
+        with np.errstate(all="ignore"):
+            found = np.asarray(_value(self._tree, {**CONSTANTS, **values}), dtype=np.float64)
+        found = np.broadcast_to(found, (len(points),)).copy()
+        infinite = np.flatnonzero(~np.isfinite(found))
+        if infinite.size:
+            place = ", ".join(f"{x:.6g}" for x in points[infinite[0]])
+            raise InvalidInputError(
+                f"the formula {shortened(self.text)!r} must have a finite value at every node, got "
+                f"{found[infinite[0]]} at ({place}): choose another one there with where(condition, a, b), "
+                "each of whose values may be infinite where the other is taken"
+            )
+        return found
 
 
 @dataclass(frozen=True)
@@ -141,24 +160,45 @@ def between(start: float | str, end: float | str, share: float) -> float | str:
     return end if share == 1.0 else start + share * (end - start)
 
 
+def is_finite(value: float) -> bool:
+    """Tell whether a number is finite, also an integer that no float can hold."""
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
+
+
 def _check(node: ast.expr, text: str, depth: int) -> None:
-    if depth > DEEPEST or not _known(node):
-        part = ast.unparse(node) if depth <= DEEPEST else "deeply nested brackets"
-        raise InvalidInputError(
-            f"a formula may hold {ALLOWED}, got {part!r} in {text!r}: leave it out, or give the value by a "
-            "scene in Python"
-        )
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.expr) and not (isinstance(node, ast.Call) and child is node.func):
-            _check(child, text, depth + 1)
+    for operation in _from_left(node):
+        if depth > DEEPEST or not _known(operation):
+            part = ast.get_source_segment(text.strip(), operation) or text
+            if depth > DEEPEST:
+                part = f"more than {DEEPEST} nested operations"
+            raise InvalidInputError(
+                f"a formula may hold {ALLOWED}, got {shortened(part)!r} in {shortened(text)!r}: leave it "
+                "out, or give the value by a scene in Python"
+            )
+        left = operation.left if isinstance(operation, ast.BinOp) else None
+        for child in ast.iter_child_nodes(operation):
+            name = isinstance(operation, ast.Call) and child is operation.func
+            if isinstance(child, ast.expr) and child is not left and not name:
+                _check(child, text, depth + 1)
+
+
+def _from_left(node: ast.expr) -> list[ast.expr]:
+    """Return the operations of a - b + c - ..., each of which is the left operand of the one before."""
+    found = [node]
+    while isinstance(found[-1], ast.BinOp):
+        found.append(found[-1].left)
+    return found
 
 
 def _known(node: ast.expr) -> bool:
     match node:
         case ast.Constant(value=bool()):
             return False
-        case ast.Constant(value=int() | float()):
-            return True
+        case ast.Constant(value=int() | float() as value):
+            return is_finite(value)
         case ast.Name(id=name):
             return name in COORDINATES or name in CONSTANTS
         case ast.UnaryOp(op=ast.UAdd() | ast.USub()):
@@ -183,8 +223,13 @@ def _value(node: ast.expr, names: dict[str, Any]) -> Any:
             return -_value(operand, names)
         case ast.UnaryOp(operand=operand):
             return _value(operand, names)
-        case ast.BinOp(left=left, op=operator, right=right):
-            return _BINARY[type(operator)](_value(left, names), _value(right, names))
+        case ast.BinOp():
+            *operations, first = _from_left(node)
+            found = _value(first, names)
+            for operation in reversed(operations):
+                assert isinstance(operation, ast.BinOp)
+                found = _BINARY[type(operation.op)](found, _value(operation.right, names))
+            return found
         case ast.Compare(left=left, ops=[comparison], comparators=[right]):
             return _COMPARED[type(comparison)](_value(left, names), _value(right, names))
         case ast.Call(func=ast.Name(id=name), args=arguments):

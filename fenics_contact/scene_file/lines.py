@@ -1,84 +1,142 @@
-"""On which line of a TOML text a key stands."""
+"""On which lines of a TOML text its keys stand."""
 
 from __future__ import annotations
 
+import re
 import tomllib
 from bisect import bisect_left
+from collections.abc import Mapping
 from typing import Any
 
-import tomlkit
-import tomlkit.exceptions
+from fenics_contact.scene_file.places import Path
 
-from fenics_contact.scene_file.places import Path, value_at
+_BARE = r"[A-Za-z0-9_-]+"
+_BASIC, _LITERAL = r'"(?:[^"\\\n]|\\.)*"', r"'[^'\n]*'"
+_PART = rf"(?:{_BARE}|{_BASIC}|{_LITERAL})"
+_KEY = re.compile(rf"{_PART}(?:[ \t]*\.[ \t]*{_PART})*")
+_BARE_KEY = re.compile(rf"{_BARE}(?:\.{_BARE})*")
+#: Strings over several lines come first: they begin as the others do.
+_STRING = re.compile(rf"\"{{3}}(?:[^\\]|\\.)*?\"{{3,5}}|'{{3}}.*?'{{3,5}}|{_BASIC}|{_LITERAL}", re.DOTALL)
+_NUMBER_OR_DATE = re.compile(r"[^,\]}#\n]*")
+_OPEN_HEAD, _CLOSED_HEAD = re.compile(r"\[+[ \t]*"), re.compile(r"[ \t]*\]+")
+_EQUALS = re.compile(r"[ \t]*=[ \t]*")
+_BLANK = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
+_BLANK_OR_COMMA = re.compile(r"(?:[ \t\r\n,]|#[^\n]*)*")
 
-_MARK = "\u241f"  # stands in no file
 
-
-def line_of(text: str, path: Path) -> int:
-    """Return the line, from 1, on which a key or table of a TOML text begins.
-
-    A key that is not there is looked for at the nearest table around it.
+def lines_of(text: str) -> dict[Path, int]:
+    """Return the line, from 1, on which every key, table and entry of a list begins.
 
     Args:
-        text: A text that is TOML.
-        path: Keys and positions from its top.
-
-    Returns:
-        The line; 0 where nothing on the way to the key is there.
+        text: A text that is TOML; of any other the answer means nothing.
     """
-    whole = tomllib.loads(text)
-    while path and value_at(whole, path) is None:
+    return _Scanner(text).found
+
+
+def nearest(lines: Mapping[Path, int], path: Path) -> int:
+    """Return the line of a key, or of the nearest table around it; 0 where none of them is there."""
+    while path and path not in lines:
         path = path[:-1]
-    if not path:
-        return 0
-    lines = text.splitlines(keepends=True)
-    # The first lines of a text are TOML wherever a statement ends, and from the key's own on they hold it.
-    end = bisect_left(range(len(lines)), True, key=lambda count: _holds(lines, count + 1, path)) + 1
-    start = end - 1
-    while start > 0 and _parsed("".join(lines[:start])) is None:
-        start -= 1
-    return start + _within("".join(lines[start:]), path) + 1
+    return lines.get(path, 0)
 
 
-def _parsed(text: str) -> dict[str, Any] | None:
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError:
-        return None
+class _Scanner:
+    """Goes through a text once, from statement to statement."""
+
+    def __init__(self, text: str) -> None:
+        """Scan the text."""
+        self._text, self._at = text, 0
+        self._ends = [match.start() for match in re.finditer("\n", text)]
+        self._lengths: dict[Path, int] = {}  # of lists of tables, [[...]]
+        self.found: dict[Path, int] = {}
+        table: Path = ()
+        self._skip(_BLANK)
+        while self._at < len(text):
+            before = self._at
+            if text[self._at] == "[":
+                table = self._head()
+            else:
+                self._assignment(table)
+            self._skip(_BLANK)
+            if self._at == before:  # no TOML
+                return
+
+    def _skip(self, pattern: re.Pattern[str]) -> str:
+        match = pattern.match(self._text, self._at)
+        if match is None:
+            return ""
+        self._at = match.end()
+        return match.group()
+
+    def _note(self, path: Path) -> None:
+        self.found.setdefault(path, bisect_left(self._ends, self._at) + 1)
+
+    def _head(self) -> Path:
+        """Take in [a.b] or [[a.b]]; return its path, with the number of the present entry of every list."""
+        several = self._text.startswith("[[", self._at)
+        self._skip(_OPEN_HEAD)
+        path: Path = ()
+        parts = key_parts(self._skip(_KEY))
+        for number, part in enumerate(parts, 1):
+            path = (*path, part)
+            self._note(path)
+            if several and number == len(parts):
+                self._lengths[path] = self._lengths.get(path, 0) + 1
+            if path in self._lengths:
+                path = (*path, self._lengths[path] - 1)
+                self._note(path)
+        self._skip(_CLOSED_HEAD)
+        return path
+
+    def _assignment(self, table: Path) -> None:
+        """Take in key = value."""
+        path, start = table, self._at
+        parts = key_parts(self._skip(_KEY))
+        after, self._at = self._at, start
+        for part in parts:
+            path = (*path, part)
+            self._note(path)
+        self._at = after
+        self._skip(_EQUALS)
+        self._value(path)
+
+    def _value(self, path: Path) -> None:
+        first = self._text[self._at : self._at + 1]
+        if first in ("[", "{"):
+            self._entries(path, "]" if first == "[" else "}")
+        elif first in ('"', "'"):
+            self._skip(_STRING)
+        else:
+            self._skip(_NUMBER_OR_DATE)
+
+    def _entries(self, path: Path, end: str) -> None:
+        """Take in what stands between brackets or braces."""
+        self._at += 1
+        number = 0
+        self._skip(_BLANK_OR_COMMA)
+        while self._at < len(self._text) and self._text[self._at] != end:
+            before = self._at
+            if end == "}":
+                self._assignment(path)
+            else:
+                self._note((*path, number))
+                self._value((*path, number))
+                number += 1
+            self._skip(_BLANK_OR_COMMA)
+            if self._at == before:  # no TOML
+                self._at = len(self._text)
+        self._at += 1
 
 
-def _holds(lines: list[str], count: int, path: Path) -> bool:
-    """Tell whether the statement that ends on or after a line, or one before it, holds a key."""
-    for stop in range(count, len(lines) + 1):
-        data = _parsed("".join(lines[:stop]))
-        if data is not None:
-            return value_at(data, path) is not None
-    return True
-
-
-def _within(text: str, path: Path) -> int:
-    """Return how many lines below the beginning of its statement a key stands, inside of brackets.
-
-    The key is marked in a copy of the statement, whose text first differs there.
-    """
-    statement = ""
-    for line in text.splitlines(keepends=True):
-        statement += line
-        if _parsed(statement) is not None:
-            break
-    if statement.lstrip().startswith("["):
-        return 0  # the head of a table
-    document = tomlkit.parse(statement)
-    for inner in (path[first:] for first in range(len(path))):
-        if value_at(document, inner) is None:
-            continue
-        try:
-            value_at(document, inner[:-1])[inner[-1]] = _MARK
-        except (tomlkit.exceptions.TOMLKitError, TypeError, ValueError):
-            return 0
-        marked = tomlkit.dumps(document)
-        differing = (
-            at for at, (one, other) in enumerate(zip(statement, marked, strict=False)) if one != other
-        )
-        return statement.count("\n", 0, next(differing, 0))
-    return 0
+def key_parts(key: str) -> list[str]:
+    """Return the names of a dotted key of TOML, none where the text is no such key."""
+    if _BARE_KEY.fullmatch(key):
+        return key.split(".")
+    names: list[str] = []
+    if not _KEY.fullmatch(key):
+        return names
+    inner: Any = tomllib.loads(f"{key} = 0")
+    while isinstance(inner, Mapping):
+        ((name, inner),) = inner.items()
+        names.append(name)
+    return names

@@ -73,7 +73,7 @@ class ChainMesh(_Links):
     """A straight chain of links, parts "1", "2", ...; each bears with contact on the grip of the next."""
 
     shape: Literal["chain"]
-    links: int = Field(ge=2, description="number of links")
+    links: int = Field(ge=2, le=10_000, description="number of links")
     gap: float = Field(0.0, description="clearance between neighbours, [length]")
 
     def build(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import Field, PlainValidator, Tag, WithJsonSchema
 
 from fenics_contact import scene
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, running
 from fenics_contact.scene import Material
 from fenics_contact.scene_file.own_python import is_reference, load
 from fenics_contact.scene_file.values import Pair, Part, Triple, chooser, needs
@@ -109,12 +109,13 @@ class OwnMaterial(Part):
             InvalidInputError: If the class is not there or does not take these parameters.
         """
         kind = load(self.model, folder)
-        try:
-            material: Material = kind(**self.parameters)
-        except TypeError as error:
-            raise InvalidInputError(
-                f"parameters must be what {self.model!r} takes, got {sorted(self.parameters)}: {error}"
-            ) from error
+        with running(f"{self.model!r} with the parameters {sorted(self.parameters)}"):
+            try:
+                material: Material = kind(**self.parameters)
+            except TypeError as error:
+                raise InvalidInputError(
+                    f"parameters must be what {self.model!r} takes, got {sorted(self.parameters)}: {error}"
+                ) from error
         return material
 
 

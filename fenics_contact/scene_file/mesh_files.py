@@ -12,7 +12,7 @@ from fenics_contact import geometry
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import BodyMesh
 from fenics_contact.scene_file.placing import Placed, Shaped
-from fenics_contact.scene_file.values import needs
+from fenics_contact.scene_file.values import PlaceOfFile, needs
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -70,7 +70,7 @@ SurfaceGroups: TypeAlias = Annotated[Any, PlainValidator(_surfaces), WithJsonSch
 class MeshFile(Placed):
     """Bodies and surfaces by name from a mesh file: .msh, .xdmf, or another format that meshio reads."""
 
-    file: str = Field(description="the file, relative to the folder of the scene file")
+    file: PlaceOfFile = Field(description="the file, relative to the folder of the scene file")
     bodies: BodyGroups | None = Field(
         None, description="groups of cells that are bodies; or body to group, groups or regions (all)"
     )

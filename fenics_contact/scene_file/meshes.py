@@ -10,6 +10,8 @@ import numpy as np
 from pydantic import Field, Tag
 
 from fenics_contact import geometry
+from fenics_contact.geometry.arguments import MOST
+from fenics_contact.geometry.block import checked_corners, checked_counts
 from fenics_contact.geometry.hemisphere import graded
 from fenics_contact.scene_file.links import ChainMesh, LinkMesh, TwoLinksMesh
 from fenics_contact.scene_file.mesh_files import MeshFile
@@ -61,7 +63,8 @@ class BlockMesh(_Single):
         """Return the box."""
         if not any(self.grading):
             return Shaped(geometry.block(self.lower, self.upper, self.counts, self.cell))
-        geometry.block(self.lower, self.upper, (1, 1, 1))  # refuses corners that span no box
+        checked_corners(self.lower, self.upper, "xyz")
+        checked_counts(self.counts, "xyz")
         ticks = [
             _ticks(*each) for each in zip(self.lower, self.upper, self.counts, self.grading, strict=True)
         ]
@@ -82,7 +85,8 @@ class RectangleMesh(_Single):
         """Return the rectangle."""
         if not any(self.grading):
             return Shaped(geometry.rectangle(self.lower, self.upper, self.counts, self.cell))
-        geometry.rectangle(self.lower, self.upper, (1, 1))  # refuses corners that span none
+        checked_corners(self.lower, self.upper, "xy")
+        checked_counts(self.counts, "xy")
         ticks = [
             _ticks(*each) for each in zip(self.lower, self.upper, self.counts, self.grading, strict=True)
         ]
@@ -152,7 +156,7 @@ class DrilledPlateMesh(_Single):
     half_width: float = Field(gt=0, description="the strip reaches from y = 0 to this, [length]")
     ends: Pair = Field(description="x of both ends, at or beyond the square around the hole, [length]")
     heights: Pair = Field(description="z of bottom and top, [length]")
-    n_layers: int = Field(ge=1, description="cells through the thickness")
+    n_layers: int = Field(ge=1, le=MOST, description="cells through the thickness")
     n: int = Field(ge=1, description="cells along an eighth of the hole")
     n_radial: int | None = Field(None, ge=1, description="cells from the hole to the square around it")
 

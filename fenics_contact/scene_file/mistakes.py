@@ -9,6 +9,9 @@ from difflib import get_close_matches
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene_file.places import Path
 
+#: Mistakes that a message lists.
+MOST_TOLD = 50
+
 
 @dataclass(frozen=True)
 class Mistake:
@@ -32,7 +35,7 @@ class Mistake:
 
 
 class SceneFileError(InvalidInputError):
-    """A scene file cannot be used; all mistakes that were found are listed.
+    """A scene file cannot be used; all mistakes that were found are listed, the first fifty in the message.
 
     Attributes:
         mistakes: The mistakes in the order of their lines.
@@ -52,8 +55,9 @@ class SceneFileError(InvalidInputError):
         elif len(found) == 1:
             super().__init__(f"{name}, {found[0]}" if found[0].place else f"{name}: {found[0]}")
         else:
-            lines = "".join(f"\n  {mistake}" for mistake in found)
-            super().__init__(f"{name} has {len(found)} mistakes:{lines}")
+            lines = "".join(f"\n  {mistake}" for mistake in found[:MOST_TOLD])
+            more = f"\n  and {len(found) - MOST_TOLD} more" if len(found) > MOST_TOLD else ""
+            super().__init__(f"{name} has {len(found)} mistakes:{lines}{more}")
 
 
 def suggestion(given: str, allowed: Iterable[str]) -> str:

@@ -6,7 +6,7 @@ from typing import Literal, TypeAlias
 
 from pydantic import Field
 
-from fenics_contact.scene_file.values import Part
+from fenics_contact.scene_file.values import Part, PlaceOfFile
 
 FileKind: TypeAlias = Literal["vtu", "vtx", "xdmf"]
 PictureKind: TypeAlias = Literal["stress", "pressure", "status", "decomposition", "error"]
@@ -23,7 +23,7 @@ def _stress() -> list[PictureKind]:
 class OutputPart(Part):
     """What is written, and where."""
 
-    folder: str | None = Field(
+    folder: PlaceOfFile | None = Field(
         default=None,
         description="folder of the results, relative to where the command runs (output/NAME of the file)",
     )

@@ -4,10 +4,21 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, running
+from fenics_contact.geometry.files import require_file
+from fenics_contact.scene_file.places import as_toml, written
+
+if TYPE_CHECKING:
+    from fenics_contact.scene_file.document import Document
+    from fenics_contact.scene_file.mistakes import Mistake
+    from fenics_contact.scene_file.places import Path as Keys
+    from fenics_contact.scene_file.source import Source
+
+_NOTHING = object()
 
 
 def is_reference(text: object) -> bool:
@@ -28,23 +39,40 @@ def load(reference: str, folder: Path) -> Any:
     """
     file, _, name = reference.rpartition(":")
     path = folder / file
-    if not path.is_file():
-        raise InvalidInputError(f"there must be a Python file '{path}', there is none: correct the path")
+    require_file(path, "a Python file")
     module_name = f"_fenics_contact_scene_{path.stem}"
     spec = importlib.util.spec_from_file_location(module_name, path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[module_name] = module  # dataclasses of the file look themselves up there
-    try:
+    with running(f"the Python file '{path}'"):
         spec.loader.exec_module(module)
-    except Exception as error:
-        raise InvalidInputError(
-            f"the Python file '{path}' must run without errors, it raised {type(error).__name__}: {error}"
-        ) from error
-    if not hasattr(module, name):
+        found = getattr(module, name, _NOTHING)
+    if found is _NOTHING:
         known = sorted(
             key for key, value in vars(module).items() if getattr(value, "__module__", "") == module_name
         )
         raise InvalidInputError(f"'{path}' must define {name!r}, it defines {known}: use one of them")
-    return getattr(module, name)
+    return found
+
+
+def references(document: Document) -> Iterator[tuple[Keys, str]]:
+    """Yield what a scene file takes from Python files, with its keys: all of them are run."""
+    for name, material in document.materials.items():
+        if is_reference(material.model):
+            yield ("materials", name, "model"), material.model
+    if document.design is not None and is_reference(document.design.objective):
+        yield ("design", "objective"), document.design.objective
+
+
+def refused_python(source: Source, document: Document) -> list[Mistake]:
+    """Return a mistake for everything that a scene file takes from a Python file."""
+    return [
+        source.mistake(
+            path,
+            f"{written(path)} must not be Python code (--no-python), got {as_toml(reference)}: read that "
+            "file, and leave --no-python out if you trust it",
+        )
+        for path, reference in references(document)
+    ]

@@ -9,19 +9,28 @@ from typing import Any, TypeAlias
 import tomlkit
 import tomlkit.items
 
+from fenics_contact.progress.words import visible
+
 #: Keys and positions from the top of the file: ("contacts", 0, "friction").
 Path: TypeAlias = tuple[str | int, ...]
 
 #: Longest value that a message repeats.
 LONGEST = 60
+_MOST_BITS = 3322
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def written(path: Path) -> str:
     """Return a path as `--set` takes it: ``contacts.0.friction``."""
     return ".".join(
-        str(part) if isinstance(part, int) or _BARE.fullmatch(part) else f'"{part}"' for part in path
+        str(part) if isinstance(part, int) or _BARE.fullmatch(part) else f'"{shortened(visible(part))}"'
+        for part in path
     )
+
+
+def shortened(text: str) -> str:
+    """Return a text, cut where it is longer than messages repeat."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
 
 
 def as_toml(value: Any) -> str:
@@ -31,12 +40,19 @@ def as_toml(value: Any) -> str:
     elif value is None:
         text = "nothing"
     else:
-        try:
-            text = tomlkit.item(value).as_string()
-        except (TypeError, ValueError):
-            text = repr(value)
-    text = " ".join(text.split())
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
+        text = _as_toml(value)
+    return shortened(visible(" ".join(text.split())))
+
+
+def _as_toml(value: Any) -> str:
+    if isinstance(value, str | list | tuple):
+        value = value[:LONGEST]
+    if isinstance(value, int) and value.bit_length() > _MOST_BITS:
+        return "an integer of more than 1000 digits"  # Python refuses to write it
+    try:
+        return tomlkit.item(value).as_string()
+    except (TypeError, ValueError):
+        return repr(value)
 
 
 def value_at(data: Any, path: Path) -> Any:

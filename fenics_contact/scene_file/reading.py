@@ -14,11 +14,13 @@ from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.contact import LoadSequence, State, find_state
 from fenics_contact.contact.equilibrium import decomposed
 from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.geometry.files import require_file
 from fenics_contact.scene import LoadStep, Scene
 from fenics_contact.scene_file.building import Builder, located
 from fenics_contact.scene_file.document import Document
 from fenics_contact.scene_file.mistakes import SceneFileError
 from fenics_contact.scene_file.names import wrong_names
+from fenics_contact.scene_file.own_python import refused_python
 from fenics_contact.scene_file.places import Path as Keys
 from fenics_contact.scene_file.placing import Shaped
 from fenics_contact.scene_file.source import Source, parse
@@ -28,6 +30,9 @@ from fenics_contact.scene_file.validation import validated
 
 if TYPE_CHECKING:
     from mpi4py import MPI
+
+#: Largest scene file that is read, in bytes.
+LARGEST = 10_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,9 +82,8 @@ class SceneFile:
     @cached_property
     def steps(self) -> tuple[LoadStep, ...]:
         """All load steps; empty where everything acts at once. Collective on first use."""
-        document = self.document
-        with self._at("steps"):
-            return load_steps(document.steps, document.supports, document.loads, self.scene.dim)
+        document, bodies = self.document, self.scene.bodies
+        return load_steps(document.steps, document.supports, document.loads, bodies, self._at)
 
     @cached_property
     def partitions(self) -> dict[str, np.ndarray]:
@@ -169,7 +173,11 @@ class _Located:
 
 
 def read_scene_file(
-    scene: str | Path | Mapping[str, Any], comm: MPI.Comm, *, overrides: Sequence[str] = ()
+    scene: str | Path | Mapping[str, Any],
+    comm: MPI.Comm,
+    *,
+    overrides: Sequence[str] = (),
+    python: bool = True,
 ) -> SceneFile:
     """Read and check a scene file, or a dictionary of the same form. Collective on ``comm``.
 
@@ -179,6 +187,8 @@ def read_scene_file(
         scene: A TOML file, or what one would hold.
         comm: Communicator on which meshes will be built and states found.
         overrides: Other values for some keys, ``"contacts.0.friction.coefficient=0.2"``.
+        python: Whether the file may name Python code ("file.py:Name"), which is run when the scene is built.
+            Say False for a file that you do not trust.
 
     Returns:
         The file, checked as far as no mesh need be built.
@@ -192,7 +202,7 @@ def read_scene_file(
     """
     source = _source(scene, comm).with_overrides(overrides)
     document = validated(source)
-    wrong = wrong_names(source, document)
+    wrong = wrong_names(source, document) or ([] if python else refused_python(source, document))
     if wrong:
         raise SceneFileError(source.name, wrong)
     return SceneFile(source, document, comm)
@@ -201,6 +211,11 @@ def read_scene_file(
 def _source(scene: str | Path | Mapping[str, Any], comm: MPI.Comm) -> Source:
     if isinstance(scene, Mapping):
         return Source("the scene", Path(), scene)
+    if not isinstance(scene, str | Path):
+        raise InvalidInputError(
+            f"a scene must be the path of a TOML file or a dictionary, got {type(scene).__name__}: give one "
+            "of them"
+        )
     path, text = Path(scene), ""
     with together(comm):
         if comm.rank == 0:
@@ -209,9 +224,23 @@ def _source(scene: str | Path | Mapping[str, Any], comm: MPI.Comm) -> Source:
 
 
 def _text_of(path: Path) -> str:
-    if not path.is_file():
-        raise InvalidInputError(f"there must be a scene file '{path}', there is none: correct the path")
+    require_file(path, "a scene file")
     try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InvalidInputError(f"the scene file '{path}' must be readable UTF-8 text: {error}") from error
+        content = path.read_bytes() if path.stat().st_size <= LARGEST else None
+    except OSError as error:
+        raise InvalidInputError(
+            f"the scene file '{path}' must be readable: {error.strerror or error}"
+        ) from error
+    if content is None:
+        raise InvalidInputError(
+            f"the scene file '{path}' must have at most {LARGEST // 10**6} MB, it has more: put meshes into "
+            "files of their own"
+        )
+    try:
+        return content.decode("utf-8").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise InvalidInputError(
+            f"the scene file '{path}' must be readable UTF-8 text, line {line} is not ({error.reason}): let "
+            "the editor save it as UTF-8"
+        ) from error

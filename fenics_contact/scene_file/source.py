@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import re
+import tomllib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path as FilePath
 from typing import Any
 
 import tomlkit
 import tomlkit.exceptions
 
-from fenics_contact.scene_file.lines import line_of
+from fenics_contact.progress.words import visible
+from fenics_contact.scene_file.lines import key_parts, lines_of, nearest
 from fenics_contact.scene_file.mistakes import Mistake, SceneFileError
-from fenics_contact.scene_file.places import Path, replaced, value_at
+from fenics_contact.scene_file.places import Path, replaced, shortened, value_at
 
 _OPEN = "; a bracket or quote may be open on a line before"
+#: What some editors put before the text: TOML has none.
+BYTE_ORDER_MARK = "\ufeff"
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +47,12 @@ class Source:
         for given, words in self.overrides.items():
             if path[: len(given)] == given:
                 return 0, words
-        line = line_of(self.text, path) if self.text else 0
+        line = nearest(self._lines, path)
         return (line, f"line {line}") if line else (0, "")
+
+    @cached_property
+    def _lines(self) -> Mapping[Path, int]:
+        return lines_of(self.text)
 
     def mistake(self, path: Path, words: str) -> Mistake:
         """Return a mistake at a key."""
@@ -64,11 +75,11 @@ class Source:
                 path, value = _parsed(override)
                 path = _resolved(data, path)
                 data = replaced(data, path, value)
-            except (KeyError, tomlkit.exceptions.TOMLKitError, ValueError) as error:
+            except (KeyError, ValueError) as error:
                 reason = error.args[0] if error.args else error
                 words = (
                     "must be KEY=VALUE with a key such as contacts.0.friction.coefficient, got "
-                    f"{override!r}: {reason}"
+                    f"{shortened(override)!r}: {reason}"
                 )
                 raise SceneFileError(self.name, [Mistake((), 0, "--set", words)]) from error
             places[path] = "--set"
@@ -81,30 +92,50 @@ def parse(text: str, name: str, folder: FilePath) -> Source:
     Raises:
         SceneFileError: If it is no TOML, with the line.
     """
+    if text.startswith(BYTE_ORDER_MARK):
+        words = (
+            "must be TOML in UTF-8, which has no byte-order mark, got one before the first character: let "
+            "the editor save the file as UTF-8 without BOM"
+        )
+        raise SceneFileError(name, [Mistake((), 1, "line 1", words)])
     try:
-        data = tomlkit.parse(text).unwrap()
-    except tomlkit.exceptions.ParseError as error:
-        reason = str(error).partition(" at line ")[0]
-        line = min(error.line, text.count("\n") + 1)
-        content = text.splitlines()[line - 1].strip() if text.splitlines() else ""
-        words = f"must be TOML, got {content!r}: {reason}{_OPEN if 'nexpected' in reason else ''}"
-        raise SceneFileError(name, [Mistake((), line, f"line {line}", words)]) from error
-    return Source(name, folder, data, text)
+        return Source(name, folder, tomllib.loads(text), text)
+    except (ValueError, RecursionError) as error:
+        raise SceneFileError(name, [_no_toml(text, error)]) from error
+
+
+def _no_toml(text: str, error: Exception) -> Mistake:
+    """Put into words why a text is no TOML, in those of tomlkit where it finds a reason: they say more."""
+    reason, line = str(error), 0
+    if isinstance(error, RecursionError):
+        reason = "brackets are nested too deeply"
+    try:
+        tomlkit.parse(text)
+    except tomlkit.exceptions.ParseError as better:
+        reason, line = str(better).partition(" at line ")[0], better.line
+    except Exception:  # what it cannot tell is told by the first one
+        reason, _, place = reason.partition(" (at ")
+        found = re.match(r"line (\d+)", place)
+        line = int(found.group(1)) if found else 0
+    lines = text.split("\n")
+    line = min(line, len(lines))
+    content = f", got {shortened(lines[line - 1].strip())!r}" if line else ""
+    words = f"must be TOML{content}: {visible(reason)}{_OPEN if 'nexpected' in reason else ''}"
+    return Mistake((), line, f"line {line}" if line else "", words)
 
 
 def _parsed(override: str) -> tuple[Path, Any]:
     key, equals, value = override.partition("=")
     if not equals:
         raise ValueError("there is no =")
-    path: list[str] = []
-    inner: Any = tomlkit.parse(f"{key} = ''").unwrap()
-    while isinstance(inner, Mapping):
-        ((part, inner),) = inner.items()
-        path.append(part)
-    try:
-        return tuple(path), tomlkit.parse(f"x = {value}").unwrap()["x"]
-    except tomlkit.exceptions.ParseError:
-        return tuple(path), value.strip()
+    path = key_parts(key.strip())
+    if not path:
+        raise ValueError("what stands before = is no key")
+    with suppress(ValueError, RecursionError):
+        found = tomllib.loads(f"x = {value}")
+        if list(found) == ["x"]:
+            return tuple(path), found["x"]
+    return tuple(path), value.strip()
 
 
 def _resolved(data: Any, path: Path) -> Path:

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field, PlainValidator, WithJsonSchema
 
-from fenics_contact.scene import LoadStep
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.scene import Body, LoadStep
+from fenics_contact.scene_file.evaluation import check_formulas
 from fenics_contact.scene_file.expression import between
 from fenics_contact.scene_file.values import (
     FREE,
     Components,
+    Line,
     Part,
     Scalar,
     VectorOrFormulas,
+    formula,
     is_number,
     needs,
 )
@@ -24,13 +29,22 @@ if TYPE_CHECKING:
     from fenics_contact.scene_file.supports import SupportPart
 
 
+#: Load steps of a file in all; longer histories are driven from Python, step by step.
+MOST = 100_000
+
+
 def _load_value(value: Any) -> Any:
-    if isinstance(value, list):
-        if len(value) in (2, 3) and all(isinstance(entry, str) or is_number(entry) for entry in value):
-            return tuple(value)
-    elif isinstance(value, str) or is_number(value):
-        return value
-    raise needs("a number or a formula, or two or three of them in brackets, like the load's own value")
+    if isinstance(value, list | tuple) and len(value) in (2, 3):
+        return tuple(map(_entry, value))
+    return _entry(value)
+
+
+def _entry(value: Any) -> float | str:
+    if isinstance(value, str):
+        return formula(value)
+    if not is_number(value):
+        raise needs("a number or a formula, or two or three of them in brackets, like the load's own value")
+    return float(value)
 
 
 _LOAD = {"anyOf": [{"type": "number"}, {"type": "string"}, {"type": "array", "minItems": 2, "maxItems": 3}]}
@@ -39,8 +53,10 @@ _LOAD = {"anyOf": [{"type": "number"}, {"type": "string"}, {"type": "array", "mi
 class StepPart(Part):
     """One load step or several: values go linearly from those before to those given here."""
 
-    name: str = Field("step", description="what it does, for records")
-    count: int = Field(1, ge=1, description="number of load steps in which the values are reached")
+    name: Line = Field("step", description="what it does, for records")
+    count: int = Field(
+        1, ge=1, le=MOST, description="number of load steps in which the values are reached"
+    )
     supports: dict[str, Components] = Field(
         default_factory=dict, description="name of a support -> its value at the end"
     )
@@ -50,7 +66,11 @@ class StepPart(Part):
 
 
 def load_steps(
-    steps: Sequence[StepPart], supports: Sequence[SupportPart], loads: Sequence[AnyLoad], dim: int
+    steps: Sequence[StepPart],
+    supports: Sequence[SupportPart],
+    loads: Sequence[AnyLoad],
+    bodies: Mapping[str, Body],
+    at: Callable[..., AbstractContextManager[None]],
 ) -> tuple[LoadStep, ...]:
     """Return all load steps, in their order.
 
@@ -61,27 +81,46 @@ def load_steps(
         steps: The steps of the file.
         supports: All supports.
         loads: All loads.
-        dim: Dimension of the bodies.
+        bodies: The bodies by name.
+        at: Takes keys and returns a context that leads errors of its block back to them.
+
+    Raises:
+        InvalidInputError: If there are too many, or one has a value that cannot be used.
     """
+    with at("steps"):
+        _require_few(steps)
+    dim = next(iter(bodies.values())).mesh.dim
     held: dict[str, Any] = {part.name: part.value or (0.0,) * dim for part in supports if part.name}
     acting: dict[str, Any] = {part.name: part.size for part in loads if part.name}
-    found = []
-    for step in steps:
-        for number in range(1, step.count + 1):
-            share = number / step.count
-            supported = {**held, **_on_the_way(held, step.supports, share)}
-            loaded = {**acting, **_on_the_way(acting, step.loads, share)}
-            name = step.name if step.count == 1 else f"{step.name} {number}/{step.count}"
-            found.append(
-                LoadStep(
-                    name,
-                    loads=tuple(part.build(loaded.get(part.name or "")) for part in loads),
-                    supports=tuple(part.build(dim, supported.get(part.name or "")) for part in supports),
+    found: list[LoadStep] = []
+    for position, step in enumerate(steps):
+        with at("steps", position):
+            for number in range(1, step.count + 1):
+                share = number / step.count
+                supported = {**held, **_on_the_way(held, step.supports, share)}
+                loaded = {**acting, **_on_the_way(acting, step.loads, share)}
+                name = step.name if step.count == 1 else f"{step.name} {number}/{step.count}"
+                found.append(
+                    LoadStep(
+                        name,
+                        loads=tuple(part.build(loaded.get(part.name or "")) for part in loads),
+                        supports=tuple(part.build(dim, supported.get(part.name or "")) for part in supports),
+                    )
                 )
-            )
+            for part in (*(found[-1].loads or ()), *(found[-1].supports or ())):
+                check_formulas(part, bodies)
         held.update(step.supports)
         acting.update(step.loads)
     return tuple(found)
+
+
+def _require_few(steps: Sequence[StepPart]) -> None:
+    count = sum(step.count for step in steps)
+    if count > MOST:
+        raise InvalidInputError(
+            f"a file may have at most {MOST} load steps in all, got {count}: take larger steps, or drive a "
+            "longer history from Python with LoadSequence"
+        )
 
 
 def _on_the_way(before: Mapping[str, Any], after: Mapping[str, Any], share: float) -> dict[str, Any]:

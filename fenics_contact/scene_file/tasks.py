@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors import InvalidInputError, running, together
 from fenics_contact.optimize import BundleTrust, LinearConstraints, Result, minimize
 from fenics_contact.optimize.progress import Callback
 from fenics_contact.qp import FaceNewton
@@ -135,7 +135,8 @@ def _objective(name: str, source: Source) -> Objective:
     if name == TOTAL_POTENTIAL:
         return TotalPotential()
     found: Any = load(name, source.folder)
-    missing = [part for part in ("value", "partials") if not hasattr(found, part)]
+    with running(f"objective {name!r}"):
+        missing = [part for part in ("value", "partials") if not hasattr(found, part)]
     if missing or isinstance(found, type):
         raise InvalidInputError(
             f"objective {name!r} must be an object with value and partials, got {found!r}: see "

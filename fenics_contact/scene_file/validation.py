@@ -9,6 +9,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import Tag, ValidationError
 from pydantic.fields import FieldInfo
 
+from fenics_contact.progress.words import is_visible
 from fenics_contact.scene_file.document import Document
 from fenics_contact.scene_file.mistakes import Mistake, SceneFileError, listed, suggestion
 from fenics_contact.scene_file.places import Path, as_toml, value_at, written
@@ -23,10 +24,10 @@ NEEDED = {
     "bool_type": "true or false",
     "string_type": "text in quotes",
     "finite_number": "a finite number",
-    "greater_than": "a number greater than {gt:g}",
-    "greater_than_equal": "a number of at least {ge:g}",
-    "less_than": "a number less than {lt:g}",
-    "less_than_equal": "a number of at most {le:g}",
+    "greater_than": "a number greater than {gt:.12g}",
+    "greater_than_equal": "a number of at least {ge:.12g}",
+    "less_than": "a number less than {lt:.12g}",
+    "less_than_equal": "a number of at most {le:.12g}",
     "dict_type": "a table",
     "model_type": "a table",
     "model_attributes_type": "a table",
@@ -42,11 +43,31 @@ def validated(source: Source) -> Document:
     Raises:
         SceneFileError: Naming everything that is wrong.
     """
+    unseen = invisible_texts(source)
+    if unseen:
+        raise SceneFileError(source.name, unseen)
     try:
         return Document.model_validate(source.data)
     except ValidationError as error:
         mistakes = [_mistake(source, each) for each in _told_once(error.errors())]
         raise SceneFileError(source.name, mistakes) from None
+
+
+def invisible_texts(source: Source) -> list[Mistake]:
+    """Return the names and texts that hold what a terminal would obey instead of showing it."""
+    found: list[Mistake] = []
+    waiting: list[tuple[Path, Any]] = [((), source.data)]
+    while waiting:
+        path, value = waiting.pop()
+        if isinstance(value, Mapping):
+            waiting += [((*path, key), part) for key, part in value.items()]
+        elif isinstance(value, list | tuple):
+            waiting += [((*path, number), part) for number, part in enumerate(value)]
+        for text in (value, *path[-1:]):
+            if isinstance(text, str) and not is_visible(text):
+                words = f"must be text that can be shown, got {as_toml(text)}: leave out control characters"
+                found.append(source.mistake(path, f"{written(path)} {words}"))
+    return found
 
 
 def _told_once(errors: Sequence[Any]) -> list[Any]:
@@ -62,9 +83,7 @@ def _told_once(errors: Sequence[Any]) -> list[Any]:
 
 
 def _mistake(source: Source, error: Any) -> Mistake:
-    location = tuple(error["loc"])
-    path: Path = tuple(part for part in location if not _is_tag(part))
-    table, field = _field(location)
+    path, table, field = _field(tuple(error["loc"]))
     kind, context = error["type"], error.get("ctx", {})
     hint = f": {field.description}" if field is not None and field.description else ""
     if kind == "missing":
@@ -78,9 +97,12 @@ def _mistake(source: Source, error: Any) -> Mistake:
     given = as_toml(value_at(source.data, path))
     if kind == "literal_error":
         allowed = [str(value) for value in _literals(field)]
-        hint = f": {suggestion(str(error['input']), allowed)}".rstrip(": ") + (hint and f" ({hint[2:]})")
+        meant = suggestion(error["input"] if isinstance(error["input"], str) else "", allowed)
+        hint = f": {meant}".rstrip(": ") + (hint and f" ({hint[2:]})")
         return source.mistake(path, f"{written(path)} must be one of {listed(allowed)}, got {given}{hint}")
     needed = NEEDED[kind].format(**context) if kind in NEEDED else error["msg"].lower()
+    if kind == "float_type" and isinstance(value_at(source.data, path), int):
+        needed = "a number below 1.8e308, the largest that there is"
     return source.mistake(path, f"{written(path)} must be {needed}, got {given}{hint}")
 
 
@@ -111,26 +133,25 @@ def _wrong_choice(source: Source, path: Path, key: str, *allowed: str) -> Mistak
         words = f"{written(path)} must have {key!r}, one of {listed(allowed)}, got only {', '.join(table)}"
         return source.mistake(path, words if table else words.replace("only ", "nothing"))
     given = table[key]
-    meant = suggestion(str(given), allowed).rstrip()
+    meant = suggestion(given if isinstance(given, str) else "", allowed).rstrip()
     words = f"{written((*path, key))} must be one of {listed(allowed)}, got {as_toml(given)}"
     return source.mistake((*path, key), f"{words}: {meant}" if meant else words)
 
 
-def _is_tag(part: str | int) -> bool:
-    return isinstance(part, str) and part.startswith("<") and part.endswith(">")
-
-
-def _field(location: tuple[str | int, ...]) -> tuple[type[Part] | None, FieldInfo | None]:
-    """Return the table that the last key of a location belongs to, and what is known of the key."""
+def _field(location: tuple[str | int, ...]) -> tuple[Path, type[Part] | None, FieldInfo | None]:
+    """Return a location as keys, the table that its last key belongs to, and what is known of the key."""
     kind: Any = Document
+    path: Path = ()
     table: type[Part] | None = None
     field: FieldInfo | None = None
     for part in location:
         members = list(_members(kind))
-        if _is_tag(part):
-            kind = next((member for tag, member in members if tag == part), None)
+        chosen = next((member for tag, member in members if tag is not None and tag == part), None)
+        if chosen is not None:  # not a key: which of several kinds of tables it is
+            kind = chosen
             table = kind if _is_part(kind) else table
             continue
+        path = (*path, part)
         plain = members[0][1] if members else None
         if plain is not None and _is_part(plain):
             table, field = plain, plain.model_fields.get(str(part))
@@ -138,7 +159,7 @@ def _field(location: tuple[str | int, ...]) -> tuple[type[Part] | None, FieldInf
         else:
             arguments = get_args(plain)
             kind = arguments[-1] if arguments else None
-    return table, field
+    return path, table, field
 
 
 def _is_part(kind: Any) -> bool:

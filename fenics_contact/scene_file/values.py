@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import os
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, TypeAlias
 
@@ -10,12 +10,15 @@ from pydantic import BaseModel, ConfigDict, Discriminator, PlainValidator, WithJ
 from pydantic_core import PydanticCustomError
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene_file.expression import Expression
+from fenics_contact.geometry.arguments import MOST
+from fenics_contact.scene_file.expression import Expression, is_finite
 
 #: What a support's component is called that it leaves alone.
 FREE = "free"
 #: Stands in the message of an error of kind "choice" between the key and the values that it may have.
 SEPARATOR = "|"
+#: What Linux allows, in bytes.
+LONGEST_NAME, LONGEST_PATH = 255, 4000
 _COUNTS = {2: "two", 3: "three"}
 
 
@@ -59,7 +62,25 @@ def chooser(tag: Callable[[Any], str | None], key: str, allowed: tuple[str, ...]
 
 def is_number(value: object) -> bool:
     """Tell whether a value is a finite number, which true and false are not."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    return isinstance(value, int | float) and not isinstance(value, bool) and is_finite(value)
+
+
+def _line(value: Any) -> str:
+    if not isinstance(value, str) or not value.isprintable():
+        raise needs("one line of text in quotes")
+    return value
+
+
+def _place_of_file(value: Any) -> str:
+    """Check a path as far as that can be without looking whether it is there."""
+    if not isinstance(value, str) or not value.strip():
+        raise needs("the path of a file or folder, in quotes")
+    longest = max(len(os.fsencode(part)) for part in value.split("/"))
+    if longest > LONGEST_NAME or len(os.fsencode(value)) > LONGEST_PATH:
+        raise needs(
+            f"a path of at most {LONGEST_PATH} bytes in which no name has more than {LONGEST_NAME} bytes"
+        )
+    return value
 
 
 def _numbers(*counts: int) -> Callable[[Any], tuple[float, ...]]:
@@ -82,6 +103,8 @@ def _integers(*counts: int) -> Callable[[Any], tuple[int, ...]]:
         )
         if not whole or len(value) not in counts:
             raise needs(f"{said} positive integers in brackets")
+        if max(value) > MOST:
+            raise needs(f"{said} integers of at most {MOST} in brackets")
         return tuple(value)
 
     return validate
@@ -93,10 +116,12 @@ def _array(kind: Mapping[str, Any], *counts: int) -> WithJsonSchema:
     )
 
 
-_NUMBER = {"type": "number"}
+_NUMBER, _TEXT = {"type": "number"}, {"type": "string"}
 _NUMBER_OR_FORMULA = {"anyOf": [{"type": "number"}, {"type": "string"}]}
-_COUNT = {"type": "integer", "minimum": 1}
+_COUNT = {"type": "integer", "minimum": 1, "maximum": MOST}
 
+Line: TypeAlias = Annotated[str, PlainValidator(_line), WithJsonSchema(_TEXT)]
+PlaceOfFile: TypeAlias = Annotated[str, PlainValidator(_place_of_file), WithJsonSchema(_TEXT)]
 Pair: TypeAlias = Annotated[tuple[float, float], PlainValidator(_numbers(2)), _array(_NUMBER, 2)]
 Triple: TypeAlias = Annotated[tuple[float, float, float], PlainValidator(_numbers(3)), _array(_NUMBER, 3)]
 Vector: TypeAlias = Annotated[tuple[float, ...], PlainValidator(_numbers(2, 3)), _array(_NUMBER, 2, 3)]
@@ -108,7 +133,7 @@ Counts: TypeAlias = Annotated[tuple[int, ...], PlainValidator(_integers(2, 3)), 
 def _scalar(value: Any) -> float | str:
     """Check a number or a formula."""
     if isinstance(value, str):
-        return _formula(value)
+        return formula(value)
     if not is_number(value):
         raise needs("a finite number, or a formula in x, y and z in quotes")
     return float(value)
@@ -128,7 +153,8 @@ def _components(value: Any) -> tuple[float | str, ...]:
     return tuple(FREE if entry == FREE else _scalar(entry) for entry in value)
 
 
-def _formula(text: str) -> str:
+def formula(text: str) -> str:
+    """Check a formula."""
     try:
         Expression(text)
     except InvalidInputError as error:

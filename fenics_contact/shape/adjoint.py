@@ -8,6 +8,7 @@ import numpy as np
 
 from fenics_contact.contact import State
 from fenics_contact.errors import ConvergenceError
+from fenics_contact.feti import DualSystem
 from fenics_contact.progress import Task
 from fenics_contact.qp import (
     CountedOperator,
@@ -16,10 +17,14 @@ from fenics_contact.qp import (
     Face,
     FaceSystems,
     Stop,
+    apply_unless_zero,
     projected_gmres,
 )
 from fenics_contact.shape.linearised_face import LinearisedFace
 from fenics_contact.shape.objective import Partials
+
+#: Derivatives along a rigid motion below this part of their summands are rounding.
+UNFELT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +34,13 @@ class Adjoint:
     Attributes:
         displacement: w on this rank's torn dofs.
         multiplier: ζ = Z_s z, owned.
+        motions: β, coefficients of the rigid motions in w, shape (m,), replicated.
         iterations: Krylov iterations, each one F-product.
     """
 
     displacement: np.ndarray
     multiplier: np.ndarray
+    motions: np.ndarray
     iterations: int
 
 
@@ -55,24 +62,31 @@ def solve_adjoint(
     Eliminating w leaves (Z_uᵀ F Z_s + κ) z − (G Z_u)ᵀ β = Z_uᵀ (B K⁺ ∂J/∂u − ∂J/∂λ) under G Z_s z = Rᵀ ∂J/∂u,
     the system of a Newton step with its two bases swapped.
 
+    All of it is linear in the objective, also the start and the size that the residual is compared with: in
+    other units an objective has the same adjoint, to rounding.
+
     Args:
         state: A converged state.
         partials: Partial derivatives of the objective.
         linearised: Branch of the contact law.
-        tolerance: Relative residual.
+        tolerance: Residual relative to what the objective asks for.
         max_iterations: Largest number of F-products.
-        start: Multiplier of an adjoint to start from, owned; that of the same objective at a less accurate
-            state saves most products. By default minus the multiplier of the state.
+        start: Multiplier of an adjoint to start from, owned, of any length; that of the same objective at a
+            less accurate state saves most products. By default the multiplier of the state.
 
     Raises:
-        ConvergenceError: If the face does not hold every body, or the tolerance was not reached.
+        ConvergenceError: If the face does not hold every body, the objective depends on where a body lies
+            that nothing holds, or the tolerance was not reached.
     """
     system = state.dual
+    _require_held(system, partials.by_displacement)
     problem, face, factor = _evened_out(system.problem, linearised.face)
     task = Task("adjoint", unit="products")
     operator = CountedOperator(problem.operator, task)
     face_system = FaceSystems(problem, operator).build(face)
-    transposed = CoupledSystem.build(face_system, problem.coarse, linearised.moving, linearised.tested)
+    transposed = CoupledSystem.build(
+        face_system, problem.coarse, linearised.moving, linearised.tested, damped=True
+    )
     if transposed is None:
         raise ConvergenceError(
             "the adjoint needs a contact face that holds every body, but from this state some body can slide "
@@ -83,24 +97,76 @@ def solve_adjoint(
     right = linearised.moving.T @ (factor * (system.jump(flexed) - partials.by_multiplier))
     load = np.asarray(problem.comm.allreduce(system.kernel.T @ partials.by_displacement))
     # At a minimum of the energy without slip the adjoint multiplier is minus the multiplier itself.
-    guess = -state.solution.multiplier if start is None else start
-    start = transposed.balanced(linearised.tested.T @ (guess / factor), load)
-    gradient = transposed.operate(start, problem.operator(linearised.tested @ start)) - right
-    scale = max(problem.norm(transposed.oblique(right)), problem.norm(transposed.oblique(gradient)))
-    weights = np.ones(len(start))
+    guess = state.solution.multiplier if start is None else start
+    begin = _begin(problem, transposed, right, load, linearised.tested.T @ (guess / factor))
+    weights = np.ones(len(right))
     with task:
-        solved = projected_gmres(transposed, gradient, weights, tolerance * scale, max_iterations)
+        solved = projected_gmres(transposed, begin.gradient, weights, tolerance * begin.size, max_iterations)
     if solved.stop is not Stop.CONVERGED:
         raise ConvergenceError(
             f"the adjoint needs a relative residual below {tolerance:.1e}, reached "
-            f"{solved.measure / scale:.1e} after {solved.iterations} iterations ({solved.stop.value}): "
-            "raise max_iterations or loosen the tolerance"
+            f"{solved.measure / (begin.size or 1.0):.1e} after {solved.iterations} iterations "
+            f"({solved.stop.value}): raise max_iterations or loosen the tolerance"
         )
-    multiplier = factor * (linearised.tested @ (start + solved.step))
-    final = gradient + transposed.operate(solved.step, solved.product)
+    multiplier = factor * (linearised.tested @ (begin.point + solved.step))
+    final = begin.gradient + transposed.operate(solved.step, solved.product)
     beta = transposed.oblique.coefficients(final)
     displacement = system.inverse(partials.by_displacement - system.force(multiplier)) + system.kernel @ beta
-    return Adjoint(displacement, multiplier, solved.iterations)
+    return Adjoint(displacement, multiplier, beta, solved.iterations)
+
+
+@dataclass(frozen=True, eq=False)
+class _Begin:
+    """Where the iteration begins.
+
+    Attributes:
+        point: z, shape (n_face,).
+        gradient: Residual of the equations there, shape (n_face,).
+        size: Norm of the projected residual that the objective alone gives rise to, whatever the guess.
+    """
+
+    point: np.ndarray
+    gradient: np.ndarray
+    size: float
+
+
+def _begin(
+    problem: DualProblem, transposed: CoupledSystem, right: np.ndarray, load: np.ndarray, guess: np.ndarray
+) -> _Begin:
+    """Return the shortest z that bears the load plus as much of the guess as shortens the residual most.
+
+    The guess comes in units of its own (forces, or those of another objective), so that its share is found
+    and not given. Collective; a product each for load and guess.
+    """
+
+    def image(z: np.ndarray) -> np.ndarray:
+        return transposed.operate(z, apply_unless_zero(problem, problem.operator, transposed.moving @ z))
+
+    bearing = transposed.balanced(np.zeros_like(right), load)
+    direction = transposed.balanced(guess, np.zeros_like(load))
+    gradient, turned = image(bearing) - right, image(direction)
+    rest, along = transposed.oblique(gradient), transposed.oblique(turned)
+    slope, square = problem.dot(along, rest), problem.dot(along, along)
+    share = -slope / square if square > 0.0 else 0.0
+    size = max(problem.norm(transposed.oblique(right)), problem.norm(rest))
+    return _Begin(bearing + share * direction, gradient + share * turned, size)
+
+
+def _require_held(system: DualSystem, by_displacement: np.ndarray) -> None:
+    """Refuse objectives that change along motions that nothing holds. Collective.
+
+    Such motions are not determined by the state but agreed upon, and how the agreement changes with the shape
+    is no part of the adjoint.
+    """
+    work = system.unheld.T @ by_displacement
+    size = abs(system.unheld).T @ np.abs(by_displacement)
+    work, size = system.problem.comm.allreduce(np.stack([work, size]))
+    if np.any(np.abs(work) > UNFELT * size):
+        raise ConvergenceError(
+            "the adjoint needs an objective that is the same wherever nothing holds a body, but this one "
+            "changes along a rigid motion that meets no resistance (`State.unheld`): add a support, or judge "
+            "by stresses, energies or contact forces"
+        )
 
 
 def _evened_out(problem: DualProblem, face: Face) -> tuple[DualProblem, Face, np.ndarray | float]:

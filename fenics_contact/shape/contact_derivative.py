@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.contact import State
+from fenics_contact.errors import together
 from fenics_contact.feti import ContactPoints, TornSystem
 from fenics_contact.feti.contact_search import surface_of
-from fenics_contact.scene import RigidObstacle, Surface, Tresca
+from fenics_contact.feti.nodal_means import nodal_means
+from fenics_contact.scene import RigidObstacle, Surface, Tresca, asked
 from fenics_contact.shape.adjoint import Adjoint
 from fenics_contact.shape.linearised_face import LinearisedFace
 from fenics_contact.shape.objective import Partials
@@ -83,8 +85,9 @@ def contact_by_shape(state: State, adjoint: Adjoint, by_bound: np.ndarray) -> np
 def _by_obstacle(torn: TornSystem, obstacle: RigidObstacle, rows: RowFields, mine: np.ndarray) -> np.ndarray:
     """Return the derivative by the slave nodes that meet an obstacle, shape (n, dim)."""
     by, normal = _by_point(torn.points, rows, mine), torn.points.normal[mine]
-    bending = obstacle.curvatures(_points(torn, torn.points.slave[mine]))
-    turning = by.normal + frames_pulled_back(normal, by.tangents)
+    with together(torn.decomposition.comm):
+        bending = asked(obstacle, "curvatures", _points(torn, torn.points.slave[mine]))
+    turning = by.normal + frames_pulled_back(normal, by.tangents, by.axes)
     return np.asarray(by.gap[:, None] * normal + np.einsum("nde,ne->nd", bending, turning))
 
 
@@ -132,27 +135,9 @@ def _row_fields(state: State, adjoint: Adjoint) -> RowFields:
         friction[k, torn.frictional] = gathered.reshape(-1, width)
     nodes = np.unique(points.jump.indices)
     fields = (adjoint.displacement, state.torn_displacement)
-    values = np.stack([nodal_means(state, field, nodes) for field in fields])
+    values = np.stack([nodal_means(torn.decomposition, field, nodes) for field in fields])
     jump = points.jump[:, nodes]
     return RowFields(normal, friction, nodes, values, np.stack([jump @ value for value in values]))
-
-
-def nodal_means(state: State, field: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Return the mean over all copies of a torn field at some nodes, replicated, (n, dim). Collective.
-
-    Copies weigh as in the contact rows.
-    """
-    decomposition = state.torn.decomposition
-    tearing = decomposition.tearing
-    copies = tearing.multiplicity[nodes]
-    within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
-    copy = np.repeat(tearing.first_copy[nodes], copies) + within
-    block = decomposition.copy_block[copy]
-    here = np.flatnonzero(block >= 0)
-    total = np.zeros((len(nodes), tearing.dim))
-    shares = tearing.copy_share[copy[here], None] * field.reshape(-1, tearing.dim)[block[here]]
-    np.add.at(total, np.repeat(np.arange(len(nodes)), copies)[here], shares)
-    return np.asarray(decomposition.comm.allreduce(total))
 
 
 def _by_point(
@@ -170,7 +155,8 @@ def _by_point(
     normal = np.einsum("kn,knd->nd", force, relative)
     tangents = -np.einsum("kna,knd->nad", friction, relative)
     if corners is None:
-        return PointDerivatives(force[1], normal, tangents, np.zeros((len(mine), 0)))
+        return PointDerivatives(force[1], normal, tangents, np.zeros((len(mine), 0)), points.axes[mine])
     pulled = -force[:, :, None] * points.normal[mine]
     pulled = pulled + np.einsum("kna,nad->knd", friction, points.tangents[mine])
-    return PointDerivatives(force[1], normal, tangents, np.einsum("knd,knjd->nj", pulled, corners))
+    weight = np.einsum("knd,knjd->nj", pulled, corners)
+    return PointDerivatives(force[1], normal, tangents, weight, points.axes[mine])

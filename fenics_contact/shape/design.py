@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fenics_contact.errors import InvalidInputError
+from fenics_contact._libraries import MPI
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.geometry import BodyMesh, DesignSurface, boundary_faces
 from fenics_contact.shape.bernstein import tensor_bernstein
 
@@ -114,3 +116,27 @@ class SurfaceDesign:
         nearest = np.argmin(distance, axis=1)
         on_surface = points[self.surface.nodes[nearest]]
         return (on_surface + alpha[:, None] * self.surface.directions[nearest]).reshape(*self.net, 3)
+
+
+def checked_variables(alpha: np.ndarray, size: int, comm: MPI.Comm) -> np.ndarray:
+    """Return design variables as an array, refuse what is no design. Collective on ``comm``.
+
+    Args:
+        alpha: Design variables.
+        size: How many there must be.
+        comm: Communicator of the ranks, which must be given the same.
+
+    Raises:
+        InvalidInputError: If they have another shape, are not finite or differ from rank to rank.
+    """
+    with together(comm):
+        variables = np.asarray(alpha, dtype=float)
+        if variables.shape != (size,):
+            raise InvalidInputError(
+                f"alpha must have shape ({size},), got {variables.shape}: one number a control point"
+            )
+        if not np.isfinite(variables).all():
+            first = int(np.flatnonzero(~np.isfinite(variables))[0])
+            raise InvalidInputError(f"alpha must be finite, got {variables[first]} in entry {first}")
+    require_alike(comm, described(variables, "alpha"))
+    return variables

@@ -9,7 +9,7 @@ import numpy as np
 import ufl
 
 from fenics_contact import _dolfinx
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, calling
 from fenics_contact.feti import TornSystem
 from fenics_contact.feti.composition import integrate, possible
 from fenics_contact.feti.load_forms import Symbol, load_key, load_name, load_parameters, load_work
@@ -90,7 +90,8 @@ class ShapeForms:
             change, numbers, fields = temperature.write(cell_type)
 
             def density(material: Material, constants: Sequence[Any]) -> Any:
-                return integrand(u, x, stress_left(material, u, constants, change))
+                with calling(f"the integrand of {name!r}"):
+                    return integrand(u, x, stress_left(material, u, constants, change))
 
             form, constants = integrate(materials, cell_type, density, volume_measure(cell_type, 2))
             if by == "displacement":
@@ -229,7 +230,7 @@ def subdomain_fields(
         _dolfinx.update_coordinates(mesh.space.mesh, points[np.sort(mesh.nodes)])
         functions = []
         for index, field in enumerate(fields):
-            function = _dolfinx.Function(mesh.space, name=f"field{index}")
+            function = _dolfinx.fem.Function(mesh.space, name=f"field{index}")
             function.x.array[:] = field[start : start + mesh.size]
             functions.append(function)
         yield subdomain, functions

@@ -7,21 +7,30 @@ from enum import Enum
 
 import numpy as np
 import scipy.sparse as sp
-from mpi4py import MPI
 
 from fenics_contact.contact import State
 from fenics_contact.feti.surface import edge_distance
-from fenics_contact.qp import Face, classify, contact_step
+from fenics_contact.qp import ContactLayout, DualProblem, DualSolution, Face, classify, contact_step
 from fenics_contact.scene import Surface
 
-#: A contact point is weakly active when it is closer to the switch than this fraction of the force scale.
-WEAK_TOLERANCE = 1e-7
+#: A contact point is weakly active when it is closer to the switch than this many times the state's residual.
+UNCERTAINTY = 3.0
+#: What rounding alone leaves of the forces, and of those that would close the gaps.
+ROUNDING = 1e-13
+#: Weak points further from the switch than this fraction of the forces lean to a side, and are taken there.
+LEANING = 1e-5
 #: A projection this close to the edge of its facet, in local coordinates, lies on it.
 EDGE_TOLERANCE = 1e-6
 
 
 class WeakChoice(Enum):
-    """Which branch weakly active points take; either gives an element of the limiting coderivative."""
+    """Which branch weakly active points take, all of them the same.
+
+    Each branch of each point is an element of the limiting coderivative of its contact law, and the adjoint
+    of such a choice is what the inclusion for coderivatives of a composition gives. Of a single weak point
+    either is a Clarke subgradient. Of several it need not be one: designs nearby may close some points only
+    while others open, and no design has all of them open, or all of them closed.
+    """
 
     RELEASED = "weak contacts count as open, weak discs as slipping"
     HELD = "weak contacts count as closed, weak discs as sticking"
@@ -29,19 +38,33 @@ class WeakChoice(Enum):
 
 @dataclass(frozen=True)
 class WeakPoints:
-    """How many points lie on a switch of the contact law, over all ranks.
+    """How many points lie on a switch of the contact law as far as the state can tell, over all ranks.
 
     Attributes:
         contacts: Points with neither force nor gap.
         discs: Friction discs at their bound without slip.
         edges: Closed points that project on an edge between facets; they count as inside the facet found.
-        choice: The branch that contacts and discs were given.
+        choice: The branch that contacts and discs were given. Those of a loose state that are clearly on one
+            side, only not beyond doubt, are taken there.
     """
 
     contacts: int
     discs: int
     edges: int
     choice: WeakChoice
+
+    @property
+    def count(self) -> int:
+        """All of them."""
+        return self.contacts + self.discs + self.edges
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether the branch of all of them together may be one that no design nearby has.
+
+        Where one weak contact closes, its friction may slip: it alone must not be held.
+        """
+        return self.count > 1 or (self.contacts > 0 and self.choice is WeakChoice.HELD)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,44 +97,94 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
             that of Tresca friction.
     """
     system, solution = state.dual, state.dual_solution
-    layout, comm = system.problem.layout, system.problem.comm
+    layout, bound = system.problem.layout, solution.slip_bound
     step = contact_step(layout, system.problem.diagonal)
     trial = solution.multiplier - step * solution.residual
-    scale = comm.allreduce(float(np.abs(solution.multiplier[layout.normal]).max(initial=0.0)), op=MPI.MAX)
-    slack, bound = WEAK_TOLERANCE * scale, solution.slip_bound
     coefficient = system.torn.friction_coefficient[system.owned_discs()]
     length = np.linalg.norm(trial[layout.tangential], axis=1)
-    contact = np.abs(trial[layout.normal]) <= slack
-    vanishing = contact[layout.friction_of] & (coefficient > 0)
-    disc = (bound > 0) & ~vanishing & (np.abs(length - bound) <= slack)
-    counts = comm.allreduce(np.array([np.count_nonzero(contact), np.count_nonzero(disc)]))
+    told, closest = _told_apart(system.problem, solution, step)
+    counted = _on_switch(layout, trial, bound, coefficient, told)
+    weak = _on_switch(layout, trial, bound, coefficient, closest)
 
     known = classify(layout, bound, solution.multiplier, solution.residual, step)
-    direction = _directions(known.direction, trial[layout.tangential], length, disc | vanishing)
-    held, at_rest = choice is WeakChoice.HELD, length <= slack
+    direction = _directions(known.direction, trial[layout.tangential], length, weak.disc | weak.vanishing)
+    held, at_rest = choice is WeakChoice.HELD, length <= closest[layout.tangential[:, 0]]
     face = replace(
         known,
-        closed=np.where(contact, held, known.closed),
-        stick=np.where(vanishing, held & at_rest, np.where(disc, held, known.stick)),
-        slip=~vanishing & np.where(disc, not held, known.slip),
+        closed=np.where(weak.contact, held, known.closed),
+        stick=np.where(weak.vanishing, held & at_rest, np.where(weak.disc, held, known.stick)),
+        slip=~weak.vanishing & np.where(weak.disc, not held, known.slip),
         direction=direction,
-        overshoot=np.where(disc, 1.0, known.overshoot),
+        overshoot=np.where(weak.disc, 1.0, known.overshoot),
     )
-    starting = vanishing & held & ~at_rest
+    starting = weak.vanishing & held & ~at_rest
     tested = face.restriction
     moving = tested + _growth(face, starting, coefficient) if coupling else tested
     slip_direction = np.where(face.slip[:, None], direction, 0.0)
-    weak = WeakPoints(int(counts[0]), int(counts[1]), _points_on_edges(state), choice)
-    return LinearisedFace(face, tested, moving.tocsr(), slip_direction, weak)
+    contacts, discs = system.problem.comm.allreduce(counted.counts)
+    points = WeakPoints(int(contacts), int(discs), _points_on_edges(state), choice)
+    return LinearisedFace(face, tested, moving.tocsr(), slip_direction, points)
+
+
+@dataclass(frozen=True)
+class _OnSwitch:
+    """Marks of this rank's points that lie on a switch.
+
+    Attributes:
+        contact: Neither force nor gap, shape (n_contact,).
+        vanishing: Discs whose radius vanishes with the normal force of such a contact, shape (n_friction,).
+        disc: Other discs at their bound without slip, shape (n_friction,).
+    """
+
+    contact: np.ndarray
+    vanishing: np.ndarray
+    disc: np.ndarray
+
+    @property
+    def counts(self) -> np.ndarray:
+        """Number of contacts and of discs."""
+        return np.array([np.count_nonzero(self.contact), np.count_nonzero(self.disc)])
+
+
+def _on_switch(
+    layout: ContactLayout, trial: np.ndarray, bound: np.ndarray, coefficient: np.ndarray, slack: np.ndarray
+) -> _OnSwitch:
+    """Return which points are no further from a switch than their slack, [force]."""
+    contact = np.abs(trial[layout.normal]) <= slack[layout.normal]
+    vanishing = contact[layout.friction_of] & (coefficient > 0)
+    beyond = np.linalg.norm(trial[layout.tangential], axis=1) - bound
+    disc = (bound > 0) & ~vanishing & (np.abs(beyond) <= slack[layout.tangential[:, 0]])
+    return _OnSwitch(contact, vanishing, disc)
+
+
+def _told_apart(
+    problem: DualProblem, solution: DualSolution, step: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distance from a switch at which the sides can be told apart, owned, [force]. Collective.
+
+    That is what the residuals of the state can make of λ − ρ r, with ρ the ``step``: those of the contact
+    law are forces already, jumps between subdomains become forces as slips and gaps do.
+
+    Returns:
+        The distance, and that below which points of a loose state lean to neither side, shapes (size,).
+    """
+    residuals = solution.residuals
+    forces, jumps = residuals.natural * residuals.force_scale, residuals.gluing * residuals.gluing_scale
+    rounding = ROUNDING * max(problem.norm(solution.multiplier), problem.norm(step * problem.rhs))
+    told = np.asarray(UNCERTAINTY * (forces + step * jumps) + rounding)
+    return told, np.minimum(told, LEANING * residuals.force_scale + rounding)
 
 
 def _points_on_edges(state: State) -> int:
-    """Count the closed points over an edge of their master facet, where the normal field has a kink."""
+    """Count the closed points over an edge of their master facet, where the normal field has a kink.
+
+    Points of mortar contact stand for a mean over facets and lie on none.
+    """
     points = state.torn.points
     total = 0
     for index, pair in enumerate(state.scene.contacts):
         if isinstance(pair.master, Surface):
-            closed = (points.pair == index) & (state.contact.normal_force > 0)
+            closed = (points.pair == index) & (points.facet >= 0) & (state.contact.normal_force > 0)
             corners = state.scene.facets(pair.master).shape[1]
             distance = np.abs(edge_distance(points.local[closed], corners))
             total += int(np.count_nonzero(distance < EDGE_TOLERANCE))

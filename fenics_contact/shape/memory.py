@@ -28,7 +28,8 @@ class DesignPoint:
     Attributes:
         alpha: Design variables, shape (size,).
         value: Objective.
-        gradient: Clarke subgradient, shape (size,); the gradient where no point is weakly active.
+        gradient: The gradient where no point is weakly active, a Clarke subgradient where one is, what their
+            branch gives where several are, see `WeakChoice`, shape (size,).
         state: Equilibrium.
         weak: Weakly active points and the branch they were given.
         adjoint_iterations: F-products of the adjoint.

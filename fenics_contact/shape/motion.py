@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import ufl
-from mpi4py import MPI
-from petsc4py import PETSc
 
 from fenics_contact import _dolfinx
+from fenics_contact._libraries import MPI, PETSc, check_not_forked
 from fenics_contact.contact.fields import body_mesh
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import Decomposition
 from fenics_contact.feti.forms import Template, volume_measure
 from fenics_contact.linalg import dispose_with
-from fenics_contact.scene import Body
+from fenics_contact.scene import Body, Scene, SurfaceLoad
+from fenics_contact.shape.design import SurfaceDesign
 
 
 class HarmonicExtension:
@@ -82,6 +84,7 @@ class HarmonicExtension:
 
     def extend(self, displacement: np.ndarray) -> np.ndarray:
         """Return the displacement of all nodes, shape (n_nodes, 3), given the moving ones'. Collective."""
+        check_not_forked()
         prescribed, right = self._laplacian.createVecs()
         solution = right.duplicate()
         result = np.zeros((len(self._rows), 3))
@@ -103,6 +106,7 @@ class HarmonicExtension:
         Args:
             gradient: Derivative by the displacement of every node, shape (n_nodes, 3), replicated.
         """
+        check_not_forked()
         right, image = self._laplacian.createVecs()
         adjoint = right.duplicate()
         result = np.zeros((len(self.moving), 3))
@@ -128,3 +132,32 @@ class HarmonicExtension:
         """Return all entries of a distributed vector on every rank."""
         comm = vector.getComm().tompi4py()
         return np.concatenate(comm.allgather(vector.array_r))
+
+
+def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign) -> HarmonicExtension:
+    """Return what moves the mesh of a body with its design. Collective.
+
+    Raises:
+        InvalidInputError: If the scene has no such body, or a surface moves that is held or loaded.
+    """
+    name = design.body
+    if name not in scene.bodies:
+        raise InvalidInputError(
+            f"a design names body {name!r}, the scene has {sorted(scene.bodies)}: use one of them"
+        )
+    body = scene.bodies[name]
+    surfaces = {part.surface for part in scene.supports if part.body == name}
+    surfaces |= {load.surface for load in scene.loads if load.body == name and isinstance(load, SurfaceLoad)}
+    held = [body.mesh.surfaces[surface].ravel() for surface in sorted(surfaces)]
+    held.append(design.nodes_beyond_transition(body.mesh))
+    return HarmonicExtension(decomposition, name, body, design.surface.nodes, np.unique(np.concatenate(held)))
+
+
+def moving_nodes(
+    scene: Scene, designs: Sequence[SurfaceDesign], motions: Sequence[HarmonicExtension]
+) -> dict[str, np.ndarray]:
+    """Return which nodes of each body its designs move, body name -> marks, shape (n_nodes,)."""
+    moving = {name: np.zeros(body.mesh.n_nodes, dtype=bool) for name, body in scene.bodies.items()}
+    for design, motion in zip(designs, motions, strict=True):
+        moving[design.body][np.setdiff1d(np.arange(len(moving[design.body])), motion.held)] = True
+    return moving

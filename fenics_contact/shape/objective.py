@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
@@ -10,8 +11,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from fenics_contact import _dolfinx
+from fenics_contact._libraries import MPI
 from fenics_contact.contact import ContactResult, State
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, calling, collective, together
 from fenics_contact.feti.composition import possible
 from fenics_contact.feti.subdomain import Subdomain
 from fenics_contact.feti.temperature import temperature_of
@@ -55,6 +57,11 @@ class Objective(Protocol):
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
         """Evaluate J and its partial derivatives. Collective."""
+
+
+def asking(comm: MPI.Comm) -> AbstractContextManager[None]:
+    """Guard a block in which an objective is asked, which may be a user's own. Collective on ``comm``."""
+    return collective(comm, "the objective", closed=True, users=True)
 
 
 @dataclass(frozen=True)
@@ -176,23 +183,35 @@ class ContactForces:
     function: ForceFunction
 
     def value(self, state: State, forms: ShapeForms) -> float:
-        """Return φ."""
-        return float(self.function(state.contact)[0])
+        """Return φ. Collective."""
+        with together(state.torn.decomposition.comm):
+            return _finite(self._asked(state)[0])[0]
 
-    def partials(self, state: State, forms: ShapeForms) -> Partials:
-        """Place the user's derivatives on the contact rows.
+    def _asked(self, state: State) -> tuple[float, np.ndarray, np.ndarray]:
+        with calling("ContactForces.function"):
+            value, normal, tangential = self.function(state.contact)
+            return float(value), np.asarray(normal), np.asarray(tangential)
+
+    def _differentiated(self, state: State) -> tuple[float, np.ndarray, np.ndarray]:
+        """Return what the user's function does, once it was checked.
 
         Raises:
-            InvalidInputError: If the function returns derivatives of another shape.
+            InvalidInputError: If that is something else than finite numbers of the right shapes.
         """
-        system, torn = state.dual, state.torn
-        value, normal, tangential = self.function(state.contact)
-        count = torn.points.count
-        if normal.shape != (count,) or tangential.shape != (count, 2):
+        count, width = state.torn.points.count, state.torn.dim - 1
+        value, normal, tangential = self._asked(state)
+        if normal.shape != (count,) or tangential.shape != (count, width):
             raise InvalidInputError(
-                f"ContactForces.function must return derivatives of shapes ({count},) and ({count}, 2), got "
-                f"{normal.shape} and {tangential.shape}: one row for each contact point"
+                f"ContactForces.function must return derivatives of shapes ({count},) and ({count}, "
+                f"{width}), got {normal.shape} and {tangential.shape}: one row for each contact point"
             )
+        return _finite(value, normal, tangential)
+
+    def partials(self, state: State, forms: ShapeForms) -> Partials:
+        """Place the user's derivatives on the contact rows; raises as the function's call does."""
+        system, torn = state.dual, state.torn
+        with together(torn.decomposition.comm):
+            value, normal, tangential = self._differentiated(state)
         by_multiplier = np.zeros(len(torn.numbering.owned))
         for rows, values in (
             (torn.normal_rows, normal),
@@ -202,3 +221,13 @@ class ContactForces:
             by_multiplier[position[position >= 0]] = values[position >= 0]
         by_shape = np.zeros((int(torn.decomposition.tearing.node_offset[-1]), torn.scene.dim))
         return Partials(float(value), np.zeros(len(state.torn_displacement)), by_multiplier, by_shape)
+
+
+def _finite(value: float, *derivatives: np.ndarray) -> tuple[Any, ...]:
+    """Return what a function of contact forces has returned, refuse what is not finite."""
+    if not (np.isfinite(value) and all(np.isfinite(numbers).all() for numbers in derivatives)):
+        raise InvalidInputError(
+            "ContactForces.function must return finite numbers, got NaN or infinity: check divisions by "
+            "forces that may be zero"
+        )
+    return value, *derivatives

@@ -8,45 +8,58 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
-from fenics_contact.checkpoint import described
+from fenics_contact._libraries import MPI
 from fenics_contact.contact import State, find_state
-from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidDesignError, InvalidInputError
+from fenics_contact.errors import (
+    ConvergenceError,
+    InfeasibleError,
+    InvalidDesignError,
+    InvalidInputError,
+    collectively,
+    tell,
+)
 from fenics_contact.feti import decompose
+from fenics_contact.fingerprint import described
 from fenics_contact.qp import DualSolver, FaceNewton
-from fenics_contact.scene import Scene, SurfaceLoad
+from fenics_contact.scene import Scene
 from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
+from fenics_contact.shape.beside import with_fewest_weak_points
 from fenics_contact.shape.contact_derivative import bound_sensitivity, contact_by_shape
-from fenics_contact.shape.design import SurfaceDesign
+from fenics_contact.shape.design import SurfaceDesign, checked_variables
 from fenics_contact.shape.forms import ShapeForms, work_by_shape
 from fenics_contact.shape.linearised_face import WeakChoice, linearise_face
 from fenics_contact.shape.memory import DesignMemory, DesignPoint
-from fenics_contact.shape.motion import HarmonicExtension
-from fenics_contact.shape.objective import Objective
+from fenics_contact.shape.motion import motion_of, moving_nodes
+from fenics_contact.shape.objective import Objective, asking
 from fenics_contact.shape.pairs import check_pairs
 from fenics_contact.shape.state_error import state_error
 from fenics_contact.shape.tolerance import AdaptiveTolerance
 from fenics_contact.shape.volume import volume_by_points
 from fenics_contact.timing import PhaseTimer
 
-#: Tolerance of the adjoint relative to that of the state, and the smallest one asked for: the subgradient may
-#: not be worse than the state it is taken at, down to what rounding allows.
+#: Tolerance of the adjoint relative to that of the state, and the least: no worse than the state it is of.
 ADJOINT_SHARE, ADJOINT_FLOOR = 1e-1, 1e-11
 
 logger = logging.getLogger(__name__)
 
 
-class ShapeProblem:
-    """J(α) with a Clarke subgradient, for one or more moving surfaces of a scene.
+def _comm(problem: ShapeProblem, *_: Any, **__: Any) -> MPI.Comm:
+    return problem.comm
 
-    Call it with α to get (J, subgradient): one state, one adjoint, whatever the number of variables.
-    Topology, partition and compiled forms are kept; each state starts from the one before.
+
+class ShapeProblem:
+    """J(α) with a subgradient, for one or more moving surfaces of a scene.
+
+    Call it with α to get (J, subgradient): one state, one adjoint, whatever the number of variables. Where no
+    contact point is weakly active that is the gradient, where one is, a Clarke subgradient. Where several are
+    it may be none (`WeakChoice`): such designs are `doubtful`, `beside` finds a gradient nearby. Topology,
+    partition and compiled forms are kept; each state starts from the one before.
 
     Attributes:
         designs: The moving surfaces; α is their variables one after the other.
         products: F-products of states and adjoints so far.
-        evaluations: Number of designs evaluated.
+        evaluations: Number of designs evaluated, without those beside others.
 
     Example:
         >>> designs = SurfaceDesign("link1", links.first.crown, net=(7, 4))  # doctest: +SKIP
@@ -101,8 +114,9 @@ class ShapeProblem:
         with self._timer.phase("decompose"):
             self.decomposition = decompose(scene, partitions, comm)
         with self._timer.phase("mesh motion"):
-            self._motions = [self._motion(design) for design in self.designs]
-        check_pairs(scene, self._moving_nodes())
+            self._motions = [motion_of(self.decomposition, scene, design) for design in self.designs]
+        self._moving = moving_nodes(scene, self.designs, self._motions)
+        check_pairs(scene, self._moving)
 
     @property
     def size(self) -> int:
@@ -159,7 +173,7 @@ class ShapeProblem:
         return self._timer.seconds
 
     def __call__(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return J(α) and a Clarke subgradient. Collective.
+        """Return J(α) and a subgradient, see the class. Collective.
 
         Raises:
             InvalidDesignError: If the design inverts a cell.
@@ -179,16 +193,10 @@ class ShapeProblem:
         Raises:
             InvalidInputError: If alpha has another shape or is not finite.
         """
-        alpha = np.asarray(alpha, dtype=float)
-        if alpha.shape != (self.size,):
-            raise InvalidInputError(
-                f"alpha must have shape ({self.size},), got {alpha.shape}: one number a control point"
-            )
-        if not np.isfinite(alpha).all():
-            first = int(np.flatnonzero(~np.isfinite(alpha))[0])
-            raise InvalidInputError(f"alpha must be finite, got {alpha[first]} in entry {first}")
+        alpha = checked_variables(alpha, self.size, self.comm)
         points: dict[str, np.ndarray] = {}
-        for design, motion, part in zip(self.designs, self._motions, self._split(alpha), strict=True):
+        parts = np.split(alpha, np.cumsum([design.size for design in self.designs])[:-1])
+        for design, motion, part in zip(self.designs, self._motions, parts, strict=True):
             start = points.get(design.body, self.scene.bodies[design.body].mesh.points)
             points[design.body] = start + motion.extend(design.displacement(part))
         return points
@@ -205,6 +213,7 @@ class ShapeProblem:
         except InvalidInputError as error:
             raise InvalidDesignError(f"the design cannot be meshed: {error}") from error
 
+    @collectively("ShapeProblem.state_of", _comm)
     def state_of(self, alpha: np.ndarray) -> State:
         """Return the equilibrium of a design, started from the one before. Collective.
 
@@ -213,11 +222,14 @@ class ShapeProblem:
         """
         return self._solved(alpha, self._tightest)
 
+    @collectively("ShapeProblem.value_of", _comm)
     def value_of(self, alpha: np.ndarray) -> float:
         """Return J(α) alone, without adjoint. Collective."""
         state = self.state_of(alpha)
-        return self.objective.value(state, self._shape_forms(state))
+        with asking(self.comm):
+            return self.objective.value(state, self._shape_forms(state))
 
+    @collectively("ShapeProblem.evaluate", _comm)
     def evaluate(self, alpha: np.ndarray) -> DesignPoint:
         """Solve the state and its adjoint and return value and subgradient. Collective.
 
@@ -236,6 +248,7 @@ class ShapeProblem:
         """Whether an optimiser may ask for less accuracy, see `within`."""
         return self._adaptive is not None
 
+    @collectively("ShapeProblem.within", _comm)
     def within(self, alpha: np.ndarray, value: float, subgradient: float) -> tuple[float, np.ndarray, float]:
         """Return J(α), a subgradient and the estimated error of J, no more accurate than asked. Collective.
 
@@ -261,6 +274,31 @@ class ShapeProblem:
         self._memory.judged(point)
         return point.value, point.gradient, point.error
 
+    @collectively("ShapeProblem.doubtful", _comm)
+    def doubtful(self, alpha: np.ndarray) -> bool:
+        """Tell whether what was returned last, at α, may be no subgradient. Collective."""
+        known = self._memory.of_design(alpha)
+        return known is not None and known.weak.doubtful
+
+    @collectively("ShapeProblem.beside", _comm)
+    def beside(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """Return the gradient of a design between two, as near to α as fewest points are weak. Collective.
+
+        Args:
+            alpha: Design variables, shape (size,), [length].
+            end: A design nearby in a direction that nothing singles out, shape (size,), [length].
+
+        Raises:
+            InvalidDesignError: If no design between them has an equilibrium.
+        """
+        known = self._memory.of_design(alpha)
+        tolerance = known.tolerance if known else self._tightest
+
+        def judged(near: np.ndarray) -> DesignPoint:
+            return self._point_at(near, self._solved(near, tolerance), tolerance, None)
+
+        return with_fewest_weak_points(alpha, end, judged).gradient
+
     def _solved(self, alpha: np.ndarray, tolerance: float, known: DesignPoint | None = None) -> State:
         """Find an equilibrium, from a less accurate one of the same design where it is known. Collective."""
         previous = self._memory.state if known is None else known.state
@@ -277,7 +315,7 @@ class ShapeProblem:
         except ConvergenceError as error:
             if previous is None:
                 raise
-            logger.warning("a warm start led nowhere, a cold one follows: %s", error)
+            tell(logger.warning, "a warm start led nowhere, a cold one follows: %s", error)
             state = self._solved_cold(find)
         self._memory.passed(alpha, state)
         return state
@@ -294,7 +332,7 @@ class ShapeProblem:
         """Return objective, subgradient and their errors at a state. Collective."""
         before = state.dual.products
         forms = self._shape_forms(state)
-        with self._timer.phase("objective"):
+        with self._timer.phase("objective"), asking(self.comm):
             partials = self.objective.partials(state, forms)
         with self._timer.phase("adjoint"):
             linearised = linearise_face(state, self.choice)
@@ -312,7 +350,7 @@ class ShapeProblem:
         value = partials.value + (error.correction if self.inexact else 0.0)
         # Ranks must take the same decisions: rounding in sums over ranks may not tell them apart.
         value, gradient, error = self.comm.bcast((value, gradient, error))
-        logger.info("J = %.9g ± %.1e, %d products", value, error.size, state.dual.products)
+        tell(logger.info, "J = %.9g ± %.1e, %d products", value, error.size, state.dual.products)
         return DesignPoint(
             alpha=np.array(alpha, dtype=float),
             value=value,
@@ -326,6 +364,7 @@ class ShapeProblem:
             adjoint_multiplier=adjoint.multiplier,
         )
 
+    @collectively("ShapeProblem.volume", _comm)
     def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the volume of the designed bodies and its gradient, [length³]. Collective."""
         scene = self.scene_of(alpha)
@@ -355,34 +394,7 @@ class ShapeProblem:
             parts.append(design.pull_back(motion.pull_back(by_points[nodes])))
         return np.concatenate(parts)
 
-    def _split(self, alpha: np.ndarray) -> list[np.ndarray]:
-        return np.split(alpha, np.cumsum([design.size for design in self.designs])[:-1])
-
     def _shape_forms(self, state: State) -> ShapeForms:
         if self._forms is None:
-            self._forms = ShapeForms(state.torn, np.concatenate(list(self._moving_nodes().values())))
+            self._forms = ShapeForms(state.torn, np.concatenate(list(self._moving.values())))
         return self._forms
-
-    def _moving_nodes(self) -> dict[str, np.ndarray]:
-        """Return which nodes of each body the designs move, body name -> marks, shape (n_nodes,)."""
-        moving = {name: np.zeros(body.mesh.n_nodes, dtype=bool) for name, body in self.scene.bodies.items()}
-        for design, motion in zip(self.designs, self._motions, strict=True):
-            moving[design.body][np.setdiff1d(np.arange(len(moving[design.body])), motion.held)] = True
-        return moving
-
-    def _motion(self, design: SurfaceDesign) -> HarmonicExtension:
-        scene, name = self.scene, design.body
-        if name not in scene.bodies:
-            raise InvalidInputError(
-                f"a design names body {name!r}, the scene has {sorted(scene.bodies)}: use one of them"
-            )
-        body = scene.bodies[name]
-        surfaces = {part.surface for part in scene.supports if part.body == name}
-        surfaces |= {
-            load.surface for load in scene.loads if load.body == name and isinstance(load, SurfaceLoad)
-        }
-        held = [body.mesh.surfaces[surface].ravel() for surface in sorted(surfaces)]
-        held.append(design.nodes_beyond_transition(body.mesh))
-        return HarmonicExtension(
-            self.decomposition, name, body, design.surface.nodes, np.unique(np.concatenate(held))
-        )

@@ -21,15 +21,19 @@ class PointDerivatives:
         normal: By the normal, shape (n, 3).
         tangents: By the tangents, shape (n, 2, 3).
         weight: By the weights of the facet's corners, shape (n, corners).
+        axes: Axes that the first tangents lean to, shape (n, 3); `reference_axes` by default.
     """
 
     gap: np.ndarray
     normal: np.ndarray
     tangents: np.ndarray
     weight: np.ndarray
+    axes: np.ndarray | None = None
 
 
-def frames_pulled_back(normal: np.ndarray, by_tangents: np.ndarray) -> np.ndarray:
+def frames_pulled_back(
+    normal: np.ndarray, by_tangents: np.ndarray, axes: np.ndarray | None = None
+) -> np.ndarray:
     """Return the derivative by the unit normals from that by the tangents built on them, shape (n, 3).
 
     Reverse of `fenics_contact.feti.contact_points.tangent_frames`.
@@ -37,8 +41,9 @@ def frames_pulled_back(normal: np.ndarray, by_tangents: np.ndarray) -> np.ndarra
     Args:
         normal: Unit normals, shape (n, 3).
         by_tangents: Derivative by both tangents, shape (n, 2, 3).
+        axes: Axes that the first tangents lean to, shape (n, 3); `reference_axes` by default.
     """
-    axes = reference_axes(normal)
+    axes = reference_axes(normal) if axes is None else axes
     along = np.einsum("nd,nd->n", axes, normal)
     first = axes - along[:, None] * normal
     length = np.linalg.norm(first, axis=1)
@@ -73,7 +78,7 @@ def projection_pulled_back(
     corners, normals = master.points[nodes], master.normals[nodes]
     values, derivatives = shape_functions(local, master.corners)
     normal, length = interpolated_normal(values, normals)
-    by_normal = by.normal + frames_pulled_back(normal, by.tangents)
+    by_normal = by.normal + frames_pulled_back(normal, by.tangents, by.axes)
     by_mean = _tangential(by_normal, normal) / length[:, None]
     by_local = np.einsum("nk,nka->na", by.weight, derivatives)
     by_local += np.einsum("nka,nkd,nd->na", derivatives, normals, by_mean)

@@ -8,6 +8,7 @@ import numpy as np
 
 from fenics_contact.contact import State
 from fenics_contact.qp import ContactLayout, FeasibleSet, contact_step
+from fenics_contact.qp.face import STEEP
 from fenics_contact.shape.adjoint import Adjoint
 from fenics_contact.shape.linearised_face import LinearisedFace
 from fenics_contact.shape.objective import Partials
@@ -27,21 +28,26 @@ class StateError:
 
     @property
     def size(self) -> float:
-        """How far off the corrected value may be, a safe estimate: what is left is of second order."""
-        return max(abs(self.correction), self.spread)
+        """How far off the corrected value may be: what is left is of second order, this is of first.
+
+        A safe estimate and no bound: a state so loose that it lies on another face can be further off.
+        """
+        return abs(self.correction) + self.spread
 
 
 def state_error(state: State, partials: Partials, linearised: LinearisedFace, adjoint: Adjoint) -> StateError:
     r"""Return what the residuals of a state change in the objective. Collective; no product.
 
-    The state satisfies K u = f − Bᵀλ to rounding. What it misses is r = −(B u − c) along the tested
-    directions of the face, and n = λ − P_Λ(λ − ρ r) off the face, where the law prescribes the multiplier.
-    One step of Newton's method on the face would remove both; along it the objective changes by
+    The state is u = K⁺(f − Bᵀλ) + R α. What it misses is r = −(B u − c) along the tested directions of the
+    face, to which a slipping disc adds κ s, with the part s of its force across the slip: there the law wants
+    r + κ s = 0 (`Face.curvature`); the balance G λ − e of the bodies; and n = λ − P_Λ(λ − ρ r) off the face,
+    where the law prescribes the multiplier. One step of Newton's method on the face would remove all of it;
+    along it the objective changes by
 
-        δJ = ζᵀ r − (∂J/∂λ − B w)ᵀ n_off,
+        δJ = ζᵀ r + zᵀ κ s − βᵀ(G λ − e) − (∂J/∂λ − B w)ᵀ n_off,
 
-    with the adjoint w, ζ. The value J + δJ is wrong to second order only, as long as the face is the right
-    one.
+    with the adjoint w, ζ = Z_s z and β. The value J + δJ is wrong to second order only, as long as the face
+    is the right one.
 
     Args:
         state: An inexact state.
@@ -58,20 +64,31 @@ def state_error(state: State, partials: Partials, linearised: LinearisedFace, ad
     trial = solution.multiplier - contact_step(layout, problem.diagonal) * solution.residual
     miss = solution.multiplier - FeasibleSet(layout, solution.slip_bound).project(trial)
     slope = partials.by_multiplier - system.jump(adjoint.displacement)
-    shares = adjoint.multiplier * solution.residual - slope * _off_face(miss, linearised, layout)
+    tested = solution.residual + _bent(linearised, solution.multiplier)
+    shares = adjoint.multiplier * tested - slope * _off_face(miss, linearised, layout)
     discs = shares[layout.tangential].sum(axis=1)
     single = np.concatenate([shares[layout.equality], shares[layout.normal], discs])
     total, squares = problem.comm.allreduce(np.array([single.sum(), single @ single]))
-    return StateError(float(total), float(np.sqrt(squares)))
+    unbalanced = adjoint.motions * problem.coarse.residual(solution.multiplier)
+    return StateError(float(total - unbalanced.sum()), float(np.sqrt(squares + unbalanced @ unbalanced)))
+
+
+def _bent(linearised: LinearisedFace, multiplier: np.ndarray) -> np.ndarray:
+    """Return κ s across the slip of slipping discs, zero in all other rows, owned."""
+    across = linearised.face.curvature * linearised.face.restrict(multiplier)
+    return np.asarray(linearised.face.prolong(across))
 
 
 def _off_face(miss: np.ndarray, linearised: LinearisedFace, layout: ContactLayout) -> np.ndarray:
-    """Return n where contacts are open, discs are pinned, and along the force of slipping discs, owned."""
+    """Return n where contacts are open, discs are pinned, and along the force of slipping discs, owned.
+
+    Of discs that slip too far to turn within a step, the face prescribes the force across, too.
+    """
     face, direction = linearised.face, linearised.slip_direction
     off = np.zeros_like(miss)
     off[layout.normal] = np.where(face.closed, 0.0, miss[layout.normal])
     tangential = miss[layout.tangential]
     along = np.einsum("ia,ia->i", tangential, direction)[:, None] * direction
-    slipping = np.where(face.slip[:, None], along, tangential)
+    slipping = np.where((face.slip & (face.overshoot <= STEEP))[:, None], along, tangential)
     off[layout.tangential] = np.where(face.stick[:, None], 0.0, slipping)
     return off

@@ -17,9 +17,11 @@ def normals_pulled_back(surface: FacetedSurface, by_normals: np.ndarray) -> np.n
     products = corner_products(surface.points, surface.facets)
     summed = np.zeros_like(surface.points)
     np.add.at(summed, surface.facets, products)
+    summed[surface.mirrored] = 0.0
     length = np.linalg.norm(summed, axis=1)
     along = np.einsum("nd,nd->n", surface.normals, by_normals)
     by_summed = (by_normals - along[:, None] * surface.normals) / length[:, None]
+    by_summed[surface.mirrored] = 0.0
     return _products_pulled_back(surface, by_summed[surface.facets])
 
 

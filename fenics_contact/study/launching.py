@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -15,15 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fenics_contact.errors import MissingRequirementError
+from fenics_contact.launching import clean_environment, last_words, launcher
 from fenics_contact.study.parameters import Parameters
 
 #: The program of a run: the communicator is for a program to choose, not for the package.
 PROGRAM = "from mpi4py import MPI; from fenics_contact.study.worker import main; main(MPI.COMM_WORLD)"
-#: MPI leaves such names in the environment of a process; ranks that find them take themselves for its parts.
-MPI_TRACES = ("OMPI_COMM_", "OMPI_UNIVERSE_", "ORTE_", "PMI_", "PMIX_", "OPAL_")
-#: How much of a failed run's output is kept, characters.
-KEPT = 2000
 
 Record = dict[str, Any]
 
@@ -57,30 +52,12 @@ def measure(task: Task) -> Record:
         file = Path(folder) / "record.json"
         what = {"scene": task.scene, "parameters": task.parameters.as_dict()}
         words = json.dumps({**what, "file": str(file), "verify": task.verify})
-        status, output = _run([*launcher(task.ranks), sys.executable, "-c", PROGRAM, words], task.limit)
+        command = [*launcher(task.ranks), sys.executable, "-c", PROGRAM, words]
+        status, output = _run(command, task.limit)
         record = _read(file)
     if record is None:
-        record = {"failed": _failure(status, output, task.limit)}
+        record = {"failed": _failure(command, status, output, task.limit)}
     return {**record, "load_average": load}
-
-
-def launcher(ranks: int) -> list[str]:
-    """Return how a program is started on so many ranks.
-
-    Raises:
-        MissingRequirementError: If there is no mpirun for several ranks.
-    """
-    if ranks == 1:
-        return []
-    beside = [Path(prefix) / "bin" / "mpirun" for prefix in (sys.prefix, sys.base_prefix)]
-    found = [str(path) for path in beside if os.access(path, os.X_OK)] or [shutil.which("mpirun") or ""]
-    if not found[0]:
-        raise MissingRequirementError(
-            f"a study on {ranks} ranks needs mpirun, found none beside Python or on PATH: install the MPI of "
-            "mpi4py, or study on one rank",
-            name="mpirun",
-        )
-    return [found[0], "-n", str(ranks)]
 
 
 def _run(command: list[str], limit: float) -> tuple[int | None, str]:
@@ -112,7 +89,7 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 def _environment(given: Mapping[str, str]) -> dict[str, str]:
     """Return the environment of a run: no traces of MPI, one thread a rank, this very package."""
-    kept = {name: value for name, value in given.items() if not name.startswith(MPI_TRACES)}
+    kept = clean_environment(given)
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
         kept.setdefault(name, "1")  # ranks, not threads, share the cores
     package = str(Path(__file__).resolve().parents[2])
@@ -127,8 +104,7 @@ def _read(file: Path) -> Record | None:
     return record if isinstance(record, dict) else None
 
 
-def _failure(status: int | None, output: str, limit: float) -> dict[str, str]:
+def _failure(command: list[str], status: int | None, output: str, limit: float) -> dict[str, str]:
     if status is None:
         return {"kind": "timeout", "message": f"it did not end within {limit:g} s and was ended"}
-    words = output.strip()[-KEPT:]
-    return {"kind": "crash", "message": f"it ended with exit status {status}: {words}"}
+    return {"kind": "crash", "message": f"it ended with exit status {status}: {last_words(command, output)}"}

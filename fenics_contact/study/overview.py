@@ -34,10 +34,10 @@ line. The last panel shows the estimate that every state carries of its own erro
 is compared with theory where there is one, else with the limit of the meshes (Richardson's extrapolation of
 the three finest), and where they do not converge monotonically with the finest of them.
 
-**`parts.png`**: what the error consists of: mesh (an estimate), solver (a certificate, never below the true
-error, which is marked by crosses), and law of friction. Left, at the balanced tolerance, the solver's part
-must stay below a tenth of that of the mesh; right it is seen how a tolerance changes the solver's part
-alone.
+**`parts.png`**: what the error consists of: mesh (an estimate), solver (a certificate; with Coulomb's law
+for the slip bounds of the state; true errors are marked by crosses), and law of friction (an estimate).
+Left, at the balanced tolerance, the solver's part must stay below a tenth of that of the mesh; right it is
+seen how a tolerance changes the solver's part alone.
 
 **`phases.png`**: where the time goes.
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene import LoadStep, Scene

@@ -11,8 +11,9 @@ from time import perf_counter
 from typing import Any, TextIO
 
 from fenics_contact.io import versions
+from fenics_contact.launching import launcher
 from fenics_contact.progress import shown
-from fenics_contact.study.launching import Record, Task, launcher, measure
+from fenics_contact.study.launching import Record, Task, measure
 from fenics_contact.study.parameters import Parameters, Sweep
 from fenics_contact.study.progress import Progress, described
 from fenics_contact.study.protocol import StudyScene

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI
 from fenics_contact.contact import FixedPoint, State, solve_scene, solve_steps
 from fenics_contact.geometry import BodyMesh, default_partition
 from fenics_contact.qp import FaceNewton

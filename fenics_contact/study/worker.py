@@ -10,8 +10,8 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI
 from fenics_contact.contact import State, Status
 from fenics_contact.errors import FenicsContactError
 from fenics_contact.io import write_json

@@ -21,7 +21,7 @@ from fenics_contact.viz.profile import Profile, profiles
 from fenics_contact.viz.sheet import sheet
 from fenics_contact.viz.trace import contact_trace
 from fenics_contact.viz.units import Units
-from fenics_contact.viz.words import checked_range, checked_reach, headline, written
+from fenics_contact.viz.words import change, checked_range, checked_reach, headline, written
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def plot_before_after(
     peaks = [float(contact.pressure[contact.on_pair(pair)].max(initial=0.0)) for contact in contacts]
     facts = f"largest pressure {written(peaks[0])} → {written(peaks[1])} {named.stress}"
     if isinstance(first, DesignPoint) and isinstance(best, DesignPoint):
-        facts = f"{label} {_fall(first.value, best.value)}; {facts}"
+        facts = f"{label} {change(first.value, best.value)}; {facts}"
     look = _Look(pair, given, reach, headline(title, facts), named, width)
     draw = _draw_in_plane if before.scene.dim == 2 else _draw_in_space
     comm = before.torn.decomposition.comm
@@ -107,13 +107,6 @@ def _check(first: State, best: State, pair: int) -> None:
         raise InvalidInputError(
             "a picture of before and after needs contact forces before, got none: draw with plot_stress"
         )
-
-
-def _fall(first: float, best: float) -> str:
-    words = f"{written(first, 6)} → {written(best, 6)}"
-    if first == 0:
-        return words
-    return words + f", {100 * abs((best - first) / first):.2f} % {'lower' if best <= first else 'higher'}"
 
 
 def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> None:

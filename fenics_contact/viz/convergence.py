@@ -13,7 +13,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import BLUE, GREY, ORANGE
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.sheet import sheet
-from fenics_contact.viz.words import headline, written
+from fenics_contact.viz.words import change, headline
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -88,16 +88,14 @@ def _checked(values: Sequence[float] | np.ndarray, kinds: Sequence[str]) -> tupl
 
 
 def _draw(
-    values: np.ndarray, kind: np.ndarray, paper: BinaryIO, words: tuple[str, str, str], width: int
+    values: np.ndarray, kind: np.ndarray, paper: BinaryIO, look: tuple[str, str, str], width: int
 ) -> None:
-    label, title, scale = words
+    label, title, scale = look
     number = np.arange(len(values))
     centre = np.isin(kind, ("start", "serious", "refined"))
     first, last = values[centre][0], values[centre][-1]
-    facts = f"{label} {written(first, 6)} → {written(last, 6)}"
-    if first != 0:
-        facts += f", {100 * abs((last - first) / first):.2f} % {'lower' if last <= first else 'higher'}"
-    with sheet(paper, (width, round(0.6 * width)), headline(title, facts), "constrained") as figure:
+    words = headline(title, f"{label} {change(first, last)}")
+    with sheet(paper, (width, round(0.6 * width)), words, "constrained") as figure:
         axes = figure.subplots()
         axes.plot(
             number[centre], values[centre], "-o", color=BLUE, lw=2, ms=8, label="start and serious steps"

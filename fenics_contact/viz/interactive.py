@@ -10,7 +10,7 @@ from matplotlib.colors import Normalize
 
 from fenics_contact.checkpoint import put_whole
 from fenics_contact.contact import State
-from fenics_contact.errors import InvalidInputError, MissingRequirementError, together
+from fenics_contact.errors import InvalidInputError, MissingRequirementError, tell, together
 from fenics_contact.viz.browser import InteractiveScene, captioned, exported, html_path, see_in_perspective
 from fenics_contact.viz.colours import PRESSURE_MAP
 from fenics_contact.viz.decomposition import plot_decomposition
@@ -86,7 +86,7 @@ def interactive(
     if target is not None:
         raise MissingRequirementError(f"scenes for a browser need {missing}: {remedy}", name="trame")
     if comm.rank == 0:
-        logger.info("the picture is static, turning it needs %s: %s", missing, remedy)
+        tell(logger.info, "the picture is static, turning it needs %s: %s", missing, remedy)
     return _static(subject, field, title)
 
 

@@ -22,6 +22,7 @@ from fenics_contact.viz.colours import (
     neighbours,
 )
 from fenics_contact.viz.fields import BodyFields
+from fenics_contact.viz.places import contact_places
 from fenics_contact.viz.stage import Layer, balls, segments, surface
 from fenics_contact.viz.stress import stress_range
 from fenics_contact.viz.symbols import symbols_of
@@ -132,8 +133,7 @@ def pressure_content(subject: Subject) -> Content:
 def status_content(subject: Subject) -> Content:
     """What contact points do, seen through the bodies, with arrows where they slip."""
     contact, layers, legend = subject.state.contact, _glass(subject), {}
-    names = subject.state.torn.decomposition.tearing.body_names
-    places = np.concatenate([subject.places(name) for name in names])[contact.points.slave]
+    places = contact_places(subject.state, {name: subject.places(name) for name in subject.bodies})
     dim = contact.points.normal.shape[1]
     side = float(contact.points.area.mean()) ** (1 / (dim - 1))
     for pair in subject.state.scene.contacts:
@@ -148,7 +148,7 @@ def status_content(subject: Subject) -> Content:
                 layers.append(Layer(balls(places[chosen], size), {"color": colour, **_LIGHT}))
                 legend[name] = colour
     slips = (contact.status == Status.SLIP) & rubs
-    slip = in_space(np.einsum("na,nad->nd", contact.slip, contact.points.tangents))
+    slip = in_space(contact.slip_in_space)
     longest = float(np.linalg.norm(slip[slips], axis=1).max(initial=0.0))
     if longest > 0:
         arrows = pv.PolyData(places[slips])

@@ -69,12 +69,12 @@ def contact_patch(state: State, pair: int, reach: float | None) -> ContactPatch:
     points = np.searchsorted(numbers, contact.points.slave[chosen])
     pressure = np.zeros(len(nodes))
     pressure[points] = contact.pressure[chosen]
-    slip = np.einsum("na,nad->nd", contact.slip[chosen], contact.points.tangents[chosen])
     places = view.project(mesh.points[nodes])
     window = _window(places, points, pressure[points], contact.points.area[chosen], reach)
     return ContactPatch(
         view, f"{slave.body}, {slave.name}", places, local.reshape(-1, facets.shape[1]), pressure, points,
-        contact.status[chosen], view.project(slip), force, state.scene.contacts[pair].has_friction, *window,
+        contact.status[chosen], view.project(contact.slip_in_space[chosen]), force,
+        state.scene.contacts[pair].has_friction, *window,
     )  # fmt: skip
 
 

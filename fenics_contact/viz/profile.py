@@ -10,7 +10,6 @@ from scipy.spatial import cKDTree
 from fenics_contact.contact import State
 from fenics_contact.geometry import boundary_faces
 from fenics_contact.viz.painting_in_plane import contact_window
-from fenics_contact.viz.places import contact_places
 from fenics_contact.viz.section import section_frame, section_views, strongest_contact
 from fenics_contact.viz.stage import surface
 from fenics_contact.viz.view import View, axis_label, oblique_view
@@ -93,7 +92,7 @@ def profiles(first: State, best: State, reach: float | None) -> list[Profile]:
     """
     points = {name: body.mesh.points for name, body in first.scene.bodies.items()}
     moves = {name: body.mesh.points - points[name] for name, body in best.scene.bodies.items()}
-    places = contact_places(first, points)
+    places = first.contact_places
     if first.scene.dim == 2:
         return [_plane_profile(first, points, moves, places, reach)]
     spot, everything = strongest_contact(first.contact, places), np.concatenate(list(points.values()))

@@ -76,8 +76,7 @@ def contact_trace(state: State, pair: int) -> ContactTrace:
     points = sorting[np.searchsorted(numbers, contact.points.slave[chosen], sorter=sorting)]
     shear = np.einsum("na,nad->nd", -contact.friction_force[chosen], contact.points.tangents[chosen])
     shear = np.einsum("nd,nd->n", shear, forward[points])
-    slip = np.einsum("na,nad->nd", contact.slip[chosen], contact.points.tangents[chosen])
-    slip = np.einsum("nd,nd->n", slip, forward[points])
+    slip = np.einsum("nd,nd->n", contact.slip_in_space[chosen], forward[points])
     values = np.zeros((3, len(order)))
     area = contact.points.area[chosen]
     values[:, points] = np.stack([contact.normal_force[chosen], shear, contact.slip_bound[chosen]]) / area

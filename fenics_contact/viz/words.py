@@ -49,6 +49,14 @@ def nice_number(value: float) -> float:
     return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= value * (1 + 1e-9)))
 
 
+def change(first: float, last: float) -> str:
+    """Return "first → last", and by how much lower or higher that is."""
+    words = f"{written(first, 6)} → {written(last, 6)}"
+    if first == 0:
+        return words
+    return words + f", {100 * abs((last - first) / first):.2f} % {'lower' if last <= first else 'higher'}"
+
+
 def headline(title: str, facts: str) -> str:
     """Return "title: facts", or the facts with a capital letter where there is no title."""
     return f"{title}: {facts}" if title else facts[:1].upper() + facts[1:]

@@ -9,8 +9,8 @@ from mpi4py import MPI
 
 from fenics_contact.accuracy import DiscretisationError, discretisation_error
 from fenics_contact.accuracy.recovery import recovered_gradients
-from fenics_contact.accuracy.sites import Sites, find_sites, nodal_displacement
-from fenics_contact.feti import TornSystem, build_torn_system, decompose
+from fenics_contact.accuracy.sites import Sites, find_sites
+from fenics_contact.feti import TornSystem, build_torn_system, decompose, nodal_mean
 from fenics_contact.geometry import BodyMesh, bisection_partition
 from fenics_contact.scene import Body, IsotropicElasticity, Material, PlaneStrain, Scene, Support
 
@@ -48,7 +48,8 @@ def recovered(scene: Scene, field: Field, parts: int = 1) -> tuple[Sites, np.nda
     """Sites and recovered gradients of a field that is taken at the nodes."""
     torn = torn_up(scene, parts)
     sites = find_sites(torn, next(iter(scene.bodies.values())).mesh.order)
-    return sites, recovered_gradients(sites, nodal_displacement(torn, torn_field(torn, field))[sites.node])
+    nodal = nodal_mean(torn.decomposition, torn_field(torn, field))
+    return sites, recovered_gradients(sites, nodal[sites.node])
 
 
 def norm(torn: TornSystem, displacement: np.ndarray) -> float:

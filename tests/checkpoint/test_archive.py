@@ -50,10 +50,11 @@ def test_the_arrays_of_a_load_history_have_the_names_that_are_described(tmp_path
     steps = sequence(Checkpoint(tmp_path / "run.npz"), MPI.COMM_SELF)
     for step in shears((0.0, 0.006)):
         steps.advance(step)
+    parts = ("step", "multiplier", "origin", "slid", "motion")
     with np.load(tmp_path / "run.npz") as members:
         assert set(members.files) == {
             *("_format", "_version", "_kind", "_fingerprint", "_digest", "steps"),
-            *(f"00000{k}.{part}" for k in (0, 1) for part in ("step", "multiplier", "origin", "motion")),
+            *(f"00000{k}.{part}" for k in (0, 1) for part in parts),
         }
         assert str(members["_kind"]) == "load history"
         assert members["000001.multiplier"].any()
@@ -106,10 +107,10 @@ def test_objects_that_run_code_are_refused(path: Path) -> None:
 
 
 def test_another_version_is_refused(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(archive, "VERSION", 2)
+    monkeypatch.setattr(archive, "VERSION", 3)
     write_archive(path, "test", PROBLEM, ARRAYS)
     monkeypatch.undo()
-    with pytest.raises(InvalidInputError, match=r"version 1 is needed, .* is of version 2: go on"):
+    with pytest.raises(InvalidInputError, match=r"version 2 is needed, .* is of version 3: go on"):
         read_archive(path, "test", PROBLEM)
 
 

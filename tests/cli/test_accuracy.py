@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -13,8 +12,9 @@ from pathlib import Path
 import pytest
 
 from fenics_contact.__main__ import main
+from fenics_contact.launching import clean_environment
 from fenics_contact.study import read_study, running
-from tests.conftest import MPI_TRACES, ROOT
+from tests.conftest import ROOT
 from tests.study.samples import BLOCK, Machine
 
 
@@ -25,7 +25,7 @@ from tests.study.samples import BLOCK, Machine
             ["accuracy", "hertzz"],
             r"a study is one of ['hertz', 'cattaneo_mindlin', 'chain_links'] or a Python",
         ),
-        (["accuracy", "nowhere.py"], "a study needs a file that exists, got 'nowhere.py'"),
+        (["accuracy", "nowhere.py"], "there must be a Python file with a study 'nowhere.py', there is none"),
         (["accuracy", "hertz", "--cells", "cube"], "cell must be one of ['hexahedron', "),
         (
             ["accuracy", "hertz", "--report", "--output", "/nowhere"],
@@ -90,11 +90,10 @@ def test_an_interrupt_from_the_keyboard_leaves_a_report_of_what_was_done(
 
 
 def start(*arguments: object) -> subprocess.Popen[str]:
-    environment = {name: value for name, value in os.environ.items() if not name.startswith(MPI_TRACES)}
     command = [sys.executable, "-m", "fenics_contact", "accuracy", *map(str, arguments)]
     return subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        env=environment | {"PYTHONPATH": str(ROOT)},
+        env=clean_environment() | {"PYTHONPATH": str(ROOT)},
     )  # fmt: skip
 
 

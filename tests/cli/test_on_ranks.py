@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -13,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from fenics_contact.cli import Ending
-from tests.conftest import LAUNCH, MPI_TRACES, ROOT, launch
+from tests.conftest import LAUNCH, ROOT, launch
 from tests.scene_file.texts import GOOD, changed
 
 #: Runs commands one after the other on all ranks and tells how each ended on each rank.
@@ -74,10 +73,9 @@ def test_the_program_ends_with_its_code_under_mpirun(tmp_path: Path) -> None:
 def test_a_run_that_is_terminated_goes_on(ranks: int, tmp_path: Path) -> None:
     scene = ROOT / "demos" / "scenes" / "sheared_block.toml"
     arguments = (scene, "-o", tmp_path, "--no-pictures", "--set", "steps.3.count=1")
-    environment = {name: value for name, value in os.environ.items() if not name.startswith(MPI_TRACES)}
     command = [str(LAUNCH), str(ranks), sys.executable, "-m", "fenics_contact", "run", *map(str, arguments)]
     stopped = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     while not (tmp_path / "history.pvd").exists() and stopped.poll() is None:
         time.sleep(0.05)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import tomllib
@@ -11,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import MPI_TRACES, ROOT
+from fenics_contact.launching import clean_environment
+from tests.conftest import ROOT
 
 
 def packages() -> list[str]:
@@ -30,11 +30,7 @@ def test_every_package_is_listed() -> None:
 
 @pytest.mark.slow
 def test_an_installed_command_finds_its_demos(tmp_path: Path) -> None:
-    environment = {
-        name: value
-        for name, value in os.environ.items()
-        if not name.startswith(MPI_TRACES) and name != "PYTHONPATH"
-    }
+    environment = {name: value for name, value in clean_environment().items() if name != "PYTHONPATH"}
 
     def run(*command: object, folder: Path = tmp_path) -> str:
         answer = subprocess.run(

@@ -27,14 +27,18 @@ from fenics_contact.scene import (
 )
 
 FLOOR = RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+WALL = RigidPlane((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 #: Pressed, sheared until much slips, let go, sheared the other way.
 PATH = (0.0, 0.006, 0.02, 0.008, 0.0, -0.02, -0.004)
 
 
 def sheared_block() -> Scene:
     mesh = block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (5, 3, 3))
-    pair = ContactPair(Surface("block", "z0"), FLOOR, Coulomb(0.3))
-    return Scene({"block": Body(mesh, IsotropicElasticity(1000.0, 0.3))}, contacts=[pair])
+    pairs = [
+        ContactPair(Surface("block", "z0"), FLOOR, Coulomb(0.3)),
+        ContactPair(Surface("block", "y0"), WALL),
+    ]
+    return Scene({"block": Body(mesh, IsotropicElasticity(1000.0, 0.3))}, contacts=pairs)
 
 
 def shears(path: tuple[float, ...] = PATH) -> list[LoadStep]:
@@ -45,7 +49,7 @@ def shears(path: tuple[float, ...] = PATH) -> list[LoadStep]:
 def sequence(checkpoint: Checkpoint | None, comm: MPI.Comm) -> LoadSequence:
     scene = sheared_block()
     cut = {"block": box_partition(scene.bodies["block"].mesh, (2, 1, 1))}
-    return LoadSequence(scene, cut, comm, solver=FaceNewton(tolerance=1e-7), checkpoint=checkpoint)
+    return LoadSequence(scene, cut, comm, solver=FaceNewton(tolerance=1e-8), checkpoint=checkpoint)
 
 
 def forces(state: State) -> np.ndarray:
@@ -60,6 +64,7 @@ def collect(path: Path, comm: MPI.Comm) -> dict[str, Any]:
         "ranks": comm.size,
         "forces": [forces(state).tolist() for state in states],
         "slip": [state.contact.total_slip.tolist() for state in states],
+        "last slip": [state.contact.slip.tolist() for state in states],
         "products": [state.solution.products for state in states],
     }
 

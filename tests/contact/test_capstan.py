@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status, solve_scene
+from fenics_contact.contact import State, Status, solve_scene, solve_steps
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.geometry import BodyMesh, block, box_partition, rectangle
 from fenics_contact.qp import FaceNewton
@@ -18,6 +18,7 @@ from fenics_contact.scene import (
     ContactPair,
     Coulomb,
     IsotropicElasticity,
+    LoadStep,
     PlaneStress,
     RigidPlane,
     RigidSphere,
@@ -148,6 +149,16 @@ def test_pushing_a_block_along_a_slope_takes_the_force_of_the_formula(
     angle = SLOPE + way * np.arctan(friction_coefficient)
     assert -state.contact.force[:, 0].sum() == pytest.approx(2.0 * np.tan(angle), rel=0.01)
     assert state.contact.force[:, 2].sum() == pytest.approx(2.0, rel=1e-6)
+
+
+def test_a_block_that_a_later_step_pushes_rubs_where_it_was_held_first() -> None:
+    """The nodes that are pushed move along the slope only then: before, supports held all that could slip."""
+    first, later = (on_slope(0.3, [Support("block", "x0", (push, None, None))]) for push in (0.0, 0.02))
+    steps = [LoadStep("held", supports=first.supports), LoadStep("pushed", supports=later.supports)]
+    cut = {name: box_partition(body.mesh, (2, 1, 1)) for name, body in first.bodies.items()}
+    *_, state = solve_steps(first, steps, cut, MPI.COMM_SELF, tolerance=1e-8)
+    pushed = 2.0 * np.tan(SLOPE + np.arctan(0.3))
+    assert -state.contact.force[:, 0].sum() == pytest.approx(pushed, rel=0.01)
 
 
 @pytest.mark.parametrize("friction_coefficient", [0.1, 0.3])

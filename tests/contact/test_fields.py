@@ -17,7 +17,7 @@ from fenics_contact.geometry import block
 def test_cell_values_come_in_the_order_of_the_body(cell: str) -> None:
     body = block((0, 0, 0), (1, 2, 3), (3, 2, 2), cell)
     mesh = _dolfinx.rank_mesh(MPI.COMM_SELF, body.points, body.cells, np.zeros(body.n_cells, int), cell)
-    function = _dolfinx.Function(_dolfinx.scalar_space(mesh, 0))
+    function = _dolfinx.fem.Function(_dolfinx.scalar_space(mesh, 0))
     x, y, z = function.function_space.tabulate_dof_coordinates().T
     function.x.array[:] = x + 10 * y + 100 * z
     middle = body.points[body.cells].mean(axis=1)
@@ -35,7 +35,7 @@ RANKS = """
     body = block((0, 0, 0), (1, 2, 3), (3, 2, 2))
     rank = np.ones(body.n_cells, dtype=int)
     mesh = _dolfinx.rank_mesh(comm, body.points, body.cells, rank, "hexahedron")
-    function = _dolfinx.Function(_dolfinx.scalar_space(mesh, 0))
+    function = _dolfinx.fem.Function(_dolfinx.scalar_space(mesh, 0))
     middle = body.points[body.cells].mean(axis=1) @ [1, 10, 100]
     x, y, z = function.function_space.tabulate_dof_coordinates().T
     function.x.array[:] = x + 10 * y + 100 * z

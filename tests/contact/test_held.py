@@ -12,13 +12,14 @@ from mpi4py import MPI
 from fenics_contact.contact import Status, check_held, solve_scene
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.feti import build_torn_system, decompose
-from fenics_contact.geometry import block
+from fenics_contact.geometry import block, graph_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,
     ContactPair,
     Coulomb,
     IsotropicElasticity,
+    RigidPlane,
     Scene,
     Support,
     Surface,
@@ -35,6 +36,7 @@ from tests.contact.gallery import (
     stack,
     two_blocks,
 )
+from tests.hard.transform import in_units
 
 DOWN, ALONG = -4.0, 2.0  # the load of the block on the plane, with its push of 1
 NUMBERS = r"\(([^)]*)\)"
@@ -97,6 +99,17 @@ def test_the_limit_of_friction_is_sharp(friction: Coulomb | Tresca, part: float)
         check(scene)
     else:
         assert refused(scene)[0] == "block"
+
+
+@pytest.mark.parametrize("friction", [Coulomb(0.3), Tresca(0.15)])
+@pytest.mark.parametrize("force", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("length", [1e-6, 1.0, 1e6])
+def test_the_limit_of_friction_does_not_depend_on_the_units(
+    friction: Coulomb | Tresca, force: float, length: float
+) -> None:
+    scene = block_on_plane(friction)
+    check(in_units(pulled(scene, "block", (0.998 * 0.3, 0.0, -1.0)), length, force))
+    refused(in_units(pulled(scene, "block", (1.002 * 0.3, 0.0, -1.0)), length, force))
 
 
 def test_a_body_at_the_very_limit_of_friction_is_refused_as_any_slide_is_an_answer() -> None:
@@ -193,3 +206,71 @@ def test_solving_refuses_what_is_not_held() -> None:
     scene = block_on_plane(Coulomb(0.3))
     with pytest.raises(InfeasibleError, match="body 'block' can move away"):
         solve_scene(scene, partitions(scene), MPI.COMM_SELF)
+
+
+def test_friction_of_a_gap_that_supports_keep_open_holds_nothing() -> None:
+    """As rigid bodies they could meet; the top, which moves by a part of the gap, does not let them."""
+    mesh = block((0.1, 0.0, 0.3), (3.0, 1.8, 1.2), (3, 3, 2))
+    scene = Scene(
+        {"block": Body(mesh, SOFT)},
+        [Support("block", "z1", (None, None, -0.01))],
+        [TotalForce("block", "z1", (0.3, 0.1, -1.0))],
+        [ContactPair(Surface("block", "z0"), FLOOR, Coulomb(2.0))],
+    )
+    with pytest.raises(InfeasibleError, match=r"all contacts stay open, and \d+ % of the load drive motions"):
+        solve_scene(scene, None, MPI.COMM_SELF)
+
+
+@pytest.mark.parametrize("parts", [1, 3])
+def test_displacements_are_right_where_loads_go_straight_into_supports(parts: int) -> None:
+    """What such loads would do to the pieces is 10⁴ times what happens, and says nothing of an error."""
+    mesh = block((0.0, 0.0, 0.0), (1.1, 1.3, 0.7), (3, 3, 5))
+    lift = 1e-4
+
+    def lifted(load: float) -> np.ndarray:
+        scene = Scene(
+            {"block": Body(mesh, SOFT)},
+            [Support("block", "z0"), Support("block", "z1", (0.0, 0.0, lift))],
+            [TotalForce("block", "z1", (0.0, 0.0, -load))],
+            [ContactPair(Surface("block", "x1"), RigidPlane((1.2, 0.0, 0.0), (-1.0, 0.0, 0.0)))],
+        )
+        cut = {"block": graph_partition(mesh, parts)}
+        return solve_scene(scene, cut, MPI.COMM_SELF, tolerance=1e-6).gather_displacement("block")
+
+    np.testing.assert_allclose(lifted(1e4), lifted(0.0), atol=1e-5 * lift)
+
+
+@pytest.mark.parametrize("discretisation", ["node", "mortar"])
+def test_friction_between_surfaces_that_supports_hold_apart_holds_nothing(discretisation: str) -> None:
+    """Both are guided on the face on which they touch: no force presses one against the other."""
+    left = block((-1.1, 0.0, 0.0), (0.0, 0.9, 0.7), (3, 3, 3))
+    right = block((0.0, 0.0, 0.0), (1.3, 0.9, 0.7), (3, 3, 3))
+    faces = (("left", "x1"), ("right", "x0"))
+    scene = Scene(
+        {"left": Body(left, SOFT), "right": Body(right, SOFT)},
+        [Support("left", "x0"), *(Support(*face, (0.0, None, None)) for face in faces)],
+        [TotalForce("right", "x1", (-1.0, 0.0, -0.01))],
+        [ContactPair(Surface("right", "x0"), Surface("left", "x1"), Coulomb(1.4), discretisation)],
+    )
+    with pytest.raises(InfeasibleError, match="body 'right' can move away"):
+        solve_scene(scene, None, MPI.COMM_SELF)
+    free = replace(scene, supports=[scene.supports[0]])
+    state = solve_scene(free, None, MPI.COMM_SELF)
+    np.testing.assert_allclose(state.contact.force.sum(axis=0), [1.0, 0.0, 0.01], atol=1e-3)
+
+
+def test_friction_that_nothing_presses_is_refused_where_the_solver_gets_nowhere() -> None:
+    """The face that rubs is guided, and the load passes it by."""
+    left = block((-1.1, 0.0, 0.0), (0.0, 0.9, 0.7), (3, 3, 3))
+    right = block((0.0, 0.0, 0.0), (1.3, 0.9, 0.7), (3, 3, 3))
+    scene = Scene(
+        {"left": Body(left, SOFT), "right": Body(right, SOFT)},
+        [Support("left", "x0"), Support("right", "x0", (0.0, None, None))],
+        [TotalForce("right", "x1", (0.0, 0.0, -1.0))],
+        [ContactPair(Surface("left", "x1"), Surface("right", "x0"), Coulomb(0.3))],
+    )
+    with pytest.raises(InfeasibleError, match="friction needs surfaces that are pressed together"):
+        solve_scene(scene, None, MPI.COMM_SELF)
+    free = replace(scene, supports=[scene.supports[0]], loads=[TotalForce("right", "x1", (-4.0, 0.0, -1.0))])
+    state = solve_scene(free, None, MPI.COMM_SELF)
+    np.testing.assert_allclose(state.contact.force.sum(axis=0), [-4.0, 0.0, -1.0], atol=1e-2)

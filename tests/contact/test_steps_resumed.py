@@ -32,6 +32,7 @@ def whole() -> dict[str, Any]:
     return {
         "forces": np.array([state.contact.force for state in states]),
         "slip": np.array([state.contact.total_slip for state in states]),
+        "last slip": np.array([state.contact.slip for state in states]),
         "products": [state.solution.products for state in states],
     }
 
@@ -56,7 +57,7 @@ def test_the_history_goes_on_with_the_same_forces_and_slips(ranks: int, interrup
     assert found["ranks"] == ranks
     assert found["products"][:DONE] == [1] * DONE
     assert min(whole()["products"][:DONE]) > 1
-    for name in ("forces", "slip"):
+    for name in ("forces", "slip", "last slip"):
         expected = whole()[name]
         assert np.abs(np.array(found[name]) - expected).max() < 1e-10 * np.abs(expected).max()
     # What follows starts from the same forces, so that it costs the same.

@@ -10,6 +10,8 @@ from mpi4py import MPI
 
 from fenics_contact.contact import State, Status, solve_scene, solve_steps
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti import TornSystem, build_torn_system, decompose
+from fenics_contact.feti.contact_search import surface_of
 from fenics_contact.geometry import block, box_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
@@ -143,16 +145,142 @@ def test_supports_that_press_surfaces_into_one_another_are_refused() -> None:
         solved(replace(scene, supports=sunk))
 
 
-def test_a_row_that_is_free_but_for_a_slight_tilt_counts_as_held() -> None:
-    """Normals of a crowned face are tilted by less than a percent at the plane of symmetry."""
+def tilted(slope: float, cells: int = 4) -> Scene:
+    """The model with an upper face of the lower block that falls away from the plane y = 0 as a roof does."""
+    scene = stack(1.0, cells)
+    points = scene.bodies["lower"].mesh.points.copy()
+    points[:, 2] -= slope * np.abs(points[:, 1]) * points[:, 2]
+    return scene.moved({"lower": points})
+
+
+def torn_of(scene: Scene) -> TornSystem:
+    cut = {name: box_partition(body.mesh, (2, 1, 1)) for name, body in scene.bodies.items()}
+    return build_torn_system(scene, decompose(scene, cut, MPI.COMM_SELF))
+
+
+@pytest.mark.parametrize("slope", [0.004, 0.1, 0.5])
+def test_normals_lie_in_a_plane_of_symmetry_however_the_face_is_tilted(slope: float) -> None:
+    torn = torn_of(tilted(slope))
+    fixed, points, slip = torn.decomposition.fixed, torn.points, torn.relations[2]
+    on_plane = fixed[points.slave, 1]
+    assert on_plane.sum() == 5
+    np.testing.assert_array_equal(points.normal[on_plane, 1], 0.0)
+    assert np.abs(points.normal[~on_plane, 1]).min() > 0.5 * slope
+    across = np.abs(slip.directions[:, 1]) == 1.0
+    np.testing.assert_array_equal(slip.held(fixed), across & on_plane[slip.which])
+
+
+@pytest.mark.parametrize("discretisation", ["node", "mortar"])
+def test_half_a_roof_gives_half_the_answer(discretisation: Discretisation) -> None:
+    """The ridge lies in the plane of symmetry; its normals are those of both slopes together."""
+    models = [tilted(0.03, cells) for cells in (4, 8)]
+    pairs = [replace(model.contacts[0], discretisation=discretisation) for model in models]
+    half, whole = (solved(replace(m, contacts=[p])) for m, p in zip(models, pairs, strict=True))
+    assert 0 < half.contact.count(Status.OPEN) < half.contact.points.count
+    assert half.energies.total_potential == pytest.approx(0.5 * whole.energies.total_potential, rel=1e-6)
+    assert half.energies.friction == pytest.approx(0.5 * whole.energies.friction, rel=1e-4)
+
+
+def test_friction_that_supports_hold_is_told(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level("INFO", "fenics_contact"):
+        torn_of(stack(1.0, 4))
+    assert "5 of 50 friction rows are left to the supports, which hold slip there" in caplog.text
+
+
+def beside(share: float) -> Scene:
+    """An upper block whose side is held at a part of a facet beside the held side of the lower one."""
+    lower = block((0.0, 0.0, 0.0), (2.1, 1.1, 1.0), (3, 3, 2))
+    upper = block((0.7 * share, 0.0, 1.0), (1.7, 1.1, 1.8), (5, 3, 2))
+    rollers = [Support(name, "x0", (0.0, None, None)) for name in ("lower", "upper")]
+    return Scene(
+        {"lower": Body(lower, STEEL), "upper": Body(upper, STEEL)},
+        [Support("lower", "z0", (None, 0.0, 0.0)), *rollers, Support("upper", "z1", (None, 0.0, -0.05))],
+        contacts=[ContactPair(*FACES, Coulomb(0.2))],
+    )
+
+
+@pytest.mark.parametrize("share", [0.3, 0.019, 0.002])
+def test_a_held_slave_node_keeps_its_friction_where_its_master_can_move(share: float) -> None:
+    """98 % of its master is held, too; the rest slips under it as the lower block bulges."""
+    state = solved(beside(share))
+    contact, fixed = state.contact, state.torn.decomposition.fixed
+    driven = np.flatnonzero(fixed[contact.points.slave, 0])
+    assert len(driven) == 4
+    assert not state.torn.relations[2].held(fixed).any()
+    displacement = np.vstack([state.gather_displacement(name) for name in state.scene.bodies])
+    moved = (contact.points.jump @ displacement)[driven]
+    across = np.einsum("na,nad->nd", contact.slip, contact.points.tangents)[driven]
+    size = np.abs(displacement).max()
+    assert np.abs(moved[:, 0]).max() > 0.02 * share * size
+    np.testing.assert_allclose(across[:, 0], moved[:, 0], atol=1e-7 * size)
+    slips = contact.status[driven] == Status.SLIP
+    assert (np.linalg.norm(across[~slips], axis=1) < 1e-6 * size).all()
+    friction, bound = np.linalg.norm(contact.friction_force[driven], axis=1), contact.slip_bound[driven]
+    np.testing.assert_allclose(friction[slips], bound[slips], rtol=1e-4)
+    assert slips.any()
+    assert state.energies.primal == pytest.approx(state.energies.dual, rel=1e-6)
+
+
+@pytest.mark.parametrize(("share", "held"), [(4e-6, False), (2e-7, True)])
+def test_what_is_left_free_by_rounding_alone_is_held(share: float, held: bool) -> None:
+    torn = torn_of(beside(share))
+    slip, fixed = torn.relations[2], torn.decomposition.fixed
+    on_side = fixed[slip.points.slave[slip.which], 0] & (np.abs(slip.directions[:, 0]) > 0.9)
+    assert on_side.sum() == 4
+    assert (slip.held(fixed)[on_side] == held).all()
+
+
+@pytest.mark.parametrize("tilt", [0.01, 0.2])
+def test_slip_across_two_rollers_is_no_slip_when_it_only_opens(tilt: float) -> None:
+    """Supports on faces that are no planes of symmetry: normals lean out of the plane that nodes move in."""
     scene = stack(1.0, 4)
     points = scene.bodies["lower"].mesh.points.copy()
-    points[:, 2] -= 0.004 * points[:, 1] * points[:, 2]
-    tilted = scene.moved({"lower": points})
-    torn = solved(tilted).torn
-    slip = torn.relations[2]
-    across = np.abs(slip.directions[:, 1]) > 0.99
-    on_plane = torn.decomposition.fixed[slip.points.slave[slip.which], 1]
-    assert 0.0 < np.abs(slip.directions[across & on_plane, 2]).max() < 0.02
-    assert slip.held(torn.decomposition.fixed)[across & on_plane].all()
-    assert not slip.held(torn.decomposition.fixed)[~on_plane].any()
+    points[:, 2] -= tilt * points[:, 1] * points[:, 2]
+    scene = scene.moved({"lower": points})
+    held = [Support(name, face, (None, 0.0, None)) for name, face in (("lower", "z1"), ("upper", "z0"))]
+    torn = torn_of(replace(scene, supports=[scene.supports[0], *held]))
+    slip, fixed = torn.relations[2], torn.decomposition.fixed
+    assert slip.held(fixed).reshape(-1, 2).tolist() == [[True, False]] * torn.points.count
+    ways = slip.directions.reshape(-1, 2, 3)[:, 1]
+    np.testing.assert_allclose(ways[:, 1], 0.0, atol=1e-15)
+    rows = torn.B[torn.n_equality + torn.points.count :].tocsr()
+    assert (np.diff(rows.indptr).reshape(-1, 2)[:, 0] == 0).all()
+
+
+@pytest.mark.parametrize(("degrees", "held"), [(5.0, True), (40.0, True), (50.0, False), (85.0, False)])
+def test_a_way_down_a_slope_is_slip_where_it_is_more_slip_than_opening(degrees: float, held: bool) -> None:
+    """Nodes that are held along y move along z alone beside that, which a wall meets ever more sideways."""
+    angle = np.radians(degrees)
+    wall = RigidPlane((0.0, 0.0, -5.0), (0.0, float(np.sin(angle)), float(np.cos(angle))))
+    mesh = block((0.0, 0.0, 0.0), (0.7, 1.1, 1.3), (3, 5, 2))
+    supports = [Support("block", "z0", (None, 0.0, None)), Support("block", "z1")]
+    pair = ContactPair(Surface("block", "z0"), wall, Coulomb(0.3))
+    torn = torn_of(Scene({"block": Body(mesh, STEEL)}, supports, contacts=[pair]))
+    slip, fixed = torn.relations[2], torn.decomposition.fixed
+    way = np.abs(slip.directions[:, 2]) > 1e-3
+    assert way.sum() == torn.points.count == 24
+    assert (slip.held(fixed)[way] == held).all()
+    assert not torn.relations[1].held(fixed).any()
+
+
+def test_a_surface_that_lies_in_a_plane_of_symmetry_keeps_its_normals() -> None:
+    mesh = block((0.0, 0.0, 0.0), (0.7, 1.1, 1.3), (3, 5, 3))
+    points = mesh.points + 1e-9 * np.sin(np.arange(mesh.points.size)).reshape(-1, 3)
+    pair = ContactPair(Surface("block", "y0"), RigidPlane((0.0, -0.1, 0.0), (0.0, 1.0, 0.0)))
+    roller = Support("block", "y0", (None, 0.01, None))
+    scene = Scene({"block": Body(mesh.moved(points), STEEL)}, [roller, Support("block", "y1")], [], [pair])
+    surface = surface_of(scene, pair.slave)
+    assert not surface.mirrored.any()
+    np.testing.assert_allclose(surface.normals, np.tile([0.0, -1.0, 0.0], (16, 1)), atol=1e-7)
+
+
+def test_surfaces_that_supports_hold_but_for_a_tilt_get_the_room_that_faceting_takes() -> None:
+    """Pressed by a thousandth, they need not slip a tenth down a slope of one percent."""
+    scene = tilted(0.01)
+    sides = [Support("lower", "z1", (None, None, 0.0)), Support("upper", "z0", (None, None, -0.004))]
+    torn = torn_of(replace(scene, supports=[Support("lower", "z0"), *sides]))
+    fixed, normal = torn.decomposition.fixed, torn.relations[1]
+    assert 0.0 < normal.freedom(fixed).max() < 0.02
+    prescribed = np.where(torn.supported[torn.normal_rows] > torn.points.gap, 1, 0)
+    assert prescribed.any()
+    assert torn.right[torn.normal_rows].min() == 0.0

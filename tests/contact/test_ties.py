@@ -87,6 +87,19 @@ def test_a_sliding_tie_holds_the_normal_direction_alone() -> None:
     assert min(widths) > 0.0
 
 
+@pytest.mark.parametrize("discretisation", ["node", "mortar"])
+@pytest.mark.parametrize("sliding", [True, False])
+def test_only_a_tie_that_does_not_slide_drags_what_it_is_tied_to(
+    sliding: bool, discretisation: Discretisation
+) -> None:
+    """The upper block is moved along x as a whole; what it does to the lower one is all that deforms."""
+    moved = [Support("lower", "z0"), Support("upper", "z1", (0.1, 0.0, 0.0))]
+    ties = [Tie(*FACES, sliding=sliding, discretisation=discretisation)]
+    scene = tower((5, 3, 3), supports=moved, loads=[], ties=ties)
+    strain = solve_scene(scene, cuts(scene), MPI.COMM_SELF, tolerance=1e-10).energies.strain
+    assert strain < 1e-12 if sliding else strain > 1e-2
+
+
 def test_a_tie_beside_contact_leaves_the_contact_law_alone() -> None:
     """A tied tower that stands on a floor with friction bears the whole push there."""
     floor = ContactPair(Surface("lower", "z0"), RigidPlane((0, 0, 0), (0, 0, 1)), Coulomb(0.5))
@@ -115,7 +128,7 @@ def test_a_body_cannot_be_tied_to_itself() -> None:
 
 def test_an_unknown_discretisation_is_refused() -> None:
     with pytest.raises(
-        InvalidInputError, match=r"discretisation must be one of \['node', 'mortar'\], got 'x'"
+        InvalidInputError, match=r"Tie.discretisation must be 'node' or 'mortar', got 'x': as for"
     ):
         Tie(Surface("a", "s"), Surface("b", "s"), discretisation="x")  # type: ignore[arg-type]
 

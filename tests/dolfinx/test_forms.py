@@ -36,11 +36,11 @@ def test_a_form_bound_to_several_meshes_is_compiled_once(cell: str, monkeypatch:
     def refuse(*arguments: Any, **options: Any) -> None:
         raise AssertionError("compiled again")
 
-    monkeypatch.setattr(_dolfinx.jit, "ffcx_jit", refuse)
+    monkeypatch.setattr("dolfinx.jit.ffcx_jit", refuse)
     with pytest.raises(AssertionError, match="compiled again"):
         _dolfinx.CompiledForm(MPI.COMM_SELF, 2 * factor * dx)
     for scale, (_, mesh, volume) in enumerate(boxes(cell), start=1):
-        bound = form.bind(mesh, [], {}, {factor: _dolfinx.Constant(mesh, np.float64(scale))})
+        bound = form.bind(mesh, [], {}, {factor: _dolfinx.fem.Constant(mesh, np.float64(scale))})
         assert _dolfinx.assemble_scalar(bound) == pytest.approx(scale * volume, rel=1e-13)
 
 
@@ -57,7 +57,7 @@ def test_a_surface_integral_covers_the_facets_it_is_given(cell: str) -> None:
         )
         for side, expected in sides.items():
             facets = {1: _dolfinx.match_facets(mesh, geometry.surfaces[side])}
-            bound = form.bind(mesh, [], {}, {one: _dolfinx.Constant(mesh, np.float64(1.0))}, facets)
+            bound = form.bind(mesh, [], {}, {one: _dolfinx.fem.Constant(mesh, np.float64(1.0))}, facets)
             assert _dolfinx.assemble_scalar(bound) == pytest.approx(expected, rel=1e-13)
 
 
@@ -70,7 +70,7 @@ def test_constants_and_coefficients_reach_their_own_places(cell: str) -> None:
     _, mesh, volume = boxes(cell)[1]
     fields = {u: _dolfinx.coefficient(mesh, "u"), v: _dolfinx.coefficient(mesh, "v")}
     fields[u].x.array[:], fields[v].x.array[:] = 3.0, 5.0
-    numbers = {b: _dolfinx.Constant(mesh, np.float64(10.0)), a: _dolfinx.Constant(mesh, np.float64(2.0))}
+    numbers = {symbol: _dolfinx.fem.Constant(mesh, np.float64(value)) for symbol, value in ((b, 10), (a, 2))}
     bound = form.bind(mesh, [], fields, numbers)
     assert _dolfinx.assemble_scalar(bound) == pytest.approx((2 * 3 + 100 * 5) * volume, rel=1e-13)
 
@@ -101,8 +101,8 @@ def test_a_tagged_volume_integral_covers_the_cells_it_is_given(cell: str) -> Non
     sample = box(cell, (4, 1, 2), (4, 2, 2))
     mesh = _dolfinx.local_mesh(sample.points, sample.cells, cell)
     numbers = {
-        a: _dolfinx.Constant(mesh, np.float64(1.0)),
-        b: _dolfinx.Constant(mesh, np.float64(100.0)),
+        a: _dolfinx.fem.Constant(mesh, np.float64(1.0)),
+        b: _dolfinx.fem.Constant(mesh, np.float64(100.0)),
     }
     height = 2.0 if sample.dim == 3 else 1.0
     middle = sample.points[sample.cells].mean(axis=1)[_dolfinx.input_cells(mesh), 0]

@@ -267,3 +267,34 @@ def test_points_beyond_the_ends_of_a_curve_and_from_behind_have_no_projection() 
     points = np.array([[0.5, 0.1], [1.03, 0.1], [-0.03, 0.1], [1.0, 0.1], [0.3, 0.1]])
     normals = np.array([[0.0, -1], [0, -1], [0, -1], [0, -1], [0, 1]])
     assert project(points, normals, line).point.tolist() == [0, 3]
+
+
+# Wherever the surface lies, and in whatever unit.
+
+
+@pytest.mark.parametrize("corners", CORNERS)
+@pytest.mark.parametrize(("size", "shift"), [(1e-9, 0.0), (1.0, 0.0), (1e9, 0.0), (1.0, 1e5), (1.0, 1e7)])
+def test_of_facets_that_share_a_point_the_first_is_taken(corners: int, size: float, shift: float) -> None:
+    """Points over nodes and over the middles of edges, on a turned surface: all that decides is rounding."""
+    turn, _ = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))
+    turn *= np.sign(np.linalg.det(turn))
+    ticks = np.linspace(0.0, 0.7, 8)
+    x, y = np.meshgrid(ticks, ticks, indexing="ij")
+    flat = lattice(x, y, np.zeros_like(x), corners)
+
+    def placed(points: np.ndarray) -> np.ndarray:
+        return size * (points @ turn.T) + shift
+
+    surface = faceted_surface(placed(flat.points), flat.facets)
+    sides = np.sort(np.stack([flat.facets, np.roll(flat.facets, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    facet_of_side = np.repeat(np.arange(len(flat.facets)), corners)
+    pairs, first = np.unique(sides, axis=0, return_index=True)
+    middles = flat.points[pairs].mean(axis=1)
+    points = np.concatenate([flat.points, middles]) + np.array([0.0, 0.0, 0.03])
+    found = project(placed(points), downwards(len(points)) @ turn.T, surface)
+    np.testing.assert_array_equal(found.point, np.arange(len(points)))
+    assert (found.beside == 0.0).all()
+    assert len(found.lost) == 0
+    lowest = np.array([np.argmax((flat.facets == node).any(axis=1)) for node in range(len(flat.points))])
+    np.testing.assert_array_equal(found.facet, np.concatenate([lowest, facet_of_side[first]]))
+    np.testing.assert_allclose(found.gap, 0.03 * size, rtol=1e-12 + 1e-14 * shift)

@@ -95,11 +95,11 @@ def test_parts_that_metis_leaves_empty_are_filled(empty: list[int], monkeypatch:
     mesh = block((0, 0, 0), (4, 4, 2), (4, 4, 2), "tetrahedron")
     full = np.setdiff1d(np.arange(4), empty)
 
-    def metis(graph: object, parts: int) -> np.ndarray:
+    def metis(indptr: np.ndarray, indices: np.ndarray, parts: int) -> np.ndarray:
         return full[np.arange(mesh.n_cells) % full.size]
 
     module = importlib.import_module("fenics_contact.geometry.graph_partition")
-    monkeypatch.setattr(module, "_metis", metis)
+    monkeypatch.setattr(module, "part_graph", metis)
     partition = graph_partition(mesh, 4)
     check_face_connected(mesh, partition)
     assert np.unique(partition).tolist() == [0, 1, 2, 3]

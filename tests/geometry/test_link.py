@@ -189,9 +189,9 @@ def test_the_same_shape_gives_the_same_mesh_bit_for_bit(small: Link) -> None:
         ({"cell": "wedge"}, "cell must be one of .*, got 'wedge'"),
         ({"inner_radius": 0.0}, "inner_radius must be positive, got 0.0"),
         ({"straight": -1.0}, "straight must be positive, got -1.0"),
-        ({"straight": np.nan}, "straight must be positive, got nan"),
+        ({"straight": np.nan}, "straight must be a finite number of less than"),
         ({"thickness": -2.0}, "thickness and width must be positive, got -2.0 and 16.0"),
-        ({"width": np.inf}, "thickness and width must be positive, got 16.0 and inf"),
+        ({"width": np.inf}, "width must be a finite number of less than"),
         (
             {"roundness": 1.0},
             r"roundness must lie between 0 .square. and 1 .disc, whose corner cells are flat.",

@@ -61,7 +61,7 @@ def test_hexahedra_in_two_dimensions_are_refused(parts: dict[str, Any]) -> None:
 def test_a_coordinate_that_is_not_finite_is_named(parts: dict[str, Any], value: float) -> None:
     parts["points"][5, 1] = value
     with pytest.raises(
-        InvalidInputError, match=rf"must be finite, 1 of 12 are not, first node 5 at .*{value}"
+        InvalidInputError, match=rf"must be finite and below .*, 1 of 12 are not, first node 5 at .*{value}"
     ):
         BodyMesh(**parts)
 
@@ -142,6 +142,23 @@ def test_a_facet_whose_nodes_cross_is_refused(parts: dict[str, Any]) -> None:
 def test_a_facet_may_start_at_any_of_its_nodes(parts: dict[str, Any]) -> None:
     parts["surfaces"]["z1"] = np.roll(parts["surfaces"]["z1"], 2, axis=1)
     assert BodyMesh(**parts).surfaces["z1"].shape == (2, 4)
+
+
+@pytest.mark.parametrize("start", [0, 1, 3])
+def test_a_facet_that_is_listed_twice_is_refused(parts: dict[str, Any], start: int) -> None:
+    """Its area would count twice, and a total force over it be halved."""
+    facets = parts["surfaces"]["z1"]
+    parts["surfaces"]["z1"] = np.vstack([facets, np.roll(facets[:1], start, axis=1)])
+    message = r"'z1' must list every facet once, 1 of 2 are listed more often.*: keep one of each"
+    with pytest.raises(InvalidInputError, match=message):
+        BodyMesh(**parts)
+
+
+def test_a_facet_that_repeats_a_node_is_refused(parts: dict[str, Any]) -> None:
+    facets = parts["surfaces"]["z1"]
+    parts["surfaces"]["z1"] = np.vstack([facets, facets[:1, [0, 1, 2, 2]]])
+    with pytest.raises(InvalidInputError, match="'z1' must consist of boundary faces of the cells, 1 of"):
+        BodyMesh(**parts)
 
 
 @pytest.mark.parametrize("facets", [np.zeros((0, 4), dtype=int), np.zeros((1, 3), dtype=int)])

@@ -57,14 +57,14 @@ def write(path: Path, mesh: Any, *tags: Any) -> Path:
     with dolfinx.io.XDMFFile(MPI.COMM_SELF, str(path), "w") as file:
         file.write_mesh(mesh)
         for one in tags:
-            file.write_meshtags(*((one,) if _dolfinx.VERSION < (0, 7) else (one, mesh.geometry)))
+            file.write_meshtags(*((one,) if _dolfinx.version() < (0, 7) else (one, mesh.geometry)))
     return path
 
 
 def second_order_triangle(points: np.ndarray) -> Any:
     """A mesh of one triangle with its edge midpoints, in dolfinx's order."""
     cells = np.arange(6, dtype=np.int64)[None]
-    if _dolfinx.VERSION < (0, 7):
+    if _dolfinx.version() < (0, 7):
         import ufl
 
         domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.triangle, 2))

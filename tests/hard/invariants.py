@@ -73,6 +73,16 @@ class Violations:
         return max(self.penetration, self.complementarity, self.friction)
 
 
+def assert_holds(found: Violations, tolerance: float, amplification: float) -> None:
+    """Require every violation to be as small as the tolerance lets it be."""
+    assert found.natural <= 1.01 * tolerance, found
+    assert found.cone <= tolerance, found
+    assert found.gluing <= 10 * tolerance, found
+    assert found.balance <= 10 * tolerance, found
+    for value in (found.nodal, found.penetration, found.complementarity, found.friction):
+        assert value <= amplification * tolerance, found
+
+
 def violations(state: State, force_scale: float = 0.0) -> Violations:
     """Recompute everything. On one rank.
 

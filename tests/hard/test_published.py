@@ -15,7 +15,7 @@ from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, Smalse, solve
 from tests.hard.conftest import Record
 from tests.hard.trial import fallbacks
-from tests.qp.published_friction import CYCLING, SHARED, cone_residual, published
+from tests.qp.published_friction import CASES, cone_residual, published
 
 TOLERANCE = 1e-8
 SOLVERS: dict[str, DualSolver] = {
@@ -23,8 +23,6 @@ SOLVERS: dict[str, DualSolver] = {
     "FixedPoint(Smalse)": FixedPoint(Smalse(tolerance=TOLERANCE)),
     "FixedPoint(FaceNewton)": FixedPoint(FaceNewton(tolerance=TOLERANCE)),
 }
-#: The one problem that is beside the tests is among the eleven, too.
-CASES = {path.stem: path for path in sorted(SHARED.glob("*.npz"))} or {"OneObject": CYCLING}
 #: Problems whose plain fixed point, Ψ ← μ λ_N without damping, runs in circles.
 CYCLES = {"Capsules-i101-404__sym", "OneObject-i100000-499__sym"}
 
@@ -90,6 +88,5 @@ def test_published_problem(case: str, solver: str, record: Record) -> None:
     )  # fmt: skip
 
 
-@pytest.mark.skipif(len(CASES) < 11, reason="the published problems are not beside this checkout")
 def test_two_of_the_eleven_make_the_plain_fixed_point_cycle() -> None:
     assert {case for case, path in CASES.items() if cycles(path)} == CYCLES

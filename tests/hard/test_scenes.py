@@ -15,7 +15,7 @@ from fenics_contact.contact import State
 from fenics_contact.errors import ConvergenceError
 from tests.conftest import run_on_ranks
 from tests.hard.conftest import Record
-from tests.hard.invariants import Violations, violations
+from tests.hard.invariants import assert_holds, violations
 from tests.hard.scenes import TRIALS
 from tests.hard.trial import OTHER_UNITS, Answer, Trial, fallbacks, scene_size, statuses
 
@@ -42,16 +42,6 @@ def on_ranks(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
         return found[ranks][sentence]
 
     return answer
-
-
-def assert_holds(found: Violations, tolerance: float, amplification: float) -> None:
-    """Require every violation to be as small as the tolerance lets it be."""
-    assert found.natural <= 1.01 * tolerance, found
-    assert found.cone <= tolerance, found
-    assert found.gluing <= 10 * tolerance, found
-    assert found.balance <= 10 * tolerance, found
-    for value in (found.nodal, found.penetration, found.complementarity, found.friction):
-        assert value <= amplification * tolerance, found
 
 
 def other_answers(case: Trial, sentence: str, on_ranks: OnRanks) -> dict[str, Answer]:

@@ -35,7 +35,7 @@ DIMENSIONS = {
     BodyForce: (-3, 1),
     ThermalStrain: (0, 0),
 }
-MODULI = ("young_modulus", "young_moduli", "shear_moduli")
+MODULI = ("young_modulus", "young_moduli", "shear_modulus", "shear_moduli")
 
 
 def in_units(scene: Scene, length: float, force: float) -> Scene:

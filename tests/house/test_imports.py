@@ -12,8 +12,9 @@ from tests.house.source import PACKAGE, Module, modules, room_of
 #: From the ground up; rooms on one floor do not know each other.
 FLOORS = [
     {"errors"},
-    {"progress"},
-    {"_requirements", "timing", "checkpoint"},
+    {"progress", "fingerprint"},
+    {"_requirements", "launching", "timing", "checkpoint"},
+    {"_libraries"},
     {"_dolfinx"},
     {"geometry", "linalg"},
     {"scene", "qp"},
@@ -36,6 +37,9 @@ WITHOUT_FENICS = {
     "qp": {"dolfinx", "ufl", "basix", "ffcx", "gmsh"},
     "optimize": {"dolfinx", "ufl", "basix", "ffcx", "gmsh", "petsc4py", "mpi4py"},
 }
+
+#: What stands for libraries that are loaded when they are first used.
+LATE = {f"{PACKAGE}._libraries.MPI": "mpi4py", f"{PACKAGE}._libraries.PETSc": "petsc4py"}
 
 
 def pointing_up(module: Module) -> list[str]:
@@ -64,8 +68,8 @@ def reached(room: str, house: list[Module]) -> set[str]:
                 continue
             for found in module.imports():
                 there = room_of(found.target)
-                if there is None and not found.for_types:
-                    outside.add(found.target.partition(".")[0])
+                if (there is None or found.target in LATE) and not found.for_types:
+                    outside.add(LATE.get(found.target, found.target.partition(".")[0]))
                 elif there and there not in rooms:
                     rooms.add(there)
                     waiting.append(there)
@@ -155,7 +159,17 @@ def test_a_room_without_fenics_stays_so_also_through_others(room: str) -> None:
 
 
 def test_fenics_reached_through_another_room_is_found() -> None:
-    assert "dolfinx" in reached("feti", modules())
+    assert {"dolfinx", "petsc4py", "mpi4py"} <= reached("feti", modules())
+
+
+def test_mpi_and_petsc_are_loaded_late_everywhere() -> None:
+    at_once = {"mpi4py", "petsc4py"}
+    assert [
+        f"{module.name}:{found.line}"
+        for module in modules()
+        for found in module.imports()
+        if found.target.partition(".")[0] in at_once and not found.for_types
+    ] == []
 
 
 def test_only_the_private_module_imports_dolfinx() -> None:

@@ -90,6 +90,7 @@ def petsc(scalar: type, packages: tuple[str, ...]) -> SimpleNamespace:
 
 def test_what_is_installed_here_will_do(caplog: pytest.LogCaptureFixture) -> None:
     _requirements.check()
+    _requirements.load_petsc()
     _requirements.check_gmsh()
     assert caplog.messages == []
 
@@ -147,25 +148,25 @@ def test_a_library_that_does_not_load_is_named_with_the_reason(
     with pytest.raises(
         MissingRequirementError, match=rf"needs {library} .*cannot be loaded \(numpy\.core\.multiarray failed"
     ):
-        _requirements.check()
+        _requirements.load_petsc()
 
 
 def test_a_petsc_with_complex_numbers_is_refused(loading: Callable[[str, object], None]) -> None:
     loading("petsc4py.PETSc", petsc(np.complex128, ("cholmod", "mumps")))
     with pytest.raises(MissingRequirementError, match="with complex numbers, where real ones are needed"):
-        _requirements.check()
+        _requirements.load_petsc()
 
 
 @pytest.mark.parametrize("package", ["cholmod", "mumps"])
 def test_one_sparse_factorisation_is_enough(package: str, loading: Callable[[str, object], None]) -> None:
     loading("petsc4py.PETSc", petsc(np.float64, (package,)))
-    _requirements.check()
+    assert _requirements.load_petsc().ScalarType is np.float64
 
 
 def test_a_petsc_without_sparse_factorisation_is_refused(loading: Callable[[str, object], None]) -> None:
     loading("petsc4py.PETSc", petsc(np.float64, ("petsc",)))
     with pytest.raises(MissingRequirementError, match="with neither CHOLMOD nor MUMPS, where one is needed"):
-        _requirements.check()
+        _requirements.load_petsc()
 
 
 def test_a_package_that_petsc_does_not_have_is_recognised() -> None:

@@ -65,7 +65,7 @@ def test_vtu_files_number_the_subdomains_of_all_bodies(tmp_path: Path) -> None:
 
 def test_vtu_files_hold_further_fields_of_the_cells(tmp_path: Path) -> None:
     for state in (touching_blocks(), plane_block()):
-        found = discretisation_error(state.torn, state.torn_displacement)
+        found = discretisation_error(state.torn, state.conforming_displacement)
         error = {body: found.by_cell(body) for body in state.scene.bodies}
         middle = {name: b.mesh.points[b.mesh.cells].mean(axis=1) for name, b in state.scene.bodies.items()}
         read = pv.read(write_vtu(state, tmp_path, cell_fields={"error": error, "middle": middle}))

@@ -211,7 +211,7 @@ def test_unknown_formats_and_names_with_folders_are_refused(tmp_path: Path) -> N
         ResultSeries(tmp_path, "a/b", MPI.COMM_SELF)
 
 
-@pytest.mark.skipif(_dolfinx.HAS_VTX, reason="this dolfinx has ADIOS2")
+@pytest.mark.skipif(_dolfinx.has_vtx(), reason="this dolfinx has ADIOS2")
 def test_without_adios2_the_error_names_the_formats_that_there_are(tmp_path: Path) -> None:
     message = r"needs? a dolfinx that was built with ADIOS2, this one \(0\.\d+\) was not: .*'vtu' and 'xdmf'"
     with pytest.raises(InvalidInputError, match=message):
@@ -221,7 +221,7 @@ def test_without_adios2_the_error_names_the_formats_that_there_are(tmp_path: Pat
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.skipif(not _dolfinx.HAS_VTX, reason="needs ADIOS2")
+@pytest.mark.skipif(not _dolfinx.has_vtx(), reason="needs ADIOS2")
 def test_vtx_folders_are_there_for_every_member_body_and_field(tmp_path: Path) -> None:
     told = a_series(tmp_path, formats=("vtu", "vtx"))
     for value in (0, 1, 1):
@@ -278,7 +278,7 @@ RANKS = """
     from tests.contact.step_cases import sequence, shears
 
     comm, folder = MPI.COMM_WORLD, sys.argv[1]
-    formats = ("vtu", "xdmf", "vtx") if _dolfinx.HAS_VTX else ("vtu", "xdmf")
+    formats = ("vtu", "xdmf", "vtx") if _dolfinx.has_vtx() else ("vtu", "xdmf")
     steps, told = sequence(None, comm), ResultSeries(folder, "run", comm, formats=formats)
     states = [steps.advance(step) for step in shears((0.0, 0.006, 0.02))]
     for value, state in enumerate(states[:2]):
@@ -305,7 +305,7 @@ def test_two_ranks_write_the_same_series(mpirun: Callable[..., str], tmp_path: P
         np.testing.assert_allclose(displacement, state.gather_displacement("block"), **near)
     files = {path.suffix for path in tmp_path.rglob("run*.*")}
     assert files - {".bp"} == {".pvd", ".vtm", ".vtu", ".xdmf", ".h5"}
-    assert (".bp" in files) is _dolfinx.HAS_VTX
+    assert (".bp" in files) is _dolfinx.has_vtx()
     assert len(list(tmp_path.rglob("*.bp"))) in (0, 6)
     assert not list(tmp_path.rglob(".*")), "nothing hidden is left"
 

@@ -26,7 +26,14 @@ RUN_CLARABEL = quadratic_program._run_clarabel
 def random_bundle(seed: int, m: int = 7, n: int = 4) -> Bundle:
     generator = np.random.default_rng(seed)
     errors = np.append(0.0, generator.uniform(0.0, 2.0, m - 1))
-    return Bundle(generator.standard_normal((m, n)) + 0.3, errors, np.zeros(m), 0.0, np.zeros(m))
+    return Bundle(
+        generator.standard_normal((m, n)) + 0.3,
+        errors,
+        np.zeros(m),
+        0.0,
+        np.zeros(m),
+        np.zeros(m, dtype=bool),
+    )
 
 
 def boxed(n: int = 4) -> FeasibleSet:
@@ -70,7 +77,14 @@ def test_predicted_decrease_splits_into_aggregate_error_and_norm(seed: int, t: f
 def test_units_of_value_and_length_do_not_matter(value: float, length: float) -> None:
     plain, allowed = random_bundle(5), feasible_set(4, (-0.4, 0.9))
     step = solve_step(plain, allowed.around(np.zeros(4), np.ones(4)), 0.7)
-    bundle = Bundle(plain.gradients * value / length, plain.errors * value, plain.distances, 0.0, plain.noise)
+    bundle = Bundle(
+        plain.gradients * value / length,
+        plain.errors * value,
+        plain.distances,
+        0.0,
+        plain.noise,
+        plain.doubtful,
+    )
     near = feasible_set(4, (-0.4 * length, 0.9 * length)).around(np.zeros(4), np.ones(4))
     other = solve_step(bundle, near, 0.7 * length**2 / value)
     assert other.move / length == pytest.approx(step.move, abs=1e-7)
@@ -79,7 +93,14 @@ def test_units_of_value_and_length_do_not_matter(value: float, length: float) ->
 
 def test_aggregate_much_shorter_than_the_subgradients_is_resolved() -> None:
     # Two opposite slopes of size one whose shortest convex combination has the length 1e-6.
-    bundle = Bundle(np.array([[1.0, 1e-6], [-1.0, 1e-6]]), np.zeros(2), np.zeros(2), 0.0, np.zeros(2))
+    bundle = Bundle(
+        np.array([[1.0, 1e-6], [-1.0, 1e-6]]),
+        np.zeros(2),
+        np.zeros(2),
+        0.0,
+        np.zeros(2),
+        np.zeros(2, dtype=bool),
+    )
     step = solve_step(bundle, feasible_set(2).around(np.zeros(2), np.ones(2)), 1.0)
     assert step.aggregate_norm == pytest.approx(1e-6, rel=1e-3)
     assert step.decrease == pytest.approx(1e-12, rel=1e-2)
@@ -87,7 +108,9 @@ def test_aggregate_much_shorter_than_the_subgradients_is_resolved() -> None:
 
 def test_planes_far_below_do_not_blur_the_step() -> None:
     gradients = np.array([[1.0, 1e-4], [-1.0, 1e-4], [1e3, 1e3]])
-    bundle = Bundle(gradients, np.array([0.0, 0.0, 1e12]), np.zeros(3), 0.0, np.zeros(3))
+    bundle = Bundle(
+        gradients, np.array([0.0, 0.0, 1e12]), np.zeros(3), 0.0, np.zeros(3), np.zeros(3, dtype=bool)
+    )
     step = solve_step(bundle, feasible_set(2).around(np.zeros(2), np.ones(2)), 1.0)
     assert step.aggregate_norm == pytest.approx(1e-4, rel=1e-4)
     assert step.weights[2] == pytest.approx(0.0, abs=1e-9)

@@ -12,7 +12,7 @@ import sys
 import termios
 from pathlib import Path
 
-from tests.conftest import LAUNCH, MPI_TRACES
+from tests.conftest import LAUNCH
 
 COLUMNS = 100
 CONTROL = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")
@@ -22,13 +22,12 @@ def at_a_terminal(script: Path, ranks: int, *arguments: str, timeout: float = 60
     """Run a script with stdin, stdout and stderr at a terminal; return everything that was written to it."""
     master, slave = pty.openpty()
     fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 30, COLUMNS, 0, 0))
-    environment = {name: value for name, value in os.environ.items() if not name.startswith(MPI_TRACES)}
     process = subprocess.Popen(
         [str(LAUNCH), str(ranks), sys.executable, str(script), *arguments],
         stdin=slave,
         stdout=slave,
         stderr=slave,
-        env={**environment, "TERM": "xterm"},
+        env={**os.environ, "TERM": "xterm"},
         start_new_session=True,
     )
     os.close(slave)

@@ -7,11 +7,14 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 from mpi4py import MPI
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from fenics_contact.qp import CoarseSpace, ContactLayout, DualProblem
 
-CYCLING = Path(__file__).parents[1] / "data/one_object.npz"
-SHARED = Path(__file__).parents[3] / "shared/data/coulomb_cases"
+#: All eleven by their names.
+CASES = {path.stem: path for path in sorted((Path(__file__).parents[1] / "data/siconos").glob("*.npz"))}
+#: One on which the plain fixed point runs in circles.
+CYCLING = CASES["OneObject-i100000-499__sym"]
 
 
 def published(path: Path) -> tuple[DualProblem, np.ndarray]:
@@ -32,9 +35,10 @@ def cone_residual(problem: DualProblem, mu_f: np.ndarray, multiplier: np.ndarray
     The natural map of De Saxcé's form of the law, with one ρ for all contacts: the `rels` of Siconos's
     judges, not the residual by which the solvers of this project stop.
     """
-    W = np.column_stack([problem.operator(column) for column in np.eye(problem.layout.size)])
-    rho = 1.0 / np.linalg.norm(W, 2)
-    velocity = (W @ multiplier - problem.rhs).reshape(-1, 3)
+    n = problem.layout.size
+    W = LinearOperator((n, n), matvec=problem.operator, dtype=np.float64)
+    rho = 1.0 / float(eigsh(W, k=1, v0=np.ones(n), return_eigenvectors=False)[0])
+    velocity = (problem.operator(multiplier) - problem.rhs).reshape(-1, 3)
     velocity[:, 0] += mu_f * np.linalg.norm(velocity[:, 1:], axis=1)
     reaction = multiplier.reshape(-1, 3)
     distance = reaction - _nearest_in_cone(reaction - rho * velocity, mu_f)

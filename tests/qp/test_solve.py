@@ -183,6 +183,23 @@ def test_residuals_are_what_their_formulas_say():
     assert min(found.natural, found.gluing, found.coarse, found.violation) > 1e-3
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_the_natural_residual_is_at_least_the_violation(seed):
+    """So the worst residual, by which solvers go on, leaves no violation out."""
+    problem = random_problem(seed)
+    rng = np.random.default_rng(seed)
+    found, _, _ = measured(problem, rng.standard_normal(problem.layout.size), rng.standard_normal(6))
+    assert 0.0 < found.violation <= found.natural * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("one", range(4))
+def test_one_large_residual_keeps_an_answer_from_being_within_a_tolerance(one):
+    residuals = np.zeros(4)
+    residuals[one] = 0.1
+    assert Residuals(*residuals, 1.0, 1.0).within(0.1)
+    assert not Residuals(*residuals, 1.0, 1.0).within(0.099)
+
+
 def test_not_a_number_is_never_within_a_tolerance():
     assert not Residuals(np.nan, 0.0, 0.0, 0.0, 1.0, 1.0).within(1.0)
     assert Residuals(0.1, 0.0, 0.0, 0.0, 1.0, 1.0).within(0.1)

@@ -225,3 +225,17 @@ def test_an_obstacle_in_space_is_refused_below_a_plane_body(obstacle: RigidObsta
     )
     with pytest.raises(InvalidInputError, match=message):
         Scene({"block": body}, contacts=[ContactPair(Surface("block", "y0"), obstacle)])
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e3, 1e5, 1e7])
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
+def test_differences_of_a_distance_are_right_far_from_the_origin(size: float, shift: float) -> None:
+    """A ball of radius 3 seen by nodes within 2 of each other, wherever all of it lies."""
+    centre = size * shift * np.array([1.0, -0.4, 0.7])
+    ball = RigidSphere(tuple(centre), 3.0 * size)
+    given = DistanceObstacle(ball.distance)
+    points = centre + size * np.random.default_rng(5).uniform(2.0, 4.0, (20, 3))
+    np.testing.assert_allclose(given.normals(points), ball.normals(points), atol=1e-8 + 3e-13 * shift)
+    np.testing.assert_allclose(
+        size * given.curvatures(points), size * ball.curvatures(points), atol=1e-4 + 1e-9 * shift
+    )

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
+from fenics_contact.progress.words import visible
 from fenics_contact.scene_file import SceneFileError, read_scene_file
 from tests.scene_file.texts import GOOD, changed
 
@@ -120,6 +121,84 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         "sin, sinh, sqrt, tan, tanh, where, got 'open(x)' in 'open(x)': leave it out, or give the value by a "
         "scene in Python",
     ),
+    "a sum is fine, brackets are too many": (
+        "value = [10.0, 0.0, -100.0]",
+        f'value = ["{"abs(" * 60}x{")" * 60}", "{" + ".join(["x"] * 60)}", -100.0]',
+        "scene.toml, line 35: loads.0.value: a formula may hold numbers, x, y, z, pi, e, + - * / **, "
+        "comparisons with < <= > >=, and abs, acos, asin, atan, atan2, cos, cosh, exp, log, max, min, "
+        "sign, sin, sinh, sqrt, tan, tanh, where, got 'more than 50 nested operations' in "
+        "'abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(a...': leave it out, or give the value "
+        "by a scene in Python",
+    ),
+    "a formula has no value": (
+        "value = [10.0, 0.0, -100.0]",
+        'value = ["1/0", 0.0, -100.0]',
+        "scene.toml, line 35: loads.0.value: the formula '1/0' must have a finite value at every node, "
+        "got inf at (0.5, 0.5, 1): choose another one there with where(condition, a, b), each of whose "
+        "values may be infinite where the other is taken",
+    ),
+    "a number has four hundred digits": (
+        "2.1e5",
+        "1" + "0" * 400,
+        "scene.toml, line 16: materials.steel.young_modulus must be a number below 1.8e308, the largest "
+        "that there is, got 100000000000000000000000000000000000000000000000000000000...: Young's modulus"
+        " E, [force / length²]",
+    ),
+    "a vector has four hundred digits": (
+        "value = [10.0,",
+        f"value = [1{'0' * 400},",
+        "scene.toml, line 35: loads.0.value must be a finite number, or a formula in x, y and z in "
+        "quotes, got [10000000000000000000000000000000000000000000000000000000...: numbers, or formulas "
+        "in x, y, z, [force / length²]",
+    ),
+    "a count has four hundred digits": (
+        "counts = [2, 2, 1]",
+        f"counts = [1{'0' * 400}, 2, 1]",
+        "scene.toml, line 7: meshes.lower.counts must be three integers of at most 1000000 in brackets, "
+        "got [10000000000000000000000000000000000000000000000000000000...: cells along x, y and z",
+    ),
+    "cells are too many in a row": (
+        "counts = [2, 2, 1]",
+        "counts = [1_000_000_000, 2, 1]",
+        "scene.toml, line 7: meshes.lower.counts must be three integers of at most 1000000 in brackets, "
+        "got [1000000000, 2, 1]: cells along x, y and z",
+    ),
+    "load steps are too many": (
+        "[solver]",
+        "[[steps]]\ncount = 1_000_000_000\n\n[solver]",
+        "scene.toml, line 43: steps.0.count must be a number of at most 100000, got 1000000000: number of"
+        " load steps in which the values are reached",
+    ),
+    "a name changes colours": (
+        'title = "Two blocks"',
+        'title = "\\u001b[31mTwo blocks"',
+        'scene.toml, line 1: title must be text that can be shown, got "\\u001b[31mTwo blocks": leave out '
+        "control characters",
+    ),
+    "a key holds a zero byte": (
+        'title = "Two blocks"',
+        '"\\u0000" = "Two blocks"',
+        'scene.toml, line 1: "\\x00" must be text that can be shown, got "\\u0000": leave out control '
+        "characters",
+    ),
+    "a path is longer than any can be": (
+        "[solver]",
+        f'[output]\nfolder = "{"a" * 300}"\n\n[solver]',
+        "scene.toml, line 43: output.folder must be a path of at most 4000 bytes in which no name has "
+        'more than 255 bytes, got "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa...: folder of'
+        " the results, relative to where the command runs (output/NAME of the file)",
+    ),
+    "a byte-order mark comes first": (
+        'title = "Two blocks"',
+        '\ufefftitle = "Two blocks"',
+        "scene.toml, line 1: must be TOML in UTF-8, which has no byte-order mark, got one before the "
+        "first character: let the editor save the file as UTF-8 without BOM",
+    ),
+    "a key is there twice": (
+        "poisson_ratio = 0.3",
+        "poisson_ratio = 0.3\npoisson_ratio = 0.3",
+        "scene.toml, line 18: must be TOML, got 'poisson_ratio = 0.3': Cannot overwrite a value",
+    ),
 }
 
 PAGE = """\
@@ -139,10 +218,16 @@ def said(text: str, folder: Path, comm: MPI.Comm) -> str:
         path.write_text(text, encoding="utf-8")
     comm.Barrier()
     try:
-        _ = read_scene_file(path, comm).scene
+        _ = read_scene_file(path, comm).steps  # builds the scene first
     except SceneFileError as error:
         return str(error)
     return ""
+
+
+def _shown(text: str) -> str:
+    """Return a piece of a file in one line, what is long or invisible in words."""
+    line = visible(" ".join(text.replace("\ufeff", "(mark)").split()))
+    return f"`{line if len(line) <= 70 else f'{line[:40]}...{line[-20:]}'}`" if line else ""
 
 
 def page(folder: Path) -> str:
@@ -150,8 +235,8 @@ def page(folder: Path) -> str:
     parts = [PAGE]
     for name, (old, new, _) in MISTAKES.items():
         message = said(changed((old, new)), folder, MPI.COMM_SELF)
-        wanted = f"`{old.strip()}`"
-        given = f"`{new.strip()}`" if new.strip() else "nothing"
+        wanted = _shown(old)
+        given = _shown(new) or "nothing"
         parts.append(
             f"## {name.capitalize()}\n\nNeeded {wanted}, the file has {given}:\n\n```text\n{message}\n```\n\n"
         )

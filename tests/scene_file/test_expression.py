@@ -23,6 +23,7 @@ X, Y, Z = POINTS.T
         ("sqrt(x**2 + y**2 + z**2) - 9", np.linalg.norm(POINTS, axis=1) - 9),
         ("abs(y) * atan2(y, x)", np.abs(Y) * np.arctan2(Y, X)),
         ("3", np.full(2, 3.0)),
+        ("+".join(["x"] * 400) + "-" + "-".join(["y"] * 400), 400 * X - 400 * Y),
     ],
 )
 def test_a_formula_has_the_values_of_numpy(text: str, values: np.ndarray) -> None:

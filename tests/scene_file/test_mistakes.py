@@ -58,6 +58,50 @@ def test_several_mistakes_are_all_listed_in_the_order_of_their_lines(tmp_path: P
         ),
         ('title = "Two blocks"', "title = 3", "line 1: title must be text in quotes, got 3"),
         (
+            "counts = [2, 2, 1]",
+            "counts = [9999, 9999, 9999]",
+            "9999 x 9999 x 9999 cells, which take 1.2 PB",
+        ),
+        (
+            "counts = [2, 2, 1]",
+            "counts = [9999, 9999, 9999]\ngrading = [1, 0, 0]",
+            "must fit into the memory",
+        ),
+        (
+            "[solver]",
+            "[[steps]]\ncount = 60_000\n[[steps]]\ncount = 60_000\n[solver]",
+            "line 42: steps: a file may have at most 100000 load steps in all, got 120000",
+        ),
+        (
+            "[[loads]]",
+            "[[steps]]\nloads.push = [0, 0, '1/(z-z)']\n[[loads]]\nname = 'push'",
+            "line 31: steps.0: the formula '1/(z-z)' must have a finite value at every node, got inf at",
+        ),
+        (
+            "[[supports]]",
+            "[[supports]]\nvalue = ['log(x-9)', 0.0, 0.0]",
+            "line 28: supports.0.value: the formula",
+        ),
+        (
+            "master = {",
+            "master = { obstacle = 'distance', formula = '1/0' } #",
+            "line 39: contacts.0.master.formula",
+        ),
+        ("value = [10.0,", "value = ['x # y',", "loads.0.value: a formula must be arithmetic"),
+        ("value = [10.0,", "value = ['1e400',", "loads.0.value: a formula may hold numbers"),
+        ("2.1e5", "1" + 5000 * "0", "line 16: must be TOML, got 'young_modulus = 1000"),
+        (
+            "[solver]",
+            '[[steps]]\nname = "a\\nb"\n[solver]',
+            "steps.0.name must be one line of text in quotes",
+        ),
+        ('mesh = "lower"', 'mesh = "lower"\n"<block>" = 1', 'line 21: bodies.lower."<block>" is not known'),
+        (
+            "[bodies.lower]",
+            "[bodies]\nx = [[]]\n[bodies.lower]",
+            "line 20: bodies.x must be a table, got [[]]",
+        ),
+        (
             "[solver]",
             "[output]\ncheckpoint = 1\n[solver]",
             "line 43: output.checkpoint must be true or false, got 1",

@@ -201,7 +201,7 @@ def test_a_formula_in_z_is_refused_for_plane_bodies() -> None:
         loads=[{"kind": "pressure", "body": "a", "surface": "y1", "value": "z"}],
     )
     with pytest.raises(
-        SceneFileError, match=r"loads\.0: the formula 'z' depends on z, but the bodies lie in"
+        SceneFileError, match=r"loads\.0\.value: the formula 'z' depends on z, but the bodies lie in"
     ):
         _ = file.scene
 

@@ -1,4 +1,4 @@
-"""A small scene as text, to be changed."""
+"""Small scenes as text, to be changed."""
 
 from __future__ import annotations
 
@@ -46,6 +46,35 @@ friction = { law = "coulomb", coefficient = 0.3 }
 
 [solver]
 tolerance = 1e-8
+"""
+
+#: A block on a floor, pressed and shifted in three steps.
+STEPS = """
+title = "Shifted block"
+meshes.m = { shape = "block", lower = [0, 0, 0], upper = [2, 1, 1], counts = [3, 2, 2] }
+materials.s = { young_modulus = 10.0, poisson_ratio = 0.3 }
+bodies.block = { mesh = "m", material = "s" }
+output.pictures = []
+solver.tolerance = 1e-8
+
+[[supports]]
+name = "top"
+body = "block"
+surface = "z1"
+value = [0.0, 0.0, -0.1]
+
+[[contacts]]
+slave = { body = "block", surface = "z0" }
+master = { obstacle = "plane", point = [0, 0, 0], normal = [0, 0, 1] }
+friction = { law = "coulomb", coefficient = 0.3 }
+
+[[steps]]
+name = "pressed"
+
+[[steps]]
+name = "shifted"
+count = 2
+supports.top = [0.4, 0.0, -0.1]
 """
 
 

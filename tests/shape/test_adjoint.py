@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -83,10 +84,37 @@ def test_too_few_iterations_are_an_error() -> None:
         solve_adjoint(line("mixed").state(), partials, linearised, max_iterations=3)
 
 
-def test_a_body_that_can_slide_away_has_no_adjoint() -> None:
+SLIDING = {"energy": True, "stress": True, "normal forces": True, "displacement": False}
+
+
+@pytest.mark.parametrize("judge", SLIDING)
+def test_where_a_body_lies_that_can_slide_must_not_matter(judge: str) -> None:
+    """Along the floor nothing holds or pushes the block: it stays, and only some objectives do not care."""
     sliding = problem(block_on_floor(None, load=(0.0, 0.0, -2.0)))
-    assert sliding.value_of(np.zeros(6)) < 0.0
-    with pytest.raises(ConvergenceError, match="some body can slide without resistance: refine the contact"):
-        sliding.evaluate(np.zeros(6))
+    objective, design = objectives("block")[judge], 0.005 * np.random.default_rng(1).standard_normal(6)
+    assert len(sliding.state_of(design).unheld) == 3
+    if not SLIDING[judge]:
+        with pytest.raises(ConvergenceError, match=r"changes along a rigid motion that meets no resistance"):
+            sliding.evaluate_by(objective, design)
+        return
+    direction, step = np.random.default_rng(2).standard_normal(6), 1e-5
+    ahead, behind = (sliding.value_by(objective, design + sign * step * direction) for sign in (1, -1))
+    slope = sliding.evaluate_by(objective, design).gradient @ direction
+    assert slope == pytest.approx((ahead - behind) / (2 * step), rel=1e-6)
+
+
+def test_a_body_that_friction_alone_holds_has_an_adjoint() -> None:
     held = problem(block_on_floor(Coulomb(0.3), load=(0.0, 0.0, -2.0)))
     assert np.abs(held.evaluate(np.zeros(6)).gradient).max() > 0.1
+
+
+@pytest.mark.parametrize("objective", ["energy", "stress"])
+def test_discs_that_are_next_to_rigid_across_their_force_cost_little(objective: str) -> None:
+    """Beside a switch a disc has next to no radius, and the curvature of its circle is next to infinite."""
+    partials, linearised, usual = solved("slip", objective)
+    overshoot = np.where(linearised.face.slip, 9e5, 1.0)
+    rigid = replace(linearised, face=replace(linearised.face, overshoot=overshoot))
+    found = solve_adjoint(line("slip").state(), partials, rigid, tolerance=1e-11)
+    assert found.iterations < 4 * usual.iterations
+    across = np.abs(rigid.face.restrict(found.multiplier)[rigid.face.curvature > 0.0])
+    assert 0.0 < across.max() < 1e-3 * np.abs(found.multiplier).max()

@@ -17,6 +17,7 @@ from fenics_contact.shape.projection_derivative import (
     frames_pulled_back,
     projection_pulled_back,
 )
+from fenics_contact.shape.surface_derivative import normals_pulled_back
 
 CELLS = ("hexahedron", "tetrahedron")
 STEP = 1e-6
@@ -108,8 +109,11 @@ def test_each_term_agrees_with_central_differences(cell: str, term: str, what: s
     assert adjoint == pytest.approx(quotient, rel=1e-6)
 
 
-def test_frames_turn_with_their_normals() -> None:
+@pytest.mark.parametrize("given", [False, True])
+def test_frames_turn_with_their_normals(given: bool) -> None:
+    """About the axis that is least aligned, or one that is given."""
     rng = np.random.default_rng(3)
+    axes = np.eye(3)[rng.integers(0, 3, 40)] if given else None
     normals = rng.standard_normal((40, 3))
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     by_tangents, turn = rng.standard_normal((40, 2, 3)), rng.standard_normal((40, 3))
@@ -117,12 +121,34 @@ def test_frames_turn_with_their_normals() -> None:
 
     def frames(step: float) -> np.ndarray:
         moved = normals + step * turn
-        return tangent_frames(moved / np.linalg.norm(moved, axis=1)[:, None])
+        return tangent_frames(moved / np.linalg.norm(moved, axis=1)[:, None], axes)
 
     quotients = np.einsum("nad,nad->n", by_tangents, frames(STEP) - frames(-STEP)) / (2 * STEP)
-    adjoint = np.einsum("nd,nd->n", frames_pulled_back(normals, by_tangents), turn)
+    adjoint = np.einsum("nd,nd->n", frames_pulled_back(normals, by_tangents, axes), turn)
     assert np.abs(quotients).min() > 1e-3
     assert adjoint == pytest.approx(quotients, rel=1e-5, abs=1e-7)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_normals_in_a_plane_of_symmetry_turn_within_it(cell: str) -> None:
+    rng = np.random.default_rng(4)
+    known = setting(cell).master
+    mirrored = np.zeros(known.points.shape, dtype=bool)
+    side = known.points[:, 0] < 0.1
+    mirrored[side, 0] = True
+    by, way = rng.standard_normal((2, *known.points.shape))
+
+    def normals(step: float) -> np.ndarray:
+        return faceted_surface(known.points + step * way, known.facets, mirrored).normals
+
+    assert not normals(0.0)[side, 0].any()
+    quotient = np.sum(by * (normals(STEP) - normals(-STEP))) / (2 * STEP)
+    surface = faceted_surface(known.points, known.facets, mirrored)
+    found = np.sum(normals_pulled_back(surface, by) * way)
+    assert abs(found) > 0.1
+    assert found == pytest.approx(quotient, rel=1e-6)
+    plain = faceted_surface(known.points, known.facets)
+    assert abs(np.sum(normals_pulled_back(plain, by) * way) - found) > 1e-3 * abs(found)
 
 
 def test_pushing_a_point_along_the_normal_opens_its_gap_and_nothing_else() -> None:

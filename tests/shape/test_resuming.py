@@ -90,6 +90,17 @@ def test_first_and_best_design_are_built_again(name: str, ranks: int, folder: Pa
     assert found["best alpha"] == found["x"]
 
 
+def test_what_error_went_with_which_tolerance_is_known_after_going_on(folder: Path) -> None:
+    """The tolerance of the next state is guessed from it: a run that forgot it would solve twice."""
+    before, after = posed("block", MPI.COMM_SELF), posed("block", MPI.COMM_SELF)
+    start = np.zeros(before.size)
+    before(start)
+    assert before._memory.error_by_tolerance > 0.0
+    after.recall(before.memory())
+    assert after._memory.error_by_tolerance == before._memory.error_by_tolerance
+    assert after.evaluate(start).tolerance == before.evaluate(start).tolerance
+
+
 def test_a_checkpoint_of_another_scene_is_refused(folder: Path) -> None:
     problem = posed("chain", MPI.COMM_SELF, 1e-7)
     with pytest.raises(InvalidInputError, match=r"differ tolerance \(1e-05, 1e-07\): give the same problem"):

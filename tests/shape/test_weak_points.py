@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactResult, Status, solve_scene
-from fenics_contact.geometry import block
+from fenics_contact.contact import ContactResult, Status, find_state, solve_scene
+from fenics_contact.feti import decompose
+from fenics_contact.geometry import BodyMesh, block
+from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import Body, ContactPair, Coulomb, IsotropicElasticity, Scene, Support, Surface
 from fenics_contact.shape import ContactForces, Objective, WeakChoice, linearise_face
+from tests.contact.gallery import partitions, two_blocks
 from tests.shape.objectives import objectives
-from tests.shape.pressed import Pressed, about_to_close, about_to_slip, line
+from tests.shape.pressed import DESIGN, Pressed, about_to_close, about_to_slip, line
 from tests.shape.quotients import Line
 
 SWITCHES: dict[str, Callable[[], Pressed]] = {
@@ -59,6 +63,34 @@ def test_weak_points_are_counted_and_their_branch_is_named(switch: str, choice: 
     weak = lines(switch)[choice].point(OBJECTIVES["energy"]).weak
     assert (weak.contacts, weak.discs) == COUNTS[switch]
     assert weak.choice is choice
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize("switch", SWITCHES)
+def test_weak_points_are_recognised_at_the_accuracy_of_the_state(switch: str, tolerance: float) -> None:
+    exact = lines(switch)[WeakChoice.HELD].problem
+    decomposition = decompose(exact.scene, partitions(exact.scene), MPI.COMM_SELF)
+    scene = exact.scene_of(DESIGN)
+    state = find_state(scene, decomposition, solver=FaceNewton(tolerance=tolerance), sensitivity=True)
+    weak = linearise_face(state, WeakChoice.HELD).weak
+    assert (weak.contacts > 0, weak.discs > 0) == tuple(count > 0 for count in COUNTS[switch])
+    assert weak.count < 6, "a state tells most points apart"
+    assert not linearise_face(state, WeakChoice.RELEASED).weak.doubtful or weak.count > 1
+    if tolerance <= 1e-6:
+        assert (weak.contacts, weak.discs) == COUNTS[switch]
+
+
+@pytest.mark.parametrize("judge", ["energy", "normal forces"])
+@pytest.mark.parametrize("switch", SWITCHES)
+def test_a_strict_state_very_near_to_the_switch_has_the_gradient_of_its_side(switch: str, judge: str) -> None:
+    """Also at the products of any other: next to no force, a disc that slips is next to rigid across it."""
+    here, objective, side = lines(switch)[WeakChoice.HELD], OBJECTIVES[judge], held_side(switch)
+    for choice, sign in ((WeakChoice.HELD, side), (WeakChoice.RELEASED, -side)):
+        point = here.problem.evaluate_by(objective, here.at(1e-4 * sign))
+        assert (point.weak.contacts, point.weak.discs) == (0, 0)
+        expected = lines(switch)[choice].point(objective).gradient
+        assert np.linalg.norm(point.gradient - expected) < 1e-6 * np.linalg.norm(expected)
+        assert point.adjoint_iterations < 30
 
 
 @pytest.mark.parametrize("switch", SWITCHES)
@@ -141,3 +173,29 @@ def test_points_over_facet_edges_are_counted() -> None:
         assert state.contact.count(Status.SLIP) > 0
         edges.append(linearise_face(state, WeakChoice.RELEASED).weak.edges)
     assert edges == [9, 0]
+
+
+def distance_to_edges(places: np.ndarray, mesh: BodyMesh, surface: str) -> np.ndarray:
+    """How far points lie from the edges of a level surface, seen from above, shape (n,)."""
+    facets = mesh.surfaces[surface]
+    edges = np.concatenate(
+        [np.stack([facets[:, k - 1], facets[:, k]], axis=1) for k in range(facets.shape[1])]
+    )
+    start, along = mesh.points[edges[:, 0], :2], np.diff(mesh.points[edges, :2], axis=1)[:, 0]
+    way = places[:, None, :2] - start
+    share = np.clip(np.einsum("nek,ek->ne", way, along) / (along**2).sum(axis=1), 0.0, 1.0)
+    return np.asarray(np.linalg.norm(way - share[..., None] * along, axis=2).min(axis=1))
+
+
+@pytest.mark.parametrize("discretisation", ["node", "mortar"])
+@pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])
+def test_points_on_edges_are_those_that_project_on_one(cell: str, discretisation: str) -> None:
+    """Nodes project upright on the level face below; points of mortar contact stand for a mean of facets."""
+    scene = two_blocks(Coulomb(0.38), cell)
+    scene = replace(scene, contacts=[replace(scene.contacts[0], discretisation=discretisation)])
+    state = find_state(scene, decompose(scene, partitions(scene), MPI.COMM_SELF), sensitivity=True)
+    places = state.contact_places[state.contact.normal_force > 0]
+    on_edges = int(np.count_nonzero(distance_to_edges(places, scene.bodies["lower"].mesh, "z1") < 1e-9))
+    assert 3 < on_edges < len(places) - 3
+    expected = on_edges if discretisation == "node" else 0
+    assert linearise_face(state, WeakChoice.RELEASED).weak.edges == expected

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from fenics_contact.errors import MissingRequirementError
 from fenics_contact.study import Parameters, launching
-from fenics_contact.study.launching import Task, launcher, measure
+from fenics_contact.study.launching import Task, measure
 
 TASK = Task("hertz", Parameters(2), 1, verify=False, limit=60.0)
 
@@ -44,10 +44,16 @@ def test_a_run_finds_this_package_and_one_thread(monkeypatch: pytest.MonkeyPatch
     assert words.endswith(str(Path(launching.__file__).parents[1] / "__init__.py") + "1")
 
 
-def test_several_ranks_need_mpirun(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert launcher(1) == []
-    assert launcher(2)[1:] == ["-n", "2"]
-    monkeypatch.setattr(launching.os, "access", lambda *_: False)
-    monkeypatch.setattr(launching.shutil, "which", lambda _: None)
-    with pytest.raises(MissingRequirementError, match="a study on 2 ranks needs mpirun, found none"):
-        launcher(2)
+def test_ranks_of_a_study_start_where_mpi_has_left_its_traces(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OMPI_MCA_ess", "singleton")
+    code = "from mpi4py import MPI; raise SystemExit(f'{MPI.COMM_WORLD.size} ranks')"
+    monkeypatch.setattr(launching, "PROGRAM", code)
+    message = measure(replace(TASK, ranks=2))["failed"]["message"]
+    assert "2 ranks" in message
+
+
+def test_a_launcher_that_says_nothing_is_told_with_its_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(launching, "launcher", lambda ranks: ["false", str(ranks)])
+    message = measure(replace(TASK, ranks=2))["failed"]["message"]
+    assert message.startswith("it ended with exit status 1: it said nothing, as an mpirun that cannot start")
+    assert "`false 2 " in message

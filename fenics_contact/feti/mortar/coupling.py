@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from mpi4py import MPI
 from scipy import sparse
 
+from fenics_contact._libraries import MPI
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.feti.mortar.candidates import candidate_pairs
 from fenics_contact.feti.mortar.cells import cells_of
@@ -48,7 +48,7 @@ class MortarCoupling:
 
 
 def mortar_coupling(
-    slave: FacetedSurface, master: FacetedSurface, comm: MPI.Comm = MPI.COMM_SELF
+    slave: FacetedSurface, master: FacetedSurface, comm: MPI.Comm | None = None
 ) -> MortarCoupling:
     """Integrate the coupling of two surfaces. Collective on ``comm``.
 
@@ -63,7 +63,7 @@ def mortar_coupling(
     Args:
         slave: Surface that carries the multipliers.
         master: Surface that it meets.
-        comm: Communicator of the ranks that share the work; all have the same surfaces.
+        comm: Communicator of the ranks that share the work, all with the same surfaces; this one by default.
 
     Raises:
         InvalidInputError: If a slave facet is not convex or the surfaces are not of the same dimension.
@@ -75,6 +75,7 @@ def mortar_coupling(
         contact with consistent linearization. International Journal for Numerical Methods in Engineering 83
         (2010).
     """
+    comm = comm or MPI.COMM_SELF
     mine = np.arange(comm.rank, len(slave.facets), comm.size)
     part: tuple[np.ndarray, sparse.csr_matrix] | None = None
     with together(comm):

@@ -7,11 +7,13 @@ from typing import Any
 
 import ufl
 
+from fenics_contact.scene.checked import checked
 from fenics_contact.scene.materials.constants import check_isotropic, lame
 from fenics_contact.scene.materials.elasticity import Elasticity, strain
 
 
 @dataclass(frozen=True)
+@checked()
 class Isotropic(Elasticity):
     """The constants that all isotropic models have."""
 

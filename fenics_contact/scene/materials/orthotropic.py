@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.scene.checked import checked
 from fenics_contact.scene.materials.constants import numbers
 from fenics_contact.scene.materials.elasticity import Elasticity, strain
 from fenics_contact.scene.materials.voigt import (
@@ -55,6 +56,7 @@ def material_axes(first: Sequence[float], second: Sequence[float]) -> tuple[Trip
 
 
 @dataclass(frozen=True)
+@checked("young_moduli", "poisson_ratios", "shear_moduli", "thermal_expansion")
 class OrthotropicElasticity(Elasticity):
     """Small-strain orthotropic elasticity in space from nine engineering constants in material axes.
 
@@ -138,6 +140,7 @@ class OrthotropicElasticity(Elasticity):
 
 
 @dataclass(frozen=True)
+@checked("young_moduli", "thermal_expansion")
 class OrthotropicPlaneStress(Elasticity):
     """A thin orthotropic plate without stress normal to it.
 

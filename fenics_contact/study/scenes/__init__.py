@@ -7,7 +7,8 @@ import importlib.util
 import sys
 from pathlib import Path
 
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, running
+from fenics_contact.geometry.files import require_file
 from fenics_contact.study.protocol import StudyScene
 
 BUILT_IN = ("hertz", "cattaneo_mindlin", "chain_links")
@@ -39,15 +40,15 @@ def scene_file(name: str) -> Path | None:
 
 
 def _from_file(path: Path) -> StudyScene:
-    if not path.is_file():
-        raise InvalidInputError(f"a study needs a file that exists, got {str(path)!r}: correct the path")
+    require_file(path, "a Python file with a study")
     module_name = f"_fenics_contact_study_{path.stem}"
     spec = importlib.util.spec_from_file_location(module_name, path)
     if spec is None or spec.loader is None:
         raise InvalidInputError(f"{str(path)!r} cannot be read as Python: give a file that ends in '.py'")
     module = importlib.util.module_from_spec(spec)
     sys.modules[module_name] = module  # dataclasses of the file look themselves up there
-    spec.loader.exec_module(module)
+    with running(f"the Python file '{path}'"):
+        spec.loader.exec_module(module)
     return _checked(getattr(module, "study", None), str(path))
 
 

@@ -24,8 +24,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI
 from fenics_contact.contact import State, Status
 from fenics_contact.geometry import CELL_TYPES, BodyMesh, quadratic
 from fenics_contact.scene import Body, ContactPair, Coulomb, LoadStep, PlaneStrain, Scene, Support, Surface

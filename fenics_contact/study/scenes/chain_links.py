@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from mpi4py import MPI
 
+from fenics_contact._libraries import MPI
 from fenics_contact.geometry import LinkShape, TwoLinks, two_links
 from fenics_contact.scene import (
     Body,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from mpi4py import MPI
+
+from fenics_contact._libraries import MPI
 
 
 class Sharing:

@@ -17,7 +17,7 @@ import numpy as np
 MOST_NAMED = 4
 
 
-def described(value: Any, name: str) -> dict[str, str]:
+def described(value: Any, name: str, *, carried: bool = True) -> dict[str, str]:
     """Describe a value by its parts: one entry for each number, text or array.
 
     Arrays are described by shape, type and a hash of their bits, dataclasses, mappings and sequences by what
@@ -27,13 +27,14 @@ def described(value: Any, name: str) -> dict[str, str]:
     Args:
         value: What is to be recognised.
         name: How it is called.
+        carried: Tell what functions carry along, too.
 
     Example:
         >>> described({"length": 2.0}, "beam")
         {'beam': '1 entries', "beam['length']": '2.0'}
     """
     found: dict[str, str] = {}
-    _describe(value, name, found, ())
+    _describe(value, name, found, (), carried)
     return found
 
 
@@ -52,16 +53,16 @@ def differences(there: Mapping[str, str], here: Mapping[str, str]) -> list[str]:
     return [*named, f"{more} more"] if more > 0 else named
 
 
-def _describe(value: Any, name: str, found: dict[str, str], around: tuple[int, ...]) -> None:
+def _describe(value: Any, name: str, found: dict[str, str], around: tuple[int, ...], carried: bool) -> None:
     """Add the parts of a value, which lies inside the objects of these identities."""
     known = _leaf(value)
     if known is not None:
         found[name] = known
         return
     found[name], parts = _branches(value, name)
-    if id(value) not in around:
+    if id(value) not in around and (carried or not isinstance(value, FunctionType)):
         for part, inner in parts:
-            _describe(inner, part, found, (*around, id(value)))
+            _describe(inner, part, found, (*around, id(value)), carried)
 
 
 def _leaf(value: Any) -> str | None:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenics_contact.checkpoint import described, differences
+from fenics_contact.fingerprint import described, differences
 from fenics_contact.scene import Coulomb
 
 
@@ -69,6 +69,12 @@ def test_what_differs_is_described_differently_and_what_is_equal_alike(name: str
     assert differences(described(one, "it"), described(other, "it"))
 
 
+def test_what_functions_carry_along_is_left_out_where_that_is_asked() -> None:
+    one, other = ({"function": scaled(size), "number": size} for size in (1.0, 2.0))
+    found = differences(described(one, "it", carried=False), described(other, "it", carried=False))
+    assert found == ["it['number'] (1.0, 2.0)"]
+
+
 def test_a_function_that_calls_itself_comes_to_an_end() -> None:
     assert len(described(recursive(), "it")) == 2
 
@@ -80,7 +86,7 @@ def test_no_address_of_an_object_is_told() -> None:
 
 def test_another_process_finds_the_same_words() -> None:
     script = (
-        "import json, numpy as np\nfrom fenics_contact.checkpoint import described\n"
+        "import json, numpy as np\nfrom fenics_contact.fingerprint import described\n"
         "from fenics_contact.scene import Coulomb\n"
         "print(json.dumps(described([Coulomb(0.3), {'a': np.arange(3.0)}, np.sin], 'it')))"
     )

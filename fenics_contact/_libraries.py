@@ -1,0 +1,92 @@
+"""MPI and PETSc, loaded when something of them is first used: importing the package starts nothing.
+
+What MPI_Init leaves in the environment makes every `mpirun` that is started from the process fail, so a
+program that only imports the package has to stay free of it. Starting PETSc is collective, and by default
+over all ranks there are: `start` does it over those that work.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from fenics_contact import _requirements
+from fenics_contact.errors import ForkedProcessError
+
+__all__ = ["MPI", "Late", "PETSc", "check_not_forked", "start"]
+
+
+class Late(ModuleType):
+    """A stand-in for a module that is loaded when one of its names is asked for."""
+
+    def __init__(self, name: str, load: Callable[[], Any]) -> None:
+        """Keep how the module is loaded."""
+        super().__init__(name)
+        self._load = load
+        self._module: Any = None
+
+    def __getattr__(self, name: str) -> Any:
+        """Return the name of the module itself, which is loaded by the first call.
+
+        Raises:
+            MissingRequirementError: The library cannot be loaded or does not do.
+            ForkedProcessError: The process was forked from one that had computed.
+        """
+        check_not_forked()
+        if self._module is None:
+            self._module = self._load()
+        return getattr(self._module, name)
+
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+    from petsc4py import PETSc
+else:
+    MPI = Late("MPI", _requirements.load_mpi)
+    PETSc = Late("PETSc", _requirements.load_petsc)
+
+
+def start(comm: MPI.Comm) -> None:
+    """Start PETSc on the ranks of a communicator where nobody has. Collective on ``comm``.
+
+    PETSc's own world are these ranks then, and others need not know. A program that uses ``PETSc.COMM_WORLD``
+    itself imports petsc4py on all ranks before.
+
+    Raises:
+        MissingRequirementError: PETSc cannot be loaded or does not do.
+        ForkedProcessError: The process was forked from one that had computed.
+    """
+    check_not_forked()
+    ready = _requirements.petsc_is_started()
+    if not comm.allreduce(ready, MPI.LAND):
+        world = comm.Split(MPI.UNDEFINED if ready else 0, comm.rank)
+        if not ready:
+            _requirements.load_petsc(world)  # which keeps it: it is never freed
+
+
+_forked = False
+
+
+def check_not_forked() -> None:
+    """Refuse to compute where libraries would wait for threads that are in another process.
+
+    Raises:
+        ForkedProcessError: The process was forked from one that had computed.
+    """
+    if _forked:
+        raise ForkedProcessError(
+            "computing needs a process that starts its libraries itself, this one was forked from one that "
+            "had computed and would wait for ever for threads that are not here: start processes anew, with "
+            "multiprocessing.get_context('spawn') or mpirun, or fork them before anything is computed"
+        )
+
+
+def _note_fork() -> None:
+    """Remember in a child that its parent has computed, so that factorisations may have started threads."""
+    global _forked
+    _forked = _forked or vars(PETSc)["_module"] is not None
+
+
+os.register_at_fork(after_in_child=_note_fork)

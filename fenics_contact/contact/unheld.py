@@ -1,0 +1,71 @@
+"""Rigid motions that nothing holds, in words: bodies that the load does not move stay where they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.feti import DualSystem
+from fenics_contact.scene import rigid_body_modes
+
+#: Parts of a motion below this fraction of the largest are rounding.
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class UnheldMotion:
+    """A rigid motion that no support, tie or contact resists and no load drives.
+
+    Attributes:
+        bodies: Body name -> coefficients of its `rigid_body_modes`, translations first, shape (3,) in the
+            plane, (6,) in space; the largest of all is one. Bodies that stay are left out.
+    """
+
+    bodies: Mapping[str, np.ndarray]
+
+    def __str__(self) -> str:
+        """Return it in words."""
+        return "; ".join(f"{name!r}: {motion_in_words(motion)}" for name, motion in self.bodies.items())
+
+
+def unheld_motions(system: DualSystem) -> tuple[UnheldMotion, ...]:
+    """Return the motions that a dual system leaves out. Collective.
+
+    Args:
+        system: The system.
+    """
+    count = system.unheld.shape[1]
+    if count == 0:
+        return ()
+    torn, found = system.torn, []
+    starts = np.cumsum([0] + [part.mesh.size for part in torn.subdomains])
+    for name, body in torn.scene.bodies.items():
+        modes = rigid_body_modes(body.mesh.points)
+        size = modes.shape[2]
+        sums = np.zeros((size, size + count))
+        for part, start in zip(torn.subdomains, starts, strict=False):
+            if part.mesh.body == name:
+                own = modes[part.mesh.nodes].reshape(part.mesh.size, size)
+                moved = system.unheld[start : start + part.mesh.size].toarray()
+                sums += own.T @ np.hstack([own, moved])
+        sums = torn.numbering.comm.allreduce(sums)
+        found.append(np.linalg.solve(sums[:, :size], sums[:, size:]))
+    motions = np.stack(found)  # (n_bodies, n_modes, count)
+    motions /= np.abs(motions).max(axis=(0, 1))
+    motions[np.abs(motions) <= ROUNDING] = 0.0
+    return tuple(
+        UnheldMotion({name: own for name, own in zip(torn.scene.bodies, motion, strict=True) if own.any()})
+        for motion in np.moveaxis(motions, 2, 0)
+    )
+
+
+def motion_in_words(motion: np.ndarray) -> str:
+    """Return coefficients of rigid modes, shape (3,) or (6,), as translation and rotation."""
+    dim = 2 if len(motion) == 3 else 3
+    return " with ".join(
+        f"{kind} ({', '.join(f'{component:.2g}' for component in part)})"
+        for kind, part in (("translation", motion[:dim]), ("rotation", motion[dim:]))
+        if np.any(part)
+    )

@@ -1,0 +1,48 @@
+"""Errors that say what is needed, what was given and what to do, raised by all ranks or by none."""
+
+from fenics_contact.errors.agreement import agree, collective, collectively, together
+from fenics_contact.errors.kinds import (
+    ConvergenceError,
+    FenicsContactError,
+    ForkedProcessError,
+    InfeasibleError,
+    InvalidDesignError,
+    InvalidInputError,
+    MissingRequirementError,
+    RemoteError,
+    UserCodeError,
+)
+from fenics_contact.errors.telling import tell
+from fenics_contact.errors.user_code import calling, running
+
+__all__ = [
+    "ConvergenceError",
+    "FenicsContactError",
+    "ForkedProcessError",
+    "InfeasibleError",
+    "InvalidDesignError",
+    "InvalidInputError",
+    "MissingRequirementError",
+    "RemoteError",
+    "UserCodeError",
+    "agree",
+    "calling",
+    "collective",
+    "collectively",
+    "running",
+    "tell",
+    "together",
+]
+
+for _kind in (
+    ConvergenceError,
+    FenicsContactError,
+    ForkedProcessError,
+    InfeasibleError,
+    InvalidDesignError,
+    InvalidInputError,
+    MissingRequirementError,
+    RemoteError,
+    UserCodeError,
+):
+    _kind.__module__ = __name__  # tracebacks name the place that they are imported from

@@ -1,0 +1,216 @@
+"""What one rank meets, all ranks meet: errors are agreed on before they are raised.
+
+Every point at which ranks agree is one and the same exchange on a communicator of this package's own: the
+end of a block that fails or succeeds on each rank by itself (`together`), and the beginning of a function
+that all ranks have to call (`collective`). So a rank that has failed anywhere tells the others at the next
+such point that they reach, wherever that is, and so does one whose program has ended. Ranks that wait inside
+a call of MPI which the failed one will never make cannot be told; where a failed rank finds that nobody
+comes, it ends the program on all of them.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import wraps
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+from fenics_contact.errors import meeting
+from fenics_contact.errors.kinds import FenicsContactError, InvalidInputError, RemoteError
+from fenics_contact.errors.meeting import FAILED, exchanged, own_of
+from fenics_contact.errors.user_code import failure, told
+
+if TYPE_CHECKING:  # these errors also report that mpi4py is missing
+    from mpi4py import MPI
+
+#: Marks errors that all ranks have met already.
+_AGREED = "_fenics_contact_agreed"
+
+Given = ParamSpec("Given")
+Found = TypeVar("Found")
+
+
+def agree(
+    comm: MPI.Comm,
+    error: BaseException | None,
+    where: str = "",
+    *,
+    wait: float | None = None,
+    users: bool = False,
+) -> None:
+    """Let all ranks raise as soon as one of them has an error.
+
+    A rank with an error of its own raises that; a rank without one raises an error of the
+    same class with the message of the lowest failing rank. Collective on ``comm``.
+
+    Args:
+        comm: Communicator whose ranks must stay together.
+        error: This rank's error, or None.
+        where: What this rank calls; all ranks must call the same.
+        wait: Seconds after which a rank with an error ends the program, because the others wait in a call
+            that it will not make; None where they are sure to come.
+        users: This rank's error was met in a user's code. If others have met none, all raise a
+            `UserCodeError` instead; what all meet, such as an exception by which the user stops a run, stays
+            what it is.
+
+    Raises:
+        BaseException: ``error`` itself where there is one.
+        FenicsContactError: On the other ranks, of the failing rank's class where that is one of
+            this package's, else `RemoteError`; exits and interrupts stay what they are.
+        InvalidInputError: If ranks call different things.
+    """
+    if comm.size == 1:
+        if error is not None:
+            raise error
+        return
+    own = own_of(comm)
+    places, stop = exchanged(own, error, where, wait)
+    if FAILED in places:
+        named = _named(stop, where) if users else stop
+        reports = own.allgather(None if named is None else _report(named))
+        if named is not None:
+            raise _marked(named if None in reports else stop or named)
+        raise _marked(_remote(reports))
+    if len(set(places)) > 1:
+        raise _marked(_strayed(own.allgather(where)))
+    if stop is not None:
+        raise stop
+
+
+@contextmanager
+def together(comm: MPI.Comm, where: str = "") -> Iterator[None]:
+    """Run a block that makes no collective calls, then raise on all ranks if it failed on one.
+
+    Collective on ``comm``, which the block itself must not use.
+
+    Args:
+        comm: Communicator whose ranks must stay together.
+        where: As for `agree`.
+
+    Raises:
+        BaseException: What the block raised on this rank, or as in `agree` what it raised on another.
+
+    Example:
+        >>> with together(comm):  # doctest: +SKIP
+        ...     if comm.rank == 0:
+        ...         text = path.read_text()
+    """
+    error: BaseException | None = None
+    try:
+        yield
+    except GeneratorExit:
+        raise
+    except BaseException as caught:
+        error = caught
+    agree(comm, error, where)
+
+
+@contextmanager
+def collective(comm: MPI.Comm, where: str, *, closed: bool = False, users: bool = False) -> Iterator[None]:
+    """Run a block that makes collective calls; what one rank alone meets in it, all ranks meet.
+
+    The ranks meet at its beginning: there they hear of a failure of another one since they met last, and of
+    ranks that call something else. A rank that fails inside tells the others where these meet next. Where
+    they do not, because they wait in a call of MPI for the one that failed, it ends the program: an error
+    is logged, and all ranks are aborted.
+
+    Args:
+        comm: Communicator whose ranks run the block.
+        where: What it is, for messages.
+        closed: Meet at its end, too: who comes after it knows that nobody failed in it.
+        users: It is a user's code, as for `agree`.
+
+    Raises:
+        BaseException: As `agree`.
+    """
+    agree(comm, None, where)
+    begun = time.perf_counter()
+    try:
+        yield
+    except GeneratorExit:
+        raise
+    except BaseException as error:
+        if comm.size > 1 and not hasattr(error, _AGREED):
+            wait = min(max(time.perf_counter() - begun, meeting.SHORTEST_WAIT), meeting.LONGEST_WAIT)
+            agree(comm, error, where, wait=wait, users=users)
+        raise
+    if closed:
+        agree(comm, None, f"the end of {where}")
+
+
+def collectively(
+    where: str, comm_of: Callable[..., MPI.Comm]
+) -> Callable[[Callable[Given, Found]], Callable[Given, Found]]:
+    """Make the whole of a function a `collective` block.
+
+    Args:
+        where: Its name, for messages.
+        comm_of: Gets its arguments, returns the communicator.
+
+    Example:
+        >>> @collectively("Model.solve", lambda self: self.comm)
+        ... def solve(self): ...
+    """
+
+    def guarded(function: Callable[Given, Found]) -> Callable[Given, Found]:
+        @wraps(function)
+        def called(*arguments: Given.args, **named: Given.kwargs) -> Found:
+            with collective(comm_of(*arguments, **named), where):
+                return function(*arguments, **named)
+
+        return called
+
+    return guarded
+
+
+Report = tuple[type[BaseException], str, Any]
+
+
+def _report(error: BaseException) -> Report:
+    """Return what other ranks need: a class that they know, the message, the status of an exit."""
+    kind = type(error)
+    if isinstance(error, FenicsContactError) and kind.__module__.startswith("fenics_contact."):
+        return kind, str(error), None
+    if isinstance(error, SystemExit):
+        return SystemExit, str(error), error.code if isinstance(error.code, int | str) else 1
+    if isinstance(error, KeyboardInterrupt):
+        return KeyboardInterrupt, str(error), None
+    return RemoteError, told(error), None
+
+
+def _named(error: BaseException | None, where: str) -> BaseException | None:
+    """Return an error of a user's code as one that says whose it is."""
+    if isinstance(error, FenicsContactError) or not isinstance(error, Exception):
+        return error
+    named = failure(where, error)
+    named.__cause__ = error
+    return named
+
+
+def _remote(reports: list[Report | None]) -> BaseException:
+    """Return what a rank raises that has met nothing itself."""
+    rank, (kind, message, code) = next((r, report) for r, report in enumerate(reports) if report is not None)
+    if kind is SystemExit:
+        return SystemExit(code)
+    text = f"{message} (met on rank {rank})" if message else f"met on rank {rank}"
+    try:
+        return kind(text)
+    except TypeError:  # a class that is made of more than a message
+        return RemoteError(f"{kind.__name__}: {text}")
+
+
+def _strayed(places: list[str]) -> InvalidInputError:
+    """Return what all ranks raise that call different things."""
+    other = next(rank for rank, place in enumerate(places) if place != places[0])
+    first, second = (place or "a step inside the package" for place in (places[0], places[other]))
+    return InvalidInputError(
+        f"all ranks must make the same collective calls in the same order, but rank 0 calls {first} and rank "
+        f"{other} {second}: take them out of blocks like `if comm.rank == 0`"
+    )
+
+
+def _marked(error: BaseException) -> BaseException:
+    with suppress(AttributeError):
+        setattr(error, _AGREED, True)
+    return error

@@ -1,0 +1,57 @@
+"""The classes of errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+
+class FenicsContactError(Exception):
+    """Base of every error that this package raises on purpose."""
+
+
+class InvalidInputError(FenicsContactError, ValueError):
+    """The input cannot be used as given; the message says what would be accepted."""
+
+
+class InvalidDesignError(InvalidInputError):
+    """The objective does not exist at this design, for example because a cell is inverted.
+
+    A minimisation that meets it tries a shorter step.
+    """
+
+
+class InfeasibleError(FenicsContactError):
+    """No equilibrium exists: nothing holds some motion of some body."""
+
+
+class MissingRequirementError(FenicsContactError, ImportError):
+    """A library that the package stands on is missing or has an unsupported version."""
+
+
+class ForkedProcessError(FenicsContactError, RuntimeError):
+    """Something is to be computed in a process that was forked from one that had computed."""
+
+
+class ConvergenceError(FenicsContactError, RuntimeError):
+    """An iterative method stopped before its tolerance was met.
+
+    Attributes:
+        history: The record of every iteration up to the stop, oldest first.
+    """
+
+    def __init__(self, message: str, history: Sequence[Any] = ()) -> None:
+        """Keep the history beside the message."""
+        super().__init__(message)
+        self.history = tuple(history)
+
+
+class UserCodeError(FenicsContactError, RuntimeError):
+    """A function, material or obstacle that was given to this package failed.
+
+    The message says which one, how and where; what it raised is the cause on the rank that met it.
+    """
+
+
+class RemoteError(FenicsContactError, RuntimeError):
+    """Another rank of the communicator met an error; its message is repeated here."""

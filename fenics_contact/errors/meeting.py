@@ -1,0 +1,153 @@
+"""The one exchange by which ranks meet: each says where it is, and hears where the others are.
+
+It takes place on a communicator of this package's own, a duplicate of the user's. Ranks look for the others
+again and again instead of waiting inside MPI, so that they can tell what they wait for, hear an interrupt,
+and give up. A rank whose program has come to its end answers until the others have come to theirs, too.
+"""
+
+from __future__ import annotations
+
+import atexit
+import logging
+import os
+import sys
+import time
+import zlib
+from array import array
+from functools import cache
+from typing import TYPE_CHECKING, Any, cast
+
+from fenics_contact.errors.telling import tell
+
+if TYPE_CHECKING:  # these errors also report that mpi4py is missing
+    from mpi4py import MPI
+
+#: Seconds that a rank which failed among collective calls waits for the others: as long as the calls took so
+#: far, but within these limits.
+SHORTEST_WAIT, LONGEST_WAIT = 5.0, 60.0
+#: After so many seconds a rank says where it waits for the others.
+PATIENCE = 30.0
+#: Waiting ranks look again after this part of the time that they have waited, and after this at most [s].
+PAUSE, LONGEST_PAUSE = 0.05, 5e-3
+#: What a rank that failed says in place of where it is.
+FAILED = 0
+#: Where ranks are whose program is over.
+ENDED = "nothing any more, for its program has ended"
+
+#: Duplicates that are in use: those who meet there are answered at the end of the program, too.
+_open: dict[int, MPI.Comm] = {}
+_LOG = logging.getLogger(__name__)
+_WAITING = (
+    "rank %d waits since %.0f s for the others in %s, which is collective: if they are not just slower, call "
+    "it on every rank, outside of blocks like `if comm.rank == 0`"
+)
+_ENDING = (
+    "rank %d failed in %s, and the other ranks wait for it where they cannot be told: the program is ended "
+    "on all ranks"
+)
+
+
+def own_of(comm: MPI.Comm) -> MPI.Comm:
+    """Return the duplicate of a communicator on which ranks meet; what users send never meets this.
+
+    Collective on ``comm`` when it is asked for first.
+    """
+    kind: Any = type(comm)
+    key = _key(kind)
+    own: Any = comm.Get_attr(key)
+    if own is None:
+        own = comm.Dup()
+        comm.Set_attr(key, own)
+        _open[id(own)] = own
+    # What was registered last comes first: before the end of PETSc, which waits for ranks and may be new.
+    atexit.unregister(_answer_until_all_have_ended)
+    atexit.register(_answer_until_all_have_ended, os.getpid())
+    return cast("MPI.Comm", own)
+
+
+@cache
+def _key(kind: Any) -> int:
+    """Return the key under which MPI keeps an attribute of this module with communicators of a class."""
+    return int(kind.Create_keyval(delete_fn=_freed))
+
+
+def _freed(comm: MPI.Comm, key: int, own: MPI.Comm) -> None:
+    _open.pop(id(own), None)
+    own.Free()
+
+
+class Post:
+    """One exchange under way.
+
+    Attributes:
+        places: Where all ranks are, once `ended` says that it is over.
+    """
+
+    def __init__(self, own: MPI.Comm, place: int) -> None:
+        """Say where this rank is."""
+        self._mine, self.places = array("q", [place]), array("q", [0]) * own.size
+        self._request = own.Iallgather(self._mine, self.places)
+
+    def ended(self) -> bool:
+        """Tell whether all ranks have said where they are."""
+        return bool(self._request.Test())
+
+
+def place_of(where: str) -> int:
+    """Return the number by which ranks compare where they are."""
+    return 1 + zlib.crc32(where.encode())
+
+
+def exchanged(
+    own: MPI.Comm, error: BaseException | None, where: str, wait: float | None
+) -> tuple[list[int], BaseException | None]:
+    """Return where all ranks are, and this rank's error: also an interrupt that it met while it waited.
+
+    Args:
+        own: What `own_of` returned.
+        error: This rank's error, or None.
+        where: What this rank calls.
+        wait: Seconds after which a rank with an error ends the program; None for never.
+    """
+    post = Post(own, place_of(where) if error is None else FAILED)
+    begun, warned = time.monotonic(), not where
+    while True:
+        try:
+            if post.ended():
+                return list(post.places), error
+            waited = time.monotonic() - begun
+            if error is not None and wait is not None and waited > wait:
+                tell(_LOG.critical, _ENDING, own.rank, where or "a collective call", exc_info=error)
+                own.Abort(1)
+            if error is None and waited > PATIENCE and not warned:
+                warned = True
+                tell(_LOG.warning, _WAITING, own.rank, waited, where)
+            time.sleep(min(PAUSE * waited, LONGEST_PAUSE))
+        except BaseException as caught:
+            # The exchange must end before its buffers go: an interrupt has to wait for that, not for ever.
+            if error is not None or type(caught).__module__.startswith("mpi4py"):
+                raise
+            error, wait = caught, SHORTEST_WAIT + time.monotonic() - begun
+
+
+def _answer_until_all_have_ended(process: int) -> None:
+    """Stay until the other ranks have come to their end, too, as MPI itself would, but tell those that call.
+
+    Args:
+        process: The one that is a rank; children that it has forked are none.
+    """
+    finalized = any(sys.modules[type(own).__module__].Is_finalized() for own in _open.values())
+    if os.getpid() != process or finalized:
+        return
+    place, begun = place_of(ENDED), time.monotonic()
+    posts = {key: Post(own, place) for key, own in _open.items()}
+    while posts:
+        for key, post in list(posts.items()):
+            if not post.ended():
+                continue
+            if set(post.places) == {place}:
+                del posts[key]
+                continue
+            _open[key].allgather(None if FAILED in post.places else ENDED)
+            posts[key] = Post(_open[key], place)
+        time.sleep(min(PAUSE * (time.monotonic() - begun), LONGEST_PAUSE))

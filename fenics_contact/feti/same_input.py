@@ -1,0 +1,71 @@
+"""Every rank must be given the same scene: numbers, topology, and functions as far as their values tell."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fenics_contact._libraries import MPI
+from fenics_contact.errors import calling, together
+from fenics_contact.feti.load_forms import is_scalar
+from fenics_contact.fingerprint import described, require_alike
+from fenics_contact.scene import Scene, Support, SurfaceLoad, Ufl
+from fenics_contact.scene.values import evaluate
+
+#: At so many nodes functions are compared: ranks that mean different ones differ nearly everywhere.
+COMPARED = 8
+
+
+def check_same_input(comm: MPI.Comm, scene: Scene, **settings: Any) -> None:
+    """Refuse a scene or settings that differ from rank to rank. Collective on ``comm``.
+
+    Compared are hashes of all arrays, the text of all numbers, the parameters of materials, and what
+    functions of position return at a few nodes; of other functions and objects only the names. One message
+    of some bytes a rank; what it costs is the hashing of the meshes.
+
+    Args:
+        comm: Communicator.
+        scene: This rank's scene.
+        **settings: What else must be the same, by name.
+
+    Raises:
+        InvalidInputError: On all ranks; names what differs.
+        UserCodeError: If a function or a material fails.
+    """
+    if comm.size == 1:
+        return
+    with together(comm):
+        told = {**described(scene, "scene", carried=False), **_values(scene)}
+        for name, value in settings.items():
+            told.update(described(value, name, carried=False))
+    require_alike(comm, told)
+
+
+def _values(scene: Scene) -> dict[str, str]:
+    """Describe what the user's functions and materials return."""
+    found: dict[str, str] = {}
+    for name, body in scene.bodies.items():
+        for material in body.materials:
+            kind = type(material).__name__
+            with calling(f"the parameters of material {kind}"):
+                numbers = np.asarray(material.parameters, dtype=np.float64)
+            found.update(described(numbers.tolist(), f"parameters of {kind} in body {name!r}"))
+    for number, support in enumerate(scene.supports):
+        if any(callable(component) for component in support.value):
+            values = support.values(_nodes(scene, support))
+            found.update(described(values, f"scene.supports[{number}] at some nodes"))
+    for number, load in enumerate(scene.loads):
+        if callable(load.value) and not isinstance(load.value, Ufl):
+            points, shape = _nodes(scene, load), () if is_scalar(load) else (scene.dim,)
+            values = evaluate(f"{type(load).__name__} on body {load.body!r}", load.value, points, shape)
+            found.update(described(values, f"scene.loads[{number}] at some nodes"))
+    return found
+
+
+def _nodes(scene: Scene, part: Any) -> np.ndarray:
+    """Return the coordinates of some nodes that a load or support acts on, shape (n, dim)."""
+    mesh = scene.bodies[part.body].mesh
+    on_surface = isinstance(part, Support | SurfaceLoad)
+    nodes = np.unique(mesh.surfaces[part.surface]) if on_surface else np.arange(mesh.n_nodes)
+    return mesh.points[nodes[np.linspace(0, len(nodes) - 1, min(COMPARED, len(nodes))).astype(int)]]

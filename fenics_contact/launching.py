@@ -1,0 +1,98 @@
+"""How processes are started on one rank or several, free of what MPI left in the environment of this one.
+
+MPI_Init and mpirun describe a process in its environment, which its children inherit: a child that starts MPI
+takes itself for that process, and an mpirun among them ends with status 1 and no word. What a user sets (a
+component, the prefix of the installation) stays.
+
+Also a program, for shells: ``python -P launching.py RANKS`` prints how the command begins, a word a line.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from fenics_contact.errors import MissingRequirementError
+
+#: How the names begin that Open MPI 4 and 5, PMIx, PMI, ORTE, PRRTE and MPICH write and nobody else.
+_TRACES = (
+    "OMPI_APP_CTX_", "OMPI_ARGV", "OMPI_COMMAND", "OMPI_COMM_WORLD_", "OMPI_FILE_LOCATION",
+    "OMPI_FIRST_RANKS", "OMPI_NUM_APP_CTX", "OMPI_UNIVERSE_SIZE", "OMPI_MCA_ess", "OMPI_MCA_initial_wdir",
+    "OMPI_MCA_mpi_oversubscribe", "OMPI_MCA_orte_app_num", "OMPI_MCA_orte_ess_", "OMPI_MCA_orte_hnp_uri",
+    "OMPI_MCA_orte_jobfam_session_dir", "OMPI_MCA_orte_launch", "OMPI_MCA_orte_local_daemon_uri",
+    "OMPI_MCA_orte_num_nodes", "OMPI_MCA_orte_precondition_transports", "OMPI_MCA_orte_top_session_dir",
+    "OMPI_MCA_pmix", "OMPI_MCA_shmem_RUNTIME_QUERY_hint", "OPAL_OUTPUT_", "ORTE_", "PMI_", "PMIX_", "PRTE_",
+    "HYDI_", "MPI_LOCAL",
+)  # fmt: skip
+#: Settings of users among them.
+_SETTINGS = ("PMIX_MCA_", "PRTE_MCA_")
+#: How all names begin that have to do with starting MPI.
+_FAMILIES = ("OMPI_", "OPAL_", "ORTE_", "PMI_", "PMIX_", "PRTE_", "HYDRA_", "I_MPI_", "MPICH_")
+
+
+def traces(names: Iterable[str]) -> list[str]:
+    """Return those of the names of an environment that MPI has written."""
+    return [name for name in names if name.startswith(_TRACES) and not name.startswith(_SETTINGS)]
+
+
+def clean_environment(given: Mapping[str, str] | None = None) -> dict[str, str]:
+    """Return an environment, by default that of this process, without the traces of MPI."""
+    kept = dict(os.environ if given is None else given)
+    for name in traces(kept):
+        del kept[name]
+    return kept
+
+
+def launcher(ranks: int) -> list[str]:
+    """Return how a program is started on so many ranks: by the mpirun beside this Python, or on PATH.
+
+    Raises:
+        MissingRequirementError: If there is no mpirun for several ranks.
+    """
+    if ranks == 1:
+        return []
+    beside = [Path(prefix) / "bin" / "mpirun" for prefix in (sys.prefix, sys.base_prefix)]
+    found = [str(path) for path in beside if os.access(path, os.X_OK)] or [shutil.which("mpirun") or ""]
+    if not found[0]:
+        raise MissingRequirementError(
+            f"{ranks} ranks need mpirun, found none beside {sys.executable} or on PATH: install the MPI of "
+            "its mpi4py, or take one rank",
+            name="mpirun",
+        )
+    return [found[0], "-n", str(ranks)]
+
+
+def last_words(command: Sequence[str], output: str, most: int = 2000) -> str:
+    """Return the end of what a process that failed has said, or what to look at where it said nothing.
+
+    Args:
+        command: Its command.
+        output: All that it wrote.
+        most: Largest number of characters.
+    """
+    words = output.strip()[-most:]
+    if words:
+        return words
+    settings = sorted(name for name in clean_environment() if name.startswith(_FAMILIES))
+    return (
+        f"it said nothing, as an mpirun that cannot start: try `{shlex.join(command)[:most]}` in a shell, "
+        f"without what the environment says of MPI ({', '.join(settings) or 'nothing'})"
+    )
+
+
+def main() -> None:
+    """Print the beginning of the command that the program's one argument, the number of ranks, asks for."""
+    try:
+        start = launcher(int(sys.argv[1]))
+    except MissingRequirementError as error:
+        sys.stderr.write(f"{error}\n")
+        sys.exit(2)
+    sys.stdout.write("\n".join(["env", *(f"--unset={name}" for name in traces(os.environ)), *start]) + "\n")
+
+
+if __name__ == "__main__":
+    main()

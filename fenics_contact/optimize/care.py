@@ -1,0 +1,74 @@
+"""Subgradients that may be none: before the method stops on them, gradients from beside take their place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenics_contact.optimize.objective import Evaluation, beside
+from fenics_contact.optimize.problem import Problem
+from fenics_contact.optimize.state import MethodState
+
+Array = NDArray[np.float64]
+
+_NEAR = 1e-2  # distance to a neighbour, in lengths of the problem
+_ATTEMPTS = 8  # directions that are tried until one leads half as far
+
+
+def surely(problem: Problem, found: Evaluation, number: int) -> Evaluation:
+    """Return an evaluation whose subgradient is one, as far as the function can tell.
+
+    At almost every point a locally Lipschitz function has a gradient, and what such gradients tend to where
+    points tend to x are Clarke subgradients at x: the one beside x in a direction that nothing singles out
+    stands for one of them.
+
+    Args:
+        problem: The problem.
+        found: Value and subgradient, doubtful or not.
+        number: Count of the evaluation, for messages.
+
+    References:
+        J. V. Burke, A. S. Lewis, M. L. Overton, A robust gradient sampling algorithm for nonsmooth, nonconvex
+        optimization, SIAM J. Optim. 15 (2005) 751-779.
+    """
+    return beside(problem.fun, found, neighbour(problem, found.x), number) if found.doubtful else found
+
+
+def without_doubt(problem: Problem, state: MethodState) -> MethodState:
+    """Return the state with a centre that was looked into, without doubtful planes, careful from now on.
+
+    A proximal parameter that false promises have worn down begins anew.
+    """
+    centre = surely(problem, state.centre, state.evaluations + 1)
+    bundle = state.bundle.refined(centre.subgradient * problem.scale, 0.0, centre.error)
+    trust = replace(state.trust, t=state.first_t) if state.trust.exhausted else state.trust
+    kept = bundle.chosen(np.flatnonzero(~bundle.doubtful))
+    return replace(state, centre=centre, bundle=kept, trust=trust, careful=True)
+
+
+def neighbour(problem: Problem, x: Array) -> Array:
+    """Return a feasible point near x in a random direction, the same one for the same x.
+
+    What leaves the box is turned back into it; of several points the one furthest from x is taken, x itself
+    where nothing else is feasible.
+    """
+    allowed, scale = problem.allowed, problem.scale
+    below, above = (allowed.lower - x) / scale, (allowed.upper - x) / scale
+    length, best = _NEAR * problem.length, x
+    random = np.random.default_rng(np.frombuffer(x.tobytes(), dtype=np.uint32))
+    for _ in range(_ATTEMPTS):
+        way = random.standard_normal(x.size)
+        way *= length / np.linalg.norm(way)
+        way = np.where((way < below) | (way > above), -way, way)
+        point = allowed.project(x + scale * way)
+        if _distance(point, x, scale) > _distance(best, x, scale):
+            best = point
+        if _distance(best, x, scale) > 0.5 * length:
+            break
+    return best
+
+
+def _distance(point: Array, x: Array, scale: Array) -> float:
+    return float(np.linalg.norm((point - x) / scale))

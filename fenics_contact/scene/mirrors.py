@@ -1,0 +1,33 @@
+"""Planes of symmetry: flat sides on rollers, beyond which the body goes on as its mirror image."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fenics_contact.geometry import vector_areas
+
+if TYPE_CHECKING:
+    from fenics_contact.scene.scene import Scene
+
+#: A facet lies across an axis if the cosine of its normal misses one by no more.
+ACROSS = 1e-9
+
+
+def mirrored(scene: Scene, body: str) -> np.ndarray:
+    """Return which nodes of a body lie on a plane of symmetry across each axis, shape (n_nodes, dim).
+
+    A plane of symmetry is a flat side across an axis on which a support prescribes that component alone.
+    """
+    mesh = scene.bodies[body].mesh
+    marks = np.zeros(mesh.points.shape, dtype=bool)
+    for support in scene.supports:
+        given = [axis for axis, value in enumerate(support.value) if value is not None]
+        if support.body != body or len(given) != 1 or callable(support.value[given[0]]):
+            continue
+        facets = mesh.surfaces[support.surface]
+        areas = vector_areas(mesh.points, facets)
+        across = np.abs(areas[:, given[0]]) >= (1.0 - ACROSS) * np.linalg.norm(areas, axis=1)
+        marks[facets[across].ravel(), given[0]] = True
+    return marks

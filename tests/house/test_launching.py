@@ -1,0 +1,91 @@
+"""Processes start on ranks from everywhere: beside MPI, under mpirun, and where MPI has left its traces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from fenics_contact import launching
+from fenics_contact.errors import MissingRequirementError
+from fenics_contact.launching import clean_environment, last_words, launcher, traces
+from tests.conftest import LAUNCH
+
+#: A process without a shell between: its environment is that which MPI_Init wrote into, not `os.environ`.
+STARTING = f"""
+    import subprocess, sys
+    from mpi4py import MPI
+
+    ranks = "import sys; from mpi4py import MPI; sys.stdout.write(str(MPI.COMM_WORLD.size) + chr(10))"
+    if MPI.COMM_WORLD.rank == 0:
+        for count in ("1", "2"):
+            command = [{str(LAUNCH)!r}, count, sys.executable, "-c", ranks]
+            done = subprocess.run(command, capture_output=True, text=True)
+            sys.stdout.write(f"{{done.returncode}} {{done.stdout}} {{done.stderr}}")
+"""
+#: What stays although MPI_Init writes it: switches of network libraries, settings of PMIx.
+HARMLESS = ("HFI_NO_BACKTRACE", "IPATH_NO_BACKTRACE", "PSM2_DEVICES", "PMIX_MCA_")
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_ranks_start_from_a_process_that_uses_mpi(ranks: int, mpirun: Callable[..., str]) -> None:
+    assert mpirun(STARTING, ranks, timeout=60.0).split() == ["0", "1", "0", "2", "2"]
+
+
+def test_all_that_mpi_writes_into_the_environment_is_known(mpirun: Callable[..., str]) -> None:
+    script = """
+        import subprocess, sys
+
+        def environment():
+            lines = subprocess.run(["env", "-0"], capture_output=True, text=True).stdout.split("\\0")
+            return set(filter(None, lines))
+
+        before = environment()
+        from mpi4py import MPI
+        sys.stdout.write(" ".join(line.partition("=")[0] for line in environment() - before))
+    """
+    written = [name for name in mpirun(script, 1).split() if not name.startswith(HARMLESS)]
+    assert sorted(written) == sorted(traces(written))
+
+
+def test_traces_go_and_settings_stay() -> None:
+    left = {
+        "OMPI_MCA_ess": "singleton", "OMPI_MCA_orte_ess_num_procs": "1", "OMPI_MCA_pmix": "^s1",
+        "OMPI_COMM_WORLD_SIZE": "2", "PMIX_RANK": "0", "ORTE_SCHIZO_DETECTION": "ORTE", "PMI_FD": "5",
+        "PRTE_LAUNCHED": "1",
+    }  # fmt: skip
+    kept = {
+        "OMPI_MCA_btl": "^tcp", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OPAL_PREFIX": "/opt", "PMIX_MCA_gds": "hash",
+        "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe", "OMPI_MCA_orte_tmpdir_base": "/scratch",
+    }  # fmt: skip
+    assert clean_environment({**left, **kept}) == kept
+
+
+def test_clean_is_the_environment_of_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OMPI_MCA_ess", "singleton")
+    monkeypatch.setenv("A_SETTING", "of mine")
+    environment = clean_environment()
+    assert environment["A_SETTING"] == "of mine"
+    assert "OMPI_MCA_ess" not in environment
+
+
+def test_several_ranks_need_mpirun(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert launcher(1) == []
+    assert launcher(2)[1:] == ["-n", "2"]
+    monkeypatch.setattr(launching.os, "access", lambda *_: False)
+    monkeypatch.setattr(launching.shutil, "which", lambda _: None)
+    with pytest.raises(MissingRequirementError, match=r"2 ranks need mpirun, found none beside .* install"):
+        launcher(2)
+    monkeypatch.setattr(launching.sys, "argv", ["launching.py", "2"])
+    with pytest.raises(SystemExit) as ended:
+        launching.main()
+    assert ended.value.code == 2
+
+
+def test_a_process_without_a_word_gets_some(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert last_words(["mpirun", "x"], " no room\n") == "no room"
+    assert last_words(["mpirun", "x"], "a" * 50, most=3) == "aaa"
+    monkeypatch.setenv("OMPI_MCA_plm", "slurm")
+    words = last_words(["mpirun", "-n", "2", "my script"], "\n")
+    assert "nothing, as an mpirun that cannot start: try `mpirun -n 2 'my script'` in a shell" in words
+    assert "OMPI_MCA_plm" in words

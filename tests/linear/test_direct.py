@@ -1,0 +1,53 @@
+"""One held body in one piece is factored, and what comes out is judged."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.contact import solve_scene
+from fenics_contact.errors import ConvergenceError
+from fenics_contact.feti import DirectSystem
+from fenics_contact.geometry import block
+from fenics_contact.scene import Body, IsotropicElasticity, Scene, Support, Traction
+
+
+def cantilever(length: float, cells: int) -> Scene:
+    mesh = block((0.0, 0.0, 0.0), (length, 1.0, 1.0), (cells, 2, 2))
+    body = Body(mesh, IsotropicElasticity(100.0, 0.3))
+    return Scene({"beam": body}, [Support("beam", "x0")], [Traction("beam", "x1", (0.0, 0.0, 1e-6))])
+
+
+def test_a_slender_beam_is_solved_to_what_double_precision_allows() -> None:
+    state = solve_scene(cantilever(100.0, 40), None, MPI.COMM_SELF)
+
+    assert isinstance(state.system, DirectSystem)
+    (part,) = state.torn.subdomains
+    free = np.setdiff1d(np.arange(part.mesh.size), state.torn.B.indices)
+    dense = np.linalg.solve(part.stiffness[free][:, free].toarray(), part.load[free])
+    np.testing.assert_allclose(state.torn_displacement[free], dense, atol=1e-6 * np.abs(dense).max())
+    assert state.errors.algebraic < 1e-7
+
+
+def test_an_answer_that_is_rounding_is_refused() -> None:
+    with pytest.raises(ConvergenceError, match=r"error below 0.0001 in energy norm.*too slender"):
+        solve_scene(cantilever(3e4, 40), None, MPI.COMM_SELF)
+
+
+def test_a_damaged_factor_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = DirectSystem.__init__
+
+    def damaged(self: DirectSystem, *args: object, **kwargs: object) -> None:
+        whole(self, *args, **kwargs)
+        solve = self._factor.solve
+
+        def wrong(right: np.ndarray, out: np.ndarray) -> None:
+            solve(right, out)
+            out *= 0.7
+
+        self._factor.solve = wrong
+
+    monkeypatch.setattr(DirectSystem, "__init__", damaged)
+    with pytest.raises(ConvergenceError, match="needs an error below"):
+        solve_scene(cantilever(3.0, 5), None, MPI.COMM_SELF)

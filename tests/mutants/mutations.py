@@ -1,0 +1,190 @@
+"""The mistakes that are tried, and the quick tests that must find them."""
+
+from __future__ import annotations
+
+from tests.mutants.copy_of_package import Mutation
+
+CONIC = "tests/contact/test_conic.py::test_energies_and_contact_forces_equal_those_of_a_conic_solver"
+
+PARTS = "tests/accuracy/test_certificate_parts.py"
+
+MUTATIONS = (
+    Mutation(
+        "friction drags the slave along its slip",
+        "contact/result.py",
+        "self.normal_force[:, None] * normal - self._in_space(",
+        "self.normal_force[:, None] * normal + self._in_space(",
+        (CONIC,),
+    ),
+    Mutation(
+        "pressures are too large by 0.4 percent",
+        "contact/result.py",
+        "return self.normal_force / self.points.area",
+        "return 1.004 * self.normal_force / self.points.area",
+        ("tests/contact/test_state.py::test_pressures_integrate_to_the_load",),
+    ),
+    Mutation(
+        "Tresca's bound is too large by a percent",
+        "feti/friction.py",
+        "traction[points.pair] * points.area",
+        "1.01 * traction[points.pair] * points.area",
+        (CONIC,),
+    ),
+    Mutation(
+        "gaps to rigid obstacles are forgotten",
+        "feti/contact_search.py",
+        'gap = asked(obstacle, "distance", slave.surface.points[chosen])',
+        'gap = 0.0 * asked(obstacle, "distance", slave.surface.points[chosen])',
+        ("tests/contact/test_obstacles.py::test_nodes_lie_outside_of_the_round_obstacle_after_pressing",),
+    ),
+    Mutation(
+        "bodies may overlap",
+        "feti/room.py",
+        "FACETING = 0.1",
+        "FACETING = 10.0",
+        ("tests/feti/test_contact_search.py::test_overlapping_bodies_are_refused",),
+    ),
+    Mutation(
+        "no body is ever too loose",
+        "contact/held.py",
+        "LEFT = 1e-8",
+        "LEFT = 1e3",
+        ("tests/contact/test_held.py::test_a_body_pulled_off_its_floor_is_named_with_the_way_it_goes",),
+    ),
+    Mutation(
+        "strain energy is too large by 0.2 percent",
+        "contact/energies.py",
+        "strained = 0.5 * internal",
+        "strained = 0.501 * internal",
+        ("tests/contact/test_state.py::test_the_primal_energy_is_the_dual_energy_and_contains_the_friction",),
+    ),
+    Mutation(
+        "von Mises stress is too small by 0.3 percent",
+        "contact/fields.py",
+        "ufl.sqrt(1.5 * ufl.inner(deviator, deviator))",
+        "ufl.sqrt(1.49 * ufl.inner(deviator, deviator))",
+        ("tests/models/test_plane.py::test_a_plate_is_stretched_and_contracts",),
+    ),
+    Mutation(
+        "load steps forget the slip before",
+        "contact/equilibrium.py",
+        "if slip_from is not None:",
+        "if slip_from is None:",
+        ("tests/contact/test_steps.py::test_unloading_does_not_return_to_the_start",),
+    ),
+    Mutation(
+        "the estimate of the mesh's error is half of it",
+        "accuracy/discretisation.py",
+        "return DiscretisationError(float(np.sqrt(sums.sum())), by_body",
+        "return DiscretisationError(0.5 * float(np.sqrt(sums.sum())), by_body",
+        ("tests/accuracy/test_smooth.py::test_the_estimate_is_close_to_the_error_and_falls_at_its_rate",),
+    ),
+    Mutation(
+        "a state is called balanced ten times too early",
+        "accuracy/balanced.py",
+        "return errors.together <= self.share * discretisation",
+        "return errors.together <= 10.0 * self.share * discretisation",
+        ("tests/accuracy/test_balanced.py::test_a_smaller_share_is_reached_from_where_the_solver_is",),
+    ),
+    Mutation(
+        "the certificate forgets forces across a gap",
+        "accuracy/certificate.py",
+        "rest = _pressed(problem, known, lifted.residual) + _rubbed(",
+        "rest = _rubbed(",
+        (f"{PARTS}::test_forces_across_a_gap_do_work",),
+    ),
+    Mutation(
+        "the certificate forgets what friction falls short of",
+        "accuracy/certificate.py",
+        "rest = _pressed(problem, known, lifted.residual) + _rubbed(problem, known, lifted.residual)",
+        "rest = _pressed(problem, known, lifted.residual)",
+        (f"{PARTS}::test_friction_that_falls_short_of_its_bound_does_less_work",),
+    ),
+    Mutation(
+        "the law of friction has no error",
+        "accuracy/fixed_point.py",
+        "return min(by_law, largest * certificate.bound) + by_limit",
+        "return 0.0",
+        (f"{PARTS}::test_the_estimate_by_the_law_of_friction_is_needed",),
+    ),
+    Mutation(
+        "the certificate is that of the torn displacement alone",
+        "accuracy/certificate.py",
+        "max(_distances(system, solution, lifted))",
+        "_distances(system, solution, lifted)[0]",
+        (f"{PARTS}::test_the_bound_is_that_of_both_displacements",),
+    ),
+    Mutation(
+        "a warmer body shrinks",
+        "scene/materials/isotropic.py",
+        "return (3 * lame_parameter + 2 * shear) * expansion * ufl.Identity(3)",
+        "return -(3 * lame_parameter + 2 * shear) * expansion * ufl.Identity(3)",
+        ("tests/models/test_thermal.py::test_a_free_body_expands_evenly_and_without_stress",),
+    ),
+    Mutation(
+        "sliding ties are bonded",
+        "feti/contact_rows.py",
+        "sliding = np.array([tie.sliding for tie in ties], dtype=bool)",
+        "sliding = np.array([False for tie in ties], dtype=bool)",
+        ("tests/contact/test_ties.py::test_only_a_tie_that_does_not_slide_drags_what_it_is_tied_to",),
+    ),
+    Mutation(
+        "the adjoint is solved a thousand times more loosely",
+        "shape/problem.py",
+        "ADJOINT_SHARE, ADJOINT_FLOOR = 1e-1, 1e-11",
+        "ADJOINT_SHARE, ADJOINT_FLOOR = 1e2, 1e-8",
+        (
+            "tests/shape/test_units.py::"
+            "test_the_adjoint_of_a_state_at_default_tolerance_is_more_accurate_than_the_state",
+        ),
+    ),
+    Mutation(
+        "a resumed run forgets what error went with which tolerance",
+        "shape/memory.py",
+        'self.error_by_tolerance = start.pop("alpha"), float(start.pop("error"))',
+        'self.error_by_tolerance = start.pop("alpha"), 0.0 * float(start.pop("error"))',
+        ("tests/shape/test_resuming.py::test_what_error_went_with_which_tolerance_is_known_after_going_on",),
+    ),
+    Mutation(
+        "planes of the bundle do not move with the centre",
+        "optimize/bundle.py",
+        "errors = self.errors + change - self.gradients @ step",
+        "errors = self.errors + change",
+        ("tests/optimize/test_bundle.py::test_moving_the_centre_gives_the_bundle_that_is_built_there",),
+    ),
+    Mutation(
+        "an answer need not be in balance",
+        "qp/residual.py",
+        "for value in (self.natural, self.gluing, self.coarse, self.violation))",
+        "for value in (self.natural, self.gluing, self.violation))",
+        ("tests/qp/test_solve.py::test_one_large_residual_keeps_an_answer_from_being_within_a_tolerance",),
+    ),
+    Mutation(
+        "rows that are free by more than rounding count as held",
+        "feti/contact_points.py",
+        "HELD = 1e-6",
+        "HELD = 1e-5",
+        ("tests/contact/test_symmetry_planes.py::test_what_is_left_free_by_rounding_alone_is_held",),
+    ),
+    Mutation(
+        "small pivots are zeros",
+        "feti/condensation.py",
+        "unit = 2.0 ** np.round(np.log2(stiffness.diagonal().max()))",
+        "unit = 1.0",
+        ("tests/contact/test_units.py::test_subdomains_are_factored_alike_in_all_units",),
+    ),
+    Mutation(
+        "Tresca's bound and the load are in two units",
+        "contact/held.py",
+        "bound = torn.tresca_bound / scale",
+        "bound = torn.tresca_bound",
+        ("tests/contact/test_held.py::test_the_limit_of_friction_does_not_depend_on_the_units",),
+    ),
+    Mutation(
+        "projections are sought from the origin",
+        "feti/projection.py",
+        "start = master.points[nodes[:, 0]]",
+        "start = 0.0 * master.points[nodes[:, 0]]",
+        ("tests/contact/test_far_from_origin.py::test_no_contact_point_is_lost_far_from_the_origin",),
+    ),
+)

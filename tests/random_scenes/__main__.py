@@ -1,0 +1,47 @@
+"""Judge random scenes: ``python -m tests.random_scenes --count 1000 --first 0``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from tests.random_scenes.judge import GOOD, Verdict
+from tests.random_scenes.runner import judged, table, work
+
+
+def main() -> int:
+    """Judge and write a table; fail unless every scene was solved or refused."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=1000, help="how many scenes")
+    parser.add_argument("--first", type=int, default=0, help="seed of the first")
+    parser.add_argument("--seeds", type=int, nargs="*", help="these seeds and no others")
+    parser.add_argument(
+        "--processes", type=int, default=2, help="how many at a time; 0: in this process, without a limit"
+    )
+    parser.add_argument("--limit", type=float, default=60.0, help="seconds of processor time for one scene")
+    parser.add_argument("--output", type=Path, help="all verdicts as JSON, a line each")
+    parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.worker:
+        work()
+        return 0
+    seeds = options.seeds or range(options.first, options.first + options.count)
+    verdicts = judged(seeds, options.processes, options.limit, _tell)
+    if options.output:
+        text = "\n".join(json.dumps(verdict.written()) for verdict in verdicts)
+        options.output.write_text(text + "\n", encoding="utf-8")
+    print(table(verdicts))
+    return int(any(verdict.outcome not in GOOD for verdict in verdicts))
+
+
+def _tell(verdict: Verdict) -> None:
+    if verdict.outcome not in GOOD:
+        print(
+            f"seed {verdict.seed}: {verdict.outcome.value}: {verdict.detail}\n    {verdict.words}", flush=True
+        )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,264 @@
+"""A scene on bodies in one piece, written down a second time with NumPy alone: stiffness, loads, supports.
+
+Shape functions come from monomials and the places of the nodes, materials from their engineering constants,
+integrals from Gauss's points: two a direction on linear cells and three on quadratic ones, which the answer
+depends on where cells are no parallelepipeds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact.geometry import BodyMesh
+from fenics_contact.geometry.cell_types import CELL_TYPES, FACET_TYPES, CellType
+from fenics_contact.scene import (
+    BodyForce,
+    IsotropicElasticity,
+    Load,
+    OrthotropicElasticity,
+    OrthotropicPlaneStress,
+    PlaneStrain,
+    PlaneStress,
+    Pressure,
+    Scene,
+    ThermalStrain,
+    TotalForce,
+)
+
+#: Components of a strain in the order of its vector, shear strains doubled.
+PAIRS = {2: [(0, 0), (1, 1), (0, 1)], 3: [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]}
+
+
+def elasticity(material: Any, dim: int) -> np.ndarray:
+    """Return C in the order of `PAIRS`, from the constants that a user gives."""
+    match material:
+        case IsotropicElasticity() | PlaneStrain():
+            E, nu = material.young_modulus, material.poisson_ratio
+            C = _isotropic(E, nu, dim)
+        case PlaneStress():
+            E, nu = material.young_modulus, material.poisson_ratio
+            C = E / (1 - nu**2) * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, 0.5 * (1 - nu)]])
+        case OrthotropicElasticity():
+            E, n, G = material.young_moduli, material.poisson_ratios, material.shear_moduli
+            S = np.diag([1 / E[0], 1 / E[1], 1 / E[2], 1 / G[2], 1 / G[1], 1 / G[0]])
+            for (i, j), ratio in {(0, 1): n[0], (0, 2): n[1], (1, 2): n[2]}.items():
+                S[i, j] = S[j, i] = -ratio / E[i]
+            C = _turned(np.linalg.inv(S), np.array(material.orientation))
+        case OrthotropicPlaneStress():
+            (E1, E2), nu, G12 = material.young_moduli, material.poisson_ratio, material.shear_modulus
+            S = np.array([[1 / E1, -nu / E1, 0], [-nu / E1, 1 / E2, 0], [0, 0, 1 / G12]])
+            c, s = np.cos(material.angle), np.sin(material.angle)
+            C = _turned(np.linalg.inv(S), np.array([[c, s], [-s, c]]))
+        case _:
+            raise AssertionError(material)
+    return np.asarray(C)
+
+
+def _isotropic(E: float, nu: float, dim: int) -> np.ndarray:
+    lame, shear = E * nu / ((1 + nu) * (1 - 2 * nu)), 0.5 * E / (1 + nu)
+    C = np.zeros((len(PAIRS[dim]),) * 2)
+    C[:dim, :dim] = lame
+    C += shear * np.diag([2.0] * dim + [1.0] * (len(C) - dim))
+    return C
+
+
+def _turned(C: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """Turn C, given in axes that are rows, by the strains ε_ij of the six or three unit strains."""
+    dim = len(axes)
+    to_axes = np.empty((len(C), len(C)))
+    for column, (i, j) in enumerate(PAIRS[dim]):
+        unit = np.zeros((dim, dim))
+        unit[i, j] = unit[j, i] = 1.0 if i == j else 0.5
+        seen = axes @ unit @ axes.T
+        to_axes[:, column] = [seen[a, b] * (1.0 if a == b else 2.0) for a, b in PAIRS[dim]]
+    return np.asarray(to_axes.T @ C @ to_axes)
+
+
+def thermal_strain(material: Any, dim: int) -> np.ndarray:
+    """Return the strain of one degree in the order of `PAIRS`, in plane strain with what its ends add."""
+    alpha = material.thermal_expansion
+    assert not isinstance(alpha, tuple)
+    factor = 1.0 + material.poisson_ratio if isinstance(material, PlaneStrain) else 1.0
+    return np.array([alpha * factor] * dim + [0.0] * (len(PAIRS[dim]) - dim))
+
+
+def _exponents(cell: CellType) -> np.ndarray:
+    lattice = np.array(list(product(range(cell.order + 1), repeat=cell.dim)))
+    return lattice[lattice.sum(axis=1) <= cell.order] if cell.is_simplex else lattice
+
+
+def shapes(cell: CellType, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return values (q, k) and gradients (q, k, d) of the shape functions at places (q, d)."""
+    exponents = _exponents(cell)
+    inverse = np.linalg.inv(np.prod(cell.nodes[:, None] ** exponents, axis=2))
+    values = np.prod(places[:, None] ** exponents, axis=2) @ inverse
+    slopes = []
+    for d in range(cell.dim):
+        lower = exponents.copy()
+        lower[:, d] = np.maximum(lower[:, d] - 1, 0)
+        slopes.append((exponents[:, d] * np.prod(places[:, None] ** lower, axis=2)) @ inverse)
+    return values, np.stack(slopes, axis=2)
+
+
+@cache
+def gauss(cell: CellType) -> tuple[np.ndarray, np.ndarray]:
+    """Return places and weights; simplices are integrated as squashed squares and cubes."""
+    count = cell.order + 1 + (1 if cell.is_simplex else 0)
+    ticks, weights = np.polynomial.legendre.leggauss(count)
+    ticks, weights = 0.5 * (ticks + 1), 0.5 * weights
+    places = np.array(list(product(ticks, repeat=cell.dim)))
+    weight = np.array([np.prod(w) for w in product(weights, repeat=cell.dim)])
+    if cell.is_simplex and cell.dim == 2:
+        x, y = places.T
+        return np.column_stack([x, y * (1 - x)]), weight * (1 - x)
+    if cell.is_simplex:
+        x, y, z = places.T
+        return np.column_stack([x, y * (1 - x), z * (1 - x) * (1 - y)]), weight * (1 - x) ** 2 * (1 - y)
+    return places, weight
+
+
+@dataclass(frozen=True)
+class Integrated:
+    """Shape functions (q, k), gradients (q, c, k, d) and weights (q, c) of the cells of a mesh."""
+
+    values: np.ndarray
+    gradients: np.ndarray
+    weights: np.ndarray
+
+
+def integrated(mesh: BodyMesh) -> Integrated:
+    """Evaluate everything at the Gauss points of all cells."""
+    cell = CELL_TYPES[mesh.cell_type]
+    places, weight = gauss(cell)
+    values, local = shapes(cell, places)
+    corners = mesh.points[mesh.cells]
+    corners = corners - corners[:, :1]
+    jacobian = np.einsum("qka,ckd->qcda", local, corners)
+    gradients = np.einsum("qka,qcad->qckd", local, np.linalg.inv(jacobian))
+    return Integrated(values, gradients, weight[:, None] * np.linalg.det(jacobian))
+
+
+def strain_rows(gradients: np.ndarray) -> np.ndarray:
+    """Return strains by displacements of nodes, (..., strains, k, d), from gradients (..., k, d)."""
+    dim = gradients.shape[-1]
+    B = np.zeros((*gradients.shape[:-2], len(PAIRS[dim]), *gradients.shape[-2:]))
+    for row, (i, j) in enumerate(PAIRS[dim]):
+        B[..., row, :, i] += gradients[..., j]
+        if i != j:
+            B[..., row, :, j] += gradients[..., i]
+    return B
+
+
+class Whole:
+    """One stiffness matrix, one load, all supports.
+
+    Attributes:
+        offset: Number of the first node of each body among all nodes.
+        points: Coordinates of all nodes, (n_nodes, dim).
+        K: Stiffness, dof dim n + d for component d of node n.
+        load: (n_nodes, dim).
+        prescribed: (n_nodes, dim), NaN where free.
+        body_of: Number of the body of each node.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.dim = scene, scene.dim
+        counts = [part.mesh.n_nodes for part in scene.bodies.values()]
+        self.offset = dict(zip(scene.bodies, np.cumsum([0, *counts[:-1]]).tolist(), strict=True))
+        self.body_of = np.repeat(np.arange(len(counts)), counts)
+        self.points = np.concatenate([part.mesh.points for part in scene.bodies.values()])
+        self.load = np.zeros(self.points.shape)
+        parts = []
+        for name, part in scene.bodies.items():
+            found = integrated(part.mesh)
+            C = np.array([elasticity(material, self.dim) for material in part.materials])
+            C = C[part.material_of_cells]
+            parts.append(_stiffness(part.mesh, found, C))
+            nodes = slice(self.offset[name], self.offset[name] + part.mesh.n_nodes)
+            for load in scene.loads:
+                if load.body == name:
+                    self.load[nodes] += _nodal(part, found, C, load)
+        self.K = sp.block_diag(parts, format="csr")
+        self.prescribed = np.full(self.points.shape, np.nan)
+        for support in scene.supports:
+            mesh = scene.bodies[support.body].mesh
+            nodes = np.unique(mesh.surfaces[support.surface]) + self.offset[support.body]
+            for component, value in enumerate(support.value):
+                if value is not None:
+                    assert not callable(value)
+                    self.prescribed[nodes, component] = value
+
+    @property
+    def free(self) -> np.ndarray:
+        """Whether a component of a node is not prescribed, (n_nodes, dim)."""
+        return np.isnan(self.prescribed)
+
+    def nodes(self, name: str) -> slice:
+        """Return the nodes of a body."""
+        return slice(self.offset[name], self.offset[name] + self.scene.bodies[name].mesh.n_nodes)
+
+
+def _stiffness(mesh: BodyMesh, found: Integrated, C: np.ndarray) -> sp.csr_matrix:
+    B = strain_rows(found.gradients)
+    q, c, s, k, d = B.shape
+    B = B.reshape(q, c, s, k * d)
+    blocks = np.einsum("qc,qcsi,cst,qctj->cij", found.weights, B, C, B, optimize=True)
+    dofs = (d * mesh.cells[:, :, None] + np.arange(d)).reshape(c, -1)
+    rows, columns = np.broadcast_arrays(dofs[:, :, None], dofs[:, None, :])
+    size = d * mesh.n_nodes
+    return sp.coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)).tocsr()
+
+
+def _nodal(part: Any, found: Integrated, C: np.ndarray, load: Load) -> np.ndarray:
+    """Return the nodal forces of a load, (n_nodes, dim)."""
+    mesh, force = part.mesh, np.zeros(part.mesh.points.shape)
+    if isinstance(load, ThermalStrain):
+        strain = np.array([thermal_strain(material, mesh.dim) for material in part.materials])
+        stress = np.einsum("cst,ct->cs", C, strain[part.material_of_cells]) * load.value
+        B = strain_rows(found.gradients)
+        np.add.at(force, mesh.cells, np.einsum("qc,qcskd,cs->ckd", found.weights, B, stress))
+    elif isinstance(load, BodyForce):
+        share = np.einsum("qk,qc->ck", found.values, found.weights)
+        np.add.at(force, mesh.cells, share[:, :, None] * np.array(load.value))
+    else:
+        facets = mesh.surfaces[load.surface]
+        values, normal = facet_integrals(mesh, facets)
+        area = np.linalg.norm(normal, axis=2)
+        if isinstance(load, Pressure):
+            given = np.einsum("qk,qfd->fkd", values, -load.value * normal)
+        elif callable(load.value):
+            at_nodes = load.value(mesh.points[facets].reshape(-1, mesh.dim)).reshape(*facets.shape, -1)
+            given = np.einsum("qk,ql,qf,fld->fkd", values, values, area, at_nodes)
+        else:
+            value = np.array(load.value) / (area.sum() if isinstance(load, TotalForce) else 1.0)
+            given = np.einsum("qk,qf,d->fkd", values, area, value)
+        np.add.at(force, facets, given)
+    return force
+
+
+def facet_integrals(mesh: BodyMesh, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return shape functions (q, k) and weighted outward normals (q, f, d) at the Gauss points of facets."""
+    kind = FACET_TYPES[facets.shape[1], mesh.dim]
+    places, weight = gauss(kind)
+    values, local = shapes(kind, places)
+    corners = mesh.points[facets]
+    tangents = np.einsum("qka,fkd->qfad", local, corners - corners[:, :1])
+    if mesh.dim == 3:
+        normal = np.cross(tangents[:, :, 0], tangents[:, :, 1])
+    else:
+        normal = np.stack([tangents[:, :, 0, 1], -tangents[:, :, 0, 0]], axis=2)
+    return values, weight[:, None, None] * normal
+
+
+def surface_area(mesh: BodyMesh, facets: np.ndarray) -> np.ndarray:
+    """Return the force of a unit pressure on each node of a mesh, (n_nodes,)."""
+    values, normal = facet_integrals(mesh, facets)
+    areas = np.zeros(mesh.n_nodes)
+    np.add.at(areas, facets, np.einsum("qk,qf->fk", values, np.linalg.norm(normal, axis=2)))
+    return areas

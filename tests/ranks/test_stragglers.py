@@ -1,0 +1,95 @@
+"""Ranks that call something else than the others, or not at all: they are told, or ended."""
+
+from __future__ import annotations
+
+import time
+
+from tests.conftest import launch
+
+#: A solved state on every rank.
+SOLVED = """
+import sys, time
+from mpi4py import MPI
+from fenics_contact.errors import meeting
+from tests.ranks.given import scene, solve
+from tests.ranks.run_cases import response
+world = MPI.COMM_WORLD
+"""
+
+
+def test_ranks_that_do_not_meet_are_told_so() -> None:
+    """One comes late, ranks call different things, and the program of one ends while another calls."""
+    end = launch(
+        2,
+        "-c",
+        SOLVED
+        + """
+meeting.PATIENCE = 0.2
+state = solve(world, scene())
+if world.rank == 1:
+    time.sleep(1.5)
+state.displacement
+
+def told(name):
+    try:
+        getattr(state, name)
+    except ValueError as error:
+        sys.stdout.write(f"{error}\\n")
+
+told("errors" if world.rank == 0 else "von_mises")
+if world.rank == 0:
+    for name in ("errors", "contact_pressure"):
+        told(name)
+""",
+    )
+    assert end.returncode == 0, end.stderr
+    waits = "waits since 0 s for the others in State.displacement, which is collective: if they are not just"
+    assert f"rank 0 {waits}" in end.stderr
+    assert f"rank 1 {waits}" not in end.stderr
+    order = "all ranks must make the same collective calls in the same order, but rank 0 calls State."
+    assert end.stdout.count(f"{order}errors and rank 1 State.von_mises: take them out") == 2
+    for name in ("errors", "contact_pressure"):
+        gone = f"{order}{name} and rank 1 nothing any more, for its program has ended: take them out"
+        assert end.stdout.count(gone) == 1, end.stdout
+
+
+def test_where_the_program_of_one_rank_fails_the_others_end() -> None:
+    end = launch(
+        2,
+        "-c",
+        SOLVED
+        + """
+solve(world, scene())
+if world.rank == 1:
+    raise ZeroDivisionError
+solve(world, scene())
+""",
+        timeout=60.0,
+    )
+    assert end.returncode != 0
+    assert "rank 0 calls solve_scene and rank 1 nothing any more, for its program has ended" in end.stderr
+
+
+def test_where_the_others_cannot_be_told_the_program_ends_and_says_why() -> None:
+    """The others wait inside MPI for a rank that has failed: nobody can call them back."""
+    begun = time.perf_counter()
+    end = launch(
+        2,
+        "-c",
+        SOLVED
+        + """
+meeting.SHORTEST_WAIT = meeting.LONGEST_WAIT = 0.5
+
+def largest(state):
+    if world.rank == 1:
+        raise RuntimeError("a bug on one rank")
+    return world.allreduce(1.0)
+
+response(world, largest)
+""",
+        timeout=60.0,
+    )
+    assert end.returncode != 0
+    assert "rank 1 failed in quantity 'force' of a response, and the other ranks wait for it" in end.stderr
+    assert "RuntimeError: a bug on one rank" in end.stderr
+    assert time.perf_counter() - begun < 30.0
