@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from fenics_contact.errors import ConvergenceError
+from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.qp.certify import Certificate, certify
 from fenics_contact.qp.iterate import Iterate, Start
 from fenics_contact.qp.newton_steps import NewtonSteps
-from fenics_contact.qp.not_held import require_contact, require_friction_enough
+from fenics_contact.qp.not_held import HARDLY_WEDGED, require_contact, require_friction_enough
 from fenics_contact.qp.problem import CountedOperator, DualProblem
 from fenics_contact.qp.rescue import DIVERGED, rescue
 from fenics_contact.qp.slip_law import SlipLaw
@@ -27,6 +27,8 @@ DOUBT, ROUGH = 4, 1e-3
 #: After so many steps without progress each further one solves its face better by that factor: where forces
 #: vanish in the end, residuals relative to them say nothing of how far gaps can be trusted.
 CARELESS, CARE = 2, 0.25
+#: So many rescues in turn that lead to one and the same iterate are the last; residuals agree so far there.
+VAIN, SAME = 3, 1e-6
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,8 @@ class FaceNewton:
         """Solve from ``start``; called by `solve`. Collective.
 
         Raises:
-            InfeasibleError: Some body is held by nothing but contacts that stay open, or too little friction.
+            InfeasibleError: Some body is held by nothing but contacts that stay open, or too little friction;
+                where all was tried before that was found, its cause carries the history.
             ConvergenceError: Steps or products were used up; carries the history.
         """
         operator, memory = start.operator, start.memory
@@ -88,10 +91,10 @@ class FaceNewton:
         history: list[SolverStep] = []
         first = start.iterate if start.cold else newton.settled(start.iterate)
         iterate = best = first
-        since_best, budget, care, rescues = 0, self.rescue_products, 1.0, 0
+        since_best, budget, care, rescues, vain = 0, self.rescue_products, 1.0, 0, 0
         rescued: Iterate | None = None
         origin: Iterate | None = None
-        while len(history) < self.max_steps and operator.products < self.max_products:
+        while len(history) < self.max_steps and operator.products < self.max_products and vain < VAIN:
             iterate, line = newton.step(iterate, len(history), care)
             history.append(line)
             start.reached(line)
@@ -107,8 +110,7 @@ class FaceNewton:
                 continue
             rescues += 1
             if rescues == DOUBT:
-                without = replace(self, tolerance=ROUGH, max_products=10 * self.rescue_products)
-                require_friction_enough(problem, law, without)
+                require_friction_enough(problem, law, self._rough())
             # Where Newton could do nothing with the last rescue, the next one must go further.
             origin, last = _sound(problem, best, first), origin
             budget = 2 * budget if best is rescued or origin is last else self.rescue_products
@@ -126,8 +128,19 @@ class FaceNewton:
             iterate, answer = self._checked(problem, law, operator, found)
             if answer is not None:
                 return answer.solution(problem, history, operator.products, memory)
+            vain = vain + 1 if origin is last and _same(rescued, iterate) else 0
             rescued, best, since_best = iterate, iterate, 0
-        raise ConvergenceError(self._failure(newton, operator, history, best), history)
+        failure = ConvergenceError(self._failure(newton, operator, history, best), history)
+        if rescues >= DOUBT:
+            try:
+                require_friction_enough(problem, law, self._rough(), HARDLY_WEDGED)
+            except InfeasibleError as reason:
+                raise reason from failure
+        raise failure
+
+    def _rough(self) -> FaceNewton:
+        """Return the solver that tells what presses surfaces together without friction."""
+        return replace(self, tolerance=ROUGH, max_products=10 * self.rescue_products)
 
     def _checked(
         self, problem: DualProblem, law: SlipLaw, operator: CountedOperator, iterate: Iterate
@@ -142,7 +155,8 @@ class FaceNewton:
         self, newton: NewtonSteps, operator: CountedOperator, history: list[SolverStep], best: Iterate
     ) -> str:
         """Say what was reached, why it went no further and what to try. Collective."""
-        spent = "max_products" if operator.products >= self.max_products else "max_steps"
+        up = [operator.products >= self.max_products, len(history) >= self.max_steps]
+        more = [f"raise {name}" for name, used in zip(("max_products", "max_steps"), up, strict=True) if used]
         last, rescues = history[-1], sum("rescue" in step.method for step in history)
         reached = (
             f"face Newton needs residuals below {self.tolerance:.1e}, got after {operator.products} products "
@@ -150,14 +164,21 @@ class FaceNewton:
             f"and {rescues} rescues did not help"
         )
         if slides(history) and best.residuals.worst > HARDLY:
-            return (
-                f"{reached}: all {last.slip} discs slip, and friction may not suffice for any equilibrium; "
-                f"raise the friction, lower the load, add a support, or raise {spent}"
-            )
-        return (
-            f"{reached}: raise {spent}, start from the solution of a neighbouring load, loosen the tolerance "
-            "if the best residual is near it, or use a FixedPoint of SMALSE"
-        )
+            ways = ["raise the friction", "lower the load", "add a support", *more]
+            why = f"all {last.slip} discs slip, and friction may not suffice for any equilibrium; "
+        else:
+            ways = [*more, "start from the solution of a neighbouring load"]
+            ways += ["loosen the tolerance if the best residual is near it", "use a FixedPoint of SMALSE"]
+            why = ""
+        return f"{reached}: {why}{', '.join(ways[:-1])}, or {ways[-1]}"
+
+
+def _same(before: Iterate | None, after: Iterate) -> bool:
+    """Tell whether two rescues led to one and the same iterate."""
+    if before is None:
+        return False
+    worst = after.residuals.worst
+    return abs(worst - before.residuals.worst) <= SAME * worst
 
 
 def slides(history: Sequence[SolverStep]) -> bool:

@@ -21,8 +21,9 @@ from fenics_contact.qp.solution import SolverStep
 if TYPE_CHECKING:
     from fenics_contact.qp.face_newton import FaceNewton
 
-#: Friction may press surfaces together itself, where they wedge: so many times what else does.
-WEDGED = 100.0
+#: Friction may press surfaces together itself, where they wedge: at most so many times what else does, and so
+#: many times where a solver has tried all it can.
+WEDGED, HARDLY_WEDGED = 100.0, 2.0
 #: Gaps can be trusted where jumps are smaller than this, and so large a part of the load is out of balance.
 PLAIN = 1e-2
 
@@ -51,17 +52,20 @@ def _lost(step: SolverStep) -> bool:
     return step.closed == 0 and residuals.natural == 0.0 and residuals.gluing < PLAIN < residuals.coarse
 
 
-def require_friction_enough(problem: DualProblem, law: SlipLaw, solver: FaceNewton) -> None:
+def require_friction_enough(
+    problem: DualProblem, law: SlipLaw, solver: FaceNewton, wedged: float = WEDGED
+) -> None:
     """Refuse a problem whose friction is far from holding what nothing else holds. Collective.
 
     The bodies are held in all motions that only friction resists, and solved without friction. If even
-    `WEDGED` times the slip bounds of the forces found cannot balance the load, friction holds nothing, as
+    ``wedged`` times the slip bounds of the forces found cannot balance the load, friction holds nothing, as
     where supports keep the surfaces apart. That is no proof, and asked only where a solver gets nowhere.
 
     Args:
         problem: The problem that is not solved.
         law: Its law.
         solver: Solves it without friction.
+        wedged: By so many times friction may press surfaces together itself.
 
     Raises:
         InfeasibleError: Friction does not suffice.
@@ -84,10 +88,10 @@ def require_friction_enough(problem: DualProblem, law: SlipLaw, solver: FaceNewt
         forces = solver.run(held, without, start).multiplier
     except (ConvergenceError, InfeasibleError):
         return
-    found = find_equilibrium(problem, Tresca(layout, WEDGED * law.bound(forces)))
+    found = find_equilibrium(problem, Tresca(layout, wedged * law.bound(forces)))
     if found.motion is not None:
         raise InfeasibleError(
             "friction needs surfaces that are pressed together, but without it they are pressed so little "
-            f"that even {WEDGED:g} times the forces that it may then bear leave {100 * found.error:.2g} % of "
+            f"that even {wedged:g} times the forces that it may then bear leave {100 * found.error:.2g} % of "
             "the load unbalanced: support bodies that only friction holds, press them, or raise the friction"
         )

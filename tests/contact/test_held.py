@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import Status, check_held, solve_scene
-from fenics_contact.errors import InfeasibleError
+from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.geometry import block, graph_partition
 from fenics_contact.qp import FaceNewton
@@ -274,3 +274,25 @@ def test_friction_that_nothing_presses_is_refused_where_the_solver_gets_nowhere(
     free = replace(scene, supports=[scene.supports[0]], loads=[TotalForce("right", "x1", (-4.0, 0.0, -1.0))])
     state = solve_scene(free, None, MPI.COMM_SELF)
     np.testing.assert_allclose(state.contact.force.sum(axis=0), [-4.0, 0.0, -1.0], atol=1e-2)
+
+
+def test_friction_that_is_pressed_too_little_is_refused_once_the_solver_has_tried_all() -> None:
+    """The load is ten times what friction bears where the guided face is pushed in."""
+    left = block((-1.1, 0.0, 0.0), (0.0, 0.9, 0.7), (3, 3, 3))
+    right = block((0.0, 0.0, 0.0), (1.3, 0.9, 0.7), (3, 3, 3))
+    pushed = Scene(
+        {"left": Body(left, SOFT), "right": Body(right, SOFT)},
+        [Support("left", "x0"), Support("right", "x0", (-1e-3, None, None))],
+        [],
+        [ContactPair(Surface("left", "x1"), Surface("right", "x0"), Coulomb(0.3))],
+    )
+    press = abs(float(solve_scene(pushed, None, MPI.COMM_SELF).contact.force[:, 0].sum()))
+    loads = {share: TotalForce("right", "x1", (0.0, 0.0, -share * 0.3 * press)) for share in (0.3, 10.0)}
+    state = solve_scene(replace(pushed, loads=[loads[0.3]]), None, MPI.COMM_SELF)
+    assert state.contact.force[:, 2].sum() == pytest.approx(-0.09 * press, rel=1e-4)
+    with pytest.raises(InfeasibleError, match="even 2 times the forces") as caught:
+        solve_scene(
+            replace(pushed, loads=[loads[10.0]]), None, MPI.COMM_SELF, solver=FaceNewton(max_products=6000)
+        )
+    assert isinstance(caught.value.__cause__, ConvergenceError)
+    assert caught.value.__cause__.history
