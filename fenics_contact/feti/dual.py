@@ -115,11 +115,20 @@ class DualSystem:
             preconditioner = DirichletPreconditioner(
                 self.inverse, self._B_interface, self._compliance(), torn.numbering, torn.n_gluing
             )
-            diagonal = self._diagonal()
+            diagonal, supported = self._diagonal()
             scaling = self._scaling(coarse)
         nothing = np.zeros(len(torn.numbering.owned))
         self.problem = DualProblem(
-            comm, self.apply, nothing, coarse, self._layout(), diagonal, preconditioner, scaling, self.reach
+            comm,
+            self.apply,
+            nothing,
+            coarse,
+            self._layout(),
+            diagonal,
+            preconditioner,
+            scaling,
+            self.reach,
+            supported,
         )
 
     def apply(self, multiplier: np.ndarray) -> np.ndarray:
@@ -304,8 +313,8 @@ class DualSystem:
         high = numbering.comm.allreduce(factor.max(initial=0.0), op=MPI.MAX)
         return None if high - low <= EVEN * high else Scaling.build(factor / high, coarse)
 
-    def _diagonal(self) -> np.ndarray:
-        """Return the diagonal of F on contact rows, one elsewhere, owned. Collective."""
+    def _diagonal(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the diagonal of F on contact rows, one elsewhere, and marks of filled rows. Collective."""
         numbering = self.torn.numbering
         local = np.zeros(self._B.shape[0])
         contact = np.flatnonzero(numbering.local_rows >= self.torn.n_equality)
@@ -314,10 +323,13 @@ class DualSystem:
         diagonal[numbering.owned < self.torn.n_equality] = 1.0
         return self._filled(diagonal)
 
-    def _filled(self, diagonal: np.ndarray) -> np.ndarray:
+    def _filled(self, diagonal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Give rows that supports determine alone the diagonal of their disc, or a small one. Collective.
 
         A small one, as such a row has no flexibility: any slip that supports prescribe counts as slip.
+
+        Returns:
+            The diagonal, and marks of the rows that got a small one, both owned.
         """
         layout, comm = self._layout(), self.torn.numbering.comm
         total, count = comm.allreduce(
@@ -327,6 +339,7 @@ class DualSystem:
             total, count = 1.0, 1.0
         discs = diagonal[layout.tangential]
         diagonal[layout.tangential] = np.where(discs > 0, discs, discs.max(axis=1, initial=0.0)[:, None])
-        contact = diagonal[layout.contact]
-        diagonal[layout.contact] = np.where(contact > 0, contact, STIFF * total / count)
-        return diagonal
+        supported = np.zeros(len(diagonal), dtype=bool)
+        supported[layout.contact] = ~(diagonal[layout.contact] > 0)
+        diagonal[supported] = STIFF * total / count
+        return diagonal, supported

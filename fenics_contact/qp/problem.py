@@ -14,6 +14,7 @@ from fenics_contact._libraries import MPI
 from fenics_contact.errors import InfeasibleError, InvalidInputError, together
 from fenics_contact.progress import Task
 from fenics_contact.qp.coarse import CoarseSpace
+from fenics_contact.qp.face import Marks
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector, global_sum
 
@@ -52,6 +53,8 @@ class DualProblem:
         scaling: Factors of multipliers between parts of different stiffness, or None.
         reach: (λ, α) ↦ abs(B) abs(u), how far the displacements of these go at each row, owned,
             collective; what the jumps of an answer are compared with. None where displacements are not known.
+        supported: Marks of contact rows that supports determine alone, owned, shape (size,): no multiplier
+            moves them, and their diagonal stands for no flexibility. None where there are no such rows.
     """
 
     comm: MPI.Comm
@@ -63,6 +66,12 @@ class DualProblem:
     preconditioner: Operator | None = None
     scaling: Scaling | None = None
     reach: Callable[[Vector, Vector], Vector] | None = None
+    supported: Marks | None = None
+
+    @cached_property
+    def between_supports(self) -> Marks:
+        """The marks of `supported`, shape (size,), all false where there are none."""
+        return np.zeros(self.layout.size, dtype=bool) if self.supported is None else self.supported
 
     @cached_property
     def evened(self) -> DualProblem:

@@ -83,7 +83,9 @@ def measure(
 
     Contact forces below 1e-10 of ‖λ‖ count as none, so that a body that merely touches does not keep the
     iteration alive, and so do forces below 1e-10 of those that would close the gaps, ρ‖d‖: rounding of r
-    gives rise to such. Where no normal force acts at all, ‖λ‖ over all contact rows stands in for ‖λ_N‖.
+    gives rise to such. No force closes gaps between supports: rows that these determine alone have a ρ that
+    stands for no stiffness, and excuse no error but their own. Where no normal force acts at all, ‖λ‖ over
+    all contact rows stands in for ‖λ_N‖.
 
     Args:
         problem: The dual problem.
@@ -95,28 +97,34 @@ def measure(
     layout, equality, contact = problem.layout, problem.layout.equality, problem.layout.contact
     step = contact_step(layout, problem.diagonal)
     mapped = feasible.project(multiplier - step * residual)
+    free, error, needed = ~problem.between_supports, multiplier - mapped, step * problem.rhs
     sums = global_sum(
         problem.comm,
         *(_square(x[layout.normal]) for x in (multiplier, mapped)),
-        *(_square(x[contact]) for x in (multiplier, mapped, multiplier - mapped)),
+        *(_square(x[contact]) for x in (multiplier, mapped)),
         *(_square(x[equality]) for x in (residual, product - problem.rhs, problem.rhs)),
         _square(multiplier),
         _square(problem.rhs),
-        _square(step * problem.rhs),
+        *(_square(x[rows]) for x in (error, needed) for rows in (free, ~free)),
         problem.coarse.local(multiplier),
     )
-    normal, normal_mapped, force, force_mapped, distance = np.sqrt(sums[:5])
-    jump, cancelled, load, everything, rhs, closing = np.sqrt(sums[5:11])
-    unbalanced = problem.coarse.norm(sums[11:] - problem.coarse.load)
+    normal, normal_mapped, force, force_mapped = np.sqrt(sums[:4])
+    jump, cancelled, load, everything, rhs = np.sqrt(sums[4:9])
+    distance, distance_held, closing, closing_held = np.sqrt(sums[9:13])
+    unbalanced = problem.coarse.norm(sums[13:] - problem.coarse.load)
     force_scale = max(normal, normal_mapped)
     if force_scale <= FORCE_FLOOR * max(force, force_mapped):
         force_scale = max(force, force_mapped)
     force_scale = max(force_scale, FORCE_FLOOR * max(everything, closing))
     gluing_scale = max(cancelled, load) or rhs
     rounding = ROUNDING * max(everything, closing)
+    distance = np.hypot(
+        distance if distance > rounding else 0.0,
+        distance_held if distance_held > max(rounding, ROUNDING * closing_held) else 0.0,
+    )
     violation = global_max(problem.comm, feasible.violation(multiplier))
     return Residuals(
-        natural=_ratio(distance if distance > rounding else 0.0, force_scale),
+        natural=_ratio(distance, force_scale),
         gluing=_ratio(jump if jump > ROUNDING * load else 0.0, gluing_scale),
         coarse=_ratio(unbalanced, max(everything, problem.coarse.norm(problem.coarse.load))),
         violation=_ratio(violation if violation > rounding else 0.0, force_scale),

@@ -15,8 +15,8 @@ from fenics_contact.feti.dirichlet import REGULARISATION
 from fenics_contact.feti.inverse import LocalKind
 from fenics_contact.feti.kernel_basis import whole_motions
 from fenics_contact.geometry import block, box_partition
-from fenics_contact.scene import Body, ContactPair, Coulomb, RigidPlane, Scene, Surface
-from tests.feti.scenes import CELLS, STEEL, Cut, clamped_block, ragged_block, touching_blocks
+from fenics_contact.scene import Body, ContactPair, Coulomb, RigidPlane, Scene, Support, Surface
+from tests.feti.scenes import CELLS, STEEL, Cut, clamped_block, lone_block, ragged_block, touching_blocks
 
 #: How close the preconditioner comes to its formula: explicit Schur complements are in single precision.
 ROUNDING = {LocalKind.IMPLICIT: 1e-11, LocalKind.EXPLICIT: 1e-6}
@@ -207,6 +207,20 @@ def test_the_diagonal_is_that_of_the_operator_on_contact_rows() -> None:
     np.testing.assert_allclose(system.problem.diagonal[contact], np.diag(F)[contact], rtol=1e-9)
     assert len(contact) > 50
     np.testing.assert_array_equal(system.problem.diagonal[: system.torn.n_equality], 1.0)
+
+
+def test_contact_rows_that_no_multiplier_moves_are_marked() -> None:
+    system = dual(
+        lone_block(
+            "hexahedron",
+            supports=[Support("block", "x0", (0.0, 0.0, -0.1))],
+            contacts=[ContactPair(Surface("block", "z0"), RigidPlane((0, 0, -0.2), (0, 0, 1)), Coulomb(0.3))],
+        )
+    )
+    still = np.abs(dense(system, system.apply)).max(axis=1) < 1e-14
+    still[: system.torn.n_equality] = False
+    assert 0 < still.sum() < system.torn.points.count
+    np.testing.assert_array_equal(system.problem.between_supports, still)
 
 
 def test_displacements_of_any_multiplier_obey_equilibrium_in_every_subdomain() -> None:

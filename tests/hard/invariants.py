@@ -133,9 +133,12 @@ def _forces(state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _size(state: State) -> float:
-    """Return the largest normal force, at least a part of 1e-10 of all forces: less than that is none."""
+    """Return the largest normal force, at least a part of 1e-10 of all forces: less than that is none.
+
+    No force closes a gap between two supports.
+    """
     problem, multiplier = state.system.problem, state.solution.multiplier
-    contact = problem.layout.contact
+    contact = problem.layout.contact[~problem.between_supports[problem.layout.contact]]
     closing = (problem.rhs / problem.diagonal)[contact]
     least = 1e-10 * max(float(np.linalg.norm(multiplier)), float(np.linalg.norm(closing)))
     return max(float(np.abs(state.contact.normal_force).max(initial=0.0)), least) or 1.0

@@ -192,6 +192,28 @@ def test_the_natural_residual_is_at_least_the_violation(seed):
     assert 0.0 < found.violation <= found.natural * (1 + 1e-12)
 
 
+def test_a_gap_between_supports_excuses_errors_of_its_own_point_alone():
+    """What counts as rounding beside forces that would close the gaps: none closes one between supports."""
+    problem = random_problem(3)
+    layout, dual = problem.layout, problem.dual
+    held, other = layout.normal[:2]
+    stiff, gap = dual.diagonal.copy(), np.where(np.arange(layout.size) == held, -1.0, 0.0)
+    stiff[held] = 1e-12
+    supported = np.arange(layout.size) == held
+
+    def natural(row, marks):
+        """Return the natural residual and its force scale where a contact of force 1 lacks 1e-3 of it."""
+        beside = replace(dual, diagonal=stiff, rhs=gap, supported=marks)
+        force = np.where(np.arange(layout.size) == row, 1.0, 0.0)
+        feasible = FeasibleSet(layout, problem.slip_bound)
+        found = measure(beside, feasible, force, gap, -1e-3 * stiff * force)
+        return found.natural, found.force_scale
+
+    assert natural(other, supported) == pytest.approx((1e-3, 1.0), rel=2e-3)
+    assert natural(held, supported) == pytest.approx((0.0, 1.0), rel=2e-3)
+    assert natural(other, None) == pytest.approx((0.0, 100.0))
+
+
 @pytest.mark.parametrize("one", range(4))
 def test_one_large_residual_keeps_an_answer_from_being_within_a_tolerance(one):
     residuals = np.zeros(4)
