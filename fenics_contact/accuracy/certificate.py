@@ -53,7 +53,8 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
     moved the multiplier of the solution into the cone, δ, counts with its own energy δᵀF δ.
 
     The way w is that of the preconditioner, and the bound is as close as this is good: mostly within a factor
-    of two of the error, for nearly incompressible bodies and thin plates of one of ten to thirty.
+    of two of the error, for nearly incompressible bodies, thin plates and stiff bodies on soft ones of one of
+    ten to thirty.
 
     The bound is for Tresca's problem with the slip bounds of the solution. Where these are given, that is the
     problem; and it is infinite where no multiplier within them balances the load. Where they follow the
