@@ -16,6 +16,7 @@ from fenics_contact.scene import Coulomb, Scene, Tresca
 from tests.accuracy.algebraic import CASES, Measured, clamped, energy_norm, measured, solved
 from tests.contact import gallery
 
+
 def assert_certified(found: Measured, factor: float = 10.0) -> None:
     """Require an upper bound that is not much more, and that both errors together tell the whole one.
 
