@@ -79,8 +79,19 @@ def launch(ranks: object, *arguments: object, timeout: float = 120.0) -> subproc
     return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
 
 
+def lost_by_mpirun(end: subprocess.CompletedProcess[str]) -> bool:
+    """Tell whether a rank ended with status 1 and no word but mpirun's own, as one does that lost its daemon.
+
+    That happens to Open MPI 4.1 now and then. A Python that fails says why.
+    """
+    own = end.stderr.partition("-" * 74)[0]
+    return end.returncode == 1 and not end.stdout and not own.strip()
+
+
 def run_on_ranks(script: Path, ranks: int, *arguments: object, timeout: float = 120.0) -> str:
     """Run a Python script under mpirun and return what it wrote to stdout.
+
+    A run that mpirun lost is started once more.
 
     Args:
         script: The script.
@@ -94,6 +105,8 @@ def run_on_ranks(script: Path, ranks: int, *arguments: object, timeout: float = 
     end: subprocess.CompletedProcess[str] | subprocess.TimeoutExpired
     try:
         end = launch(ranks, script, *arguments, timeout=timeout)
+        if lost_by_mpirun(end):
+            end = launch(ranks, script, *arguments, timeout=timeout)
         ending = f"ended with exit status {end.returncode}"
         if end.returncode == 0:
             return end.stdout

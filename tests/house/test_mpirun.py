@@ -65,6 +65,27 @@ def test_a_failure_on_one_rank_fails_with_the_output_shown(mpirun: Callable[...,
     assert "ValueError: rank one is unwell" in message
 
 
+@pytest.mark.parametrize(("word", "runs"), [("", 2), ("unwell", 1)])
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_run_that_ends_without_a_word_is_started_once_more(
+    mpirun: Callable[..., str], tmp_path: Path, ranks: int, word: str, runs: int
+) -> None:
+    code = """
+        import os, pathlib, sys
+        from mpi4py import MPI
+        if MPI.COMM_WORLD.rank == MPI.COMM_WORLD.size - 1:
+            count = pathlib.Path(sys.argv[1], "count")
+            count.write_text(count.read_text() + "." if count.exists() else ".")
+            sys.stderr.write(sys.argv[2])
+            sys.stderr.flush()
+            os._exit(1)
+        MPI.COMM_WORLD.Barrier()
+    """
+    with pytest.raises(pytest.fail.Exception, match="ended with exit status 1"):
+        mpirun(code, ranks, tmp_path, word)
+    assert (tmp_path / "count").read_text() == runs * "."
+
+
 def test_ranks_that_hang_are_killed(mpirun: Callable[..., str], tmp_path: Path) -> None:
     code = """
         import os, pathlib, sys, time
