@@ -60,8 +60,12 @@ class FaceSystem:
         return self.face.prolong(step)
 
     def motions(self, gradient: Vector) -> Vector:
-        """Return α, the rigid motions that fit a gradient on the face best, replicated. Collective."""
-        return self.coarse.coefficients(gradient)
+        """Return α, the rigid motions that fit a gradient on the face best, replicated. Collective.
+
+        Refined once: rounding of bodies that move far would else move others, which nothing loads.
+        """
+        alpha = self.coarse.coefficients(gradient)
+        return alpha + self.coarse.coefficients(gradient - self.coarse.transpose(alpha))
 
     def weighted_norm(self, y: Vector, weights: Vector) -> float:
         """Return the global norm of weights · y. Collective."""

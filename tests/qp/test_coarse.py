@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.qp import CoarseSpace
+from fenics_contact.qp import CoarseSpace, ContactLayout, FaceSystem, classify
 from fenics_contact.qp import coarse as coarse_module
 from fenics_contact.qp.gram import GramInverse
 from fenics_contact.qp.sparse_gram import SparseGramInverse
@@ -132,3 +132,20 @@ def test_an_unsymmetric_matrix_is_inverted_and_a_singular_one_refused():
     np.testing.assert_allclose(inverse.solve(right), np.linalg.solve(matrix, right), rtol=1e-11)
     matrix[5] = matrix[0] + 2 * matrix[1]
     assert invert_square(MPI.COMM_SELF, sp.csr_matrix(matrix), np.full(6, 0.5)) is None
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_rounding_of_bodies_that_move_far_moves_no_others(seed):
+    """Bodies in a row with two motions each, and a motion that no row feels."""
+    rng = np.random.default_rng(seed)
+    n = 24
+    steps = np.eye(n) - np.eye(n, k=-1)
+    G = np.vstack([np.kron(steps, rng.standard_normal((2, 6))), np.zeros((1, 6 * n))])
+    coarse = coarse_space(G, np.zeros(2 * n + 1))
+    none = np.zeros((0, 2), dtype=np.int64)
+    layout = ContactLayout(6 * n, none[:, 0], none, none[:, 0])
+    face = classify(layout, np.zeros(0), np.zeros(6 * n), np.zeros(6 * n), np.zeros(6 * n))
+    alpha = np.concatenate([rng.uniform(25.0, 50.0, n), np.zeros(n + 1)])
+    found = FaceSystem(MPI.COMM_SELF, face, lambda x: x, coarse).motions(G.T @ alpha)
+    np.testing.assert_allclose(found[:n], alpha[:n], rtol=1e-11)
+    assert np.abs(found[n:-1]).max() < 1e-16
