@@ -170,7 +170,8 @@ def _told_apart(
     """
     residuals = solution.residuals
     forces, jumps = residuals.natural * residuals.force_scale, residuals.gluing * residuals.gluing_scale
-    rounding = ROUNDING * max(problem.norm(solution.multiplier), problem.norm(step * problem.rhs))
+    moved = np.where(problem.between_supports, 0.0, step * problem.rhs)  # no multiplier moves the others
+    rounding = ROUNDING * max(problem.norm(solution.multiplier), problem.norm(moved))
     told = np.asarray(UNCERTAINTY * (forces + step * jumps) + rounding)
     return told, np.minimum(told, LEANING * residuals.force_scale + rounding)
 
