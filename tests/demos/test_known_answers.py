@@ -61,7 +61,7 @@ DEMOS: dict[str, tuple[dict[str, float | list[float]], set[str]]] = {
 SLOW = {"uncertain_friction"}
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=[pytest.mark.slow, pytest.mark.claim])])
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in DEMOS]
 )
