@@ -30,8 +30,8 @@ def test_every_mutation_finds_its_text_and_changes_it() -> None:
 
 
 def test_a_text_that_is_gone_is_told() -> None:
-    gone = Mutation("no more", "errors.py", "a text that is nowhere", "", ())
-    with pytest.raises(LookupError, match=r"'no more' needs its text once in errors.py, found it 0 times"):
+    gone = Mutation("no more", "timing.py", "a text that is nowhere", "", ())
+    with pytest.raises(LookupError, match=r"'no more' needs its text once in timing.py, found it 0 times"):
         replaced(gone, "some text")
 
 
@@ -55,7 +55,7 @@ def test_the_tests_pass_without_a_mistake(copy: Copy) -> None:
 @pytest.mark.slow
 def test_a_mistake_that_is_none_survives(copy: Copy) -> None:
     harmless = Mutation(
-        "none", "errors.py", "Base of every error", "The base of every error", MUTATIONS[0].killers
+        "none", "errors/kinds.py", "Base of every error", "The base of every error", MUTATIONS[0].killers
     )
     with copy.mutated(harmless):
         assert copy.run(harmless.killers).status == PASSED
