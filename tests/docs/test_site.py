@@ -31,11 +31,15 @@ def inventory(site: Site) -> dict[str, set[str]]:
     return {kind: set(names) for kind, names in data.items()}
 
 
+@pytest.mark.slow
+@pytest.mark.claim
 def test_it_builds_without_a_warning(site: Site) -> None:
     assert site.log == ""
     assert site.returncode == 0
 
 
+@pytest.mark.slow
+@pytest.mark.claim
 def test_every_public_name_is_in_the_reference(site: Site) -> None:
     described = {name for kind, names in inventory(site).items() if kind.startswith("py:") for name in names}
     assert len(reference.rooms()) > 10
@@ -54,6 +58,8 @@ def test_every_room_that_offers_names_has_a_page() -> None:
     assert offering - set(reference.rooms()) == set()
 
 
+@pytest.mark.slow
+@pytest.mark.claim
 def test_every_link_and_picture_leads_somewhere(site: Site) -> None:
     assert len(site.pages) > 100
     assert sum(len(page.links) for page in site.pages.values()) > 5000
@@ -68,6 +74,8 @@ def test_a_broken_link_is_found(tmp_path: Path) -> None:
     assert broken_links(Site(tmp_path, 0, "")) == ["one.html -> two.html#there", "one.html -> p.png"]
 
 
+@pytest.mark.slow
+@pytest.mark.claim
 def test_the_gallery_shows_every_demo_with_a_picture(site: Site) -> None:
     gallery = html(site, "docs/gallery")
     demos = sorted((ROOT / "demos").glob("demo_*.py"))
@@ -78,6 +86,8 @@ def test_the_gallery_shows_every_demo_with_a_picture(site: Site) -> None:
     assert gallery.classes.count("sd-card-img-top") == len(demos)
 
 
+@pytest.mark.slow
+@pytest.mark.claim
 def test_every_notebook_is_a_page(site: Site) -> None:
     sources = list((ROOT / "notebooks").glob("[0-9]*.py"))
     assert sources
@@ -85,6 +95,8 @@ def test_every_notebook_is_a_page(site: Site) -> None:
         assert f"../notebooks/{source.stem}.html" in html(site, "docs/notebooks").links
 
 
+@pytest.mark.slow
+@pytest.mark.claim
 def test_the_glossary_explains_the_terms_of_the_field(site: Site) -> None:
     terms = {name.lower() for name in inventory(site)["std:term"]}
     wanted = {"slave", "master", "gap", "active set", "multiplier", "coarse problem", "Total FETI", "mortar"}
@@ -92,6 +104,8 @@ def test_the_glossary_explains_the_terms_of_the_field(site: Site) -> None:
     assert {term.lower() for term in wanted} - terms == set()
 
 
+@pytest.mark.slow
+@pytest.mark.claim
 def test_equations_are_drawn_without_the_network_where_debian_has_mathjax(site: Site) -> None:
     page = html(site, "demos/demo_bolted_joint")
     scripts_of_equations = [link for link in page.links if "athjax" in link.lower()]
