@@ -55,9 +55,9 @@ GROUPS: dict[str, tuple[str, str]] = {
     "friction": (
         "Friction from none to ten",
         "Far beyond one there may be several equilibria, and which one is found depends on rounding. A "
-        "coefficient of a thousandth that alone holds a stack of bodies is the one that fails: guide such "
-        "bodies by a support. A floating body exactly at the limit of its friction has no unique slide "
-        "and is refused; one that is dragged by a support has, and is solved.",
+        "coefficient of a thousandth that alone holds a stack of bodies costs ten times as many products: "
+        "guide such bodies by a support. A floating body exactly at the limit of its friction has no unique "
+        "slide and is refused; one that is dragged by a support has, and is solved.",
     ),
     "stiffness": (
         "Stiff beside soft, thin, nearly incompressible",
