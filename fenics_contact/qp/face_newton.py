@@ -28,7 +28,7 @@ DOUBT, ROUGH = 4, 1e-3
 #: vanish in the end, residuals relative to them say nothing of how far gaps can be trusted.
 CARELESS, CARE = 2, 0.25
 #: So many rescues in turn that lead to one and the same iterate are the last; residuals agree so far there.
-VAIN, SAME = 10, 1e-6
+VAIN, SAME = 7, 1e-6
 
 
 @dataclass(frozen=True)
