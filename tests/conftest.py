@@ -84,8 +84,8 @@ def lost_by_mpirun(end: subprocess.CompletedProcess[str]) -> bool:
 
     That happens to Open MPI 4.1 now and then. A Python that fails says why.
     """
-    own = end.stderr.partition("-" * 74)[0]
-    return end.returncode == 1 and not end.stdout and not own.strip()
+    words = end.stderr.split("-" * 74)[::2]  # mpirun speaks between such lines
+    return end.returncode == 1 and not end.stdout and not "".join(words).strip()
 
 
 def run_on_ranks(script: Path, ranks: int, *arguments: object, timeout: float = 120.0) -> str:
