@@ -11,7 +11,7 @@ import pytest
 import ufl
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactResult, Status
+from fenics_contact.contact import ContactResult, State, Status
 from fenics_contact.geometry import block
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
@@ -187,10 +187,16 @@ def test_gradients_are_the_same_in_all_units(units: str, objective: str) -> None
 
 
 @cache
+def one_state() -> State:
+    """One for all multiples: another evaluation starts from this one, and ends within a tolerance of it."""
+    return measured("N and mm").point("energy").state
+
+
+@cache
 def factored(objective: str, factor: float) -> tuple[Array, int]:
     """Multiplier of the adjoint of a multiple of an objective, divided by it, and the products it takes."""
     here = measured("N and mm").usual
-    state = measured("N and mm").point("energy").state
+    state = one_state()
     partials = OBJECTIVES[objective][0].partials(state, here._shape_forms(state))
     partials = replace(
         partials,
