@@ -34,15 +34,5 @@ __all__ = [
     "together",
 ]
 
-for _kind in (
-    ConvergenceError,
-    FenicsContactError,
-    ForkedProcessError,
-    InfeasibleError,
-    InvalidDesignError,
-    InvalidInputError,
-    MissingRequirementError,
-    RemoteError,
-    UserCodeError,
-):
+for _kind in [value for value in globals().values() if isinstance(value, type)]:
     _kind.__module__ = __name__  # tracebacks name the place that they are imported from

@@ -9,7 +9,7 @@ from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.qp.certify import Certificate, certify
 from fenics_contact.qp.iterate import Iterate, Start
 from fenics_contact.qp.newton_steps import NewtonSteps
-from fenics_contact.qp.not_held import HARDLY_WEDGED, require_contact, require_friction_enough
+from fenics_contact.qp.not_held import HARDLY_WEDGED, FrictionAlone, require_contact
 from fenics_contact.qp.problem import CountedOperator, DualProblem
 from fenics_contact.qp.rescue import DIVERGED, rescue
 from fenics_contact.qp.slip_law import SlipLaw
@@ -88,6 +88,8 @@ class FaceNewton:
         """
         operator, memory = start.operator, start.memory
         newton = NewtonSteps(problem, law, operator, self)
+        rough = replace(self, tolerance=ROUGH, max_products=10 * self.rescue_products)
+        alone = FrictionAlone(problem, law, rough)
         history: list[SolverStep] = []
         first = start.iterate if start.cold else newton.settled(start.iterate)
         iterate = best = first
@@ -110,7 +112,7 @@ class FaceNewton:
                 continue
             rescues += 1
             if rescues == DOUBT:
-                require_friction_enough(problem, law, self._rough())
+                alone.require_enough()
             # Where Newton could do nothing with the last rescue, the next one must go further.
             origin, last = _sound(problem, best, first), origin
             budget = 2 * budget if best is rescued or origin is last else self.rescue_products
@@ -133,14 +135,10 @@ class FaceNewton:
         failure = ConvergenceError(self._failure(newton, operator, history, best), history)
         if rescues >= DOUBT:
             try:
-                require_friction_enough(problem, law, self._rough(), HARDLY_WEDGED)
+                alone.require_enough(HARDLY_WEDGED)
             except InfeasibleError as reason:
                 raise reason from failure
         raise failure
-
-    def _rough(self) -> FaceNewton:
-        """Return the solver that tells what presses surfaces together without friction."""
-        return replace(self, tolerance=ROUGH, max_products=10 * self.rescue_products)
 
     def _checked(
         self, problem: DualProblem, law: SlipLaw, operator: CountedOperator, iterate: Iterate

@@ -10,6 +10,7 @@ from fenics_contact.progress import Task
 from fenics_contact.qp.problem import CountedOperator, DualProblem, Operator
 from fenics_contact.qp.reductions import Vector
 from fenics_contact.qp.residual import Residuals, measure
+from fenics_contact.qp.rigid import fit_rigid_motions
 from fenics_contact.qp.slip_law import SlipLaw
 from fenics_contact.qp.solution import SmalseMemory, SolverStep
 
@@ -62,6 +63,13 @@ def iterate_at(
     residual = product - problem.rhs - problem.coarse.transpose(alpha)
     residuals = measure(problem, law.feasible(multiplier), multiplier, product, residual)
     return Iterate(multiplier, product, residual, residuals)
+
+
+def iterate_fitted(problem: DualProblem, law: SlipLaw, multiplier: Vector, product: Vector) -> Iterate:
+    """Return the iterate with the rigid motions that fit best, see `fit_rigid_motions`. Collective."""
+    return iterate_at(
+        problem, law, multiplier, product, fit_rigid_motions(problem, law, multiplier, product)
+    )
 
 
 def answer_at(

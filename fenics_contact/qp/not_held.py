@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,10 +12,9 @@ import scipy.sparse as sp
 
 from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.qp.equilibrium import find_equilibrium
-from fenics_contact.qp.iterate import Start, apply_unless_zero, iterate_at
+from fenics_contact.qp.iterate import Start, apply_unless_zero, iterate_fitted
 from fenics_contact.qp.problem import CountedOperator, DualProblem
-from fenics_contact.qp.reductions import global_max
-from fenics_contact.qp.rigid import fit_rigid_motions
+from fenics_contact.qp.reductions import Vector, global_max
 from fenics_contact.qp.slip_law import SlipLaw, Tresca
 from fenics_contact.qp.solution import SolverStep
 
@@ -52,46 +52,63 @@ def _lost(step: SolverStep) -> bool:
     return step.closed == 0 and residuals.natural == 0.0 and residuals.gluing < PLAIN < residuals.coarse
 
 
-def require_friction_enough(
-    problem: DualProblem, law: SlipLaw, solver: FaceNewton, wedged: float = WEDGED
-) -> None:
-    """Refuse a problem whose friction is far from holding what nothing else holds. Collective.
+@dataclass(frozen=True, eq=False)
+class FrictionAlone:
+    """The question whether friction can hold what nothing else holds; asked where a solver gets nowhere.
 
-    The bodies are held in all motions that only friction resists, and solved without friction. If even
-    ``wedged`` times the slip bounds of the forces found cannot balance the load, friction holds nothing, as
-    where supports keep the surfaces apart. That is no proof, and asked only where a solver gets nowhere.
-
-    Args:
+    Attributes:
         problem: The problem that is not solved.
         law: Its law.
         solver: Solves it without friction.
-        wedged: By so many times friction may press surfaces together itself.
-
-    Raises:
-        InfeasibleError: Friction does not suffice.
     """
-    layout, coarse = problem.layout, problem.coarse
-    if global_max(problem.comm, float(law.growth.max(initial=0.0))) == 0.0:
-        return
-    rows = np.concatenate([layout.equality, layout.normal])
-    entries = (np.ones(len(rows)), (rows, np.arange(len(rows))))
-    pressing = coarse.restricted(sp.csr_matrix(entries, shape=(layout.size, len(rows))))
-    unheld, _ = np.linalg.qr(pressing.gram.null_space)
-    held = replace(problem, coarse=coarse.with_load(coarse.load - unheld @ (unheld.T @ coarse.load)))
-    without = Tresca(layout, law.bound(np.zeros(layout.size)))
-    multiplier = held.coarse.particular()
-    operator = CountedOperator(problem.operator)
-    product = apply_unless_zero(held, operator, multiplier)
-    alpha = fit_rigid_motions(held, without, multiplier, product)
-    start = Start(iterate_at(held, without, multiplier, product, alpha), operator)
-    try:
-        forces = solver.run(held, without, start).multiplier
-    except (ConvergenceError, InfeasibleError):
-        return
-    found = find_equilibrium(problem, Tresca(layout, wedged * law.bound(forces)))
-    if found.motion is not None:
-        raise InfeasibleError(
-            "friction needs surfaces that are pressed together, but without it they are pressed so little "
-            f"that even {wedged:g} times the forces that it may then bear leave {100 * found.error:.2g} % of "
-            "the load unbalanced: support bodies that only friction holds, press them, or raise the friction"
-        )
+
+    problem: DualProblem
+    law: SlipLaw
+    solver: FaceNewton
+
+    def require_enough(self, wedged: float = WEDGED) -> None:
+        """Refuse a problem whose friction is far from enough. Collective.
+
+        If even ``wedged`` times the slip bounds of the forces without friction cannot balance the load,
+        friction holds nothing, as where supports keep the surfaces apart. That is no proof.
+
+        Args:
+            wedged: By so many times friction may press surfaces together itself.
+
+        Raises:
+            InfeasibleError: Friction does not suffice.
+        """
+        if self._forces is None:
+            return
+        bound = wedged * self.law.bound(self._forces)
+        found = find_equilibrium(self.problem, Tresca(self.problem.layout, bound))
+        if found.motion is not None:
+            raise InfeasibleError(
+                "friction needs surfaces that are pressed together, but without it they are pressed so "
+                f"little that even {wedged:g} times the forces that it may then bear leave "
+                f"{100 * found.error:.2g} % of the load unbalanced: support bodies that only friction holds, "
+                "press them, or raise the friction"
+            )
+
+    @cached_property
+    def _forces(self) -> Vector | None:
+        """The multiplier without friction; None where no friction grows with it or it is not found.
+
+        The bodies are held in all motions that only friction resists. Collective on first use.
+        """
+        problem, law, layout, coarse = self.problem, self.law, self.problem.layout, self.problem.coarse
+        if global_max(problem.comm, float(law.growth.max(initial=0.0))) == 0.0:
+            return None
+        rows = np.concatenate([layout.equality, layout.normal])
+        entries = (np.ones(len(rows)), (rows, np.arange(len(rows))))
+        pressing = coarse.restricted(sp.csr_matrix(entries, shape=(layout.size, len(rows))))
+        unheld, _ = np.linalg.qr(pressing.gram.null_space)
+        held = replace(problem, coarse=coarse.with_load(coarse.load - unheld @ (unheld.T @ coarse.load)))
+        without = Tresca(layout, law.bound(np.zeros(layout.size)))
+        multiplier, operator = held.coarse.particular(), CountedOperator(problem.operator)
+        product = apply_unless_zero(held, operator, multiplier)
+        start = Start(iterate_fitted(held, without, multiplier, product), operator)
+        try:
+            return self.solver.run(held, without, start).multiplier
+        except (ConvergenceError, InfeasibleError):
+            return None

@@ -11,10 +11,9 @@ from fenics_contact.errors import ConvergenceError, InvalidInputError, together
 from fenics_contact.progress import Task
 from fenics_contact.qp.certify import Certificate, count_status
 from fenics_contact.qp.equilibrium import require_equilibrium
-from fenics_contact.qp.iterate import Start, answer_at, apply_unless_zero, iterate_at
+from fenics_contact.qp.iterate import Start, answer_at, apply_unless_zero, iterate_at, iterate_fitted
 from fenics_contact.qp.problem import CountedOperator, DualProblem
 from fenics_contact.qp.reductions import Vector
-from fenics_contact.qp.rigid import fit_rigid_motions
 from fenics_contact.qp.slip_law import Coulomb, SlipLaw, Tresca
 from fenics_contact.qp.solution import DualSolution, SolverStep
 
@@ -151,15 +150,14 @@ def _begin(problem: DualProblem, law: SlipLaw, start: DualSolution | Vector | No
             _require_size(multiplier, problem.layout.size)
         product = apply_unless_zero(problem, operator, multiplier)
     if earlier is not None and earlier.alpha.shape == (coarse.m,):
-        alpha = earlier.alpha
+        iterate = iterate_at(problem, law, multiplier, product, earlier.alpha)
     else:
-        alpha = fit_rigid_motions(problem, law, multiplier, product)
-    iterate = iterate_at(problem, law, multiplier, product, alpha)
+        iterate = iterate_fitted(problem, law, multiplier, product)
     memory = None if earlier is None else earlier.memory
     if start is not None and problem.norm(coarse.particular()) == 0.0:
         # No body is pushed: no force at all may be nearer than those of another load, and is known for free.
         nothing = np.zeros_like(multiplier)
-        rest = iterate_at(problem, law, nothing, nothing, fit_rigid_motions(problem, law, nothing, nothing))
+        rest = iterate_fitted(problem, law, nothing, nothing)
         if rest.residuals.worst <= iterate.residuals.worst:
             return Start(rest, operator, memory, cold=True, task=task)
     return Start(iterate, operator, memory, cold=start is None, task=task)
