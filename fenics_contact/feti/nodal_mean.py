@@ -32,3 +32,26 @@ def nodal_mean(decomposition: Decomposition, displacement: np.ndarray) -> np.nda
     result = np.full((tearing.n_nodes, tearing.dim), np.nan)
     result[nodes] = sharing.add_up(mean)
     return result
+
+
+def nodal_mean_at(decomposition: Decomposition, field: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Return the same mean of a torn field at some nodes, on all ranks. Collective.
+
+    Args:
+        decomposition: Numbering.
+        field: This rank's part of the field, shape (torn_size,).
+        nodes: Nodes among those of all bodies, shape (n,).
+
+    Returns:
+        Shape (n, dim), replicated.
+    """
+    tearing = decomposition.tearing
+    copies = tearing.multiplicity[nodes]
+    within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
+    copy = np.repeat(tearing.first_copy[nodes], copies) + within
+    block = decomposition.copy_block[copy]
+    here = np.flatnonzero(block >= 0)
+    total = np.zeros((len(nodes), tearing.dim))
+    shares = tearing.copy_share[copy[here], None] * field.reshape(-1, tearing.dim)[block[here]]
+    np.add.at(total, np.repeat(np.arange(len(nodes)), copies)[here], shares)
+    return np.asarray(decomposition.comm.allreduce(total))

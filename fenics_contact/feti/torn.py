@@ -21,7 +21,7 @@ from fenics_contact.feti.decomposition import Decomposition
 from fenics_contact.feti.forms import as_tractions
 from fenics_contact.feti.friction import friction_data
 from fenics_contact.feti.gluing import prescribed_displacements
-from fenics_contact.feti.nodal_means import nodal_means
+from fenics_contact.feti.nodal_mean import nodal_mean_at
 from fenics_contact.feti.numbering import DualNumbering
 from fenics_contact.feti.room import check_no_penetration, gap_with_room
 from fenics_contact.feti.rows import Rows, stack
@@ -111,7 +111,7 @@ class TornSystem:
         chosen = self.frictionless
         jump = self.points.jump[chosen]
         nodes = np.unique(jump.indices)
-        relative = jump[:, nodes] @ nodal_means(self.decomposition, displacement, nodes)
+        relative = jump[:, nodes] @ nodal_mean_at(self.decomposition, displacement, nodes)
         return np.asarray(np.einsum("nad,nd->na", self.points.tangents[chosen], relative))
 
     def driven_as(self, prescribed: np.ndarray) -> bool:

@@ -10,7 +10,7 @@ from fenics_contact.contact import State
 from fenics_contact.errors import together
 from fenics_contact.feti import ContactPoints, TornSystem
 from fenics_contact.feti.contact_search import surface_of
-from fenics_contact.feti.nodal_means import nodal_means
+from fenics_contact.feti.nodal_mean import nodal_mean_at
 from fenics_contact.scene import RigidObstacle, Surface, Tresca, asked
 from fenics_contact.shape.adjoint import Adjoint
 from fenics_contact.shape.linearised_face import LinearisedFace
@@ -135,7 +135,7 @@ def _row_fields(state: State, adjoint: Adjoint) -> RowFields:
         friction[k, torn.frictional] = gathered.reshape(-1, width)
     nodes = np.unique(points.jump.indices)
     fields = (adjoint.displacement, state.torn_displacement)
-    values = np.stack([nodal_means(torn.decomposition, field, nodes) for field in fields])
+    values = np.stack([nodal_mean_at(torn.decomposition, field, nodes) for field in fields])
     jump = points.jump[:, nodes]
     return RowFields(normal, friction, nodes, values, np.stack([jump @ value for value in values]))
 
