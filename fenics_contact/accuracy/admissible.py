@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.accuracy.nearest import nearest
+from fenics_contact.accuracy.nearest import evening, nearest
 from fenics_contact.qp import CoarseSpace, ContactLayout, DualProblem, FeasibleSet, contact_step
 from fenics_contact.qp.face import Marks, face_basis
 from fenics_contact.qp.reductions import Vector, global_max
@@ -160,11 +160,6 @@ def _balanced(statuses: Statuses, feasible: FeasibleSet, start: Vector) -> tuple
             if left > PROGRESS * before:
                 break
     return found, left
-
-
-def evening(problem: DualProblem) -> Vector:
-    """Return the factors of the evened multipliers, one where stiffness is even, owned."""
-    return np.ones(problem.layout.size) if problem.scaling is None else problem.scaling.factor
 
 
 def basis(

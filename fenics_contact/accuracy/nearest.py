@@ -20,9 +20,10 @@ HELD = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """α with its multiplier, what is left of G λ − e, and the value of the convex function."""
+    """α with λ₀ − Gᵀα, its multiplier, what is left of G λ − e, and the value of the convex function."""
 
     alpha: Vector
+    trial: Vector
     multiplier: Vector
     lacking: Vector
     value: float
@@ -67,7 +68,7 @@ class _Search:
     def __init__(self, problem: DualProblem, feasible: FeasibleSet, start: Vector) -> None:
         self._problem, self._feasible, self._start = problem, feasible, start
         self._coarse = problem.evened.coarse
-        self._factor = np.ones(len(start)) if problem.scaling is None else problem.scaling.factor
+        self._factor = evening(problem)
         self._size = problem.norm(start) or 1.0
 
     def at(self, alpha: Vector) -> _Point:
@@ -76,7 +77,7 @@ class _Search:
         way = (multiplier - self._start) / self._factor
         lacking = self._problem.coarse.residual(multiplier)
         value = -0.5 * float(global_sum(self._problem.comm, way @ way)[0]) - float(alpha @ lacking)
-        return _Point(alpha, multiplier, lacking, value)
+        return _Point(alpha, trial, multiplier, lacking, value)
 
     def length(self, point: _Point) -> float:
         return self._problem.coarse.norm(point.lacking)
@@ -97,8 +98,7 @@ class _Search:
 
     def _slope(self, point: _Point, weight: float) -> sp.csr_matrix:
         """Return a root of P' + weight (1 − P') at a point, shape (size, size), owned."""
-        layout, size = self._feasible.layout, len(self._start)
-        trial = self._start - self._factor * self._coarse.transpose(point.alpha)
+        layout, size, trial = self._feasible.layout, len(self._start), point.trial
         root = np.ones(size)
         root[layout.normal] = np.where(trial[layout.normal] > 0.0, 1.0, np.sqrt(weight))
         tau, rows = trial[layout.tangential], layout.tangential
@@ -115,3 +115,8 @@ class _Search:
         i, j = np.broadcast_arrays(rows[:, :, None], rows[:, None, :])
         discs = sp.csr_matrix((blocks.ravel(), (i.ravel(), j.ravel())), shape=(size, size))
         return (sp.diags(root) + discs).tocsr()
+
+
+def evening(problem: DualProblem) -> Vector:
+    """Return the factors of the evened multipliers, one where stiffness is even, owned."""
+    return np.ones(problem.layout.size) if problem.scaling is None else problem.scaling.factor
