@@ -34,6 +34,16 @@ def check_numbers(**given: Any) -> None:
             )
 
 
+def check_grading(value: Any) -> None:
+    """Refuse a logarithm of the ratio of two cells of one mesh that is negative or too large for it."""
+    check_numbers(grading=value)
+    if not 0.0 <= value <= 8.0:
+        raise InvalidInputError(
+            f"grading must lie between 0 and 8, got {value}: 0 gives equal cells, 3 makes the smallest 20 "
+            "times smaller than the largest"
+        )
+
+
 def check_row(values: Any, name: str, count: int) -> None:
     """Refuse what is not a sequence of so many finite numbers."""
     known = isinstance(values, Sequence | np.ndarray) and np.ndim(values) == 1 and len(values) == count

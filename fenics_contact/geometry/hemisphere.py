@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry.arguments import check_count, check_numbers
+from fenics_contact.geometry.arguments import check_count, check_grading, check_numbers
 from fenics_contact.geometry.block import box_lattice, box_sides
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.room import require_room
@@ -178,14 +178,10 @@ def _lateral(n: int, grading: float, symmetric: bool) -> np.ndarray:
 
 def _check(radius: float, n: int, grading: float, symmetry: str, known: tuple[str, ...]) -> None:
     check_count(n, "n", 2)
-    check_numbers(radius=radius, grading=grading)
+    check_numbers(radius=radius)
+    check_grading(grading)
     if not 0.0 < radius < np.inf:
         raise InvalidInputError(f"radius must be positive, got {radius}: give the radius of the body")
-    if not 0.0 <= grading <= 8.0:
-        raise InvalidInputError(
-            f"grading must lie between 0 and 8, got {grading}: 0 gives equal cells, 3 makes the smallest 20 "
-            "times smaller than the largest"
-        )
     if not isinstance(symmetry, str) or symmetry not in known:
         raise InvalidInputError(
             f"symmetry must be one of {known}, got {symmetry!r}: name the planes at which the body is cut"

@@ -13,6 +13,7 @@ from fenics_contact.geometry.faces import orient
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.ring import LinkShape, crown_indices, ring_lattice, stations
 from fenics_contact.geometry.ring_gmsh import mesh_ring
+from fenics_contact.geometry.ring_spacing import drawn_together
 from fenics_contact.geometry.room import require_room
 from fenics_contact.geometry.structured import split_hexahedra, structured_cells
 
@@ -110,14 +111,15 @@ def chain_link(shape: LinkShape | None = None, comm: MPI.Comm | None = None) -> 
 def _lattice_from_gmsh(shape: LinkShape) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Mesh with gmsh and renumber the nodes as the structured lattice has them.
 
-    gmsh divides an arc to about nine digits, not quite alike from version to version; the coordinates
-    returned are the lattice's own, which gmsh's were found to be.
+    gmsh divides an arc to about nine digits, not quite alike from version to version, and into equal pieces;
+    the coordinates returned are the lattice's own, graded where the link is. Those of equal pieces gmsh's
+    were found to be.
 
     Returns:
         Coordinates, (n_nodes, 3), and facets by name, (n_facets, 4), in the numbering of `structured_cells`.
     """
     points, cells, facets = mesh_ring(shape)
-    lattice = ring_lattice(shape).reshape(-1, 3)
+    lattice = ring_lattice(shape, shape.spacing.uniform).reshape(-1, 3)
     used = np.unique(cells)
     distance, place = cKDTree(lattice).query(points[used])
     expected, _ = structured_cells((shape.n_around, shape.n_a, shape.n_b), closed=True)
@@ -130,7 +132,7 @@ def _lattice_from_gmsh(shape: LinkShape) -> tuple[np.ndarray, dict[str, np.ndarr
             f"hexahedra, got {used.size} nodes, {cells.shape[0]} hexahedra, nodes off by up to "
             f"{distance.max():.3g}: please report this shape and the version of gmsh"
         )
-    return lattice, {name: number[nodes] for name, nodes in facets.items()}
+    return ring_lattice(shape).reshape(-1, 3), {name: number[nodes] for name, nodes in facets.items()}
 
 
 def _mirrored(grid: np.ndarray, shape: LinkShape) -> np.ndarray:
@@ -153,13 +155,17 @@ def _same_cells(cells: np.ndarray, expected: np.ndarray) -> bool:
 
 
 def _crown(shape: LinkShape) -> DesignSurface:
-    around = crown_indices(shape)
+    around, spacing = crown_indices(shape), shape.spacing
     _, outward = stations(shape)
-    _, normals = shape.section.inner_arc(shape.n_b)
+    _, normals = shape.section.inner_arc(shape.n_b, spacing.across)
     across = np.array([0.0, 1.0, 0.0])
     directions = normals[None, :, :1] * outward[around][:, None] + normals[None, :, 1:] * across
     counts = (around.size, shape.n_b + 1)
-    s, t = np.meshgrid(np.linspace(0.0, 1.0, counts[0]), np.linspace(0.0, 1.0, counts[1]), indexing="ij")
+    ticks = [
+        drawn_together(np.linspace(0.0, 1.0, count), 0.5, strength)
+        for count, strength in zip(counts, (spacing.along, spacing.across), strict=True)
+    ]
+    s, t = np.meshgrid(*ticks, indexing="ij")
     nodes = around[:, None] * (shape.n_a + 1) * (shape.n_b + 1) + np.arange(shape.n_b + 1)
     parameters = np.column_stack([s.ravel(), t.ravel()])
     return DesignSurface(nodes.ravel(), parameters, directions.reshape(-1, 3), counts)

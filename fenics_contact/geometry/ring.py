@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry.arguments import check_count, check_numbers
+from fenics_contact.geometry.arguments import check_count, check_grading, check_numbers
+from fenics_contact.geometry.ring_spacing import Spacing, drawn_together, ring_spacing
 from fenics_contact.geometry.section import WireSection
 from fenics_contact.geometry.structured import check_cell_type
 
@@ -40,6 +41,12 @@ class LinkShape:
         n_around: Cells around the ring, a multiple of 6 (four quarter turns and two legs) and at least 12.
         n_a: Cells through the thickness.
         n_b: Cells across the width.
+        grading: Logarithm of the ratio of the largest to the smallest cell along the crowns, whose cells
+            shrink towards the spots where links touch; 0 for uniform. Across the wire and through its
+            thickness they shrink to the size that they have there along the ring. The number of cells stays,
+            also around the ring: legs hand some over to the crowns. 2.1 puts eight cells of the default
+            shape, in both directions, across the circle of 2.95 mm radius in which links of steel touch
+            under 80 kN (uniform: 2 along the ring).
         cell: ``"hexahedron"`` or ``"tetrahedron"``.
     """
 
@@ -51,6 +58,7 @@ class LinkShape:
     n_around: int = 48
     n_a: int = 8
     n_b: int = 20
+    grading: float = 0.0
     cell: str = "hexahedron"
 
     def __post_init__(self) -> None:
@@ -72,6 +80,7 @@ class LinkShape:
         check_count(self.n_a, "n_a")
         check_count(self.n_b, "n_b", 2)
         check_cell_type(self.cell)
+        check_grading(self.grading)
         _ = self.section
         sizes = [float(size) for size in given.values()]
         if max(sizes) > ALIKE * min(sizes):
@@ -88,6 +97,11 @@ class LinkShape:
     def section(self) -> WireSection:
         """The wire's cross-section."""
         return WireSection(self.thickness, self.width, self.roundness)
+
+    @property
+    def spacing(self) -> Spacing:
+        """How closely the nodes lie along the three directions of the lattice."""
+        return ring_spacing(self)
 
     @property
     def centre_radius(self) -> float:
@@ -107,9 +121,14 @@ class LinkShape:
     @property
     def faceting(self) -> float:
         """How far the flat facets of the inner crown stand off the smooth surface."""
-        ring = self.inner_radius * (1.0 - np.cos(np.pi / 4.0 / (self.n_around // 6)))
-        across = self.section.crown_radius * (1.0 - np.cos(self.section.half_angle / self.n_b))
-        return float(max(ring, across))
+        spacing, section = self.spacing, self.section
+        around = np.pi / 2.0 * _steps(2 * spacing.quarter, spacing.along)
+        across = section.half_angle * _steps(self.n_b, spacing.across)
+        heights = [
+            radius * (1.0 - np.cos(angles.max() / 2.0))
+            for radius, angles in ((self.inner_radius, around), (section.crown_radius, across))
+        ]
+        return float(max(heights))
 
 
 def crown_start(shape: LinkShape) -> int:
@@ -118,45 +137,55 @@ def crown_start(shape: LinkShape) -> int:
     The middle of the contact crown has the index ``n_around // 16``: half a subdomain when the ring is cut
     into eight, so that no cut across the ring meets the spot where links touch.
     """
-    return shape.n_around // 16 - shape.n_around // 6
+    return shape.n_around // 16 - shape.spacing.quarter
 
 
-def stations(shape: LinkShape) -> tuple[np.ndarray, np.ndarray]:
+def _steps(cells: int, strength: float) -> np.ndarray:
+    """Lengths of the pieces of [-1, 1], (cells,)."""
+    return np.diff(drawn_together(np.linspace(-1.0, 1.0, cells + 1), 0.0, strength))
+
+
+def stations(shape: LinkShape, spacing: Spacing | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Place the section around the ring.
 
     Args:
         shape: The link.
+        spacing: Of the nodes; the link's own unless given.
 
     Returns:
         Points of the wire's centre line, (n_around, 3), and the unit direction a of the section there,
         (n_around, 3).
     """
-    n = shape.n_around // 6
-    half_turn = np.linspace(-np.pi / 2.0, np.pi / 2.0, 2 * n, endpoint=False)
-    leg = np.linspace(0.0, shape.straight, n, endpoint=False)
+    spacing = shape.spacing if spacing is None else spacing
+    turning, n_leg = 2 * spacing.quarter, spacing.leg
+    angles = np.linspace(-np.pi / 2.0, np.pi / 2.0, turning + 1)
+    half_turn = drawn_together(angles, 0.0, spacing.along)[:-1]
+    leg = np.linspace(0.0, shape.straight, n_leg, endpoint=False)
     # Crown, leg, far crown, leg: direction a turns in the crowns only, the centre moves along the legs only.
-    turn = np.concatenate([half_turn, np.full(n, np.pi / 2.0)])
+    turn = np.concatenate([half_turn, np.full(n_leg, np.pi / 2.0)])
     turn = np.concatenate([turn, turn + np.pi])
-    moved = np.concatenate([np.zeros(2 * n), leg, np.full(2 * n, shape.straight), shape.straight - leg])
-    centre = np.zeros((6 * n, 3))
+    moved = np.concatenate([np.zeros(turning), leg, np.full(turning, shape.straight), shape.straight - leg])
+    centre = np.zeros((shape.n_around, 3))
     centre[:, 0] = -shape.inner_radius - moved
-    outward = np.column_stack([np.cos(turn), np.zeros(6 * n), np.sin(turn)])
+    outward = np.column_stack([np.cos(turn), np.zeros(shape.n_around), np.sin(turn)])
     line = centre + shape.centre_radius * outward
     start = crown_start(shape)
     return np.roll(line, start, axis=0), np.roll(outward, start, axis=0)
 
 
-def ring_lattice(shape: LinkShape) -> np.ndarray:
+def ring_lattice(shape: LinkShape, spacing: Spacing | None = None) -> np.ndarray:
     """Sweep the section's lattice around the ring.
 
     Args:
         shape: The link.
+        spacing: Of the nodes; the link's own unless given.
 
     Returns:
         Points, (n_around, n_a + 1, n_b + 1, 3).
     """
-    line, outward = stations(shape)
-    section = shape.section.lattice(shape.n_a, shape.n_b)
+    spacing = shape.spacing if spacing is None else spacing
+    line, outward = stations(shape, spacing)
+    section = shape.section.lattice(shape.n_a, shape.n_b, spacing.through, spacing.across)
     across = np.array([0.0, 1.0, 0.0])
     return np.asarray(
         line[:, None, None] + section[..., :1] * outward[:, None, None] + section[..., 1:] * across
@@ -164,5 +193,5 @@ def ring_lattice(shape: LinkShape) -> np.ndarray:
 
 
 def crown_indices(shape: LinkShape) -> np.ndarray:
-    """Indices around the ring of the contact crown's nodes, from -z to +z; (n_around // 3 + 1,)."""
-    return (crown_start(shape) + np.arange(shape.n_around // 3 + 1)) % shape.n_around
+    """Indices around the ring of the contact crown's nodes, from -z to +z; (n_crown + 1,)."""
+    return (crown_start(shape) + np.arange(2 * shape.spacing.quarter + 1)) % shape.n_around

@@ -13,7 +13,7 @@ _HEXAHEDRON, _QUADRILATERAL = 5, 3
 
 
 def mesh_ring(shape: LinkShape) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
-    """Mesh the ring with hexahedra.
+    """Mesh the ring with hexahedra that are equal on each piece of it.
 
     The geometry has six volumes with the physical name "volume"; the inner side of the crown at the origin is
     named "contact", that of the far crown "grip". Surfaces are read back by these names.
@@ -48,16 +48,18 @@ def _elements(gmsh: ModuleType, dim: int, tag: int, kind: int) -> np.ndarray:
 
 def _build_ring(gmsh: ModuleType, shape: LinkShape) -> None:
     """Sweep the section from the foot of the contact crown once around and name what is needed."""
-    geo, n = gmsh.model.geo, shape.n_around // 6
+    geo, spacing = gmsh.model.geo, shape.spacing
     near, far = -shape.inner_radius, -shape.inner_radius - shape.straight
 
     def turn(face: int, centre: float) -> list[tuple[int, int]]:
         return list(
-            geo.revolve([(2, face)], centre, 0, 0, 0, -1, 0, np.pi / 2, numElements=[n], recombine=True)
+            geo.revolve(
+                [(2, face)], centre, 0, 0, 0, -1, 0, np.pi / 2, numElements=[spacing.quarter], recombine=True
+            )
         )
 
     def leg(face: int, length: float) -> list[tuple[int, int]]:
-        return list(geo.extrude([(2, face)], length, 0, 0, numElements=[n], recombine=True))
+        return list(geo.extrude([(2, face)], length, 0, 0, numElements=[spacing.leg], recombine=True))
 
     face = _build_section(gmsh, shape)
     volumes, inner = [], []

@@ -18,6 +18,7 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry.arguments import check_numbers
+from fenics_contact.geometry.ring_spacing import drawn_together
 
 
 @dataclass(frozen=True)
@@ -82,32 +83,41 @@ class WireSection:
         segment = self.half_angle - np.sin(2.0 * self.half_angle) / 2.0
         return float(4.0 * c_a * c_b + 2.0 * segment * (self.crown_radius**2 + self.flank_radius**2))
 
-    def inner_arc(self, n: int) -> tuple[np.ndarray, np.ndarray]:
-        """Divide the arc on the ring's inside into equal pieces.
+    def inner_arc(self, n: int, strength: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Divide the arc on the ring's inside.
 
         Args:
             n: Number of pieces.
+            strength: How much shorter those in the middle are, see `drawn_together`; 0 for equal pieces.
 
         Returns:
             Points (a, b), from negative to positive b, and unit normals out of the section, both (n + 1, 2).
         """
-        angle = np.linspace(-self.half_angle, self.half_angle, n + 1)
+        angle = drawn_together(np.linspace(-self.half_angle, self.half_angle, n + 1), 0.0, strength)
         normals = np.column_stack([-np.cos(angle), np.sin(angle)])
         centre = np.array([self.crown_radius - self.thickness / 2.0, 0.0])
         return centre + self.crown_radius * normals, normals
 
-    def flank_arc(self, n: int) -> np.ndarray:
-        """Divide the arc at positive b into equal pieces, from the inner to the outer side; (n + 1, 2)."""
-        angle = np.linspace(-self.half_angle, self.half_angle, n + 1)
+    def flank_arc(self, n: int, strength: float = 0.0) -> np.ndarray:
+        """Divide the arc at positive b, from the inner to the outer side; (n + 1, 2).
+
+        Args:
+            n: Number of pieces.
+            strength: How much shorter those on the inner side are; 0 for equal pieces.
+        """
+        start = -self.half_angle
+        angle = drawn_together(np.linspace(start, self.half_angle, n + 1), start, strength)
         outward = np.column_stack([np.sin(angle), np.cos(angle)])
         return np.array([0.0, self.width / 2.0 - self.flank_radius]) + self.flank_radius * outward
 
-    def lattice(self, n_a: int, n_b: int) -> np.ndarray:
+    def lattice(self, n_a: int, n_b: int, through: float = 0.0, across: float = 0.0) -> np.ndarray:
         """Fill the section by transfinite interpolation between its four arcs.
 
         Args:
             n_a: Number of cells along a.
             n_b: Number of cells along b.
+            through: Strength with which cells become smaller towards the inner side, see `drawn_together`.
+            across: Strength with which they become smaller towards b = 0.
 
         Returns:
             Points (a, b), (n_a + 1, n_b + 1, 2).
@@ -116,10 +126,10 @@ class WireSection:
             Gordon and Hall, Construction of curvilinear co-ordinate systems and applications to mesh
             generation, Int. J. Numer. Meth. Engng 7 (1973), 461-477.
         """
-        inner, _ = self.inner_arc(n_b)
-        right = self.flank_arc(n_a)
+        inner, _ = self.inner_arc(n_b, across)
+        right = self.flank_arc(n_a, through)
         outer, left = inner * [-1.0, 1.0], right * [1.0, -1.0]
-        u = np.linspace(0.0, 1.0, n_a + 1)[:, None, None]
-        v = np.linspace(0.0, 1.0, n_b + 1)[None, :, None]
+        u = drawn_together(np.linspace(0.0, 1.0, n_a + 1), 0.0, through)[:, None, None]
+        v = drawn_together(np.linspace(0.0, 1.0, n_b + 1), 0.5, across)[None, :, None]
         corners = (1 - u) * ((1 - v) * inner[0] + v * inner[-1]) + u * ((1 - v) * outer[0] + v * outer[-1])
         return (1 - u) * inner + u * outer + (1 - v) * left[:, None] + v * right[:, None] - corners

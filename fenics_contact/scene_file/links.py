@@ -34,12 +34,17 @@ class _Links(Placed):
     n_around: int = Field(_DEFAULT.n_around, ge=12, description="cells around the ring, a multiple of 6")
     n_a: int = Field(_DEFAULT.n_a, ge=1, description="cells through the thickness")
     n_b: int = Field(_DEFAULT.n_b, ge=2, description="cells across the width")
+    grading: float = Field(
+        _DEFAULT.grading, ge=0, le=8,
+        description="logarithm of the largest to the smallest cell of the crowns on the way to the contact",
+    )  # fmt: skip
     cell: Literal["hexahedron", "tetrahedron"] = Field("hexahedron", description="type of the cells")
 
     @property
     def _link(self) -> LinkShape:
         names = (
-            "inner_radius", "straight", "thickness", "width", "roundness", "n_around", "n_a", "n_b", "cell",
+            "inner_radius", "straight", "thickness", "width", "roundness",
+            "n_around", "n_a", "n_b", "grading", "cell",
         )  # fmt: skip
         return LinkShape(**{name: getattr(self, name) for name in names})
 

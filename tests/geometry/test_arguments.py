@@ -47,7 +47,11 @@ BUILDERS: list[tuple[Callable[..., object], dict[str, Any], list[str]]] = [
         {"shank": 0.9, "head": 1.6, "head_height": 0.5, "n": 1},
         ["n"],
     ),
-    (link, {"inner_radius": 11.0, "straight": 26.0, "thickness": 16.0, "width": 16.0, "n_a": 3}, ["n_a"]),
+    (
+        link,
+        {"inner_radius": 11.0, "straight": 26.0, "thickness": 16.0, "width": 16.0, "grading": 1.0, "n_a": 3},
+        ["n_a"],
+    ),
 ]
 CASES = [
     (build, good, name, NO_COUNTS if name in counts else NO_NUMBERS)

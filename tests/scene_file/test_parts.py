@@ -66,9 +66,9 @@ def test_a_mesh_is_scaled_then_turned_then_moved() -> None:
 
 
 def test_the_parts_of_a_chain_are_its_links() -> None:
-    mesh = {"shape": "chain", "links": 3, "n_around": 24, "n_a": 2, "n_b": 6}
+    mesh = {"shape": "chain", "links": 3, "n_around": 24, "n_a": 2, "n_b": 6, "grading": 1.5}
     file = file_of(mesh=mesh, body={"part": "2"})
-    links = chain([LinkShape(n_around=24, n_a=2, n_b=6)] * 3).links
+    links = chain([LinkShape(n_around=24, n_a=2, n_b=6, grading=1.5)] * 3).links
     np.testing.assert_array_equal(file.scene.bodies["a"].mesh.points, links[1].mesh.points)
     with pytest.raises(SceneFileError, match=r"bodies.a must have 'part', one of \['1', '2', '3'\]"):
         _ = file_of(mesh=mesh).scene
