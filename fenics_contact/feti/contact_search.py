@@ -23,8 +23,8 @@ from fenics_contact.feti.facet_areas import nodal_areas
 from fenics_contact.feti.projection import Projection, join, project
 from fenics_contact.feti.surface import FacetedSurface, faceted_surface, shape_functions
 from fenics_contact.fingerprint import described, require_alike
-from fenics_contact.geometry import coordinate_rounding
-from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie, asked
+from fenics_contact.geometry import asked, coordinate_rounding
+from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie
 from fenics_contact.scene.mirrors import mirrored
 
 #: A gap of so many roundings of coordinates is none: a few operations lie between the two.

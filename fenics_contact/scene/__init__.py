@@ -36,7 +36,6 @@ from fenics_contact.scene.obstacles import (
     RigidObstacle,
     RigidPlane,
     RigidSphere,
-    asked,
 )
 from fenics_contact.scene.pairs import ContactPair, Coulomb, Discretisation, Friction, Surface, Tie, Tresca
 from fenics_contact.scene.plan import ConeKind, Plan, SolverKind, choose_solver
@@ -86,7 +85,6 @@ __all__ = [
     "Tresca",
     "Ufl",
     "VolumeLoad",
-    "asked",
     "bodies_from",
     "can_expand",
     "choose_solver",

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.checked import checked
 from fenics_contact.geometry import BodyMesh
-from fenics_contact.scene.checked import checked
 from fenics_contact.scene.materials import Material
 
 

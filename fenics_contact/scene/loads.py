@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene.checked import checked
+from fenics_contact.errors.checked import checked
+from fenics_contact.geometry.vectors import Vector
 from fenics_contact.scene.values import ScalarValue, VectorValue, checked_scalar, checked_vector
-from fenics_contact.scene.vectors import Vector
 
 
 @dataclass(frozen=True)

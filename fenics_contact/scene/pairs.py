@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene.checked import checked
+from fenics_contact.errors.checked import checked
 from fenics_contact.scene.obstacles import RigidObstacle
 
 #: Where the contact conditions are asked: at the slave's nodes, or weighted by its shape functions (mortar).

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.checked import checked
 from fenics_contact.geometry import default_partition
 from fenics_contact.scene.body import Body
-from fenics_contact.scene.checked import checked
 from fenics_contact.scene.effects import Effect, effects_of
 from fenics_contact.scene.loads import Load, SurfaceLoad, ThermalStrain
 from fenics_contact.scene.materials import can_expand

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.scene import RigidCylinder, RigidObstacle, RigidPlane, RigidSphere, Scene, Surface
+from fenics_contact.geometry import Cylinder, Plane, Sphere
+from fenics_contact.scene import RigidObstacle, Scene, Surface
 from fenics_contact.viz.colours import GREY, PALE
 from fenics_contact.viz.stage import Layer, segments, surface
 from fenics_contact.viz.view import View
@@ -61,13 +62,13 @@ def obstacle_layers(scene: Scene, points: np.ndarray, view: View) -> tuple[list[
     held = [np.zeros((0, 3))]
     for obstacle in obstacles_of(scene):
         match obstacle:
-            case RigidPlane():
+            case Plane():
                 corners = _sheet(obstacle, points)
                 layers += _plane_layers(corners, float(np.asarray(obstacle.normal) @ view.towards))
                 held.append(corners)
-            case RigidSphere():
+            case Sphere():
                 layers.append(_lines(_circle(obstacle, view), closed=True))
-            case RigidCylinder():
+            case Cylinder():
                 layers += [_lines(edge, closed=False) for edge in _edges(obstacle, points, view)]
     return layers, np.concatenate(held)
 
@@ -79,7 +80,7 @@ def _plane_layers(corners: np.ndarray, facing: float) -> list[Layer]:
     return [sheet, outline] if facing > 0.05 else [outline]
 
 
-def _sheet(plane: RigidPlane, points: np.ndarray) -> np.ndarray:
+def _sheet(plane: Plane, points: np.ndarray) -> np.ndarray:
     """Return the corners of the part of a plane under the bodies, (4, 3)."""
     normal = np.asarray(plane.normal)
     first = np.eye(3)[int(np.argmin(np.round(np.abs(normal), 6)))]
@@ -91,7 +92,7 @@ def _sheet(plane: RigidPlane, points: np.ndarray) -> np.ndarray:
     return np.asarray(plane.point) + np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]) @ axes
 
 
-def _circle(sphere: RigidSphere, view: View) -> np.ndarray:
+def _circle(sphere: Sphere, view: View) -> np.ndarray:
     """Return the outline of a sphere in parallel projection, (n, 3)."""
     angle = np.linspace(0, 2 * np.pi, PIECES, endpoint=False)[:, None]
     return np.asarray(
@@ -99,7 +100,7 @@ def _circle(sphere: RigidSphere, view: View) -> np.ndarray:
     )
 
 
-def _edges(cylinder: RigidCylinder, points: np.ndarray, view: View) -> list[np.ndarray]:
+def _edges(cylinder: Cylinder, points: np.ndarray, view: View) -> list[np.ndarray]:
     """Return the edges of a cylinder's outline beside the bodies, (2, 3) each; none if it is seen end on."""
     axis = np.asarray(cylinder.axis)
     across = np.cross(axis, view.towards)

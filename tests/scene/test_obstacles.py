@@ -187,8 +187,8 @@ def test_a_distance_that_is_no_number_a_point_is_refused(
     function: Callable[[np.ndarray], np.ndarray], given: str
 ) -> None:
     message = (
-        r"the distance of an obstacle must be one finite number a point, shape \(200,\), .*: write it for an "
-        r"array of points"
+        r"the distance of DistanceObstacle must be one finite number a point, shape \(200,\), .*: write it "
+        r"for an array of points"
     )
     with np.errstate(all="ignore"):
         with pytest.raises(InvalidInputError, match=message) as error:
@@ -202,7 +202,7 @@ def test_a_level_set_function_that_is_no_distance_is_refused(
 ) -> None:
     level_set = DistanceObstacle(lambda x: np.einsum("nd,nd->n", x, x) - 1.0, gradient)
     message = (
-        r"an obstacle needs the signed distance to its surface, whose gradient has length one, got 3 at "
+        r"DistanceObstacle needs the signed distance to its surface, whose gradient has length one, got 3 at "
         r"\[1.5, 0.0\]: divide a level set function by the length of its gradient, or round off edges"
     )
     with pytest.raises(InvalidInputError, match=message):

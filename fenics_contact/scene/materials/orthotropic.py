@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene.checked import checked
+from fenics_contact.errors.checked import checked
 from fenics_contact.scene.materials.constants import numbers
 from fenics_contact.scene.materials.elasticity import Elasticity, strain
 from fenics_contact.scene.materials.voigt import (

@@ -13,7 +13,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 
 import numpy as np
 
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors.kinds import InvalidInputError
 
 Class = TypeVar("Class", bound=type)
 
@@ -135,7 +135,8 @@ def _members(kind: Any) -> list[str]:
     """Return what a protocol asks for; nothing where it is none."""
     if not getattr(kind, "_is_protocol", False):
         return []
-    return [name for name in vars(kind) if not name.startswith("_")]
+    protocols = [each for each in kind.__mro__ if getattr(each, "_is_protocol", False)]
+    return [name for each in reversed(protocols) for name in vars(each) if not name.startswith("_")]
 
 
 def _named(hint: Any) -> str:

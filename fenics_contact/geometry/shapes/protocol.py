@@ -1,0 +1,58 @@
+"""What a surface's true shape has to answer, and how it is asked."""
+
+from __future__ import annotations
+
+from typing import Literal, Protocol, TypeAlias, runtime_checkable
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError, calling
+
+
+@runtime_checkable
+class SurfaceShape(Protocol):
+    """The true surface of a body, given by its signed distance; write a class with these members to add one.
+
+    A class that serves one dimension alone says so by an attribute ``dim``.
+    """
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """Return the signed distance, negative inside the body, (n, dim) -> (n,), [length]."""
+
+    def normals(self, points: np.ndarray) -> np.ndarray:
+        """Return the gradient of the distance, which points out of the body, (n, dim) -> (n, dim)."""
+
+    def curvatures(self, points: np.ndarray) -> np.ndarray:
+        """Return the second derivatives of the distance, (n, dim) -> (n, dim, dim), [1 / length]."""
+
+
+Quantity: TypeAlias = Literal["distance", "normals", "curvatures"]
+
+
+def asked(shape: SurfaceShape, what: Quantity, points: np.ndarray) -> np.ndarray:
+    """Ask a shape, and refuse what it must not answer.
+
+    Args:
+        shape: The shape of a surface, or a rigid obstacle.
+        what: Which of its members.
+        points: Where, shape (n, dim), [length].
+
+    Returns:
+        Its answer, shape (n,), (n, dim) or (n, dim, dim).
+
+    Raises:
+        InvalidInputError: If the answer has another shape or is not finite.
+        UserCodeError: If it raises.
+    """
+    name = f"the {what} of {type(shape).__name__}"
+    with calling(name):
+        values = np.asarray(getattr(shape, what)(points), dtype=np.float64)
+    order = ("distance", "normals", "curvatures").index(what)
+    needed = (len(points), *[points.shape[1]] * order)
+    if values.shape != needed or not np.isfinite(values).all():
+        given = f"shape {values.shape}" if values.shape != needed else "NaN or infinity"
+        raise InvalidInputError(
+            f"{name} must be finite numbers of shape {needed} for points of shape {points.shape}, got "
+            f"{given}: it gets all points at once, a row each"
+        )
+    return values
