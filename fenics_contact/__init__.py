@@ -5,6 +5,7 @@ The floors of the package, from the ground up; each imports only those before it
 * `fenics_contact.progress`: how far long work is,
 * `fenics_contact.checkpoint`: files from which interrupted runs go on,
 * `fenics_contact.geometry`: chain links, blocks, Hertz bodies, partitions,
+* `fenics_contact.theory`: contacts whose answer is known by formula,
 * `fenics_contact.scene`: bodies, materials, supports, loads, contact pairs,
 * `fenics_contact.qp`: dual solvers for bounds and friction discs,
 * `fenics_contact.feti`: subdomains, gluing, contact rows, the dual problem,

@@ -40,6 +40,7 @@ FLOORS = [
     [
         Room("geometry", "meshes, names, partitions", "model"),
         Room("linalg", "shared factors, cost model", "numbers"),
+        Room("theory", "contacts known by formula", "numbers"),
     ],
     [
         Room("scene", "bodies, materials, loads, pairs", "model", "1"),

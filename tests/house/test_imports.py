@@ -16,7 +16,7 @@ FLOORS = [
     {"_requirements", "launching", "timing", "checkpoint"},
     {"_libraries"},
     {"_dolfinx"},
-    {"geometry", "linalg"},
+    {"geometry", "linalg", "theory"},
     {"scene", "qp"},
     {"feti"},
     {"accuracy"},
