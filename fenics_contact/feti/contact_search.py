@@ -19,13 +19,13 @@ from fenics_contact.feti.contact_points import (
     tangent_frames,
 )
 from fenics_contact.feti.copies import Tearing
-from fenics_contact.feti.facet_areas import nodal_areas
 from fenics_contact.feti.projection import Projection, join, project
-from fenics_contact.feti.surface import FacetedSurface, faceted_surface, shape_functions
+from fenics_contact.feti.relief import heights
+from fenics_contact.feti.surface import FacetedSurface, shape_functions
+from fenics_contact.feti.true_surface import surface_of
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.geometry import asked, coordinate_rounding
-from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie
-from fenics_contact.scene.mirrors import mirrored
+from fenics_contact.scene import ContactPair, Geometry, RigidObstacle, Scene, Surface, Tie
 
 #: A gap of so many roundings of coordinates is none: a few operations lie between the two.
 ROUNDING = 8
@@ -60,18 +60,6 @@ def find_tied_points(
     return _points_of_pairs(scene, scene.ties, tearing, fixed, comm or MPI.COMM_SELF)
 
 
-def surface_of(scene: Scene, surface: Surface) -> FacetedSurface:
-    """Return a named surface with its averaged normals: linear facets through its nodes."""
-    mesh = scene.bodies[surface.body].mesh
-    found = faceted_surface(mesh.points, scene.facets(surface), mirrored(scene, surface.body))
-    if mesh.order == 1:
-        return found
-    # The area of a node is the force that a unit pressure puts there, which is not what linear facets say.
-    facets = mesh.surfaces[surface.name]
-    areas = np.bincount(facets.ravel(), nodal_areas(mesh.points, facets).ravel(), minlength=mesh.n_nodes)
-    return replace(found, areas=areas[found.nodes])
-
-
 def without_rounding(gap: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Return gaps, zero where surfaces touch but for the rounding of their coordinates.
 
@@ -99,9 +87,9 @@ class _Side:
     n_nodes: int
 
     @classmethod
-    def of(cls, scene: Scene, surface: Surface, tearing: Tearing) -> _Side:
+    def of(cls, scene: Scene, surface: Surface, geometry: Geometry, tearing: Tearing) -> _Side:
         """Return a named surface as a side."""
-        own = surface_of(scene, surface)
+        own = surface_of(scene, surface, geometry)
         return cls(own, tearing.global_nodes(surface.body, own.nodes), tearing.n_nodes)
 
 
@@ -110,7 +98,9 @@ def _points_of_pairs(
 ) -> ContactPoints:
     parts = []
     for index, pair in enumerate(pairs):
-        slave = _Side.of(scene, pair.slave, tearing)
+        # What lies between tied surfaces stays as it is; their gaps count for nothing.
+        geometry = pair.geometry if isinstance(pair, ContactPair) else "faceted"
+        slave = _Side.of(scene, pair.slave, geometry, tearing)
         movable = ~fixed[slave.nodes].all(axis=1)
         if not isinstance(pair.master, Surface):
             with together(comm):
@@ -119,7 +109,7 @@ def _points_of_pairs(
             require_alike(comm, described((points.slave, points.normal, points.gap), name))
         else:
             find = _by_mortar if pair.discretisation == "mortar" else _by_projection
-            master = _Side.of(scene, pair.master, tearing)
+            master = _Side.of(scene, pair.master, geometry, tearing)
             points = find(slave, movable, master, comm)
             points = replace(points, symmetric=_symmetric(points, slave, master))
         if comm.rank == 0 and not movable.all():
@@ -165,7 +155,8 @@ def _by_projection(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.C
     shape = (len(hit.point), slave.n_nodes)
     weight = sp.csr_matrix((values.ravel(), (row, corners.ravel())), shape=shape)
     chosen = candidates[hit.point]
-    return replace(_points(slave, chosen, hit.normal, hit.gap, weight), facet=hit.facet, local=hit.local)
+    gap = hit.gap - heights(master.surface, hit.facet, hit.local).value
+    return replace(_points(slave, chosen, hit.normal, gap, weight), facet=hit.facet, local=hit.local)
 
 
 def _tell_of_lost(places: np.ndarray, count: int) -> None:
@@ -187,7 +178,13 @@ def _by_mortar(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm)
     count = len(master.nodes)
     spread = sp.csr_matrix((np.ones(count), (np.arange(count), master.nodes)), shape=(count, master.n_nodes))
     weight = (found.weight[kept] @ spread).tocsr()
-    points = _points(slave, found.node[kept], found.normal[kept], found.gap[kept], weight)
+    gap = found.gap[kept]
+    if slave.surface.relief is not None or master.surface.relief is not None:
+        # Linear displacements close the gap's linear interpolant, not the mean of its bends between nodes,
+        # which is a mean for nodes beside the master alone.
+        hit = _shared_projection(slave.surface, found.node[kept], master.surface, comm)
+        gap[hit.point] = hit.gap - heights(master.surface, hit.facet, hit.local).value
+    points = _points(slave, found.node[kept], found.normal[kept], gap, weight)
     return replace(points, area=found.area[kept])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -94,8 +95,31 @@ def corner_products(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
+class Relief:
+    """The true surface over facets, as a height along the interpolated normals of the nodes.
+
+    On each facet the height is a cubic polynomial whose slopes at the corners lie in the true tangent planes
+    (Hermite interpolation along the edges, blended in between), plus what that leaves at the midpoints of the
+    edges and in the middle of the facet. The error is of the fourth order in the size of the facets, of the
+    sixth along arcs of circles. All entries are differences from what the facets tell, so that they stay as
+    they are when the nodes move a little: then normals turn as those of the facets do.
+
+    Attributes:
+        normals: True unit normals of the nodes less the averaged ones, shape (n, dim).
+        corners: The same for each corner of the facets, which differ where the surface has a crease, shape
+            (n_facets, corners, dim).
+        rest: What the cubics leave at the midpoints of the edges, from each corner to the next, and in the
+            middle, shape (n_facets, corners + 1); in the plane at the midpoint, shape (n_facets, 1), [length].
+    """
+
+    normals: np.ndarray
+    corners: np.ndarray
+    rest: np.ndarray
+
+
+@dataclass(frozen=True)
 class FacetedSurface:
-    """Facets with the unit normals of their nodes, averaged over the facets around each.
+    """Facets with the unit normals of their nodes, and what is known of the surface that they stand for.
 
     The normal field interpolated between the nodes is continuous across facets, unlike the facets' own.
 
@@ -104,17 +128,27 @@ class FacetedSurface:
         facets: Facets as rows of positions in ``nodes``, shape (n_facets, corners): triangles or
             quadrilaterals counterclockwise seen from outside, in the plane edges with the body on their left.
         points: Coordinates of the nodes, shape (n, dim), [length].
-        normals: Outward unit normals at the nodes, shape (n, dim).
+        averaged: Outward unit normals at the nodes, averaged over the facets around each, shape (n, dim).
         areas: Area, in the plane length, that belongs to each node, shape (n,), [length²] or [length].
         mirrored: Components that the normals lack on planes of symmetry, shape (n, dim).
+        relief: What the true surface has and the facets have not; None if they are all that is known, or flat.
     """
 
     nodes: np.ndarray
     facets: np.ndarray
     points: np.ndarray
-    normals: np.ndarray
+    averaged: np.ndarray
     areas: np.ndarray
     mirrored: np.ndarray
+    relief: Relief | None = None
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """Outward unit normals at the nodes, the true ones where they are known, shape (n, dim)."""
+        if self.relief is None:
+            return self.averaged
+        true = self.averaged + self.relief.normals
+        return np.asarray(true / np.linalg.norm(true, axis=1)[:, None])
 
     @property
     def corners(self) -> int:

@@ -54,9 +54,6 @@ from fenics_contact.geometry.structured import split_hexahedra
 from fenics_contact.geometry.touch import (
     PULL_AXIS,
     TwoLinks,
-    axial_clearance,
-    check_penetration,
-    mutual_clearance,
     two_links,
 )
 
@@ -83,7 +80,6 @@ __all__ = [
     "Torus",
     "TwoLinks",
     "asked",
-    "axial_clearance",
     "bisection_partition",
     "block",
     "bolt",
@@ -95,7 +91,6 @@ __all__ = [
     "chain_link",
     "check_face_connected",
     "check_one_piece",
-    "check_penetration",
     "closest_points",
     "combine",
     "coordinate_rounding",
@@ -112,7 +107,6 @@ __all__ = [
     "hemisphere",
     "merge_duplicate_nodes",
     "merge_pieces",
-    "mutual_clearance",
     "near_surfaces",
     "orient",
     "placed",

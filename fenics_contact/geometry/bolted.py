@@ -13,6 +13,7 @@ from fenics_contact.geometry.faces import boundary_faces
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.rectangle import rectangle_lattice
 from fenics_contact.geometry.room import require_room
+from fenics_contact.geometry.shapes import Cylinder
 from fenics_contact.geometry.structured import structured_cells
 
 CORE = 0.5
@@ -69,7 +70,8 @@ def drilled_plate(
     section = _section(
         parts, {"x0": (0, left), "x1": (0, right), "y0": (1, 0.0), "y1": (1, half_width)}, "hole"
     )
-    return extrude(section, heights)
+    bore = Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), hole, hollow=True)
+    return extrude(section, heights).with_shapes({"hole": bore})
 
 
 def bolt(
@@ -122,7 +124,10 @@ def bolt(
     middle = swept.points[swept.cells][:, :, 2].mean(axis=1)
     between = (middle > grip[0]) & (middle < grip[1])
     regions = {"shank": np.flatnonzero(between), "ends": np.flatnonzero(~between)}
-    return BodyMesh(swept.points, swept.cells, _bolt_surfaces(swept, shank, grip), None, regions)
+    bars = {"shank": shank, "side": head}
+    shapes = {name: Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), radius) for name, radius in bars.items()}
+    surfaces = _bolt_surfaces(swept, shank, grip)
+    return BodyMesh(swept.points, swept.cells, surfaces, None, regions, shapes=shapes)
 
 
 def _bolt_surfaces(swept: BodyMesh, shank: float, grip: tuple[float, float]) -> dict[str, np.ndarray]:

@@ -10,6 +10,7 @@ from fenics_contact.geometry.arguments import shown
 from fenics_contact.geometry.faces import boundary_faces, match_faces
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.room import require_room
+from fenics_contact.geometry.shapes import Extruded, SurfaceShape
 
 
 def extrude(section: BodyMesh, heights: ArrayLike, *, present: ArrayLike | None = None) -> BodyMesh:
@@ -24,7 +25,7 @@ def extrude(section: BodyMesh, heights: ArrayLike, *, present: ArrayLike | None 
     Returns:
         Hexahedra, layer by layer. Surfaces are "bottom" and "top", which face along z wherever cells end, and
         the section's, swept. Walls that arise inside the section, where a cell is there and its neighbour is
-        not, are in no surface. The section's regions, swept. No grid.
+        not, are in no surface. The section's regions and the shapes of its curves, swept. No grid.
 
     Raises:
         InvalidInputError: If the section is no mesh of quadrilaterals, heights do not ascend, or ``present``
@@ -54,7 +55,13 @@ def extrude(section: BodyMesh, heights: ArrayLike, *, present: ArrayLike | None 
     cells = cells.reshape(-1, 8)
     surfaces = _surfaces(section, used, cells, z.size - 1)
     regions = {name: np.flatnonzero(np.isin(cell, members)) for name, members in section.regions.items()}
-    return BodyMesh(points, cells, surfaces, None, {n: c for n, c in regions.items() if c.size})
+    shapes = {name: _swept(shape) for name, shape in section.shapes.items() if name in surfaces}
+    named = {name: members for name, members in regions.items() if members.size}
+    return BodyMesh(points, cells, surfaces, None, named, shapes=shapes)
+
+
+def _swept(curve: SurfaceShape) -> Extruded:
+    return Extruded(curve, (0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0), across=(1.0, 0.0, 0.0))
 
 
 def _checked_presence(present: ArrayLike | None, shape: tuple[int, int]) -> np.ndarray:

@@ -7,6 +7,7 @@ import numpy as np
 from fenics_contact.geometry.faces import boundary_faces
 from fenics_contact.geometry.hemisphere import half_cylinder
 from fenics_contact.geometry.mesh import BodyMesh
+from fenics_contact.geometry.shapes import Sphere
 
 
 def half_disc(radius: float, n: int, *, symmetry: str = "x", grading: float = 3.0) -> BodyMesh:
@@ -37,4 +38,6 @@ def half_disc(radius: float, n: int, *, symmetry: str = "x", grading: float = 3.
         if name in solid.surfaces:
             inside = np.isin(nodes, solid.surfaces[name])
             surfaces[name] = edges[inside[edges].all(axis=1)]
-    return BodyMesh(solid.points[nodes][:, [0, 2]], cells, surfaces)
+    disc = Sphere((0.0, radius), radius)
+    shapes = {name: disc for name in ("contact", "side")}
+    return BodyMesh(solid.points[nodes][:, [0, 2]], cells, surfaces, shapes=shapes)

@@ -16,6 +16,7 @@ from fenics_contact.geometry.arguments import check_count, check_grading, check_
 from fenics_contact.geometry.block import box_lattice, box_sides
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.room import require_room
+from fenics_contact.geometry.shapes import Cylinder, Sphere, SurfaceShape
 
 CORE = 0.5
 """Size of the core over the radius."""
@@ -32,6 +33,12 @@ class _Frame:
 
     radius: float
     flat: tuple[int, ...]
+
+    @property
+    def shape(self) -> SurfaceShape:
+        """The round surface, lifted by the radius."""
+        centre = (0.0, 0.0, self.radius)
+        return Cylinder(centre, (0.0, 1.0, 0.0), self.radius) if self.flat else Sphere(centre, self.radius)
 
     def sphere(self, cube: np.ndarray) -> np.ndarray:
         """Map cube coordinates, (n, 3), to the round surface: angles, not lengths, follow the coordinates."""
@@ -145,7 +152,10 @@ def _wrap(core: BodyMesh, round_sides: list[str], frame: _Frame, layers: int, gr
     cells = np.concatenate([core.cells, stacked])
     curved = rows[-1][local]
     surfaces = {"contact": curved[below], "side": curved[~below], **_flat_sides(points, cells, curved)}
-    return BodyMesh(points + np.array([0.0, 0.0, frame.radius]), cells, surfaces)
+    shape = frame.shape
+    return BodyMesh(
+        points + np.array([0.0, 0.0, frame.radius]), cells, surfaces, shapes={"contact": shape, "side": shape}
+    )
 
 
 def _flat_sides(points: np.ndarray, cells: np.ndarray, curved: np.ndarray) -> dict[str, np.ndarray]:

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from fenics_contact.errors import FenicsContactError, together
 from fenics_contact.geometry.faces import orient
 from fenics_contact.geometry.mesh import BodyMesh
-from fenics_contact.geometry.ring import LinkShape, crown_indices, ring_lattice, stations
+from fenics_contact.geometry.ring import LinkShape, crown_indices, crown_shapes, ring_lattice, stations
 from fenics_contact.geometry.ring_gmsh import mesh_ring
 from fenics_contact.geometry.ring_spacing import drawn_together
 from fenics_contact.geometry.room import require_room
@@ -46,7 +46,7 @@ class Link:
     Attributes:
         shape: The proportions it was built from.
         mesh: The mesh with surfaces "contact" (inner side of the contact crown) and "grip" (inner side of the
-            far crown, where the chain's next link would bear) and grid index (around, a, b).
+            far crown, where the chain's next link would bear), pieces of tori, and grid index (around, a, b).
         crown: The contact surface as a design surface.
     """
 
@@ -64,7 +64,7 @@ class Link:
         Returns:
             The link at its new place; design directions turn with it.
         """
-        mesh = self.mesh.moved(self.mesh.points @ rotation.T + translation)
+        mesh = self.mesh.placed(rotation, translation)
         return replace(
             self, mesh=mesh, crown=replace(self.crown, directions=self.crown.directions @ rotation.T)
         )
@@ -102,7 +102,7 @@ def chain_link(shape: LinkShape | None = None, comm: MPI.Comm | None = None) -> 
         points, facets = comm.bcast(built, root=0)
     cells, grid = structured_cells((shape.n_around, shape.n_a, shape.n_b), closed=True)
     surfaces = {name: orient(cells, facets[name]) for name in sorted(facets)}
-    mesh = BodyMesh(points, cells, surfaces, grid)
+    mesh = BodyMesh(points, cells, surfaces, grid, shapes=crown_shapes(shape))
     if shape.cell == "tetrahedron":
         mesh = split_hexahedra(mesh, _mirrored(grid, shape))
     return Link(shape, mesh, _crown(shape))

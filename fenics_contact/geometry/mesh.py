@@ -12,6 +12,9 @@ import numpy as np
 from fenics_contact.geometry import quality
 from fenics_contact.geometry.cell_types import cell_type_of
 from fenics_contact.geometry.coincidence import check_no_coincident_nodes
+from fenics_contact.geometry.shape_fit import check_shapes
+from fenics_contact.geometry.shapes import SurfaceShape, placed
+from fenics_contact.geometry.similarity import similarity
 from fenics_contact.geometry.validation import (
     check_jacobians,
     checked_cells,
@@ -44,11 +47,14 @@ class BodyMesh:
         regions: Name to ascending cell numbers, int64, of the parts of the body that differ, in their
             material for instance; no part unless given, else every cell belongs to exactly one.
         coincident_nodes: Whether nodes may lie at the same place, as on the two sides of a crack.
+        shapes: Name of a surface to the true shape that its facets stand for, such as a `Cylinder`; contact
+            asks it for gaps and normals. Those of other surfaces are reconstructed from their nodes.
 
     Raises:
         InvalidInputError: If an array has the wrong shape or type, a coordinate is not finite, a node
             number is out of range or unused, a cell is inverted, nodes coincide, a facet is not an outward
-            boundary face or is listed twice, or the regions overlap or leave out a cell.
+            boundary face or is listed twice, the regions overlap or leave out a cell, or a surface does not
+            lie on its shape.
 
     Example:
         A square of two triangles, whose lower edge is named.
@@ -65,6 +71,8 @@ class BodyMesh:
     grid: np.ndarray | None = None
     regions: Mapping[str, np.ndarray] = field(default_factory=dict)
     coincident_nodes: bool = False
+    shapes: Mapping[str, SurfaceShape] = field(default_factory=dict)
+    _origin: BodyMesh | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check everything, cheap things first."""
@@ -82,6 +90,7 @@ class BodyMesh:
         if not self.coincident_nodes:
             check_no_coincident_nodes(points)
         self._set(surfaces=checked_surfaces(self.surfaces, cells, *points.shape))
+        check_shapes(self.points, self.surfaces, self.shapes)
 
     def _set(self, **values: object) -> None:
         for name, value in values.items():
@@ -121,11 +130,45 @@ class BodyMesh:
         """Volume of the body, in two dimensions its area; exact for its cells."""
         return quality.volume(self.points, self.cells)
 
+    @property
+    def origin(self) -> BodyMesh:
+        """The mesh for which its shapes were given, before it was `reshaped`; else the mesh itself."""
+        return self if self._origin is None else self._origin
+
+    def with_shapes(self, shapes: Mapping[str, SurfaceShape]) -> BodyMesh:
+        """Return the same mesh with these shapes of its surfaces and no others.
+
+        Args:
+            shapes: Name of a surface -> its shape in the present place.
+
+        Raises:
+            InvalidInputError: If there is no such surface, or its nodes do not lie on the shape.
+        """
+        check_shapes(self.points, self.surfaces, shapes)
+        result = copy(self)
+        result._set(shapes=dict(shapes), _origin=None)
+        return result
+
+    def placed(self, rotation: np.ndarray, translation: np.ndarray, scale: float = 1.0) -> BodyMesh:
+        """Return the mesh scaled and turned about the origin of coordinates, then moved; so are its shapes.
+
+        Args:
+            rotation: Proper rotation matrix, (3, 3) or (2, 2).
+            translation: Displacement, (3,) or (2,), [length].
+            scale: Positive factor on all coordinates.
+        """
+        result = self._at(scale * self.points @ np.asarray(rotation).T + translation)
+        shapes = {name: placed(shape, rotation, translation, scale) for name, shape in self.shapes.items()}
+        origin = self._origin and self._origin.placed(rotation, translation, scale)
+        result._set(shapes=shapes, _origin=origin)
+        return result
+
     def moved(self, points: np.ndarray) -> BodyMesh:
         """Return the same mesh at new coordinates.
 
         Cells, surfaces, grid and regions are shared with this mesh and not checked again, nor is whether
-        nodes coincide.
+        nodes coincide. Its shapes come along where the mesh is only scaled, turned and shifted; where it is
+        deformed, they are not known any more.
 
         Args:
             points: New coordinates, (n_nodes, 3 | 2).
@@ -136,6 +179,27 @@ class BodyMesh:
         Raises:
             InvalidInputError: If the shape is wrong, a coordinate is not finite or a cell is inverted.
         """
+        result = self._at(points)
+        motion = similarity(self.points, result.points) if self.shapes else None
+        if motion is not None:
+            return self.placed(*motion)
+        result._set(shapes={}, _origin=None)
+        return result
+
+    def reshaped(self, points: np.ndarray) -> BodyMesh:
+        """Return the mesh at coordinates that are a little different, as `moved`; its shapes follow the nodes.
+
+        What a surface is between its nodes, and how its normals differ from those of its facets, stays as it
+        was; so gaps are smooth functions of the coordinates.
+
+        Args:
+            points: New coordinates, (n_nodes, 3 | 2).
+        """
+        result = self._at(points)
+        result._set(_origin=self.origin)
+        return result
+
+    def _at(self, points: np.ndarray) -> BodyMesh:
         new_points = checked_points(points, self.points.shape)
         check_jacobians(
             new_points,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
@@ -11,34 +9,32 @@ from fenics_contact.geometry.cell_types import HEXAHEDRON27, QUADRILATERAL9, TRI
 from fenics_contact.geometry.faces import boundary_faces, corners_of, match_faces
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.shape_functions import shape_values
+from fenics_contact.geometry.shapes import closest_points
 from fenics_contact.geometry.validation import check_jacobians
-
-Place = Callable[[np.ndarray], np.ndarray]
-"""Points near a surface, (n, dim), to points on it, (n, dim), [length]."""
 
 _QUADRATIC = {cell.vertices.shape: cell for cell in (TRIANGLE6, QUADRILATERAL9, HEXAHEDRON27)}
 
 
-def quadratic(mesh: BodyMesh, onto: Mapping[str, Place] | None = None) -> BodyMesh:
+def quadratic(mesh: BodyMesh) -> BodyMesh:
     """Return the mesh with quadratic cells.
 
-    The new nodes are the midpoints of edges, faces and cells. Displacements, and where ``onto`` says so the
-    surfaces, become piecewise quadratic. The numbers of the old nodes, cells and facets stay.
+    The new nodes are the midpoints of edges, faces and cells; on surfaces whose shape the mesh carries, the
+    closest points of the shape. Displacements, and such surfaces, become piecewise quadratic. The numbers of
+    the old nodes, cells and facets stay.
 
     Args:
         mesh: Hexahedra, quadrilaterals or triangles. Quadratic tetrahedra are refused: under a uniform
             pressure the nodal forces of their facets vanish at the corners.
-        onto: Name of a surface -> where its new nodes belong, for surfaces that are curved.
 
     Raises:
-        InvalidInputError: If the cells have no quadratic counterpart or are quadratic already, a surface is
-            not there, or its nodes are moved so far that a cell is inverted.
+        InvalidInputError: If the cells have no quadratic counterpart or are quadratic already, or nodes are
+            moved so far onto a shape that a cell is inverted.
 
     Example:
-        >>> def on_disc(x):
-        ...     away = x - (0.0, 1.0)
-        ...     return (0.0, 1.0) + away / np.linalg.norm(away, axis=1)[:, None]
-        >>> disc = quadratic(half_disc(1.0, 8), {"contact": on_disc})  # doctest: +SKIP
+        >>> from fenics_contact.geometry import half_disc, quadratic
+        >>> disc = quadratic(half_disc(1.0, 8))
+        >>> disc.cell_type
+        'quadrilateral9'
     """
     linear = cell_type_of(mesh.cells, mesh.dim)
     kind = _QUADRATIC.get(linear.vertices.shape)
@@ -54,21 +50,19 @@ def quadratic(mesh: BodyMesh, onto: Mapping[str, Place] | None = None) -> BodyMe
         for name, facets in mesh.surfaces.items()
     }
     placed = np.zeros(len(points), dtype=bool)
-    for name, place in (onto or {}).items():
-        if name not in surfaces:
-            raise InvalidInputError(
-                f"onto names surface {name!r}, the mesh has {sorted(surfaces)}: use one of them"
-            )
+    for name, shape in mesh.shapes.items():
         own = np.unique(surfaces[name])
         own = own[own >= mesh.n_nodes]
-        points[own] = place(points[own])
+        points[own] = closest_points(shape, points[own])
         placed[own] = True
     if placed.any():
         _follow(points, cells, kind, placed)
     check_jacobians(
-        points, cells, "refine the mesh along the surfaces that onto moves nodes to, or move less"
+        points, cells, "refine the mesh along its curved surfaces, or leave their shapes away"
     )
-    return BodyMesh(points, cells, surfaces, mesh.grid, mesh.regions, coincident_nodes=mesh.coincident_nodes)
+    return BodyMesh(
+        points, cells, surfaces, mesh.grid, mesh.regions, mesh.coincident_nodes, mesh.shapes
+    )
 
 
 def _with_more_nodes(

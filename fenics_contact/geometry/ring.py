@@ -16,6 +16,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry.arguments import check_count, check_grading, check_numbers
 from fenics_contact.geometry.ring_spacing import Spacing, drawn_together, ring_spacing
 from fenics_contact.geometry.section import WireSection
+from fenics_contact.geometry.shapes import Torus
 from fenics_contact.geometry.structured import check_cell_type
 
 #: How many times one size of a link may be another: gmsh meshes no other ring.
@@ -195,3 +196,13 @@ def ring_lattice(shape: LinkShape, spacing: Spacing | None = None) -> np.ndarray
 def crown_indices(shape: LinkShape) -> np.ndarray:
     """Indices around the ring of the contact crown's nodes, from -z to +z; (n_crown + 1,)."""
     return (crown_start(shape) + np.arange(2 * shape.spacing.quarter + 1)) % shape.n_around
+
+
+def crown_shapes(shape: LinkShape) -> dict[str, Torus]:
+    """Return the tori that the inner sides of the crowns are pieces of, by the names of the surfaces."""
+    tube = shape.section.crown_radius
+    middles = {"contact": -shape.inner_radius, "grip": -shape.inner_radius - shape.straight}
+    return {
+        name: Torus((middle, 0.0, 0.0), (0.0, 1.0, 0.0), shape.inner_radius + tube, tube)
+        for name, middle in middles.items()
+    }

@@ -97,7 +97,7 @@ def split_hexahedra(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> BodyM
         name: orient(cells, _split_facets(facets, boundary)) for name, facets in mesh.surfaces.items()
     }
     regions = repeated_regions(mesh, KUHN_TETRAHEDRA.shape[0])
-    return BodyMesh(mesh.points, cells, surfaces, grid, regions, mesh.coincident_nodes)
+    return BodyMesh(mesh.points, cells, surfaces, grid, regions, mesh.coincident_nodes, mesh.shapes)
 
 
 def _split_cells(cells: np.ndarray, mirrored: np.ndarray | None) -> np.ndarray:

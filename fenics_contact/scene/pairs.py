@@ -15,6 +15,11 @@ from fenics_contact.scene.obstacles import RigidObstacle
 Discretisation: TypeAlias = Literal["node", "mortar"]
 
 
+#: What is taken for the surfaces between their nodes: the best that is known, which is the shape that a mesh
+#: carries or else a smooth surface through the nodes; always the latter; or the flat facets.
+Geometry: TypeAlias = Literal["best", "reconstructed", "faceted"]
+
+
 @dataclass(frozen=True)
 @checked()
 class Surface:
@@ -89,9 +94,13 @@ class ContactPair:
             and what shape derivatives know. ``"mortar"`` keeps weighted means of the gap positive (dual
             basis, integration over the common segments of both meshes): passes the contact patch test on
             meshes that do not match. Nodes are kept off a rigid obstacle one by one, whatever is given.
+        geometry: What gaps and normals are measured between. ``"best"``: the shapes that the bodies' meshes
+            carry, see `BodyMesh`; a smooth surface through the nodes where there is none.
+            ``"reconstructed"``: always the latter. ``"faceted"``: the flat facets, for comparison; between
+            round bodies their error is often larger than the approach of the bodies.
 
     Raises:
-        InvalidInputError: If a body shall touch itself, or the discretisation is unknown.
+        InvalidInputError: If a body shall touch itself, or the discretisation or geometry is unknown.
 
     Example:
         >>> pair = ContactPair(Surface("punch", "bottom"), Surface("block", "z1"), Coulomb(0.3), "mortar")
@@ -103,6 +112,7 @@ class ContactPair:
     master: Surface | RigidObstacle
     friction: Friction = None
     discretisation: Discretisation = "node"
+    geometry: Geometry = "best"
 
     def __post_init__(self) -> None:
         """Refuse self-contact by name."""

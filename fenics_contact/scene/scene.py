@@ -9,7 +9,7 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.checked import checked
-from fenics_contact.geometry import default_partition
+from fenics_contact.geometry import BodyMesh, default_partition
 from fenics_contact.scene.body import Body
 from fenics_contact.scene.effects import Effect, effects_of
 from fenics_contact.scene.loads import Load, SurfaceLoad, ThermalStrain
@@ -164,11 +164,26 @@ class Scene:
         Raises:
             InvalidInputError: If a body is unknown, a coordinate is not finite or a cell is inverted.
         """
-        bodies = dict(self.bodies)
-        for name, coordinates in points.items():
+        for name in points:
             self._require(name, None, "moved")
-            bodies[name] = replace(bodies[name], mesh=bodies[name].mesh.moved(coordinates))
-        return replace(self, bodies=bodies)
+        return self._with_meshes({name: self.bodies[name].mesh.moved(x) for name, x in points.items()})
+
+    def reshaped(self, points: Mapping[str, np.ndarray]) -> Scene:
+        """Return the scene with slightly other coordinates, which surfaces follow, see `BodyMesh.reshaped`.
+
+        Args:
+            points: Body name -> coordinates, shape (n_nodes, dim), [length].
+
+        Raises:
+            InvalidInputError: As `moved`.
+        """
+        for name in points:
+            self._require(name, None, "reshaped")
+        return self._with_meshes({name: self.bodies[name].mesh.reshaped(x) for name, x in points.items()})
+
+    def _with_meshes(self, meshes: Mapping[str, BodyMesh]) -> Scene:
+        changed = {name: replace(self.bodies[name], mesh=mesh) for name, mesh in meshes.items()}
+        return replace(self, bodies={**self.bodies, **changed})
 
     def partition(self, ranks: int = 1) -> dict[str, np.ndarray]:
         """Cut every body into subdomains of a good size.

@@ -111,10 +111,8 @@ class HemisphereMesh(_Hertz):
 
     def shaped(self) -> Shaped:
         """Return the half ball."""
-        mesh = geometry.hemisphere(self.radius, self.n, symmetry=self.symmetry, grading=self.grading)
-        centre = (0.0, 0.0, self.radius)
         return Shaped(
-            mesh, None, tuple((name, centre, (0, 1, 2), self.radius) for name in ("contact", "side"))
+            geometry.hemisphere(self.radius, self.n, symmetry=self.symmetry, grading=self.grading)
         )
 
 
@@ -131,8 +129,7 @@ class HalfCylinderMesh(_Hertz):
         mesh = geometry.half_cylinder(
             self.radius, self.length, self.n, self.n_length, symmetry=self.symmetry, grading=self.grading
         )
-        centre = (0.0, 0.0, self.radius)
-        return Shaped(mesh, None, tuple((name, centre, (0, 2), self.radius) for name in ("contact", "side")))
+        return Shaped(mesh)
 
 
 class HalfDiscMesh(_Hertz):
@@ -143,9 +140,7 @@ class HalfDiscMesh(_Hertz):
 
     def shaped(self) -> Shaped:
         """Return the half disc."""
-        mesh = geometry.half_disc(self.radius, self.n, symmetry=self.symmetry, grading=self.grading)
-        centre = (0.0, self.radius)
-        return Shaped(mesh, None, tuple((name, centre, (0, 1), self.radius) for name in ("contact", "side")))
+        return Shaped(geometry.half_disc(self.radius, self.n, symmetry=self.symmetry, grading=self.grading))
 
 
 class DrilledPlateMesh(_Single):

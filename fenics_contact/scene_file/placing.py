@@ -19,22 +19,14 @@ class Shaped:
     Attributes:
         mesh: The mesh.
         crown: The smooth surface that a design may move, of chain links.
-        round_: Surfaces that are round -> (centre, directions across which they are round, radius), for
-            quadratic cells.
     """
 
     mesh: BodyMesh
     crown: DesignSurface | None = None
-    round_: tuple[tuple[str, tuple[float, ...], tuple[int, ...], float], ...] = ()
-
-    def refined(self) -> Shaped:
-        """Return the shape with quadratic cells, bent onto what is round."""
-        onto = {name: _bend(centre, across, radius) for name, centre, across, radius in self.round_}
-        return replace(self, mesh=quadratic(self.mesh, onto))
 
     def placed(self, rotation: np.ndarray, translation: np.ndarray, scale: float) -> Shaped:
         """Return the shape scaled and turned about the origin, then moved."""
-        mesh = self.mesh.moved(scale * self.mesh.points @ rotation.T + translation)
+        mesh = self.mesh.placed(rotation, translation, scale)
         crown = self.crown
         if crown is not None:
             crown = replace(crown, directions=crown.directions @ rotation.T)
@@ -59,7 +51,7 @@ class Placed(Part):
             InvalidInputError: If its cells have no quadratic counterpart, or a vector does not fit.
         """
         if self.quadratic:
-            shape = shape.refined()
+            shape = replace(shape, mesh=quadratic(shape.mesh))
         dim = shape.mesh.dim
         move = np.zeros(dim) if self.translate is None else np.array(self.translate)
         if len(move) != dim:
@@ -80,15 +72,3 @@ def _rotation(axis: tuple[float, ...], degrees: float) -> np.ndarray:
     cross = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
     rotation = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
     return np.asarray(np.round(rotation, 15))  # quarter turns are exact
-
-
-def _bend(centre: tuple[float, ...], across: tuple[int, ...], radius: float):  # type: ignore[no-untyped-def]
-    """Return the map of points to the nearest point of a sphere or cylinder."""
-
-    def place(points: np.ndarray) -> np.ndarray:
-        moved, axes = points.copy(), list(across)
-        arm = points[:, axes] - np.array(centre)[axes]
-        moved[:, axes] = np.array(centre)[axes] + radius * arm / np.linalg.norm(arm, axis=1)[:, None]
-        return moved
-
-    return place

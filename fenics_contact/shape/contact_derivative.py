@@ -9,10 +9,10 @@ import numpy as np
 from fenics_contact.contact import State
 from fenics_contact.errors import together
 from fenics_contact.feti import ContactPoints, TornSystem
-from fenics_contact.feti.contact_search import surface_of
 from fenics_contact.feti.nodal_mean import nodal_mean_at
+from fenics_contact.feti.true_surface import surface_of
 from fenics_contact.geometry import asked
-from fenics_contact.scene import RigidObstacle, Surface, Tresca
+from fenics_contact.scene import ContactPair, RigidObstacle, Surface, Tresca
 from fenics_contact.shape.adjoint import Adjoint
 from fenics_contact.shape.linearised_face import LinearisedFace
 from fenics_contact.shape.objective import Partials
@@ -69,7 +69,7 @@ def contact_by_shape(state: State, adjoint: Adjoint, by_bound: np.ndarray) -> np
     for index, pair in enumerate(torn.scene.contacts):
         mine = np.flatnonzero(points.pair == index)
         if isinstance(pair.friction, Tresca):
-            surface = surface_of(torn.scene, pair.slave)
+            surface = surface_of(torn.scene, pair.slave, "faceted")
             nodes = tearing.global_nodes(pair.slave.body, surface.nodes)
             by_areas = np.zeros(len(nodes))
             by_areas[np.searchsorted(nodes, points.slave[mine])] = (
@@ -79,7 +79,7 @@ def contact_by_shape(state: State, adjoint: Adjoint, by_bound: np.ndarray) -> np
         if not isinstance(pair.master, Surface):
             result[points.slave[mine]] += _by_obstacle(torn, pair.master, rows, mine)
         elif pair.discretisation == "node":
-            _add_projected(result, torn, pair.master, rows, mine)
+            _add_projected(result, torn, pair, rows, mine)
     return result
 
 
@@ -93,10 +93,12 @@ def _by_obstacle(torn: TornSystem, obstacle: RigidObstacle, rows: RowFields, min
 
 
 def _add_projected(
-    result: np.ndarray, torn: TornSystem, master: Surface, rows: RowFields, mine: np.ndarray
+    result: np.ndarray, torn: TornSystem, pair: ContactPair, rows: RowFields, mine: np.ndarray
 ) -> None:
     """Add the derivative by slave and master nodes of points found by projection."""
-    points, surface = torn.points, surface_of(torn.scene, master)
+    master = pair.master
+    assert isinstance(master, Surface)
+    points, surface = torn.points, surface_of(torn.scene, master, pair.geometry)
     nodes = torn.decomposition.tearing.global_nodes(master.body, surface.nodes)
     corners = rows.at(nodes[surface.facets[points.facet[mine]]])
     by = _by_point(points, rows, mine, corners)

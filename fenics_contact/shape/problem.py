@@ -209,7 +209,7 @@ class ShapeProblem:
         """
         points = self.points_of(alpha)
         try:
-            return self.scene.moved(points)
+            return self.scene.reshaped(points)
         except InvalidInputError as error:
             raise InvalidDesignError(f"the design cannot be meshed: {error}") from error
 

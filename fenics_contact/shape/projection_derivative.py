@@ -8,8 +8,9 @@ import numpy as np
 
 from fenics_contact.feti.contact_points import reference_axes
 from fenics_contact.feti.projection import interpolated_normal, newton_matrix
+from fenics_contact.feti.relief import heights
 from fenics_contact.feti.surface import FacetedSurface, shape_functions
-from fenics_contact.shape.surface_derivative import normals_pulled_back
+from fenics_contact.shape.surface_derivative import normals_pulled_back, slopes_pulled_back
 
 
 @dataclass(frozen=True)
@@ -61,14 +62,14 @@ def projection_pulled_back(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the derivatives by the slave points and by the master's nodes.
 
-    The projection solves Σ N_j(ξ) x_j + g n(ξ) − x_s = 0 with n = m/‖m‖, m = Σ N_j(ξ) a_j, a_j the nodal
-    normals; the implicit function theorem gives ξ and g.
+    The projection solves Σ N_j(ξ) x_j + r n(ξ) − x_s = 0 with n = m/‖m‖, m = Σ N_j(ξ) a_j, a_j the nodal
+    normals; the implicit function theorem gives ξ and r. The gap is r − h, h(ξ) the height of the true surface.
 
     Args:
         master: The master surface.
         facet: Facet of each point, shape (n,).
         local: ξ, shape (n, 2).
-        gap: g, shape (n,), [length].
+        gap: r − h, shape (n,), [length].
         by: Derivatives by gap, normal, tangents and weights.
 
     Returns:
@@ -76,21 +77,25 @@ def projection_pulled_back(
     """
     nodes = master.facets[facet]
     corners, normals = master.points[nodes], master.normals[nodes]
+    height = heights(master, facet, local)
     values, derivatives = shape_functions(local, master.corners)
     normal, length = interpolated_normal(values, normals)
     by_normal = by.normal + frames_pulled_back(normal, by.tangents, by.axes)
     by_mean = _tangential(by_normal, normal) / length[:, None]
-    by_local = np.einsum("nk,nka->na", by.weight, derivatives)
+    by_local = np.einsum("nk,nka->na", by.weight, derivatives) - by.gap[:, None] * height.by_local
     by_local += np.einsum("nka,nkd,nd->na", derivatives, normals, by_mean)
-    matrix = newton_matrix(corners, normals, derivatives, gap, normal, length)
+    along_ray = gap + height.value
+    matrix = newton_matrix(corners, normals, derivatives, along_ray, normal, length)
     right = np.concatenate([by_local, by.gap[:, None]], axis=1)
     z = -np.linalg.solve(np.swapaxes(matrix, 1, 2), right[:, :, None])[:, :, 0]
     # z is the derivative by the residual; the residual depends on x_s, x_j and, through g n, on a_j.
-    by_mean = by_mean + gap[:, None] * _tangential(z, normal) / length[:, None]
-    by_points, by_normals = np.zeros_like(master.points), np.zeros_like(master.points)
+    by_mean = by_mean + along_ray[:, None] * _tangential(z, normal) / length[:, None]
+    by_points, by_normals, by_averaged = slopes_pulled_back(
+        master, facet, -by.gap[:, None, None] * height.by_slopes
+    )
     np.add.at(by_points, nodes, values[:, :, None] * z[:, None])
     np.add.at(by_normals, nodes, values[:, :, None] * by_mean[:, None])
-    return -z, by_points + normals_pulled_back(master, by_normals)
+    return -z, by_points + normals_pulled_back(master, by_normals, by_averaged)
 
 
 def _tangential(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:

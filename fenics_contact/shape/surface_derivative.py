@@ -4,25 +4,66 @@ from __future__ import annotations
 
 import numpy as np
 
+from fenics_contact.feti.relief import corner_normals, edges_at_corners, slopes
 from fenics_contact.feti.surface import FacetedSurface, corner_products
 
 
-def normals_pulled_back(surface: FacetedSurface, by_normals: np.ndarray) -> np.ndarray:
+def normals_pulled_back(
+    surface: FacetedSurface, by_normals: np.ndarray, by_averaged: np.ndarray | float = 0.0
+) -> np.ndarray:
     """Return the derivative by the surface's nodes from that by its unit normals, shape (n, 3).
 
     Args:
         surface: The surface.
         by_normals: Derivative by each nodal normal, shape (n, 3).
+        by_averaged: Derivative by each averaged normal beside that, shape (n, 3).
     """
+    along = np.einsum("nd,nd->n", surface.normals, by_normals)
+    by_true = by_normals - along[:, None] * surface.normals
+    if surface.relief is not None:
+        by_true = by_true / np.linalg.norm(surface.averaged + surface.relief.normals, axis=1)[:, None]
+    by_averaged = by_averaged + by_true
     products = corner_products(surface.points, surface.facets)
     summed = np.zeros_like(surface.points)
     np.add.at(summed, surface.facets, products)
     summed[surface.mirrored] = 0.0
     length = np.linalg.norm(summed, axis=1)
-    along = np.einsum("nd,nd->n", surface.normals, by_normals)
-    by_summed = (by_normals - along[:, None] * surface.normals) / length[:, None]
+    along = np.einsum("nd,nd->n", surface.averaged, by_averaged)
+    by_summed = (by_averaged - along[:, None] * surface.averaged) / length[:, None]
     by_summed[surface.mirrored] = 0.0
     return _products_pulled_back(surface, by_summed[surface.facets])
+
+
+def slopes_pulled_back(
+    surface: FacetedSurface, facet: np.ndarray, by_slopes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return derivatives from those by the slopes of true surfaces, see `fenics_contact.feti.relief.slopes`.
+
+    Args:
+        surface: The surface.
+        facet: Facets, shape (n,).
+        by_slopes: Derivative by the slopes at their corners, shape (n, corners, 2).
+
+    Returns:
+        By nodes, by true normals and by averaged normals, shape (n_nodes, 3) each.
+    """
+    by_points, by_normals, by_averaged = (np.zeros_like(surface.points) for _ in range(3))
+    if surface.relief is None:
+        return by_points, by_normals, by_averaged
+    nodes, c, slope = surface.facets[facet], corner_normals(surface, facet), slopes(surface, facet)
+    edges, along = edges_at_corners(surface.points[nodes]), np.einsum("nkd,nkd->nk", surface.normals[nodes], c)
+    # s = −d·c / a·c
+    scaled = by_slopes / along[:, :, None]
+    by_edges = -scaled[..., None] * c[:, :, None]
+    turned = np.einsum("nke,nke->nk", scaled, slope)[:, :, None]
+    np.add.at(by_normals, nodes, -turned * c)
+    np.add.at(
+        by_averaged, nodes, -np.einsum("nke,nked->nkd", scaled, edges) - turned * surface.normals[nodes]
+    )
+    to_next, to_previous = by_edges[:, :, 0], by_edges[:, :, 1]
+    by_corner = np.roll(to_next, 1, axis=1) + np.roll(to_previous, -1, axis=1) - to_next - to_previous
+    np.add.at(by_points, nodes, by_corner)
+    return by_points, by_normals, by_averaged
 
 
 def areas_pulled_back(surface: FacetedSurface, by_areas: np.ndarray) -> np.ndarray:

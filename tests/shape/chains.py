@@ -14,7 +14,6 @@ from fenics_contact.geometry import (
     LinkShape,
     TwoLinks,
     box_partition,
-    mutual_clearance,
     two_links,
 )
 from fenics_contact.qp import FaceNewton
@@ -53,8 +52,11 @@ def crossed_links() -> TwoLinks:
     rotation = Rotation.from_euler("xyz", [2.0, 1.0, -1.5], degrees=True).as_matrix()
     tilted = links.second.placed(rotation, np.array([0.0, 0.25, 0.2]))
     first = links.first.mesh
-    touching = tilted.placed(np.eye(3), mutual_clearance(first, tilted.mesh) * PULL_AXIS)
-    return TwoLinks(links.first, touching, mutual_clearance(first, touching.mesh), links.faceting)
+    nodes = np.unique(tilted.mesh.surfaces["contact"])
+    for _ in range(20):
+        gap = first.shapes["contact"].distance(tilted.mesh.points[nodes]).min()
+        tilted = tilted.placed(np.eye(3), gap * PULL_AXIS)
+    return TwoLinks(links.first, tilted)
 
 
 def chain(friction: Friction) -> Scene:

@@ -25,6 +25,7 @@ class Cells:
         pair: Pair of facets of each cell, numbered 0, 1, … without gaps, shape (n,).
         weight: Weights with the cell's measure, shape (n, q), [length²] or [length].
         local: Local coordinates on the slave facet, shape (n, q, dim − 1).
+        opposite: Local coordinates on the master facet, shape (n, q, dim − 1).
         slave: Shape functions of the slave facet, shape (n, q, corners).
         master: Shape functions of the master facet, shape (n, q, master corners).
     """
@@ -33,6 +34,7 @@ class Cells:
     pair: np.ndarray
     weight: np.ndarray
     local: np.ndarray
+    opposite: np.ndarray
     slave: np.ndarray
     master: np.ndarray
 
@@ -71,7 +73,7 @@ def cells_of(
     used, pair = np.unique(pair, return_inverse=True)
     facets, facet = np.unique(pair_slave[used], return_inverse=True)
     cells = Cells(
-        facet.ravel()[pair.ravel()], pair.ravel(), size[:, None] * share, on_slave,
+        facet.ravel()[pair.ravel()], pair.ravel(), size[:, None] * share, on_slave, on_master,
         shape_values(on_slave, window.shape[1]), shape_values(on_master, subject.shape[1]),
     )  # fmt: skip
     return cells, facets, pair_slave[used], pair_master[used]

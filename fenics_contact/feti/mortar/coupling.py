@@ -15,6 +15,7 @@ from fenics_contact.feti.mortar.candidates import candidate_pairs
 from fenics_contact.feti.mortar.cells import cells_of
 from fenics_contact.feti.mortar.dual_basis import dual_integrals
 from fenics_contact.feti.mortar.planes import check_convex, planes_of
+from fenics_contact.feti.mortar.relief import relief_of_cells
 from fenics_contact.feti.surface import FacetedSurface
 
 #: Share of a node's area that has to face the master, or the node carries no multiplier.
@@ -37,7 +38,8 @@ class MortarCoupling:
         weight: M_ij / D_i with M_ij = ∫ ψ_i N_j, N_j of the master, shape (n, len(master.nodes)); rows add up
             to one.
         normal: Unit normal from master to slave, the averaged slave normal turned round, shape (n, dim).
-        gap: n_i · (x_i − Σ_j weight_ij x_j), positive when open, shape (n,), [length].
+        gap: n_i · (x_i − Σ_j weight_ij x_j), less the weighted mean of what the true surfaces stand over their
+            facets, positive when open, shape (n,), [length].
     """
 
     node: np.ndarray
@@ -77,7 +79,7 @@ def mortar_coupling(
     """
     comm = comm or MPI.COMM_SELF
     mine = np.arange(comm.rank, len(slave.facets), comm.size)
-    part: tuple[np.ndarray, sparse.csr_matrix] | None = None
+    part: tuple[np.ndarray, sparse.csr_matrix, np.ndarray] | None = None
     with together(comm):
         if slave.dim != master.dim:
             raise InvalidInputError(
@@ -87,11 +89,15 @@ def mortar_coupling(
         part = _integrals(slave, master, mine)
     # All ranks add up in the same order, so that their sums agree to the last bit.
     parts = [found for found in comm.allgather(part) if found is not None]
-    return _coupling(slave, master, sum(area for area, _ in parts), sum(m for _, m in parts))
+    return _coupling(slave, master, *(sum(column) for column in zip(*parts, strict=True)))
 
 
 def _coupling(
-    slave: FacetedSurface, master: FacetedSurface, area: np.ndarray, integrals: sparse.csr_matrix
+    slave: FacetedSurface,
+    master: FacetedSurface,
+    area: np.ndarray,
+    integrals: sparse.csr_matrix,
+    relief: np.ndarray,
 ) -> MortarCoupling:
     """Keep the nodes that face the master, and divide."""
     node = np.flatnonzero(area > LEAST_SHARE * slave.areas)
@@ -100,26 +106,35 @@ def _coupling(
     weight = (sparse.diags(1 / np.asarray(chosen.sum(axis=1)).ravel()) @ chosen).tocsr()
     weight.sort_indices()
     normal = -slave.normals[node]
-    gap = np.einsum("nd,nd->n", normal, slave.points[node] - weight @ master.points)
+    apart = slave.points[node] - weight @ master.points + relief[node] / area[node, None]
+    gap = np.einsum("nd,nd->n", normal, apart)
     return MortarCoupling(node, area[node], weight, normal, gap)
 
 
 def _integrals(
     slave: FacetedSurface, master: FacetedSurface, chosen: np.ndarray
-) -> tuple[np.ndarray, sparse.csr_matrix]:
-    """Return D, shape (slave nodes,), and M, shape (slave nodes, master nodes), of the chosen facets."""
+) -> tuple[np.ndarray, sparse.csr_matrix, np.ndarray]:
+    """Integrate over the chosen facets.
+
+    Returns:
+        D, shape (slave nodes,), M, shape (slave nodes, master nodes), and ∫ ψ_i of what the true surfaces
+        stand over their facets, slave less master, shape (slave nodes, dim).
+    """
     area, shape = np.zeros(len(slave.nodes)), (len(slave.nodes), len(master.nodes))
-    total = sparse.csr_matrix(shape)
+    total, relief = sparse.csr_matrix(shape), np.zeros_like(slave.points)
     if len(chosen) == 0 or len(master.facets) == 0:
-        return area, total
+        return area, total, relief
     planes = planes_of(slave, chosen)
     check_convex(planes, chosen)
     pairs = candidate_pairs(planes, planes_of(master, np.arange(len(master.facets))))
     rows, columns, values = [], [], []
     for pair_slave, pair_master in _chunks(*pairs):
         cells, facets, at_slave, at_master = cells_of(planes, pair_slave, pair_master, master)
-        coverage, integrals = dual_integrals(cells)
+        closer = relief_of_cells(cells, slave, master, (chosen[at_slave], at_master), planes.normal[at_slave])
+        coverage, integrals, of_relief = dual_integrals(cells, closer)
         np.add.at(area, slave.facets[chosen[facets]], coverage)
+        along = planes.normal[at_slave][:, None]
+        np.add.at(relief, slave.facets[chosen[at_slave]], of_relief[:, :, None] * along)
         row, column = slave.facets[chosen[at_slave]][:, :, None], master.facets[at_master][:, None]
         rows.append(np.broadcast_to(row, integrals.shape).ravel())
         columns.append(np.broadcast_to(column, integrals.shape).ravel())
@@ -127,7 +142,7 @@ def _integrals(
     if values:
         entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
         total = sparse.csr_matrix(entries, shape=shape)
-    return area, total
+    return area, total, relief
 
 
 def _chunks(pair_slave: np.ndarray, pair_master: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:

@@ -41,12 +41,17 @@ CORNERS = {
 }
 
 
-def dual_integrals(cells: Cells) -> tuple[np.ndarray, np.ndarray]:
-    """Integrate the dual functions with the slave's and the master's shape functions.
+def dual_integrals(cells: Cells, field: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Integrate the dual functions with the slave's and the master's shape functions and with a field.
+
+    Args:
+        cells: Where to integrate.
+        field: Values v at the quadrature points, shape (n, q).
 
     Returns:
-        D_e = ∫ N_i over the covered part of each facet, shape (n_facets, corners), and ∫ ψ_i N_j of each
-        pair, shape (n_pairs, corners, master corners), both [length²] or [length].
+        D_e = ∫ N_i over the covered part of each facet, shape (n_facets, corners), ∫ ψ_i N_j of each pair,
+        shape (n_pairs, corners, master corners), both [length²] or [length], and ∫ ψ_i v of each pair, shape
+        (n_pairs, corners).
     """
     over_facet, over_pair = _SumsBy(cells.facet), _SumsBy(cells.pair)
     area = over_facet(cells.weight.sum(axis=1))
@@ -55,11 +60,13 @@ def dual_integrals(cells: Cells) -> tuple[np.ndarray, np.ndarray]:
     second = over_facet(np.einsum("nqa,nqb->nab", modes * cells.weight[:, :, None], modes))
     inverse = _pseudo_inverse(second / area[:, None, None]) / area[:, None, None]
     weighted = np.concatenate([cells.weight[:, :, None], cells.weight[:, :, None] * modes], axis=2)
-    moments = over_pair(weighted.transpose(0, 2, 1) @ cells.master)
+    functions = np.concatenate([cells.master, field[:, :, None]], axis=2)
+    moments = over_pair(weighted.transpose(0, 2, 1) @ functions)
     facet = np.zeros(len(moments), dtype=np.int64)
     facet[cells.pair] = cells.facet
     values = moments[:, :1] / area[facet][:, None, None] + (at_corners @ inverse)[facet] @ moments[:, 1:]
-    return coverage, coverage[facet][:, :, None] * values
+    integrals = coverage[facet][:, :, None] * values
+    return coverage, integrals[:, :, :-1], integrals[:, :, -1]
 
 
 class _SumsBy:

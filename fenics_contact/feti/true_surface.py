@@ -1,0 +1,136 @@
+"""The surface of a scene that facets stand for: of a known shape, reconstructed, or the facets themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import replace
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from fenics_contact.feti.facet_areas import nodal_areas
+from fenics_contact.feti.projection import interpolated_normal
+from fenics_contact.feti.reconstruction import reconstructed
+from fenics_contact.feti.relief import edges_at_corners, heights, slopes
+from fenics_contact.feti.surface import FacetedSurface, Relief, faceted_surface, shape_values
+from fenics_contact.geometry import BodyMesh, SurfaceShape, asked, coordinate_rounding
+from fenics_contact.scene import Geometry, Scene, Surface
+from fenics_contact.scene.mirrors import mirrored
+
+_KNOWN: WeakKeyDictionary[BodyMesh, dict[Hashable, Relief | None]] = WeakKeyDictionary()
+"""Reliefs of the surfaces of meshes, which those that are reshaped share."""
+
+#: Steps of Newton's method along a ray to a shape; distances are nearly linear there.
+STEPS = 12
+#: A true surface has no relief if it stands over its facets by less than so many times their size.
+FLAT = 1e-12
+
+
+def surface_of(scene: Scene, surface: Surface, geometry: Geometry) -> FacetedSurface:
+    """Return a named surface with its normals and its relief: linear facets through its nodes.
+
+    Args:
+        scene: The scene.
+        surface: The surface.
+        geometry: What is taken for it between its nodes, see `ContactPair`.
+    """
+    mesh = scene.bodies[surface.body].mesh
+    marks = mirrored(scene, surface.body)
+    found = _with_areas(faceted_surface(mesh.points, scene.facets(surface), marks), mesh, surface.name)
+    if geometry == "faceted":
+        return found
+    key = (surface.name, geometry, marks.tobytes())
+    known = _KNOWN.setdefault(mesh.origin, {})
+    if key not in known:
+        known[key] = _relief(mesh.origin, surface.name, marks, geometry)
+    return replace(found, relief=known[key])
+
+
+def _with_areas(surface: FacetedSurface, mesh: BodyMesh, name: str) -> FacetedSurface:
+    """Put the area of a quadratic facet where a unit pressure puts forces, which linear facets do not say."""
+    if mesh.order == 1:
+        return surface
+    facets = mesh.surfaces[name]
+    areas = np.bincount(facets.ravel(), nodal_areas(mesh.points, facets).ravel(), minlength=mesh.n_nodes)
+    return replace(surface, areas=areas[surface.nodes])
+
+
+def _relief(mesh: BodyMesh, name: str, marks: np.ndarray, geometry: Geometry) -> Relief | None:
+    surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], marks)
+    shape = mesh.shapes.get(name) if geometry == "best" else None
+    found = reconstructed(surface) if shape is None else by_shape(surface, shape)
+    return None if _is_flat(found) else found.relief
+
+
+def _is_flat(surface: FacetedSurface) -> bool:
+    """Tell whether the facets are the surface, but for rounding."""
+    relief = surface.relief
+    assert relief is not None
+    edges = np.linalg.norm(edges_at_corners(surface.points[surface.facets]), axis=3)
+    limit = FLAT * edges.min() + 8.0 * coordinate_rounding(surface.points)
+    bends = np.abs(slopes(surface, np.arange(len(surface.facets)))).max(), np.abs(relief.rest).max()
+    return bool(max(bends) <= limit and np.abs(relief.normals).max() <= limit / edges.min())
+
+
+def by_shape(surface: FacetedSurface, shape: SurfaceShape) -> FacetedSurface:
+    """Return a surface with the relief of the shape that its nodes lie on.
+
+    Nodes that lie off the shape by a little stay where they are; the heights between them are taken from
+    there.
+
+    Args:
+        surface: Facets without relief.
+        shape: The shape.
+    """
+    normals = asked(shape, "normals", surface.points)
+    normals = np.where(surface.mirrored, 0.0, normals)
+    normals = normals / np.linalg.norm(normals, axis=1)[:, None]
+    return _fitted(surface, shape, normals)
+
+
+def _fitted(surface: FacetedSurface, shape: SurfaceShape, normals: np.ndarray) -> FacetedSurface:
+    difference = normals - surface.averaged
+    samples = sample_points(surface.corners)
+    count = len(surface.facets)
+    relief = Relief(difference, difference[surface.facets], np.zeros((count, len(samples))))
+    fitted = replace(surface, relief=relief)
+    off_nodes = height_over(fitted.points, fitted.normals, shape)
+    facet = np.arange(count)
+    # The middle last: what the midpoints of the edges leave there counts.
+    for number, sample in enumerate(samples):
+        local = np.broadcast_to(sample, (count, len(sample)))
+        values = shape_values(local, surface.corners)
+        nodes = surface.facets
+        place = np.einsum("nk,nkd->nd", values, surface.points[nodes])
+        direction, _ = interpolated_normal(values, fitted.normals[nodes])
+        missing = height_over(place, direction, shape) - np.einsum("nk,nk->n", values, off_nodes[nodes])
+        relief.rest[:, number] = missing - heights(fitted, facet, local).value
+    return fitted
+
+
+def sample_points(corners: int) -> np.ndarray:
+    """Return the midpoints of the edges and the middle, in local coordinates, shape (m, dim − 1)."""
+    if corners == 2:
+        return np.zeros((1, 1))
+    if corners == 3:
+        return np.array([[0.5, 0.0], [0.5, 0.5], [0.0, 0.5], [1 / 3, 1 / 3]])
+    return np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, 0.0]])
+
+
+def height_over(points: np.ndarray, directions: np.ndarray, shape: SurfaceShape) -> np.ndarray:
+    """Return how far it is from points along directions to a shape, shape (n,), [length].
+
+    Args:
+        points: Points near the shape, shape (n, dim), [length].
+        directions: Unit vectors that point out of it, shape (n, dim).
+        shape: The shape.
+    """
+    height = np.zeros(len(points))
+    for _ in range(STEPS):
+        place = points + height[:, None] * directions
+        step = asked(shape, "distance", place)
+        step /= np.einsum("nd,nd->n", asked(shape, "normals", place), directions)
+        height -= step
+        if np.abs(step).max(initial=0.0) <= FLAT * np.ptp(points, axis=0).max(initial=0.0):
+            break
+    return height
