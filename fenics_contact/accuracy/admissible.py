@@ -128,9 +128,7 @@ def admissible(
     return Admissible(found, statuses, slip_bound, left)
 
 
-def _balanced_by_nearest(
-    problem: DualProblem, feasible: FeasibleSet, start: Vector
-) -> tuple[Vector, float]:
+def _balanced_by_nearest(problem: DualProblem, feasible: FeasibleSet, start: Vector) -> tuple[Vector, float]:
     """Return the nearest multiplier of the cone in equilibrium, and how much is left of G λ − e. Collective.
 
     Slower than `_balanced` and without its preferences, but it finds a multiplier wherever there is one:

@@ -54,9 +54,7 @@ def nodal_function(mesh: Any, name: str, values: np.ndarray) -> Any:
     return function
 
 
-def von_mises(
-    displacement: Any, body: Body, comm: MPI.Comm, temperature: Temperature = Temperature()
-) -> Any:
+def von_mises(displacement: Any, body: Body, comm: MPI.Comm, temperature: Temperature = Temperature()) -> Any:
     """Return the von Mises stress averaged over each cell, [force / length²], a piecewise constant Function.
 
     The stress is that in space: of plane bodies with what the material carries normal to the plane.

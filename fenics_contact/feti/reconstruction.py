@@ -155,7 +155,9 @@ def _fitted_slopes(place: np.ndarray, height: np.ndarray, centre: np.ndarray, co
         terms = np.column_stack([x, y, x**2, x * y, y**2])
     weight = 1.0 / np.maximum((place**2).sum(axis=1), 1e-12)
     size = terms.shape[1]
-    products = np.concatenate([terms[:, :, None] * terms[:, None], (height[:, None] * terms)[:, :, None]], axis=2)
+    products = np.concatenate(
+        [terms[:, :, None] * terms[:, None], (height[:, None] * terms)[:, :, None]], axis=2
+    )
     over_centres = sp.csr_matrix((weight, (centre, np.arange(len(centre)))), shape=(count, len(centre)))
     summed = (over_centres @ products.reshape(len(centre), -1)).reshape(count, size, size + 1)
     matrix, right = summed[:, :, :-1], summed[:, :, -1]

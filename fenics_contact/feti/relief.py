@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.feti.surface import FacetedSurface, Relief, shape_functions
+from fenics_contact.feti.surface import FacetedSurface, shape_functions
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,9 @@ def edges_at_corners(points: np.ndarray) -> np.ndarray:
     return np.stack([np.roll(points, -1, axis=1) - points, np.roll(points, 1, axis=1) - points], axis=2)
 
 
-def height_functions(local: np.ndarray, corners: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def height_functions(
+    local: np.ndarray, corners: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Evaluate the polynomials that slopes and rests are multiplied with, and their derivatives.
 
     Args:

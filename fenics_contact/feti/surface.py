@@ -109,7 +109,7 @@ class Relief:
         corners: The same for each corner of the facets, which differ where the surface has a crease, shape
             (n_facets, corners, dim).
         rest: What the cubics leave at the midpoints of the edges, from each corner to the next, and in the
-            middle, shape (n_facets, corners + 1); in the plane at the midpoint, shape (n_facets, 1), [length].
+            middle, shape (n_facets, corners + 1); in the plane at the midpoint, (n_facets, 1), [length].
     """
 
     normals: np.ndarray
@@ -131,7 +131,7 @@ class FacetedSurface:
         averaged: Outward unit normals at the nodes, averaged over the facets around each, shape (n, dim).
         areas: Area, in the plane length, that belongs to each node, shape (n,), [length²] or [length].
         mirrored: Components that the normals lack on planes of symmetry, shape (n, dim).
-        relief: What the true surface has and the facets have not; None if they are all that is known, or flat.
+        relief: What the true surface has and the facets lack; None if they are all that is known, or flat.
     """
 
     nodes: np.ndarray

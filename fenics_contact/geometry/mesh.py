@@ -158,7 +158,8 @@ class BodyMesh:
             scale: Positive factor on all coordinates.
         """
         result = self._at(scale * self.points @ np.asarray(rotation).T + translation)
-        shapes = {name: placed(shape, rotation, translation, scale) for name, shape in self.shapes.items()}
+        shift = tuple(float(component) for component in translation)
+        shapes = {name: placed(shape, rotation, shift, scale) for name, shape in self.shapes.items()}
         origin = self._origin and self._origin.placed(rotation, translation, scale)
         result._set(shapes=shapes, _origin=origin)
         return result
@@ -187,7 +188,7 @@ class BodyMesh:
         return result
 
     def reshaped(self, points: np.ndarray) -> BodyMesh:
-        """Return the mesh at coordinates that are a little different, as `moved`; its shapes follow the nodes.
+        """Return the mesh at slightly different coordinates, as `moved`; its shapes follow the nodes.
 
         What a surface is between its nodes, and how its normals differ from those of its facets, stays as it
         was; so gaps are smooth functions of the coordinates.

@@ -57,12 +57,8 @@ def quadratic(mesh: BodyMesh) -> BodyMesh:
         placed[own] = True
     if placed.any():
         _follow(points, cells, kind, placed)
-    check_jacobians(
-        points, cells, "refine the mesh along its curved surfaces, or leave their shapes away"
-    )
-    return BodyMesh(
-        points, cells, surfaces, mesh.grid, mesh.regions, mesh.coincident_nodes, mesh.shapes
-    )
+    check_jacobians(points, cells, "refine the mesh along its curved surfaces, or leave their shapes away")
+    return BodyMesh(points, cells, surfaces, mesh.grid, mesh.regions, mesh.coincident_nodes, mesh.shapes)
 
 
 def _with_more_nodes(

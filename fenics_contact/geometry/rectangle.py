@@ -82,6 +82,4 @@ def split_quadrilaterals(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> 
     triangles = cells[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
     grid = None if mesh.grid is None else np.repeat(mesh.grid, 2, axis=0)
     regions = repeated_regions(mesh, 2)
-    return BodyMesh(
-        mesh.points, triangles, mesh.surfaces, grid, regions, mesh.coincident_nodes, mesh.shapes
-    )
+    return BodyMesh(mesh.points, triangles, mesh.surfaces, grid, regions, mesh.coincident_nodes, mesh.shapes)

@@ -29,7 +29,9 @@ def distance_in_edges(points: np.ndarray, facets: np.ndarray, shape: SurfaceShap
     corners = corners_of(facets, points.shape[1])
     edges = np.linalg.norm(points[np.roll(corners, -1, axis=1)] - points[corners], axis=2)
     size = np.full(len(nodes), np.inf)
-    np.minimum.at(size, local.reshape(facets.shape), np.broadcast_to(edges.min(axis=1)[:, None], facets.shape))
+    np.minimum.at(
+        size, local.reshape(facets.shape), np.broadcast_to(edges.min(axis=1)[:, None], facets.shape)
+    )
     return np.asarray(np.abs(asked(shape, "distance", points[nodes])) / size)
 
 

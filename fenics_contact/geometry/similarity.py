@@ -36,6 +36,8 @@ def similarity(points: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.nd
     rotation = np.where(np.abs(rotation - np.round(rotation)) < 1e-14, np.round(rotation), rotation)
     shift = there - scale * rotation @ centre
     off = np.abs(scale * points @ rotation.T + shift - moved).max()
-    if not (scale > 0 and off <= ROUNDINGS * (coordinate_rounding(moved) + scale * coordinate_rounding(points))):
+    if not (
+        scale > 0 and off <= ROUNDINGS * (coordinate_rounding(moved) + scale * coordinate_rounding(points))
+    ):
         return None
     return rotation, shift, scale

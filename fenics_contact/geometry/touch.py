@@ -84,8 +84,8 @@ def check_gap(gap: float) -> None:
     check_numbers(gap=gap)
     if gap < 0.0:
         raise InvalidInputError(
-            f"gap must be zero or positive, got {gap}: links that overlap before anything is loaded press each "
-            "other apart"
+            f"gap must be zero or positive, got {gap}: links that overlap before anything is loaded press "
+            "each other apart"
         )
 
 

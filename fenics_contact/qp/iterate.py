@@ -67,9 +67,7 @@ def iterate_at(
 
 def iterate_fitted(problem: DualProblem, law: SlipLaw, multiplier: Vector, product: Vector) -> Iterate:
     """Return the iterate with the rigid motions that fit best, see `fit_rigid_motions`. Collective."""
-    return iterate_at(
-        problem, law, multiplier, product, fit_rigid_motions(problem, law, multiplier, product)
-    )
+    return iterate_at(problem, law, multiplier, product, fit_rigid_motions(problem, law, multiplier, product))
 
 
 def answer_at(

@@ -37,7 +37,16 @@ from fenics_contact.scene.obstacles import (
     RigidPlane,
     RigidSphere,
 )
-from fenics_contact.scene.pairs import ContactPair, Coulomb, Discretisation, Friction, Geometry, Surface, Tie, Tresca
+from fenics_contact.scene.pairs import (
+    ContactPair,
+    Coulomb,
+    Discretisation,
+    Friction,
+    Geometry,
+    Surface,
+    Tie,
+    Tresca,
+)
 from fenics_contact.scene.plan import ConeKind, Plan, SolverKind, choose_solver
 from fenics_contact.scene.scene import Scene
 from fenics_contact.scene.steps import LoadStep

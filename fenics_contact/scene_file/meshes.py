@@ -111,9 +111,7 @@ class HemisphereMesh(_Hertz):
 
     def shaped(self) -> Shaped:
         """Return the half ball."""
-        return Shaped(
-            geometry.hemisphere(self.radius, self.n, symmetry=self.symmetry, grading=self.grading)
-        )
+        return Shaped(geometry.hemisphere(self.radius, self.n, symmetry=self.symmetry, grading=self.grading))
 
 
 class HalfCylinderMesh(_Hertz):

@@ -54,9 +54,7 @@ class StepPart(Part):
     """One load step or several: values go linearly from those before to those given here."""
 
     name: Line = Field("step", description="what it does, for records")
-    count: int = Field(
-        1, ge=1, le=MOST, description="number of load steps in which the values are reached"
-    )
+    count: int = Field(1, ge=1, le=MOST, description="number of load steps in which the values are reached")
     supports: dict[str, Components] = Field(
         default_factory=dict, description="name of a support -> its value at the end"
     )

@@ -63,7 +63,7 @@ def projection_pulled_back(
     """Return the derivatives by the slave points and by the master's nodes.
 
     The projection solves Σ N_j(ξ) x_j + r n(ξ) − x_s = 0 with n = m/‖m‖, m = Σ N_j(ξ) a_j, a_j the nodal
-    normals; the implicit function theorem gives ξ and r. The gap is r − h, h(ξ) the height of the true surface.
+    normals; the implicit function theorem gives ξ and r. The gap is r − h, h(ξ) the height of the true one.
 
     Args:
         master: The master surface.

@@ -51,7 +51,10 @@ def slopes_pulled_back(
     if surface.relief is None:
         return by_points, by_normals, by_averaged
     nodes, c, slope = surface.facets[facet], corner_normals(surface, facet), slopes(surface, facet)
-    edges, along = edges_at_corners(surface.points[nodes]), np.einsum("nkd,nkd->nk", surface.normals[nodes], c)
+    edges, along = (
+        edges_at_corners(surface.points[nodes]),
+        np.einsum("nkd,nkd->nk", surface.normals[nodes], c),
+    )
     # s = −d·c / a·c
     scaled = by_slopes / along[:, :, None]
     by_edges = -scaled[..., None] * c[:, :, None]

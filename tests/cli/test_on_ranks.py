@@ -74,9 +74,7 @@ def test_a_run_that_is_terminated_goes_on(ranks: int, tmp_path: Path) -> None:
     scene = ROOT / "demos" / "scenes" / "sheared_block.toml"
     arguments = (scene, "-o", tmp_path, "--no-pictures", "--set", "steps.3.count=1")
     command = [str(LAUNCH), str(ranks), sys.executable, "-m", "fenics_contact", "run", *map(str, arguments)]
-    stopped = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    stopped = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     while not (tmp_path / "history.pvd").exists() and stopped.poll() is None:
         time.sleep(0.05)
     # What the launcher passes on to ranks and waits for; alone, the process hears it itself.

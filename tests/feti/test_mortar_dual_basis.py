@@ -20,7 +20,12 @@ def covered(corners: int, parts: np.ndarray, share_of_pairs: np.ndarray) -> Cell
     local = barycentric @ parts
     values = shape_values(local, corners)
     size = np.abs(measure(parts))[:, None] * weights
-    return Cells(np.zeros(len(parts), dtype=np.int64), share_of_pairs, size, local, values, values)
+    return Cells(np.zeros(len(parts), dtype=np.int64), share_of_pairs, size, local, local, values, values)
+
+
+def without_field(cells: Cells) -> tuple[np.ndarray, np.ndarray]:
+    """Integrals of shape functions alone."""
+    return dual_integrals(cells, np.zeros(cells.weight.shape))[:2]
 
 
 def inside(corners: int, seed: int, count: int, width: float) -> np.ndarray:
@@ -39,7 +44,7 @@ def test_dual_functions_are_biorthogonal_on_the_covered_part(
     corners: int, seed: int, count: int, width: float
 ) -> None:
     cells = covered(corners, inside(corners, seed, count, width), np.arange(count))
-    coverage, integrals = dual_integrals(cells)
+    coverage, integrals = without_field(cells)
     scale = coverage.sum()
     np.testing.assert_allclose(coverage[0], np.einsum("nq,nqk->k", cells.weight, cells.slave), rtol=1e-12)
     # Thin triangles are slivers, in which only sums are kept.
@@ -53,7 +58,7 @@ def test_integrals_with_the_shape_functions_are_diagonal(corners: int, width: fl
     corner = CORNERS[corners]
     part = corner[[0, 1]] if corners == 2 else corner[[0, 1, 2]]
     parts = (corner[0] + width * (part - corner[0]))[None]
-    coverage, integrals = dual_integrals(covered(corners, parts, np.array([0])))
+    coverage, integrals = without_field(covered(corners, parts, np.array([0])))
     assert (coverage > 0).all()
     np.testing.assert_allclose(integrals[0], np.diag(coverage[0]), atol=1e-13 * coverage.sum() / width**2)
 
@@ -61,7 +66,7 @@ def test_integrals_with_the_shape_functions_are_diagonal(corners: int, width: fl
 def test_slivers_are_not_extrapolated() -> None:
     strip = np.array([[[-1.0, -1], [1, -1], [1, -1 + 1e-7]], [[-1, -1], [1, -1 + 1e-7], [-1, -1 + 1e-7]]])
     cells = covered(4, strip, np.array([0, 0]))
-    coverage, integrals = dual_integrals(cells)
+    coverage, integrals = without_field(cells)
     values = integrals[0] / coverage[0][:, None]
     # Along the strip all is linear; across it the far corners take the values of the near ones.
     np.testing.assert_allclose(values[0], values[3], atol=1e-6)
@@ -72,7 +77,7 @@ def test_slivers_are_not_extrapolated() -> None:
 def test_facets_do_not_mix() -> None:
     rng = np.random.default_rng(8)
     parts = [inside(4, seed, 3, 0.4) for seed in (1, 2)]
-    alone = [dual_integrals(covered(4, part, np.array([0, 1, 1]))) for part in parts]
+    alone = [without_field(covered(4, part, np.array([0, 1, 1]))) for part in parts]
     both = covered(4, np.concatenate(parts), np.array([0, 1, 1, 2, 3, 3]))
     order = rng.permutation(6)
     cells = Cells(
@@ -80,9 +85,16 @@ def test_facets_do_not_mix() -> None:
         both.pair[order],
         both.weight[order],
         both.local[order],
+        both.opposite[order],
         both.slave[order],
         both.master[order],
     )
-    coverage, integrals = dual_integrals(cells)
+    coverage, integrals = without_field(cells)
     np.testing.assert_allclose(coverage, np.concatenate([a[0] for a in alone]), rtol=1e-12)
     np.testing.assert_allclose(integrals, np.concatenate([a[1] for a in alone]), atol=1e-10)
+
+
+def test_a_field_is_integrated_as_a_shape_function_is() -> None:
+    cells = covered(4, inside(4, 3, 4, 0.4), np.array([0, 0, 1, 2]))
+    _, integrals, of_field = dual_integrals(cells, cells.master @ [3.0, -1.0, 2.0, 0.5])
+    np.testing.assert_allclose(of_field, integrals @ [3.0, -1.0, 2.0, 0.5], rtol=1e-10)

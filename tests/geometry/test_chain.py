@@ -51,7 +51,9 @@ def test_two_links_of_a_chain_lie_as_two_links_do(five: Chain) -> None:
 
 def test_the_clearances_are_the_gap_asked_for() -> None:
     built = chain([COARSE, THIN, COARSE], gap=0.4)
-    assert [distance(one, other) for one, other in pairwise(built.links)] == pytest.approx([0.4] * 2, abs=1e-9)
+    assert [distance(one, other) for one, other in pairwise(built.links)] == pytest.approx(
+        [0.4] * 2, abs=1e-9
+    )
     first, second = built.links[1].mesh, built.links[2].mesh
     assert np.ptp(first.points[:, 0]) < np.ptp(second.points[:, 0]), "the links are alike"
 

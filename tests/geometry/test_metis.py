@@ -30,9 +30,7 @@ def test_a_process_of_its_own_cuts_alike(parts: int, monkeypatch: pytest.MonkeyP
 def test_a_process_that_fails_is_told_with_its_words(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(metis, "_may_have_lost_its_calls", lambda: True)
     monkeypatch.setattr(metis.metis_call, "__file__", "/nowhere/metis_call.py")
-    message = (
-        r"needs pymetis .* does not run in a process of its own \(exit status 2: .*No such file"
-    )
+    message = r"needs pymetis .* does not run in a process of its own \(exit status 2: .*No such file"
     with pytest.raises(MissingRequirementError, match=message):
         metis.part_graph(GRAPH.indptr, GRAPH.indices, 3)
 

@@ -94,7 +94,7 @@ def test_links_of_different_shape_may_be_paired() -> None:
 
 @pytest.mark.parametrize("build", [two_links, lambda gap: chain([LinkShape()] * 2, gap=gap)])
 def test_a_start_that_penetrates_is_refused(build: Callable[..., object]) -> None:
-    with pytest.raises(InvalidInputError, match=r"gap must be zero or positive, got -0\.5: links that overlap"):
+    with pytest.raises(InvalidInputError, match=r"gap must be zero or positive, got -0\.5: links"):
         build(gap=-0.5)
 
 

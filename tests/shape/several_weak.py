@@ -78,4 +78,3 @@ def collect(comm: MPI.Comm, path: Path | None = None) -> dict[str, Any]:
         "reason": result.reason.name,
         "same": len(set(comm.allgather(result.x.tobytes()))) == 1,
     }
-

@@ -38,8 +38,8 @@ class MortarCoupling:
         weight: M_ij / D_i with M_ij = ∫ ψ_i N_j, N_j of the master, shape (n, len(master.nodes)); rows add up
             to one.
         normal: Unit normal from master to slave, the averaged slave normal turned round, shape (n, dim).
-        gap: n_i · (x_i − Σ_j weight_ij x_j), less the weighted mean of what the true surfaces stand over their
-            facets, positive when open, shape (n,), [length].
+        gap: n_i · (x_i − Σ_j weight_ij x_j), less the weighted mean of what the true surfaces stand over
+            their facets, positive when open, shape (n,), [length].
     """
 
     node: np.ndarray

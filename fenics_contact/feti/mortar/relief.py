@@ -17,7 +17,7 @@ def relief_of_cells(
     pairs: tuple[np.ndarray, np.ndarray],
     along: np.ndarray,
 ) -> np.ndarray:
-    """Return the height of the true slave over its facets less that of the true master, shape (n, q), [length].
+    """Return the height of the true slave over its facets less that of the master, shape (n, q), [length].
 
     Args:
         cells: Quadrature points.
