@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,6 +13,12 @@ from fenics_contact.feti.surface import FacetedSurface, Relief, corner_products
 
 #: Angle between the normals of neighbouring facets above which their common edge is a crease, in degrees.
 CREASE = 40.0
+#: A crease turns by so many times as much as a smooth surface does at the next edges.
+SEVERAL = 3.0
+#: Edges run alike if the cosine of the angle between them is above this.
+ALIKE = 0.9
+#: Angles below this one are none, in radians.
+ROUNDING = 1e-6
 #: Directions of the fit that the neighbours tell less about than this part of the best known one stay as the
 #: facets have them.
 UNKNOWN = 1e-6
@@ -22,8 +29,8 @@ def reconstructed(surface: FacetedSurface) -> FacetedSurface:
 
     At every node a quadratic polynomial is fitted to the nodes around (two rings of facets), which gives its
     normal with an error of the second order, also at the rim; cubics with these normals miss the surface by
-    an error of the third order. Creases, edges between facets whose normals differ by more than `CREASE`
-    degrees, stay: on their two sides nodes have different normals.
+    an error of the third order. Creases stay, where the surface turns by more than `CREASE` degrees from
+    facet to facet or by several times as much as beside: on their two sides nodes have different normals.
 
     Args:
         surface: Facets without relief.
@@ -34,75 +41,167 @@ def reconstructed(surface: FacetedSurface) -> FacetedSurface:
         Nagata, T.: Simple local interpolation of surfaces using normal vectors. Computer Aided Geometric
         Design 22 (2005).
     """
-    wedge, node = _wedges(surface)
-    normals = _fitted_normals(surface, wedge, node)
-    corners = normals[wedge] - surface.averaged[surface.facets]
+    wedges = _wedges(surface)
+    normals = _fitted_normals(surface, wedges)
+    corners = normals[wedges.of_corner] - surface.averaged[surface.facets]
     rest = np.zeros((len(surface.facets), 1 if surface.corners == 2 else surface.corners + 1))
     return replace(surface, relief=Relief(np.zeros_like(surface.averaged), corners, rest))
 
 
-def _wedges(surface: FacetedSurface) -> tuple[np.ndarray, np.ndarray]:
-    """Group the corners of facets that meet at a node without a crease in between.
+@dataclass(frozen=True)
+class _Joints:
+    """Edges between two facets, in the plane the nodes between two edges.
 
-    Returns:
-        Wedge of each corner, shape (n_facets, corners), and node of each wedge, shape (n_wedges,).
+    Attributes:
+        facets: The facets on both sides, shape (n, 2).
+        corners: Their corners that meet there, numbered facet by facet, shape (n, 2, ends).
+        angle: By how much the surface turns from one to the other, shape (n,), in radians.
     """
-    count, corners = surface.facets.shape
-    unit = _facet_normals(surface)
-    one, other = _smooth_neighbours(surface, unit)
-    corner = np.arange(count * corners)
-    graph = sp.coo_matrix((np.ones(len(one)), (one, other)), shape=(len(corner), len(corner)))
+
+    facets: np.ndarray
+    corners: np.ndarray
+    angle: np.ndarray
+
+    NAMES: ClassVar = ("facets", "corners", "angle")
+
+
+@dataclass(frozen=True)
+class _Wedges:
+    """Corners of facets that meet at a node without a crease in between.
+
+    Attributes:
+        of_corner: Wedge of each corner, shape (n_facets, corners).
+        node: Node of each wedge, shape (n_wedges,).
+        mirrored: Across which planes of symmetry it goes on smoothly, shape (n_wedges, dim).
+    """
+
+    of_corner: np.ndarray
+    node: np.ndarray
+    mirrored: np.ndarray
+
+
+def _wedges(surface: FacetedSurface) -> _Wedges:
+    """Group the corners of facets."""
+    joints, images = _joints(surface), _joints_with_images(surface)
+    every = _Joints(
+        *(np.concatenate([getattr(p, name) for p in (joints, *images)]) for name in _Joints.NAMES)
+    )
+    smooth = ~_is_crease(surface, every)
+    one, other = (every.corners[smooth, side].ravel() for side in (0, 1))
+    count = surface.facets.size
+    graph = sp.coo_matrix((np.ones(len(one)), (one, other)), shape=(count, count))
     number, wedge = connected_components(graph, directed=False)
     node = np.zeros(number, dtype=np.int64)
     node[wedge] = surface.facets.ravel()
-    return wedge.reshape(count, corners), node
+    mirrored = np.zeros((number, surface.dim), dtype=bool)
+    start = len(joints.angle)
+    for axis, image in enumerate(images):
+        stop = start + len(image.angle)
+        mirrored[wedge[image.corners[smooth[start:stop], 0].ravel()], axis] = True
+        start = stop
+    return _Wedges(wedge.reshape(surface.facets.shape), node, mirrored)
 
 
-def _facet_normals(surface: FacetedSurface) -> np.ndarray:
+def _joints_with_images(surface: FacetedSurface) -> list[_Joints]:
+    """Find the joints of a surface with its mirror images across each axis."""
+    count, corners = surface.facets.shape
+    corner, found = np.arange(count * corners).reshape(count, corners), []
     summed = corner_products(surface.points, surface.facets).sum(axis=1)
-    return np.asarray(summed / np.linalg.norm(summed, axis=1)[:, None])
+    unit = summed / np.linalg.norm(summed, axis=1)[:, None]
+    for axis in range(surface.dim):
+        there = surface.mirrored[surface.facets, axis]
+        if corners > 2:
+            there &= np.roll(there, -1, axis=1)
+        facet, place = np.nonzero(there)
+        ends = corner[facet, place][:, None]
+        if corners > 2:
+            ends = np.column_stack([ends, corner[facet, (place + 1) % corners]])
+        angle = 2 * np.arcsin(np.minimum(np.abs(unit[facet, axis]), 1.0))
+        found.append(_Joints(np.stack([facet, facet], 1), np.stack([ends, ends], 1), angle))
+    return found
 
 
-def _smooth_neighbours(surface: FacetedSurface, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return pairs of corners, numbered facet by facet, at both ends of the edges that are no creases."""
+def _is_crease(surface: FacetedSurface, joints: _Joints) -> np.ndarray:
+    """Tell which joints are creases.
+
+    A smooth surface turns by similar angles at the next joints on both sides that run alike; where it turns
+    by several times as much as on one of them, and by more than at the others there, it has a crease, however
+    shallow.
+    """
+    nodes = surface.facets.ravel()[joints.corners[:, 0]]
+    count, size = nodes.shape[0], len(surface.nodes)
+    number = np.repeat(np.arange(count), nodes.shape[1])
+    at_node = sp.csr_matrix((np.ones(nodes.size), (nodes.ravel(), number)), shape=(size, count))
+    along = surface.points[nodes[:, -1]] - surface.points[nodes[:, 0]]
+    along = along / np.maximum(np.linalg.norm(along, axis=1), np.finfo(float).tiny)[:, None]
+    rim = at_node.getnnz(axis=1) < np.bincount(surface.facets.ravel(), minlength=size)
+    expected = np.full(count, np.inf)  # beyond the rim nothing is known
+    for side in (0, 1):
+        beside = surface.facets[joints.facets[:, side]]
+        apart = (beside[..., None] != nodes[:, None]).all(axis=-1)
+        joint, corner = np.nonzero(apart)
+        across = sp.csr_matrix((np.ones(len(joint)), (joint, beside[joint, corner])), shape=(count, size))
+        pairs = (across @ at_node).tocoo()
+        alike = np.abs(np.einsum("nd,nd->n", along[pairs.row], along[pairs.col])) > ALIKE
+        alike |= surface.dim == 2
+        share = np.where(alike, 1.0, 1.0 / SEVERAL)
+        turned, known = np.zeros(count), np.bincount(pairs.row, alike, count) > 0
+        if surface.corners == 3:  # at the rim, the joint that runs alike may be missing
+            known &= across @ rim == 0
+        np.maximum.at(turned, pairs.row, share * joints.angle[pairs.col])
+        expected = np.minimum(expected, np.where(known, turned, np.inf))
+    alone = joints.angle > SEVERAL * expected + ROUNDING
+    return np.asarray(alone | (joints.angle > np.radians(CREASE)))
+
+
+def _joints(surface: FacetedSurface) -> _Joints:
+    """Find the joints of a surface."""
     count, corners = surface.facets.shape
     corner = np.arange(count * corners).reshape(count, corners)
-    if corners == 2:  # neighbours share a node: the end of one edge is the start of the next
-        end = np.argsort(surface.facets[:, 1])
-        ends = surface.facets[end, 1]
-        place = np.clip(np.searchsorted(ends, surface.facets[:, 0]), 0, count - 1)
-        met = ends[place] == surface.facets[:, 0]
-        before, after = end[place[met]], np.flatnonzero(met)
-        one, other = corner[before, 1], corner[after, 0]
-        flat = _alike(unit, before, after)
-        return one[flat], other[flat]
-    start, stop = surface.facets.ravel(), np.roll(surface.facets, -1, axis=1).ravel()
-    key, turned = start * len(surface.nodes) + stop, stop * len(surface.nodes) + start
-    order = np.argsort(key)
-    place = np.clip(np.searchsorted(key[order], turned), 0, len(key) - 1)
-    other = order[place]
-    met = np.flatnonzero((key[other] == turned) & (start < stop))
-    other = other[met]
-    flat = _alike(unit, met // corners, other // corners)
-    met, other = met[flat], other[flat]
-    following = np.roll(corner, -1, axis=1).ravel()
-    return np.concatenate([met, following[met]]), np.concatenate([following[other], other])
+    if corners == 2:
+        start, stop = surface.facets[:, 0], surface.facets[:, 1]
+        place, met = _matches(stop, start)
+        ends = np.stack([corner[place, 1], corner[met, 0]], axis=1)[:, :, None]
+    else:
+        start, stop = surface.facets.ravel(), np.roll(surface.facets, -1, axis=1).ravel()
+        size, following = len(surface.nodes), np.roll(corner, -1, axis=1).ravel()
+        place, met = _matches(start * size + stop, stop * size + start)
+        once = start[met] < stop[met]
+        place, met = place[once], met[once]
+        ends = np.stack([np.stack([met, following[met]], 1), np.stack([following[place], place], 1)], axis=1)
+    facets = ends[:, :, 0] // corners
+    summed = corner_products(surface.points, surface.facets).sum(axis=1)
+    one, other = (summed[facets[:, side]] for side in (0, 1))
+    across = np.linalg.norm(_crossed(one, other), axis=1)
+    return _Joints(facets, ends, np.arctan2(across, np.einsum("nd,nd->n", one, other)))
 
 
-def _alike(unit: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    return np.asarray(np.einsum("nd,nd->n", unit[one], unit[other]) > np.cos(np.radians(CREASE)))
+def _matches(keys: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return where wanted keys stand among the keys, and which of the wanted ones do."""
+    order = np.argsort(keys)
+    place = order[np.clip(np.searchsorted(keys[order], wanted), 0, len(keys) - 1)]
+    met = np.flatnonzero(keys[place] == wanted)
+    return place[met], met
 
 
-def _fitted_normals(surface: FacetedSurface, wedge: np.ndarray, node: np.ndarray) -> np.ndarray:
+def _crossed(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return cross products, in the plane as one component."""
+    if one.shape[1] == 3:
+        return np.cross(one, other)
+    return (one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0])[:, None]
+
+
+def _fitted_normals(surface: FacetedSurface, wedges: _Wedges) -> np.ndarray:
     """Fit quadratic polynomials around all wedges and return their normals, shape (n_wedges, dim)."""
+    node, mirrored = wedges.node, wedges.mirrored
     count, dim = len(node), surface.dim
     summed = np.zeros((count, dim))
-    np.add.at(summed, wedge, corner_products(surface.points, surface.facets))
-    summed[surface.mirrored[node]] = 0.0
+    np.add.at(summed, wedges.of_corner, corner_products(surface.points, surface.facets))
+    summed[mirrored] = 0.0
     mean = summed / np.linalg.norm(summed, axis=1)[:, None]
-    centre, around = _two_rings(wedge, count)
+    centre, around = _two_rings(wedges.of_corner, count)
     away = surface.points[node[around]] - surface.points[node[centre]]
-    away, centre = _with_mirror_images(away, centre, surface.mirrored[node])
+    away, centre = _with_mirror_images(away, centre, mirrored)
     size = np.zeros(count)
     np.maximum.at(size, centre, np.linalg.norm(away, axis=1))
     axes = _tangents(mean)
@@ -110,7 +209,7 @@ def _fitted_normals(surface: FacetedSurface, wedge: np.ndarray, node: np.ndarray
     height = np.einsum("nd,nd->n", mean[centre], away) / size[centre]
     slope = _fitted_slopes(place, height, centre, count)
     normal = mean - np.einsum("na,nad->nd", slope, axes)
-    normal[surface.mirrored[node]] = 0.0
+    normal[mirrored] = 0.0
     return np.asarray(normal / np.linalg.norm(normal, axis=1)[:, None])
 
 

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from fenics_contact.contact import State, Status, solve_scene, solve_steps
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
-from fenics_contact.feti.contact_search import surface_of
+from fenics_contact.feti.true_surface import surface_of
 from fenics_contact.geometry import block, box_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
@@ -269,7 +269,7 @@ def test_a_surface_that_lies_in_a_plane_of_symmetry_keeps_its_normals() -> None:
     pair = ContactPair(Surface("block", "y0"), RigidPlane((0.0, -0.1, 0.0), (0.0, 1.0, 0.0)))
     roller = Support("block", "y0", (None, 0.01, None))
     scene = Scene({"block": Body(mesh.moved(points), STEEL)}, [roller, Support("block", "y1")], [], [pair])
-    surface = surface_of(scene, pair.slave)
+    surface = surface_of(scene, pair.slave, "faceted")
     assert not surface.mirrored.any()
     np.testing.assert_allclose(surface.normals, np.tile([0.0, -1.0, 0.0], (16, 1)), atol=1e-7)
 

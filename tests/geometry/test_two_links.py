@@ -64,8 +64,9 @@ def test_the_gap_between_the_crowns_follows_their_curvatures() -> None:
     assert near.sum() > 30
     difference = 1.0 / shape.section.crown_radius - 1.0 / shape.inner_radius
     formula = 0.25 + difference * (y**2 + z**2) / 2.0
-    # Higher orders leave half a percent of what the curvatures open.
-    assert distances(pair.first.mesh, pair.second.mesh)[near] == pytest.approx(formula[near], abs=3e-4)
+    # At 2 mm the higher orders of both tori are a tenth of what their curvatures open.
+    assert distances(pair.first.mesh, pair.second.mesh)[near] == pytest.approx(formula[near], abs=0.004)
+    assert formula[near].max() > 0.28
 
 
 @pytest.mark.parametrize("gap", [0.0, 0.7])
