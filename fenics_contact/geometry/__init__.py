@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from fenics_contact.geometry.block import block, box_lattice
 from fenics_contact.geometry.bolted import bolt, drilled_plate
+from fenics_contact.geometry.cad_files import read_cad
+from fenics_contact.geometry.cad_shapes import cad_shapes
 from fenics_contact.geometry.cell_types import CELL_TYPES, FACET_TYPES, CellType, cell_type_of
 from fenics_contact.geometry.chain import Chain, chain
 from fenics_contact.geometry.coincidence import merge_duplicate_nodes
@@ -36,6 +38,7 @@ from fenics_contact.geometry.shape_functions import quadrature, shape_gradients,
 from fenics_contact.geometry.shapes import (
     Cylinder,
     Extruded,
+    Joined,
     Parametric,
     Placed,
     Plane,
@@ -67,6 +70,7 @@ __all__ = [
     "Cylinder",
     "DesignSurface",
     "Extruded",
+    "Joined",
     "Link",
     "LinkShape",
     "Parametric",
@@ -86,6 +90,7 @@ __all__ = [
     "boundary_faces",
     "box_lattice",
     "box_partition",
+    "cad_shapes",
     "cell_type_of",
     "chain",
     "chain_link",
@@ -113,6 +118,7 @@ __all__ = [
     "principal_curvatures",
     "quadratic",
     "quadrature",
+    "read_cad",
     "read_mesh",
     "read_msh",
     "read_xdmf",

@@ -102,7 +102,7 @@ def _in_vtk_order(points: np.ndarray, kind: str, cells: np.ndarray) -> np.ndarra
 
 def _groups(gmsh: ModuleType, dim: int, meshed: set[int], source: str) -> dict[Label, list[int]]:
     """Name to meshed entities of every physical group; every meshed entity must be in one."""
-    groups = _physical(gmsh, dim)
+    groups = physical_groups(gmsh, dim)
     left = sorted(meshed - {tag for tags in groups.values() for tag in tags})
     if left:
         word = "volume" if dim == 3 else "surface"
@@ -114,7 +114,8 @@ def _groups(gmsh: ModuleType, dim: int, meshed: set[int], source: str) -> dict[L
     return {label: tags for label, tags in groups.items() if meshed.intersection(tags)}
 
 
-def _physical(gmsh: ModuleType, dim: int) -> dict[Label, list[int]]:
+def physical_groups(gmsh: ModuleType, dim: int) -> dict[Label, list[int]]:
+    """Return the entities of every physical group of a dimension, by its name, else by its number."""
     groups: dict[Label, list[int]] = {}
     for _, tag in gmsh.model.getPhysicalGroups(dim):
         name = gmsh.model.getPhysicalName(dim, tag) or str(tag)
@@ -149,7 +150,7 @@ def _facets(
 ) -> dict[Label, list[np.ndarray]]:
     """Node rows of the corners of the facets of every physical group."""
     facets: dict[Label, list[np.ndarray]] = {}
-    for label, entities in _physical(gmsh, dim).items():
+    for label, entities in physical_groups(gmsh, dim).items():
         blocks: list[Any] = []
         for entity in entities:
             if dim == 2:

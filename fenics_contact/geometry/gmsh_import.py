@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.geometry.bodies import bodies_of
+from fenics_contact.geometry.cad_shapes import cad_shapes
 from fenics_contact.geometry.files import require_file
 from fenics_contact.geometry.gmsh_elements import tagged_mesh_of
 from fenics_contact.geometry.gmsh_session import gmsh_model, running_gmsh
@@ -75,12 +76,16 @@ def read_msh(
     return bodies_of(comm.bcast(read, root=0), bodies, surfaces)
 
 
-def from_gmsh_model(bodies: Bodies | None = None, surfaces: Surfaces | None = None) -> dict[str, BodyMesh]:
+def from_gmsh_model(
+    bodies: Bodies | None = None, surfaces: Surfaces | None = None, *, shapes: bool = True
+) -> dict[str, BodyMesh]:
     """Take bodies from gmsh's current model, which has been meshed and stays as it is.
 
     Args:
         bodies: As in `read_msh`.
         surfaces: As in `read_msh`.
+        shapes: Whether surfaces keep the true shapes that the model's geometry, where it has one, gives them,
+            see `cad_shapes`; else they are their facets.
 
     Returns:
         Name to body.
@@ -95,7 +100,16 @@ def from_gmsh_model(bodies: Bodies | None = None, surfaces: Surfaces | None = No
             "from_gmsh_model needs a model in memory, gmsh is not initialised: call gmsh.initialize(), build "
             "and mesh a model first, or read a file with `read_msh`"
         )
-    return bodies_of(tagged_mesh_of(gmsh, f"model '{gmsh.model.getCurrent()}'"), bodies, surfaces)
+    made = bodies_of(tagged_mesh_of(gmsh, f"model '{gmsh.model.getCurrent()}'"), bodies, surfaces)
+    if not shapes:
+        return made
+    groups = surfaces if isinstance(surfaces, Mapping) else {}
+    return {name: _with_shapes(mesh, groups) for name, mesh in made.items()}
+
+
+def _with_shapes(mesh: BodyMesh, groups: Mapping[str, str | Sequence[str]]) -> BodyMesh:
+    """Give a body the shapes of its surfaces, which are made of these groups or those of their names."""
+    return mesh.with_shapes(cad_shapes(mesh, {name: groups.get(name, name) for name in mesh.surfaces}))
 
 
 def _read(path: Path) -> TaggedMesh:

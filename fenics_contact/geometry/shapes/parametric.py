@@ -106,14 +106,14 @@ class Parametric(Patch):
             low, high, periodic = self._range
             return np.asarray(self.derivative(np.where(periodic, low + (u - low) % (high - low), u)))
         step = self._steps(1 / 3)
-        middle = self._away(u, step)
+        middle = self._away(u, 1.01 * step)
         slopes = self._slopes(middle, step)
         return slopes + np.einsum("ndab,nb->nda", self._bends(u), u - middle)
 
     def _bends(self, u: np.ndarray) -> np.ndarray:
         step = self._steps(1 / 4 if self.derivative is None else 1 / 3)
         # Differences of differences, which stay inside the range.
-        middle = self._away(u, 2 * step)
+        middle = self._away(u, 2.01 * step)
         first = partial(self._slopes, step=step) if self.derivative is None else self._tangents
         shifts = np.diag(step)
         bends = [(first(middle + s) - first(middle - s)) / (2 * s.max()) for s in shifts]

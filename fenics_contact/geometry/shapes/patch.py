@@ -40,6 +40,11 @@ class Patch(ABC):
     def _range(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Least and largest parameters and which of them are periodic, (k,) each."""
 
+    @property
+    def _borders(self) -> tuple[np.ndarray, np.ndarray]:
+        """Parameters beyond which there is no surface, (k,) each."""
+        return self._range[:2]
+
     @abstractmethod
     def _starts(self) -> np.ndarray:
         """Return the parameters of samples that are dense enough to tell where closest points are, (m, k)."""
@@ -55,6 +60,10 @@ class Patch(ABC):
     def curvatures(self, points: np.ndarray) -> np.ndarray:
         """Return the second derivatives of the distance."""
         return self._feet(points).curvatures
+
+    def at(self, u: np.ndarray) -> np.ndarray:
+        """Return the surface's points at parameters, (n, dim − 1) -> (n, dim), [length]."""
+        return self._position(np.asarray(u, dtype=np.float64))
 
     @cached_property
     def _samples(self) -> tuple[np.ndarray, cKDTree]:
@@ -83,7 +92,7 @@ class Patch(ABC):
 
     def _at(self, points: np.ndarray, u: np.ndarray) -> Feet:
         position, tangents = self._position(u), self._tangents(u)
-        low, high, periodic = self._range
+        (low, high), (_, _, periodic) = self._borders, self._range
         pull = np.einsum("nda,nd->na", tangents, points - position)
         # What lies above the very border is held by nothing, but rounding.
         strong = np.abs(pull) > HELD * np.einsum("nda,nda->na", tangents, tangents) * (high - low)
