@@ -106,15 +106,22 @@ class State:
     @cached_property
     @collectively("State.errors", _comm)
     def errors(self) -> StateErrors:
-        """Errors of the state by solver, friction law and mesh, in energy norm. Collective on first use."""
-        if self.known_errors is not None:
-            return self.known_errors
+        """Errors of the state by solver, friction law, mesh and geometry, in energy norm.
+
+        Collective on first use. Where surfaces are known better than contact took them, or reconstructed, the
+        contact problem is solved once more to tell what that does.
+        """
         from fenics_contact.accuracy import discretisation_error, solver_errors, state_errors
+        from fenics_contact.contact.geometry_error import geometry_error
 
         with Task("errors"):
-            solver = solver_errors(self.system, self.solution)
-            estimate = discretisation_error(self.torn, self.conforming_displacement)
-            return state_errors(solver, estimate, self.energies.norm)
+            found = self.known_errors
+            if found is None:
+                solver = solver_errors(self.system, self.solution)
+                estimate = discretisation_error(self.torn, self.conforming_displacement)
+                found = state_errors(solver, estimate, self.energies.norm)
+            geometry = geometry_error(self)
+        return found.with_geometry(geometry.energy, geometry.peak_pressure)
 
     @cached_property
     def unheld(self) -> tuple[UnheldMotion, ...]:

@@ -19,13 +19,14 @@ from fenics_contact.feti.contact_points import (
     tangent_frames,
 )
 from fenics_contact.feti.copies import Tearing
-from fenics_contact.feti.projection import Projection, join, project
-from fenics_contact.feti.relief import heights
-from fenics_contact.feti.surface import FacetedSurface, shape_functions
-from fenics_contact.feti.true_surface import surface_of
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.geometry import asked, coordinate_rounding
-from fenics_contact.scene import ContactPair, Geometry, RigidObstacle, Scene, Surface, Tie
+from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie
+from fenics_contact.scene.true_surfaces import surface_of
+from fenics_contact.surfaces import Geometry
+from fenics_contact.surfaces.facets import FacetedSurface, shape_functions
+from fenics_contact.surfaces.projection import Projection, join, project
+from fenics_contact.surfaces.relief import heights
 
 #: A gap of so many roundings of coordinates is none: a few operations lie between the two.
 ROUNDING = 8
@@ -34,7 +35,7 @@ _LOG = logging.getLogger(__name__)
 
 
 def find_contact_points(
-    scene: Scene, tearing: Tearing, fixed: np.ndarray, comm: MPI.Comm | None = None
+    scene: Scene, tearing: Tearing, fixed: np.ndarray, comm: MPI.Comm | None = None, *, finer: bool = False
 ) -> ContactPoints:
     """Find where the slave surface of every contact pair meets its master. Collective on ``comm``.
 
@@ -46,11 +47,12 @@ def find_contact_points(
         tearing: Node numbering.
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
         comm: Communicator of the ranks that share the work; this rank alone by default.
+        finer: Take surfaces that are known better than those the scene asks for, see `true_surface`.
 
     Raises:
         InvalidInputError: If no node of a slave surface finds its master.
     """
-    return _points_of_pairs(scene, scene.contacts, tearing, fixed, comm or MPI.COMM_SELF)
+    return _points_of_pairs(scene, scene.contacts, tearing, fixed, comm or MPI.COMM_SELF, finer)
 
 
 def find_tied_points(
@@ -87,20 +89,25 @@ class _Side:
     n_nodes: int
 
     @classmethod
-    def of(cls, scene: Scene, surface: Surface, geometry: Geometry, tearing: Tearing) -> _Side:
+    def of(cls, scene: Scene, surface: Surface, geometry: Geometry, tearing: Tearing, finer: bool) -> _Side:
         """Return a named surface as a side."""
-        own = surface_of(scene, surface, geometry)
+        own = surface_of(scene, surface, geometry, finer=finer)
         return cls(own, tearing.global_nodes(surface.body, own.nodes), tearing.n_nodes)
 
 
 def _points_of_pairs(
-    scene: Scene, pairs: Sequence[ContactPair | Tie], tearing: Tearing, fixed: np.ndarray, comm: MPI.Comm
+    scene: Scene,
+    pairs: Sequence[ContactPair | Tie],
+    tearing: Tearing,
+    fixed: np.ndarray,
+    comm: MPI.Comm,
+    finer: bool = False,
 ) -> ContactPoints:
     parts = []
     for index, pair in enumerate(pairs):
         # What lies between tied surfaces stays as it is; their gaps count for nothing.
         geometry = pair.geometry if isinstance(pair, ContactPair) else "faceted"
-        slave = _Side.of(scene, pair.slave, geometry, tearing)
+        slave = _Side.of(scene, pair.slave, geometry, tearing, finer)
         movable = ~fixed[slave.nodes].all(axis=1)
         if not isinstance(pair.master, Surface):
             with together(comm):
@@ -109,7 +116,7 @@ def _points_of_pairs(
             require_alike(comm, described((points.slave, points.normal, points.gap), name))
         else:
             find = _by_mortar if pair.discretisation == "mortar" else _by_projection
-            master = _Side.of(scene, pair.master, geometry, tearing)
+            master = _Side.of(scene, pair.master, geometry, tearing, finer)
             points = find(slave, movable, master, comm)
             points = replace(points, symmetric=_symmetric(points, slave, master))
         if comm.rank == 0 and not movable.all():

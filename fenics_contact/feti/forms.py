@@ -11,7 +11,6 @@ from fenics_contact import _dolfinx
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import together
 from fenics_contact.feti.composition import Composition, integrate, possible
-from fenics_contact.feti.facet_areas import quadrature_areas
 from fenics_contact.feti.load_forms import Symbol, fields_of, load_key, load_name, load_parameters, load_work
 from fenics_contact.feti.model_checks import check_model, unit_cell_stiffness
 from fenics_contact.feti.templates import (
@@ -25,6 +24,7 @@ from fenics_contact.feti.templates import (
     volume_measure,
 )
 from fenics_contact.scene import Load, Material, Scene, ThermalStrain, TotalForce, Traction
+from fenics_contact.surfaces.facet_areas import quadrature_areas
 
 __all__ = [
     "LOADED",

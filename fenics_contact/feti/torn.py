@@ -123,6 +123,28 @@ class TornSystem:
         rows = self.relations[2]
         return rows.resting is not None and np.array_equal(rows.of_supports(prescribed) == 0.0, rows.resting)
 
+    def finer_gap(self) -> np.ndarray:
+        """Return the gaps between surfaces known better than those used, see `true_surface`. Collective.
+
+        Returns:
+            Shape (n_contact,), [length]; the gap itself where nothing better is known.
+        """
+        decomposition, points = self.decomposition, self.points
+        tearing, comm = decomposition.tearing, decomposition.comm
+        finer = find_contact_points(self.scene, tearing, decomposition.fixed, comm, finer=True)
+        mine, theirs = (found.pair * tearing.n_nodes + found.slave for found in (points, finer))
+        _, here, there = np.intersect1d(mine, theirs, return_indices=True)
+        gap = points.gap.copy()
+        gap[here] = finer.gap[there]
+        return gap
+
+    def with_gap(self, gap: np.ndarray) -> TornSystem:
+        """Return the same system with other gaps, shape (n_contact,), [length]."""
+        change = np.zeros(int(self.n_equality + self.points.count + self.tangential_rows.size))
+        change[self.normal_rows] = gap - self.points.gap
+        points = replace(self.points, gap=gap)
+        return replace(self, points=points, right=self.right + change[self.numbering.owned])
+
     @property
     def dim(self) -> int:
         """Displacement components of a node."""

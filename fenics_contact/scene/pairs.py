@@ -10,14 +10,10 @@ import numpy as np
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.checked import checked
 from fenics_contact.scene.obstacles import RigidObstacle
+from fenics_contact.surfaces import Geometry
 
 #: Where the contact conditions are asked: at the slave's nodes, or weighted by its shape functions (mortar).
 Discretisation: TypeAlias = Literal["node", "mortar"]
-
-
-#: What is taken for the surfaces between their nodes: the best that is known, which is the shape that a mesh
-#: carries or else a smooth surface through the nodes; always the latter; or the flat facets.
-Geometry: TypeAlias = Literal["best", "reconstructed", "faceted"]
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from fenics_contact.contact import State
 from fenics_contact.errors import together
 from fenics_contact.feti import ContactPoints, TornSystem
 from fenics_contact.feti.nodal_mean import nodal_mean_at
-from fenics_contact.feti.true_surface import surface_of
 from fenics_contact.geometry import asked
 from fenics_contact.scene import ContactPair, RigidObstacle, Surface, Tresca
+from fenics_contact.scene.true_surfaces import surface_of
 from fenics_contact.shape.adjoint import Adjoint
 from fenics_contact.shape.linearised_face import LinearisedFace
 from fenics_contact.shape.objective import Partials

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.feti.contact_points import reference_axes
-from fenics_contact.feti.projection import interpolated_normal, newton_matrix
-from fenics_contact.feti.relief import heights
-from fenics_contact.feti.surface import FacetedSurface, shape_functions
 from fenics_contact.shape.surface_derivative import normals_pulled_back, slopes_pulled_back
+from fenics_contact.surfaces.facets import FacetedSurface, shape_functions
+from fenics_contact.surfaces.projection import interpolated_normal, newton_matrix
+from fenics_contact.surfaces.relief import heights
 
 
 @dataclass(frozen=True)

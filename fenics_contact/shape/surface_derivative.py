@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.feti.relief import corner_normals, edges_at_corners, slopes
-from fenics_contact.feti.surface import FacetedSurface, corner_products
+from fenics_contact.surfaces.facets import FacetedSurface, corner_products
+from fenics_contact.surfaces.relief import corner_normals, edges_at_corners, slopes
 
 
 def normals_pulled_back(
@@ -37,7 +37,7 @@ def normals_pulled_back(
 def slopes_pulled_back(
     surface: FacetedSurface, facet: np.ndarray, by_slopes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return derivatives from those by the slopes of true surfaces, see `fenics_contact.feti.relief.slopes`.
+    """Return derivatives from those by the slopes of true surfaces, see `surfaces.relief.slopes`.
 
     Args:
         surface: The surface.

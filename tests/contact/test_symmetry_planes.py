@@ -11,7 +11,6 @@ from mpi4py import MPI
 from fenics_contact.contact import State, Status, solve_scene, solve_steps
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
-from fenics_contact.feti.true_surface import surface_of
 from fenics_contact.geometry import block, box_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
@@ -27,6 +26,7 @@ from fenics_contact.scene import (
     Surface,
     Traction,
 )
+from fenics_contact.scene.true_surfaces import surface_of
 
 STEEL = IsotropicElasticity(1000.0, 0.3)
 TOLERANCE = 1e-9

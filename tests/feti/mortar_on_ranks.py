@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.mortar import mortar_coupling
-from fenics_contact.feti.surface import FacetedSurface, faceted_surface
+from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface
 from tests.feti.mortar_surfaces import plate
 
 Numbers = dict[str, np.ndarray]

@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.mortar import MortarCoupling, mortar_coupling
-from fenics_contact.feti.surface import FacetedSurface, faceted_surface
+from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface
 from tests.feti.mortar_surfaces import KINDS, SOLID, moved, plate, rotation
 
 kinds = pytest.mark.parametrize(("slave_kind", "master_kind"), KINDS)

@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 from fenics_contact.feti.mortar.clipping import clip, simplices
 from fenics_contact.feti.mortar.local_coordinates import local_coordinates, rule
 from fenics_contact.feti.mortar.planes import measure
-from fenics_contact.feti.surface import shape_values
+from fenics_contact.surfaces.facets import shape_values
 
 #: Coordinates that often coincide, so that corners meet corners and edges meet edges, and any others.
 coordinate = st.one_of(st.integers(-4, 4).map(lambda k: k / 4), st.floats(-1, 1))

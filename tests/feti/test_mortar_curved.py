@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.feti.mortar import MortarCoupling, mortar_coupling
-from fenics_contact.feti.surface import FacetedSurface
+from fenics_contact.surfaces.facets import FacetedSurface
 from tests.feti.mortar_surfaces import KINDS, moved, rotation, shell
 
 kinds = pytest.mark.parametrize(("slave_kind", "master_kind"), KINDS)

@@ -11,7 +11,7 @@ from fenics_contact.feti.mortar.cells import Cells
 from fenics_contact.feti.mortar.dual_basis import CORNERS, dual_integrals
 from fenics_contact.feti.mortar.local_coordinates import rule
 from fenics_contact.feti.mortar.planes import measure
-from fenics_contact.feti.surface import shape_values
+from fenics_contact.surfaces.facets import shape_values
 
 
 def covered(corners: int, parts: np.ndarray, share_of_pairs: np.ndarray) -> Cells:

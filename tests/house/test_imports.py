@@ -17,6 +17,7 @@ FLOORS = [
     {"_libraries"},
     {"_dolfinx"},
     {"geometry", "linalg", "theory"},
+    {"surfaces"},
     {"scene", "qp"},
     {"feti"},
     {"accuracy"},

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 from fenics_contact.feti.contact_points import tangent_frames
-from fenics_contact.feti.projection import project
-from fenics_contact.feti.surface import FacetedSurface, faceted_surface, outside, shape_functions
 from fenics_contact.geometry import block
 from fenics_contact.shape.projection_derivative import (
     PointDerivatives,
@@ -18,6 +16,8 @@ from fenics_contact.shape.projection_derivative import (
     projection_pulled_back,
 )
 from fenics_contact.shape.surface_derivative import normals_pulled_back
+from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface, outside, shape_functions
+from fenics_contact.surfaces.projection import project
 
 CELLS = ("hexahedron", "tetrahedron")
 STEP = 1e-6

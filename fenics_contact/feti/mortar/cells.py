@@ -10,7 +10,7 @@ from fenics_contact.feti.mortar.clipping import clip, simplices
 from fenics_contact.feti.mortar.layers import hidden
 from fenics_contact.feti.mortar.local_coordinates import local_coordinates, rule
 from fenics_contact.feti.mortar.planes import Planes, laid_flat, measure
-from fenics_contact.feti.surface import FacetedSurface, shape_values
+from fenics_contact.surfaces.facets import FacetedSurface, shape_values
 
 #: Area, relative to the smaller of two facets, below which a piece of their intersection is rounding.
 NOTHING = 1e-14

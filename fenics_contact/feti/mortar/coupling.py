@@ -16,7 +16,7 @@ from fenics_contact.feti.mortar.cells import cells_of
 from fenics_contact.feti.mortar.dual_basis import dual_integrals
 from fenics_contact.feti.mortar.planes import check_convex, planes_of
 from fenics_contact.feti.mortar.relief import relief_of_cells
-from fenics_contact.feti.surface import FacetedSurface
+from fenics_contact.surfaces.facets import FacetedSurface
 
 #: Share of a node's area that has to face the master, or the node carries no multiplier.
 LEAST_SHARE = 1e-8

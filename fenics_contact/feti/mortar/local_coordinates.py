@@ -19,7 +19,7 @@ def local_coordinates(points: np.ndarray, flat: np.ndarray) -> np.ndarray:
         flat: Corners, shape (n, corners, dim − 1).
 
     Returns:
-        Local coordinates as `fenics_contact.feti.surface.shape_functions` takes them, shape (n, q, dim − 1).
+        Local coordinates as `shape_functions` takes them, shape (n, q, dim − 1).
     """
     corners = flat.shape[1]
     if corners == 2:

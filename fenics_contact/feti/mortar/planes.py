@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.feti.surface import FacetedSurface, corner_products
+from fenics_contact.surfaces.facets import FacetedSurface, corner_products
 
 #: Double area of a corner's triangle, relative to the facet's area, below which a facet counts as re-entrant.
 CONVEX = -1e-10

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.feti.mortar.cells import Cells
-from fenics_contact.feti.projection import interpolated_normal
-from fenics_contact.feti.relief import heights
-from fenics_contact.feti.surface import FacetedSurface
+from fenics_contact.surfaces.facets import FacetedSurface
+from fenics_contact.surfaces.projection import interpolated_normal
+from fenics_contact.surfaces.relief import heights
 
 
 def relief_of_cells(

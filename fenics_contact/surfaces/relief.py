@@ -1,4 +1,4 @@
-"""By how much a true surface stands over its flat facets, see `fenics_contact.feti.surface.Relief`."""
+"""By how much a true surface stands over its flat facets, see `fenics_contact.surfaces.facets.Relief`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.feti.surface import FacetedSurface, shape_functions
+from fenics_contact.surfaces.facets import FacetedSurface, shape_functions
 
 
 @dataclass(frozen=True)

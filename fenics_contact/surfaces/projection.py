@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fenics_contact.feti.surface import FacetedSurface, outside, shape_functions
 from fenics_contact.geometry import coordinate_rounding
+from fenics_contact.surfaces.facets import FacetedSurface, outside, shape_functions
 
 #: Facets tried for each point in the first round, nearest centroids first.
 NEAREST = 9

@@ -1,21 +1,23 @@
-"""The surface of a scene that facets stand for: of a known shape, reconstructed, or the facets themselves."""
+"""The surface that facets stand for: of a known shape, reconstructed, or the facets themselves."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import replace
+from typing import Literal, TypeAlias
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from fenics_contact.feti.facet_areas import nodal_areas
-from fenics_contact.feti.projection import interpolated_normal
-from fenics_contact.feti.reconstruction import reconstructed
-from fenics_contact.feti.relief import edges_at_corners, heights, slopes
-from fenics_contact.feti.surface import FacetedSurface, Relief, faceted_surface, shape_values
 from fenics_contact.geometry import BodyMesh, SurfaceShape, asked, coordinate_rounding
-from fenics_contact.scene import Geometry, Scene, Surface
-from fenics_contact.scene.mirrors import mirrored
+from fenics_contact.surfaces.facet_areas import nodal_areas
+from fenics_contact.surfaces.facets import FacetedSurface, Relief, faceted_surface, shape_values
+from fenics_contact.surfaces.projection import interpolated_normal
+from fenics_contact.surfaces.reconstruction import reconstructed
+from fenics_contact.surfaces.relief import edges_at_corners, heights, slopes
+
+#: What is taken for a surface between its nodes, see `fenics_contact.scene.ContactPair`.
+Geometry: TypeAlias = Literal["best", "reconstructed", "faceted"]
 
 _KNOWN: WeakKeyDictionary[BodyMesh, dict[Hashable, Relief | None]] = WeakKeyDictionary()
 """Reliefs of the surfaces of meshes, which those that are reshaped share."""
@@ -26,23 +28,37 @@ STEPS = 12
 FLAT = 1e-12
 
 
-def surface_of(scene: Scene, surface: Surface, geometry: Geometry) -> FacetedSurface:
-    """Return a named surface with its normals and its relief: linear facets through its nodes.
+def true_surface(
+    mesh: BodyMesh,
+    name: str,
+    geometry: Geometry,
+    *,
+    mirrored: np.ndarray | None = None,
+    finer: bool = False,
+) -> FacetedSurface:
+    """Return a surface of a mesh with its normals and its relief: linear facets through its nodes.
 
     Args:
-        scene: The scene.
-        surface: The surface.
-        geometry: What is taken for it between its nodes, see `ContactPair`.
+        mesh: The mesh.
+        name: Name of the surface.
+        geometry: What is taken for it between its nodes.
+        mirrored: Which nodes lie on a plane of symmetry across each axis, shape (n_nodes, dim).
+        finer: Take what is known better than that, to tell the error: the shape, or what is reconstructed
+            with an error of the next order.
     """
-    mesh = scene.bodies[surface.body].mesh
-    marks = mirrored(scene, surface.body)
-    found = _with_areas(faceted_surface(mesh.points, scene.facets(surface), marks), mesh, surface.name)
+    marks = np.zeros(mesh.points.shape, dtype=bool) if mirrored is None else mirrored
+    found = faceted_surface(mesh.points, mesh.linear.surfaces[name], marks)
+    found = _with_areas(found, mesh, name)
+    order = 2
+    if finer:
+        order, geometry = (2 if geometry == "faceted" else 3), "best"
     if geometry == "faceted":
         return found
-    key = (surface.name, geometry, marks.tobytes())
+    key = (name, geometry, order, marks.tobytes())
     known = _KNOWN.setdefault(mesh.origin, {})
     if key not in known:
-        known[key] = _relief(mesh.origin, surface.name, marks, geometry)
+        shape = mesh.origin.shapes.get(name) if geometry == "best" else None
+        known[key] = _relief(mesh.origin, name, marks, shape, order)
     return replace(found, relief=known[key])
 
 
@@ -55,10 +71,11 @@ def _with_areas(surface: FacetedSurface, mesh: BodyMesh, name: str) -> FacetedSu
     return replace(surface, areas=areas[surface.nodes])
 
 
-def _relief(mesh: BodyMesh, name: str, marks: np.ndarray, geometry: Geometry) -> Relief | None:
+def _relief(
+    mesh: BodyMesh, name: str, marks: np.ndarray, shape: SurfaceShape | None, order: int
+) -> Relief | None:
     surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], marks)
-    shape = mesh.shapes.get(name) if geometry == "best" else None
-    found = reconstructed(surface) if shape is None else by_shape(surface, shape)
+    found = reconstructed(surface, order) if shape is None else by_shape(surface, shape)
     return None if _is_flat(found) else found.relief
 
 

@@ -8,13 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fenics_contact.feti.projection import interpolated_normal
-from fenics_contact.feti.reconstruction import reconstructed
-from fenics_contact.feti.relief import heights
-from fenics_contact.feti.surface import FacetedSurface, faceted_surface, shape_values
-from fenics_contact.feti.true_surface import by_shape, height_over, surface_of
 from fenics_contact.geometry import BodyMesh, Cylinder, Sphere, SurfaceShape, Torus, block, hemisphere
-from fenics_contact.scene import Body, IsotropicElasticity, Scene, Support, Surface
+from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface, shape_values
+from fenics_contact.surfaces.projection import interpolated_normal
+from fenics_contact.surfaces.reconstruction import reconstructed
+from fenics_contact.surfaces.relief import heights
+from fenics_contact.surfaces.true_surface import by_shape, height_over, true_surface
 from tests.feti.mortar_surfaces import lattice, ticks
 
 TORUS = Torus((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 3.0, 1.0)
@@ -162,9 +161,8 @@ def test_on_a_plane_of_symmetry_a_surface_goes_on_as_its_mirror_image() -> None:
 
 def known(mesh: BodyMesh, name: str) -> dict[str, FacetedSurface]:
     """A surface of a mesh in all three ways."""
-    scene = Scene({"body": Body(mesh, IsotropicElasticity(1.0, 0.3))}, [Support("body", "top")])
     ways = ("faceted", "reconstructed", "best")
-    return {way: surface_of(scene, Surface("body", name), way) for way in ways}  # type: ignore[arg-type]
+    return {way: true_surface(mesh, name, way) for way in ways}  # type: ignore[arg-type]
 
 
 def test_a_scene_takes_the_best_that_is_known_unless_it_asks_for_less() -> None:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.feti.facet_areas import quadrature_areas
-from fenics_contact.feti.surface import (
+from fenics_contact.surfaces.facet_areas import quadrature_areas
+from fenics_contact.surfaces.facets import (
     FacetedSurface,
     edge_distance,
     faceted_surface,

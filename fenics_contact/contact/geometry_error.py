@@ -1,0 +1,68 @@
+"""What the geometry of contact surfaces does to a state: how far it is from that of better known ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fenics_contact.contact.equilibrium import contact_result, solve_dual
+from fenics_contact.feti import DualSystem
+from fenics_contact.qp import DualSolution, FaceNewton
+
+if TYPE_CHECKING:
+    from fenics_contact.contact.state import State
+
+#: Relative residual of the state of the better geometry: differences between states are a few percent of them
+#: or not worth telling.
+TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True)
+class GeometryError:
+    """How far a state is from that of the true surfaces on the same mesh.
+
+    Attributes:
+        energy: Distance in energy norm, [√(force · length)].
+        peak_pressure: Change of the largest contact pressure, relative to that of the better geometry.
+        gap: Largest change of a gap, [length].
+    """
+
+    energy: float = 0.0
+    peak_pressure: float = 0.0
+    gap: float = 0.0
+
+
+def geometry_error(state: State) -> GeometryError:
+    """Estimate the share of geometry in the error of a state. Collective.
+
+    The contact problem is solved once more with the gaps between surfaces that are known better: the shapes
+    that the meshes carry, where facets or reconstructed surfaces were used; where there are none,
+    reconstructed surfaces of the next order. Factors, coarse problem and preconditioner are those of the
+    state. It is no bound. Zero where shapes are known and used, and between flat surfaces.
+
+    Raises:
+        ConvergenceError: If the problem of the better geometry is not solved.
+    """
+    torn = state.torn
+    if torn.points.count == 0:
+        return GeometryError()
+    gap = torn.finer_gap()
+    change = float(np.abs(gap - torn.points.gap).max())
+    if change == 0.0 or not isinstance(state.solution, DualSolution):
+        return GeometryError()
+    solver = FaceNewton(tolerance=TOLERANCE)
+    present = solve_dual(state.dual, solver, state.solution)
+    system = DualSystem(torn.with_gap(gap), previous=state.dual)
+    better = solve_dual(system, solver, present)
+    way = better.multiplier - present.multiplier
+    square = float(system.problem.comm.allreduce(way @ system.apply(way)))
+    peaks = [_peak(state.dual, present), _peak(system, better)]
+    by_geometry = abs(peaks[0] - peaks[1]) / peaks[1] if peaks[1] > 0.0 else 0.0
+    return GeometryError(float(np.sqrt(max(square, 0.0))), by_geometry, change)
+
+
+def _peak(system: DualSystem, solution: DualSolution) -> float:
+    displacement = system.displacement(solution.multiplier, solution.alpha)
+    return float(contact_result(system, solution, displacement).pressure.max())
