@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import (
@@ -260,6 +261,14 @@ def test_arcs_of_the_built_in_kernel_are_circles_in_the_plane(tmp_path: Path) ->
     require_same(mesh.shapes["inner"], Sphere((0.0, 0.0), 1.0, hollow=True), 1e-12)
     require_same(mesh.shapes["outer"], Sphere((0.0, 0.0), 2.0), 1e-12)
     assert set(mesh.shapes) == {"inner", "outer"}
+
+
+def test_other_ranks_receive_the_shapes(tmp_path: Path) -> None:
+    path = tmp_path / "quarter.geo"
+    path.write_text(GEO + PLANE)
+    alone, sent = read_cad(path)["body"], read_cad(path, comm=MPI.COMM_SELF)["body"]
+    assert len(sent.shapes) == 2
+    assert sent.shapes == alone.shapes
 
 
 def test_extruded_arcs_of_the_built_in_kernel_are_cylinders(tmp_path: Path) -> None:
