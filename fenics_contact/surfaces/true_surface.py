@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from fenics_contact.geometry import BodyMesh, SurfaceShape, asked, coordinate_rounding
+from fenics_contact.geometry import BodyMesh, Joined, SurfaceShape, asked, coordinate_rounding
 from fenics_contact.surfaces.facet_areas import nodal_areas
 from fenics_contact.surfaces.facets import FacetedSurface, Relief, faceted_surface, shape_values
 from fenics_contact.surfaces.projection import interpolated_normal
@@ -24,6 +24,8 @@ _KNOWN: WeakKeyDictionary[BodyMesh, dict[Hashable, Relief | None]] = WeakKeyDict
 
 #: Steps of Newton's method along a ray to a shape; distances are nearly linear there.
 STEPS = 12
+#: By how much normals of shapes that meet may differ, in radians, where they meet smoothly.
+CREASE = 0.02
 #: A true surface has no relief if it stands over its facets by less than so many times their size.
 FLAT = 1e-12
 
@@ -93,36 +95,78 @@ def by_shape(surface: FacetedSurface, shape: SurfaceShape) -> FacetedSurface:
     """Return a surface with the relief of the shape that its nodes lie on.
 
     Nodes that lie off the shape by a little stay where they are; the heights between them are taken from
-    there.
+    there. Where several shapes meet in a crease, each facet keeps to its own.
 
     Args:
         surface: Facets without relief.
         shape: The shape.
     """
-    normals = asked(shape, "normals", surface.points)
-    normals = np.where(surface.mirrored, 0.0, normals)
-    normals = normals / np.linalg.norm(normals, axis=1)[:, None]
-    return _fitted(surface, shape, normals)
+    parts = _parts(shape, surface.points[surface.facets].mean(axis=1))
+    corners = np.zeros((*surface.facets.shape, surface.dim))
+    for part, mine in parts:
+        nodes = surface.facets[mine]
+        found = asked(part, "normals", surface.points[nodes.ravel()]).reshape(*nodes.shape, surface.dim)
+        corners[mine] = _unit(np.where(surface.mirrored[nodes], 0.0, found))
+    normals = np.zeros_like(surface.averaged)
+    np.add.at(normals, surface.facets, corners)
+    normals = _unit(normals)
+    turned = np.einsum("nkd,nkd->nk", corners, normals[surface.facets]) < np.cos(CREASE)
+    creased = np.isin(np.arange(len(normals)), surface.facets[turned])
+    normals[creased] = surface.averaged[creased]
+    smooth = ~creased[surface.facets]
+    corners[smooth] = normals[surface.facets[smooth]]
+    return _fitted(surface, parts, normals, corners)
 
 
-def _fitted(surface: FacetedSurface, shape: SurfaceShape, normals: np.ndarray) -> FacetedSurface:
-    difference = normals - surface.averaged
+def _parts(shape: SurfaceShape, middles: np.ndarray) -> list[tuple[SurfaceShape, np.ndarray]]:
+    """Return the shapes that a shape is joined of, and which facets have which, by their middles."""
+    if not isinstance(shape, Joined):
+        return [(shape, np.ones(len(middles), dtype=bool))]
+    nearest = shape.nearest(middles)
+    return [(part, nearest == n) for n, part in enumerate(shape.shapes) if (nearest == n).any()]
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+
+
+def _fitted(
+    surface: FacetedSurface,
+    parts: list[tuple[SurfaceShape, np.ndarray]],
+    normals: np.ndarray,
+    corners: np.ndarray,
+) -> FacetedSurface:
+    """Return a surface with the normals of nodes and of corners, and the heights that parts have over it."""
     samples = sample_points(surface.corners)
-    count = len(surface.facets)
-    relief = Relief(difference, difference[surface.facets], np.zeros((count, len(samples))))
+    count, nodes = len(surface.facets), surface.facets
+    relief = Relief(
+        normals - surface.averaged, corners - surface.averaged[nodes], np.zeros((count, len(samples)))
+    )
     fitted = replace(surface, relief=relief)
-    off_nodes = height_over(fitted.points, fitted.normals, shape)
     facet = np.arange(count)
+    off_nodes = [
+        _height_over_parts(fitted.points[nodes[:, k]], fitted.normals[nodes[:, k]], parts)
+        for k in range(surface.corners)
+    ]
     # The middle last: what the midpoints of the edges leave there counts.
     for number, sample in enumerate(samples):
         local = np.broadcast_to(sample, (count, len(sample)))
         values = shape_values(local, surface.corners)
-        nodes = surface.facets
         place = np.einsum("nk,nkd->nd", values, surface.points[nodes])
         direction, _ = interpolated_normal(values, fitted.normals[nodes])
-        missing = height_over(place, direction, shape) - np.einsum("nk,nk->n", values, off_nodes[nodes])
+        missing = _height_over_parts(place, direction, parts) - np.einsum("nk,kn->n", values, off_nodes)
         relief.rest[:, number] = missing - heights(fitted, facet, local).value
     return fitted
+
+
+def _height_over_parts(
+    points: np.ndarray, directions: np.ndarray, parts: list[tuple[SurfaceShape, np.ndarray]]
+) -> np.ndarray:
+    """Return how far it is from a point on each facet to the shape of the facet, shape (n,)."""
+    height = np.zeros(len(points))
+    for part, mine in parts:
+        height[mine] = height_over(points[mine], directions[mine], part)
+    return height
 
 
 def sample_points(corners: int) -> np.ndarray:

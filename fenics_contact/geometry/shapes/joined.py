@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.checked import checked
-from fenics_contact.geometry.shapes.protocol import SurfaceShape
+from fenics_contact.geometry.shapes.protocol import Quantity, SurfaceShape
 
 #: Samples on each edge of a border.
 SAMPLES = 4
@@ -58,10 +58,13 @@ class Joined:
         """Return the curvatures of the nearest shape."""
         return self._of_nearest("curvatures", points)
 
-    def _of_nearest(self, what: str, points: np.ndarray) -> np.ndarray:
+    def nearest(self, points: np.ndarray) -> np.ndarray:
+        """Return the numbers of the shapes whose parts of the surface are the nearest, (n, dim) -> (n,)."""
+        return np.argmin([self._away(number, points) for number in range(len(self.shapes))], axis=0)
+
+    def _of_nearest(self, what: Quantity, points: np.ndarray) -> np.ndarray:
         """Ask each shape for the points to which it is the nearest."""
-        away = [self._away(number, points) for number in range(len(self.shapes))]
-        nearest = np.argmin(away, axis=0)
+        nearest = self.nearest(points)
         order = ("distance", "normals", "curvatures").index(what)
         answer = np.zeros((len(points), *[points.shape[1]] * order))
         for number, shape in enumerate(self.shapes):

@@ -9,6 +9,7 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.errors.checked import checked
+from fenics_contact.geometry.shapes.joined import Joined
 from fenics_contact.geometry.shapes.places import require_place
 from fenics_contact.geometry.shapes.protocol import SurfaceShape
 from fenics_contact.geometry.vectors import Vector
@@ -82,7 +83,7 @@ class Placed:
 
 def placed(
     shape: SurfaceShape, rotation: np.ndarray | None, translation: Sequence[float], scale: float = 1.0
-) -> Placed:
+) -> SurfaceShape:
     """Move a shape: its points x go to scale R x + translation.
 
     Args:
@@ -92,13 +93,16 @@ def placed(
         scale: Factor > 0 on all lengths.
 
     Returns:
-        The moved shape; of one that was placed before, both motions in one.
+        The moved shape; of one that was placed before, both motions in one; of joined ones, them moved.
 
     Raises:
         InvalidInputError: If the matrix is not orthogonal, the scale not positive, or the dimensions differ.
     """
     turn = np.eye(len(translation)) if rotation is None else np.asarray(rotation, dtype=np.float64)
     moved = Placed(shape, tuple(map(tuple, np.atleast_2d(turn).tolist())), tuple(translation), scale)
+    if isinstance(shape, Joined):
+        facets = [scale * part @ turn.T + np.asarray(translation) for part in shape.facets]
+        return Joined([placed(part, rotation, translation, scale) for part in shape.shapes], facets)
     if not isinstance(shape, Placed):
         return moved
     both, origin = turn @ np.asarray(shape.rotation), np.asarray(shape.translation)
