@@ -40,8 +40,8 @@ output = Path("output/five_links")
 
 # ## Geometry
 #
-# Wire of 16 mm, pitch 48 mm. `chain` turns the links and moves each along the axis until it touches the one
-# before: the clearance, measured between nodes and facets, is zero. Links need not be alike.
+# Wire of 16 mm, pitch 48 mm. `chain` turns the links and moves each along the axis until its crown touches
+# the one before. Links need not be alike.
 
 links = chain([LinkShape(n_around=36, n_a=5, n_b=14)] * 5, comm=comm)
 names = [f"link {number}" for number in range(1, len(links.links) + 1)]

@@ -177,7 +177,6 @@ assert 0.02 < abs(found["node"]["a"] / a - 1) < 0.05
 # - A rubber block: give it another material; $E^*$ knows both.
 # - Twice as many cells: the errors fall, also those that the state itself tells. Where they are large, cells
 #   are dark in `error.png`.
-# - Quadratic cells on a plane: `quadratic(ball, {"contact": ...})` from `fenics_contact.geometry` bends them
-#   onto the sphere.
+# - Quadratic cells on a plane: `quadratic(ball)` from `fenics_contact.geometry` bends them onto the sphere.
 # - A rigid plane instead of the block: `RigidPlane((0, 0, 0), (0, 0, 1))` as master of `Surface("ball",
 #   "contact")`; every node is then kept off the plane, and both discretisations are the same.

@@ -41,7 +41,7 @@ SOLVER = FaceNewton(tolerance=1e-11)
 #: A short-link chain, coarse; soft enough that ten nodes touch.
 LINK = LinkShape(inner_radius=10.0, n_around=24, n_a=2, n_b=8)
 BRONZE = IsotropicElasticity(4.2e4, 0.3)
-PULL = 80e3
+PULL = 50e3
 BOXES = (4, 1, 1)
 
 
