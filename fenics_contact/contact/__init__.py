@@ -1,5 +1,6 @@
 """Equilibrium of scenes with contact and friction."""
 
+from fenics_contact.contact.area import contact_area
 from fenics_contact.contact.coulomb import FixedPoint
 from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.equilibrium import find_state, solve_scene
@@ -23,6 +24,7 @@ __all__ = [
     "Status",
     "UnheldMotion",
     "check_held",
+    "contact_area",
     "contact_fields",
     "find_state",
     "gathered_fields",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fenics_contact.contact import State, Status, UnheldMotion
+from fenics_contact.contact import State, Status, UnheldMotion, contact_area
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.feti import DirectSystem
 from fenics_contact.io.described_scene import described_scene, readable
@@ -215,6 +215,7 @@ def _pair(state: State, number: int) -> dict[str, Any]:
         "force": contact.force[mine].sum(axis=0),
         "normal_force": float(contact.normal_force[mine].sum()),
         "peak_pressure": float(contact.pressure[mine].max(initial=0.0)),
+        "area": contact_area(state, number),
         "smallest_gap": float(contact.gap[mine].min()) if len(mine) else None,
         "largest_slip": float(np.linalg.norm(contact.slip[mine], axis=1).max(initial=0.0)),
     }
@@ -232,6 +233,8 @@ def _errors(state: State) -> dict[str, Any]:
         "algebraic": readable(found.algebraic),
         "friction": readable(found.friction),
         "discretisation": readable(found.discretisation),
+        "geometry": readable(found.geometry),
+        "peak_pressure_by_geometry": readable(found.peak_by_geometry),
         "by_body": readable(found.by_body),
     }
 
