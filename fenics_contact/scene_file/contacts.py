@@ -10,6 +10,7 @@ from fenics_contact import scene
 from fenics_contact.scene import ContactPair, Friction, RigidObstacle, Surface, Tie
 from fenics_contact.scene_file.expression import Expression
 from fenics_contact.scene_file.values import Part, Scalar, Triple, Vector, chooser, kind_of
+from fenics_contact.surfaces import Geometry
 
 
 class SurfaceOfBody(Part):
@@ -133,6 +134,10 @@ AnyFriction: TypeAlias = Annotated[
     | Annotated[TrescaFriction, Tag("<tresca>")],
     kind_of("law", LAWS),
 ]
+GEOMETRY = (
+    "what gaps are measured between; best: the true shapes that the meshes know, else smooth surfaces "
+    "through the nodes; reconstructed: always the latter; faceted: the flat facets, for comparison"
+)
 DISCRETISATION = "node: every slave node stays out of its master facet; mortar: weighted means of the gap do"
 
 
@@ -145,11 +150,14 @@ class ContactPart(Part):
     master: Master = Field(description="surface of another body, or a rigid obstacle")
     friction: AnyFriction | None = Field(None, description="law of friction, none by default")
     discretisation: Literal["node", "mortar"] = Field("node", description=DISCRETISATION)
+    geometry: Geometry = Field("best", description=GEOMETRY)
 
     def build(self) -> ContactPair:
         """Return the pair."""
         friction = None if self.friction is None else self.friction.build()
-        return ContactPair(self.slave.build(), self.master.build(), friction, self.discretisation)
+        return ContactPair(
+            self.slave.build(), self.master.build(), friction, self.discretisation, self.geometry
+        )
 
 
 class TiePart(Part):

@@ -17,6 +17,8 @@ from fenics_contact.scene_file.values import PlaceOfFile, needs
 if TYPE_CHECKING:
     from mpi4py import MPI
 
+#: CAD files that only say what is there; a .geo file is a program, which is for Python to run.
+CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 _LABEL = {"anyOf": [{"type": "string"}, {"type": "integer"}]}
 
 
@@ -68,7 +70,7 @@ SurfaceGroups: TypeAlias = Annotated[Any, PlainValidator(_surfaces), WithJsonSch
 
 
 class MeshFile(Placed):
-    """Bodies and surfaces by name from a mesh file: .msh, .xdmf, or another format that meshio reads."""
+    """Bodies and surfaces by name from a file: CAD, .msh, .xdmf, or another format that meshio reads."""
 
     file: PlaceOfFile = Field(description="the file, relative to the folder of the scene file")
     bodies: BodyGroups | None = Field(
@@ -78,13 +80,16 @@ class MeshFile(Placed):
         None, description="groups of facets that are surfaces; or surface to group or groups (all)"
     )
 
+    size: float | None = Field(
+        None, gt=0, description="largest edge of a cell, for CAD files, which gmsh meshes, [length]"
+    )
     labels: str | None = Field(
         None,
-        description="not for .msh and .xdmf: sets, blocks, pieces, or cell data that say which cells belong "
-        "together",
+        description="not for CAD, .msh and .xdmf: sets, blocks, pieces, or cell data that say which cells "
+        "belong together",
     )
     corners_only: bool = Field(
-        False, description="drop all nodes but the corners of quadratic cells (not for .msh and .xdmf)"
+        False, description="drop all nodes but the corners of quadratic cells (not for CAD, .msh and .xdmf)"
     )
 
     def build(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:
@@ -97,14 +102,22 @@ class MeshFile(Placed):
 
     def _read(self, folder: Path, comm: MPI.Comm) -> Mapping[str, BodyMesh]:
         path = folder / self.file
-        if path.suffix in (".msh", ".xdmf") and (self.labels is not None or self.corners_only):
+        kind = path.suffix.lower()
+        if kind in (*CAD, ".msh", ".xdmf") and (self.labels is not None or self.corners_only):
             raise InvalidInputError(
-                f"labels and corners_only are for other formats than .msh and .xdmf, got {self.file!r}: "
+                f"labels and corners_only are for other formats than CAD, .msh and .xdmf, got {self.file!r}: "
                 "choose groups with bodies and surfaces"
             )
-        if path.suffix == ".msh":
+        if kind in CAD:
+            return geometry.read_cad(path, self.size, self.bodies, self.surfaces, comm=comm)
+        if self.size is not None:
+            raise InvalidInputError(
+                f"size is for CAD files ({', '.join(CAD)}), got {self.file!r}: leave it away, or mesh the "
+                "body anew"
+            )
+        if kind == ".msh":
             return geometry.read_msh(path, self.bodies, self.surfaces, comm=comm)
-        if path.suffix == ".xdmf":
+        if kind == ".xdmf":
             return geometry.read_xdmf(path, self.bodies, self.surfaces, comm=comm)
         return geometry.read_mesh(
             path, self.bodies, self.surfaces, labels=self.labels, corners_only=self.corners_only, comm=comm

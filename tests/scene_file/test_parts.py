@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 from fenics_contact import scene
 from fenics_contact.geometry import block, chain, half_disc, hemisphere, read_msh, rectangle
+from fenics_contact.geometry.gmsh_session import gmsh_model
 from fenics_contact.geometry.ring import LinkShape
 from fenics_contact.scene_file import Expression, SceneFile, SceneFileError, VectorExpression, read_scene_file
 from tests.conftest import ROOT
@@ -84,6 +85,23 @@ def test_bodies_come_from_mesh_files() -> None:
         _ = file_of(mesh={"file": str(data)}, body={"part": "nothing"}).scene
     with pytest.raises(SceneFileError, match="labels and corners_only are for other formats than"):
         _ = file_of(mesh={"file": str(data), "labels": "sets"}).scene
+    with pytest.raises(SceneFileError, match=r"size is for CAD files \(.step, .*: leave it away, or mesh"):
+        _ = file_of(mesh={"file": str(data), "size": 1.0}).scene
+
+
+def test_bodies_come_from_cad_files_with_their_shapes(tmp_path: Path) -> None:
+    with gmsh_model("pin") as gmsh:
+        gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 2, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(tmp_path / "pin.brep"))
+    mesh = {"file": str(tmp_path / "pin.brep"), "size": 0.2, "surfaces": {"mantle": 1}, "scale": 2.0}
+    found = file_of(mesh=mesh).scene.bodies["a"].mesh
+    there = np.array([[3.0, 0.0, 1.0], [0.0, 2.0, 3.0]])
+    np.testing.assert_allclose(found.shapes["mantle"].distance(there), [1.0, 0.0], atol=1e-12)
+    coarse = file_of(mesh={**mesh, "size": 0.7}).scene.bodies["a"].mesh
+    assert coarse.n_cells < found.n_cells
+    with pytest.raises(SceneFileError, match=r"labels and corners_only are for other formats than CAD"):
+        _ = file_of(mesh={**mesh, "labels": "sets"}).scene
 
 
 @pytest.mark.parametrize(
@@ -192,6 +210,16 @@ def test_obstacles_and_laws_of_friction_are_those_of_the_package() -> None:
         scene.RigidCylinder((0, 0, -9), (1, 0, 0), 9.0),
         scene.DistanceObstacle(Expression("z")),
     ]
+
+
+@pytest.mark.parametrize("geometry", ["best", "reconstructed", "faceted"])
+def test_a_contact_says_what_gaps_are_measured_between(geometry: str) -> None:
+    contact = {"slave": {"body": "a", "surface": "z0"}, "master": FLOOR}
+    (pair,) = file_of(contacts=[{**contact, "geometry": geometry}]).scene.contacts
+    assert pair.geometry == geometry
+    assert file_of(contacts=[contact]).scene.contacts[0].geometry == "best"
+    with pytest.raises(SceneFileError, match=r"contacts\.0\.geometry must be .*'best', 'reconstructed'"):
+        file_of(contacts=[{**contact, "geometry": "flat"}])
 
 
 def test_a_formula_in_z_is_refused_for_plane_bodies() -> None:
