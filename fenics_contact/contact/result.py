@@ -72,19 +72,21 @@ class ContactResult:
         """Relative tangential displacement since the undeformed state, shape (n, dim - 1), [length]."""
         return self.slip_before + self.slip
 
-    def travel(self, direction: np.ndarray) -> float:
-        """Return how far slave bodies may move before anything is loaded until some point touches, [length].
+    def travel(self, direction: np.ndarray, pair: int = 0) -> float:
+        """Return how far the slave may move, as long as nothing is loaded, until the pair touches, [length].
 
         Args:
-            direction: Unit vector along which they move as rigid bodies, shape (dim,).
+            direction: Unit vector along which it moves as a rigid body, shape (dim,).
+            pair: Number of the contact pair in the scene.
 
         Returns:
             The smallest way of all points that the motion brings closer, negative where bodies overlap;
             infinite if it brings none closer.
         """
-        closing = -self.points.normal @ np.asarray(direction, dtype=np.float64)
+        mine = self.on_pair(pair)
+        closing = -self.points.normal[mine] @ np.asarray(direction, dtype=np.float64)
         ahead = closing > 0.0
-        return float(np.min(self.points.gap[ahead] / closing[ahead], initial=np.inf))
+        return float(np.min(self.points.gap[mine][ahead] / closing[ahead], initial=np.inf))
 
     def count(self, status: Status) -> int:
         """Return how many points have a status."""

@@ -51,7 +51,8 @@ def plot_before_after(
 
     The outlines are those of the undeformed bodies around the strongest contact: in space in two sections, in
     the plane as they are. Their movement is magnified by a factor that is stated. The title says by how much
-    the objective fell, where design points are given.
+    the objective fell, where design points are given, and how far the seat of the slave gave way: what it may
+    travel along its contact force until it touches, unloaded.
 
     Args:
         first: State before, or the design point, for instance ``problem.first``.
@@ -81,12 +82,20 @@ def plot_before_after(
     contacts = before.contact, after.contact
     peaks = [float(contact.pressure[contact.on_pair(pair)].max(initial=0.0)) for contact in contacts]
     facts = f"largest pressure {written(peaks[0])} → {written(peaks[1])} {named.stress}"
+    facts += f"; seat gives way by {written(_retreat(before, after, pair), 2)} {named.length}"
     if isinstance(first, DesignPoint) and isinstance(best, DesignPoint):
         facts = f"{label} {change(first.value, best.value)}; {facts}"
     look = _Look(pair, given, reach, headline(title, facts), named, width)
     draw = _draw_in_plane if before.scene.dim == 2 else _draw_in_space
     comm = before.torn.decomposition.comm
     return draw_picture(comm, target, lambda paper: draw(before, after, paper, look))
+
+
+def _retreat(first: State, best: State, pair: int) -> float:
+    """Return how much farther the slave may travel against the force that the master exerts on it."""
+    resultant = first.contact.force[first.contact.on_pair(pair)].sum(axis=0)
+    way = -resultant / np.linalg.norm(resultant)
+    return best.contact.travel(way, pair) - first.contact.travel(way, pair)
 
 
 def _check(first: State, best: State, pair: int) -> None:
