@@ -182,9 +182,19 @@ MUTATIONS = (
     ),
     Mutation(
         "projections are sought from the origin",
-        "feti/projection.py",
+        "surfaces/projection.py",
         "start = master.points[nodes[:, 0]]",
         "start = 0.0 * master.points[nodes[:, 0]]",
         ("tests/contact/test_far_from_origin.py::test_no_contact_point_is_lost_far_from_the_origin",),
+    ),
+    Mutation(
+        "slopes of true surfaces stay when their nodes move",
+        "shape/surface_derivative.py",
+        "by_edges = -scaled[..., None] * c[:, :, None]",
+        "by_edges = -0.0 * scaled[..., None] * c[:, :, None]",
+        (
+            "tests/shape/test_projection_derivative.py::test_each_term_agrees_with_central_differences",
+            "tests/shape/test_chain_sensitivity.py::test_the_adjoint_agrees_with_central_differences",
+        ),
     ),
 )

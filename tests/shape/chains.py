@@ -32,6 +32,7 @@ from fenics_contact.shape import (
     SurfaceDesign,
     TotalPotential,
 )
+from fenics_contact.surfaces import Geometry
 from tests.contact.gallery import Friction
 from tests.shape.quotients import Line, Remembering
 
@@ -59,7 +60,7 @@ def crossed_links() -> TwoLinks:
     return TwoLinks(links.first, tilted)
 
 
-def chain(friction: Friction) -> Scene:
+def chain(friction: Friction, geometry: Geometry = "best") -> Scene:
     """Link 1 is held at its far crown, link 2 pulled at its own; without friction a guide steadies it."""
     links = crossed_links()
     guide = [] if friction else [Support("link2", "grip", (None, 0.0, 0.0))]
@@ -67,7 +68,7 @@ def chain(friction: Friction) -> Scene:
         {"link1": Body(links.first.mesh, BRONZE), "link2": Body(links.second.mesh, BRONZE)},
         [Support("link1", "grip"), *guide],
         [TotalForce("link2", "grip", (PULL, 0.0, 0.0))],
-        [ContactPair(Surface("link2", "contact"), Surface("link1", "contact"), friction)],
+        [ContactPair(Surface("link2", "contact"), Surface("link1", "contact"), friction, geometry=geometry)],
     )
 
 
@@ -79,8 +80,10 @@ def chain_designs() -> tuple[SurfaceDesign, SurfaceDesign]:
     )
 
 
-def chain_problem(friction: Friction, comm: MPI.Comm = MPI.COMM_SELF, **more: Any) -> Remembering:
-    scene = chain(friction)
+def chain_problem(
+    friction: Friction, comm: MPI.Comm = MPI.COMM_SELF, geometry: Geometry = "best", **more: Any
+) -> Remembering:
+    scene = chain(friction, geometry)
     partitions = {name: box_partition(body.mesh, BOXES) for name, body in scene.bodies.items()}
     return Remembering(scene, partitions, chain_designs(), TotalPotential(), comm, solver=SOLVER, **more)
 
@@ -97,10 +100,10 @@ REGIMES: dict[str, tuple[Friction, float]] = {
 
 
 @cache
-def line(regime: str) -> Line:
+def line(regime: str, geometry: Geometry = "best") -> Line:
     """A line of designs without symmetry, on which every point keeps its status."""
     friction, step = REGIMES[regime]
-    problem = chain_problem(friction)
+    problem = chain_problem(friction, geometry=geometry)
     alpha = 0.03 * np.random.default_rng(1).standard_normal(problem.size)
     direction = np.random.default_rng(5).standard_normal(problem.size)
     # The small step of all slip would leave some remainders at the level of rounding.

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.contact import Status
+from fenics_contact.surfaces import Geometry
 from tests.shape.chains import REGIMES, line
 from tests.shape.objectives import objectives
 from tests.shape.quotients import Line
@@ -55,6 +56,20 @@ def test_taylor_remainders_are_quadratic(regime: str, objective: str) -> None:
 def test_the_regimes_have_different_derivatives() -> None:
     slopes = [line(regime).slope(OBJECTIVES["energy"]) for regime in REGIMES]
     assert np.abs(np.diff(np.sort(slopes))).min() > 1e-2 * np.abs(slopes).min()
+
+
+@pytest.mark.parametrize("objective", ["energy", "stress", "normal forces"])
+@pytest.mark.parametrize("geometry", ["reconstructed", "faceted"])
+def test_derivatives_are_right_wherever_the_surface_between_nodes_comes_from(
+    geometry: Geometry, objective: str
+) -> None:
+    here, known, judge = line("mixed", geometry), line("mixed"), OBJECTIVES[objective]
+    assert here.is_smooth()
+    assert min(here.counts().values()) > 1
+    assert here.slope(judge) != pytest.approx(known.slope(judge), rel=1e-3), "it is the same surface"
+    assert here.steepness(judge) > 0.02
+    assert here.miss(judge) < 1e-5
+    assert here.taylor_rate(judge) > 1.9
 
 
 def test_one_adjoint_gives_the_derivative_along_every_variable() -> None:
