@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.errors import InfeasibleError, InvalidInputError
-from fenics_contact.geometry import block
+from fenics_contact.geometry import block, hemisphere
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -107,6 +107,20 @@ def test_contact_points_in_the_wrong_place_are_noticed(state: State, part, chang
     points = replace(state.contact.points, **{part: change(getattr(state.contact.points, part))})
     found = complaints(replace(state, contact=replace(state.contact, points=points)), stacked())
     assert any(complaint in words for words in found), found
+
+
+def test_gaps_to_the_facets_of_a_round_master_are_noticed() -> None:
+    floor = block((-0.5, -0.5, -0.5), (0.5, 0.5, 0.0), (5, 5, 2))
+    scene = Scene(
+        {"floor": Body(floor, STEEL), "ball": Body(hemisphere(2.0, 3), STEEL)},
+        [Support("floor", "z0"), Support("ball", "top", (0.0, 0.0, -0.001))],
+        contacts=[ContactPair(Surface("floor", "z1"), Surface("ball", "contact"))],
+    )
+    for geometry, noticed in (("best", False), ("reconstructed", True), ("faceted", True)):
+        pair = replace(scene.contacts[0], geometry=geometry)
+        made = Sample(-1, "ball", replace(scene, contacts=[pair]), None, 1e-8)
+        found = complaints(solve_scene(made.scene, None, MPI.COMM_SELF, tolerance=1e-8), made)
+        assert any("a gap apart along the normal" in words for words in found) == noticed, (geometry, found)
 
 
 def test_a_point_that_is_lost_is_noticed(state: State) -> None:
