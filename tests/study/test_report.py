@@ -26,7 +26,7 @@ def test_results_survive_their_file(tmp_path: Path) -> None:
 def test_the_table_has_advice_rates_certificates_runs_and_failures(tmp_path: Path) -> None:
     write_report(tmp_path, results(), figures=False)
     text = (tmp_path / "table.md").read_text()
-    assert "- For 2 % in peak pressure: 4 cells on the radius" in text
+    assert "- For 2 %, 1 % in peak pressure: 4 cells on the radius" in text
     assert "| peak pressure | theory |  | 2.00 | 1.00 |" in text
     assert "| energy | extrapolated | -10 N mm | 2.00 | 2.00 |" in text
     assert "finest mesh: several numbers are not extrapolated" in text
@@ -65,7 +65,7 @@ def test_the_page_of_all_studies_takes_its_numbers_from_them(tmp_path: Path) -> 
     text = write_overview(tmp_path).read_text()
     assert text.count("## A sample") == 2
     assert "![accuracy](second/accuracy.png)" in text
-    assert "- For 2 % in peak pressure: 4 cells on the radius" in text
+    assert "- For 2 %, 1 % in peak pressure: 4 cells on the radius" in text
     assert "| energy | extrapolated | -10 N mm | 2.00 | 2.00 |" in text
     assert "| error of the displacement | its own estimate | | 1.00 | 1.00 |" in text
     assert "2.00 to 2.00 times the true error in 6 runs, 0 of them out of bounds" in text
