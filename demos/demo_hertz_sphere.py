@@ -165,12 +165,13 @@ plot_curves(
 if comm.rank == 0:
     print(f"pictures and files in {output}/")
 
-# Peak pressure and contact radius of the mortar method agree with Hertz to 2 %, of the node method to 5 %.
+# Peak pressure and contact radius of the mortar method agree with Hertz to 1 %. With contact by nodes the
+# radius does, too, but the peak is 8 % off: forces of single nodes waver where meshes do not match.
 
-assert abs(found["mortar"]["peak"] / p0 - 1) < 0.02
-assert abs(found["mortar"]["a"] / a - 1) < 0.02
-assert 0.02 < abs(found["node"]["peak"] / p0 - 1) < 0.05
-assert 0.02 < abs(found["node"]["a"] / a - 1) < 0.05
+assert abs(found["mortar"]["peak"] / p0 - 1) < 0.01
+assert abs(found["mortar"]["a"] / a - 1) < 0.01
+assert 0.05 < abs(found["node"]["peak"] / p0 - 1) < 0.1
+assert abs(found["node"]["a"] / a - 1) < 0.01
 
 # ## What to try next
 #
