@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.accuracy.moduli import moduli
 from fenics_contact.contact.state import State
 from fenics_contact.scene import Surface
 from fenics_contact.scene.true_surfaces import surface_of
@@ -54,6 +53,8 @@ def _modulus(state: State, pair: int) -> float:
 
     M and λ are the means of the moduli C_iiii and C_iijj, of isotropic bodies those of Lamé.
     """
+    from fenics_contact.accuracy.moduli import moduli  # not before an area is asked for
+
     scene, forms = state.scene, state.torn.decomposition.forms
     compliance = 0.0
     for surface in (scene.contacts[pair].slave, scene.contacts[pair].master):

@@ -58,7 +58,9 @@ def reconstructed(surface: FacetedSurface, order: int = 2) -> FacetedSurface:
         curved = sum(np.einsum("nki,nkij,nkj->nk", along, bend, along) for bend in ends) / 2
         rest[:, :edges] = -(curved**3) / (128.0 * np.einsum("nkd,nkd->nk", along, along))
     at_nodes = np.zeros_like(surface.averaged)
-    whole = np.bincount(wedges.node)[wedges.node] == 1  # on creases the averaged normals stay
+    # On creases the averaged normals stay, also where a surface makes one with its mirror image.
+    whole = np.bincount(wedges.node)[wedges.node] == 1
+    whole &= (wedges.mirrored == surface.mirrored[wedges.node]).all(axis=1)
     at_nodes[wedges.node[whole]] = normals[whole] - surface.averaged[wedges.node[whole]]
     return replace(surface, relief=Relief(at_nodes, corners, rest))
 

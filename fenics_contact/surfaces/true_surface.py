@@ -95,7 +95,7 @@ def by_shape(surface: FacetedSurface, shape: SurfaceShape) -> FacetedSurface:
     """Return a surface with the relief of the shape that its nodes lie on.
 
     Nodes that lie off the shape by a little stay where they are; the heights between them are taken from
-    there. Where several shapes meet in a crease, each facet keeps to its own.
+    there. Where several shapes meet in a crease, or one its mirror image, each facet keeps to its own.
 
     Args:
         surface: Facets without relief.
@@ -106,10 +106,10 @@ def by_shape(surface: FacetedSurface, shape: SurfaceShape) -> FacetedSurface:
     for part, mine in parts:
         nodes = surface.facets[mine]
         found = asked(part, "normals", surface.points[nodes.ravel()]).reshape(*nodes.shape, surface.dim)
-        corners[mine] = _unit(np.where(surface.mirrored[nodes], 0.0, found))
+        corners[mine] = _unit(found)
     normals = np.zeros_like(surface.averaged)
     np.add.at(normals, surface.facets, corners)
-    normals = _unit(normals)
+    normals = _unit(np.where(surface.mirrored, 0.0, normals))
     turned = np.einsum("nkd,nkd->nk", corners, normals[surface.facets]) < np.cos(CREASE)
     creased = np.isin(np.arange(len(normals)), surface.facets[turned])
     normals[creased] = surface.averaged[creased]

@@ -161,7 +161,7 @@ def test_rigid_motions_are_free_of_energy_far_from_the_origin() -> None:
 def test_a_slave_node_whose_projection_is_not_found_is_told(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from fenics_contact.feti import projection
+    from fenics_contact.surfaces import projection
 
     monkeypatch.setattr(projection, "RESIDUAL", 0.0)  # no answer of Newton's method is good enough
     scene = blocks(3)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from fenics_contact.geometry import Cylinder, Joined, Plane, SurfaceShape, placed
-from fenics_contact.surfaces.facets import FacetedSurface, shape_values
+from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface, shape_values
 from fenics_contact.surfaces.projection import interpolated_normal
+from fenics_contact.surfaces.reconstruction import reconstructed
 from fenics_contact.surfaces.relief import corner_normals, heights
 from fenics_contact.surfaces.true_surface import by_shape, height_over
 from tests.feti.mortar_surfaces import lattice
@@ -89,6 +90,57 @@ def test_where_shapes_touch_smoothly_there_is_no_crease(kind: str) -> None:
         corner_normals(true, np.arange(len(part))), true.normals[surface.facets], atol=1e-12
     )
     assert misses(true, FILLET, part) < 1e-2 * misses(surface, FILLET, part)
+
+
+def arch(kind: str, shift: float, *, half: bool) -> tuple[FacetedSurface, SurfaceShape]:
+    """A pointed arch of two cylinders, or its half beside the plane of symmetry y = 0 with its own one."""
+    x, y = np.meshgrid(np.linspace(0, 1, 4), np.linspace(0, 1, 7))
+    points = np.stack([x, y, np.sqrt(4.0 - (y + shift) ** 2)], axis=-1).transpose(1, 0, 2)
+    surface = lattice(points, kind, True)
+    right, left = (Cylinder((0, sign * shift, 0), (1, 0, 0), 2.0) for sign in (-1, 1))
+    mirrored = np.zeros(surface.points.shape, dtype=bool)
+    mirrored[surface.points[:, 1] == 0.0, 1] = True
+    if half:
+        return faceted_surface(surface.points, surface.facets, mirrored), right
+    on_plane, count = mirrored[:, 1], len(surface.points)
+    image = np.where(on_plane, np.arange(count), count + np.cumsum(~on_plane) - 1)
+    both = np.concatenate([surface.points, surface.points[~on_plane] * (1, -1, 1)])
+    facets = np.concatenate([surface.facets, image[surface.facets[:, ::-1]]])
+    corners = np.split(both[facets], 2)
+    return faceted_surface(both, facets), Joined((right, left), corners)
+
+
+@pytest.mark.parametrize("known", ["shape", "nodes"])
+@pytest.mark.parametrize("kind", ["quads", "triangles"])
+def test_half_an_arch_is_half_of_the_whole(kind: str, known: str) -> None:
+    """At the plane of symmetry there is a crease with the mirror image, whose normals lie in the plane."""
+    true = []
+    for half in (False, True):
+        surface, shape = arch(kind, 0.8, half=half)
+        true.append(by_shape(surface, shape) if known == "shape" else reconstructed(surface))
+    whole, part = true
+    facets = np.arange(len(part.facets))
+    np.testing.assert_array_equal(part.facets, whole.facets[facets])
+    np.testing.assert_allclose(part.normals, whole.normals[: len(part.normals)], atol=1e-12)
+    np.testing.assert_allclose(corner_normals(part, facets), corner_normals(whole, facets), atol=1e-12)
+    for local in np.random.default_rng(4).uniform(0.1, 0.4, (4, 2)):
+        at = np.tile(local, (len(facets), 1))
+        found, wanted = heights(part, facets, at).value, heights(whole, facets, at).value
+        assert np.abs(wanted).max() > 1e-3
+        np.testing.assert_allclose(found, wanted, atol=1e-12)
+    ridge = part.mirrored.any(axis=1)
+    np.testing.assert_array_equal(part.normals[ridge, 1], 0.0)
+    assert np.abs(corner_normals(part, facets)[ridge[part.facets]][:, 1]).min() > 0.2, "it has no ridge"
+
+
+@pytest.mark.parametrize("kind", ["quads", "triangles"])
+def test_a_shape_that_a_plane_of_symmetry_cuts_squarely_has_no_ridge_there(kind: str) -> None:
+    surface, shape = arch(kind, 0.0, half=True)
+    true = by_shape(surface, shape)
+    np.testing.assert_allclose(true.normals, shape.normals(surface.points), atol=1e-12)
+    np.testing.assert_allclose(
+        corner_normals(true, np.arange(len(true.facets))), true.normals[true.facets], atol=1e-12
+    )
 
 
 def test_joined_shapes_move_with_their_facets() -> None:
