@@ -21,7 +21,7 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demos notebooks test test-slow test-hard test-claims mutants docs benchmark studies study-optimisation study-optimisers lint setup
+.PHONY: help demo demos notebooks test test-slow test-hard test-claims mutants docs benchmark studies study-optimisation study-optimisers study-surfaces lint setup
 
 help: ## Show this list
 	@echo "Targets:"
@@ -69,6 +69,9 @@ study-optimisation: $(prepare) ## Measure what state tolerances do to an optimis
 
 study-optimisers: $(prepare) ## Compare SciPy's optimisers with the bundle method; docs/studies/
 	$(python) -m benchmarks.optimisers $(if $(filter quick,$(BENCH)),--quick)
+
+study-surfaces: $(prepare) ## Compare facets, reconstructed and true surfaces with theory; docs/studies/
+	$(python) -m benchmarks.true_surfaces
 
 benchmark: $(prepare) ## Measure time, memory and products; results in benchmarks/
 	$(python) -m benchmarks $(if $(filter quick,$(BENCH)),--quick)

@@ -1,0 +1,90 @@
+"""The study of true surfaces: its page is its record, and its record can be measured again."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from benchmarks.true_surfaces.cases import CASES
+from benchmarks.true_surfaces.measuring import BY_MORTAR, FACETS, errors, known
+from benchmarks.true_surfaces.orders import SURFACES, gap_errors
+from benchmarks.true_surfaces.report import page
+from tests.conftest import ROOT
+
+PAGE = ROOT / "docs" / "studies" / "true_surfaces.md"
+PLANE = ("disc on a block", "shaft in a bush")
+
+
+@pytest.fixture(scope="module")
+def record() -> dict[str, Any]:
+    return json.loads(PAGE.with_suffix(".json").read_text())
+
+
+def measured_again(record: dict[str, Any], name: str, facets: int, discretisation: Any) -> dict[str, Any]:
+    """Measure one line of the table anew and compare it with the record."""
+    (case,) = (c for c in record["cases"] if (c["case"], c["discretisation"]) == (name, discretisation))
+    if case["exact"]["from"] == "theory":
+        assert case["exact"] == pytest.approx(known(name))
+    (line,) = (run for run in case["runs"] if run["facets"] == facets)
+    found = errors(name, facets, discretisation, case["exact"])
+    for quantity in ("peak", "area"):
+        assert found[quantity] == pytest.approx(line[quantity], rel=2e-3, abs=2e-4)
+    return found
+
+
+def test_the_page_is_its_record_and_complete(record: dict[str, Any]) -> None:
+    assert PAGE.read_text() == page(record)
+    expected = [
+        (name, way) for name in CASES for way in ("node", "mortar") if way == "node" or name in BY_MORTAR
+    ]
+    assert [(case["case"], case["discretisation"]) for case in record["cases"]] == expected
+    assert all(tuple(run["facets"] for run in case["runs"]) == FACETS for case in record["cases"])
+    assert [each["surface"] for each in record["gaps"]] == list(SURFACES)
+
+
+def test_true_surfaces_are_right_where_facets_are_far_off(record: dict[str, Any]) -> None:
+    for case in record["cases"]:
+        for run in case["runs"]:
+            coarse = run["facets"] == 8
+            assert run["peak"]["faceted"] > 0.25
+            assert abs(run["peak"]["best"]) < (0.05 if coarse else 0.03)
+            assert abs(run["area"]["best"]) < 0.025
+            assert abs(run["peak"]["reconstructed"]) < (0.085 if coarse else 0.03)
+
+
+def test_gaps_converge_as_they_should(record: dict[str, Any]) -> None:
+    for each in record["gaps"]:
+        assert each["orders"]["faceted"] == pytest.approx(2.0, abs=0.1)
+        assert each["orders"]["reconstructed"] > 3.0
+        assert each["orders"]["best"] > 4.0
+
+
+@pytest.mark.parametrize("name", PLANE)
+@pytest.mark.parametrize("facets", [8, 16])
+def test_a_plane_case_is_what_the_record_says(record: dict[str, Any], name: str, facets: int) -> None:
+    found = measured_again(record, name, facets, "node")
+    assert found["peak"]["faceted"] > 0.9
+    assert abs(found["peak"]["best"]) < 0.05
+
+
+def test_mortar_is_as_wrong_by_facets_as_the_record_says(record: dict[str, Any]) -> None:
+    found = measured_again(record, "shaft in a bush", 16, "mortar")
+    assert found["peak"]["faceted"] > 2.0
+
+
+def test_gaps_of_a_disc_are_what_the_record_says(record: dict[str, Any]) -> None:
+    (stored,) = (each for each in record["gaps"] if each["surface"] == "disc")
+    found = gap_errors("disc")
+    for way, misses in stored["errors"].items():
+        assert found["errors"][way] == pytest.approx(misses, rel=1e-2, abs=1e-13)
+
+
+@pytest.mark.claim
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in CASES if name not in PLANE])
+def test_a_solid_case_is_what_the_record_says(record: dict[str, Any], name: str) -> None:
+    found = measured_again(record, name, 8, "node")
+    assert found["peak"]["faceted"] > 1.5
+    assert abs(found["peak"]["best"]) < 0.02
