@@ -37,6 +37,7 @@ from fenics_contact.scene.obstacles import (
     RigidPlane,
     RigidSphere,
 )
+from fenics_contact.scene.pair_geometry import PairGeometry
 from fenics_contact.scene.pairs import (
     ContactPair,
     Coulomb,
@@ -71,6 +72,7 @@ __all__ = [
     "Material",
     "OrthotropicElasticity",
     "OrthotropicPlaneStress",
+    "PairGeometry",
     "Plan",
     "PlaneStrain",
     "PlaneStress",

@@ -13,6 +13,7 @@ from fenics_contact.geometry import BodyMesh
 from fenics_contact.linalg.cost_model import expected_bytes
 from fenics_contact.scene.effects import Effect, EffectName, effects_of
 from fenics_contact.scene.held import held_by_supports
+from fenics_contact.scene.pair_geometry import PairGeometry, pair_geometry
 from fenics_contact.scene.pairs import Surface
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ class Plan:
         coarse_motions: Rigid motions of the subdomains, the size of the coarse problem; 0 without one.
         adjoint: Whether sensitivities are asked for, which need one adjoint solve a design.
         memory: Expected memory of all ranks together without their libraries, [bytes].
+        contacts: What the gaps of each contact pair are measured between.
     """
 
     effects: tuple[Effect, ...]
@@ -67,6 +69,7 @@ class Plan:
     coarse_motions: int
     adjoint: bool
     memory: float
+    contacts: tuple[PairGeometry, ...]
 
     def __str__(self) -> str:
         """Return one line for each decision."""
@@ -83,6 +86,7 @@ class Plan:
             "coarse problem": coarse,
             "adjoint": "one solve a design" if self.adjoint else "none",
             "memory": f"{self.memory / 1e6:.0f} MB",
+            **{f"pair {number}": str(pair) for number, pair in enumerate(self.contacts)},
         }
         return "\n".join(f"{name:15s} {value}" for name, value in lines.items())
 
@@ -116,6 +120,7 @@ def make_plan(scene: Scene, partitions: Mapping[str, np.ndarray], *, sensitivity
         coarse_motions=motions,
         adjoint=sensitivity,
         memory=factors + BYTES_PER_UNKNOWN * unknowns + 8.0 * motions**2,
+        contacts=tuple(pair_geometry(scene, pair) for pair in scene.contacts),
     )
 
 

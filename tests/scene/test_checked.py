@@ -56,7 +56,7 @@ SAMPLES: dict[type, Any] = {
     )
 }  # fmt: skip
 #: What the package hands out and nobody gives it.
-TOLD = {package.Effect, package.Plan}
+TOLD = {package.Effect, package.PairGeometry, package.Plan}
 
 
 def test_every_part_of_a_scene_has_a_sample_here() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.feti import DirectSystem, DualSystem
-from fenics_contact.geometry import block, box_partition, rectangle
+from fenics_contact.geometry import block, box_partition, half_cylinder, half_disc, hemisphere, rectangle
 from fenics_contact.scene import (
     Body,
     ConeKind,
@@ -21,15 +21,19 @@ from fenics_contact.scene import (
     IsotropicElasticity,
     Material,
     PlaneStrain,
+    Pressure,
     RigidPlane,
     Scene,
     SolverKind,
     Support,
     Surface,
     Tie,
+    TotalForce,
     Traction,
     Tresca,
 )
+from fenics_contact.surfaces import Geometry
+from fenics_contact.theory import contact_modulus, hertz_line, hertz_point
 
 STEEL = IsotropicElasticity(1000.0, 0.3)
 UNCUT = {"lower": (1, 1, 1), "upper": (1, 1, 1)}
@@ -175,3 +179,88 @@ def test_a_plane_scene_has_one_tangential_multiplier_a_node_and_three_motions_a_
     state = solve_scene(scene, cut, MPI.COMM_SELF, tolerance=1e-6)
     assert state.counts["torn_unknowns"] == plan.unknowns == 2 * 2 * 25
     assert state.counts["tangential_multipliers"] == 9
+
+
+STIFF = contact_modulus(1000.0, 0.3, np.inf, 0.0)
+
+
+def ball(symmetry: Literal["xy", ""], **pair: Any) -> Scene:
+    """A ball of radius 10, or a quarter of it, pressed by a force of 4 on the whole ball."""
+    mesh = hemisphere(10.0, 8, symmetry=symmetry)
+    supports = [Support("ball", "x0", (0.0, None, None)), Support("ball", "y0", (None, 0.0, None))]
+    load = TotalForce("ball", "top", (0.0, 0.0, -1.0 if symmetry else -4.0))
+    floor = ContactPair(Surface("ball", "contact"), RigidPlane((0, 0, 0), (0, 0, 1)), **pair)
+    return Scene({"ball": Body(mesh, STEEL)}, supports if symmetry else [], [load], [floor])
+
+
+@pytest.mark.parametrize("symmetry", ["xy", ""])
+def test_the_plan_tells_by_how_much_facets_miss_a_ball(symmetry: Literal["xy", ""]) -> None:
+    (found,) = ball(symmetry).plan().contacts
+    hertz = hertz_point(4.0, (0.1, 0.1), STIFF)
+    assert (found.slave, found.master) == ("Sphere", "RigidPlane")
+    assert found.approach == pytest.approx(hertz.approach, rel=0.02)
+    # The facets that may touch reach a little beyond √2 times Hertz's radius.
+    mesh = ball(symmetry).bodies["ball"].mesh
+    corners = mesh.points[mesh.surfaces["contact"]]
+    mine = np.hypot(*corners[:, :, :2].mean(axis=1).T) < 1.2 * np.sqrt(2) * hertz.semi_axes[0]
+    above = np.linalg.norm(corners.mean(axis=1) - (0, 0, 10.0), axis=1)
+    assert (10.0 - above[mine]).min() < found.height < 1.3 * (10.0 - above[mine]).max()
+    assert found.height < 0.2 * (10.0 - above).max(), "far away facets are larger, and do not count"
+    assert f"{100 * found.height / hertz.approach:.2g} % of the approach" in str(found)
+
+
+@pytest.mark.parametrize(("geometry", "named"), [("reconstructed", "reconstructed"), ("faceted", "facets")])
+def test_the_plan_names_the_geometry_that_was_asked_for(geometry: Geometry, named: str) -> None:
+    (found,), (best,) = (ball("xy", **pair).plan().contacts for pair in ({"geometry": geometry}, {}))
+    assert found.slave == named
+    assert found.height == pytest.approx(best.height, rel=0.05)
+    assert f"{named} on RigidPlane; facets miss it by up to" in str(ball("xy", geometry=geometry).plan())
+
+
+def test_the_plan_knows_lines_of_contact() -> None:
+    floor = RigidPlane((0, 0), (0, 1))
+    disc = Scene(
+        {"disc": Body(half_disc(10.0, 8), PlaneStrain(1000.0, 0.3))},
+        [Support("disc", "x0", (0.0, None))],
+        [Pressure("disc", "top", 0.1)],
+        [ContactPair(Surface("disc", "contact"), floor)],
+    )
+    depth = 0.1 * hertz_line(2.0, 0.1, STIFF).half_width ** 2 / 2
+    assert disc.plan().contacts[0].approach == pytest.approx(depth, rel=0.02)
+    bar = Scene(
+        {"bar": Body(half_cylinder(10.0, 5.0, 8, 3), STEEL)},
+        [Support("bar", "x0", (0.0, None, None))],
+        [Traction("bar", "top", (0.0, 0.0, -0.1))],
+        [ContactPair(Surface("bar", "contact"), RigidPlane((0, 0, 0), (0, 0, 1)))],
+    )
+    (found,) = bar.plan().contacts
+    assert found.slave == "Cylinder"
+    assert found.approach == pytest.approx(depth, rel=0.2)
+
+
+def test_an_approach_may_be_prescribed_or_unknown() -> None:
+    flat = stack(contacts=pair()).plan().contacts[0]
+    assert (flat.slave, flat.master, flat.height, flat.approach) == ("flat", "flat", 0.0, None)
+    assert str(flat) == "flat on flat; facets miss nothing"
+    lowered = [*ball("xy").supports, Support("ball", "top", (None, None, -0.5))]
+    (found,) = replace(ball("xy"), supports=lowered, loads=[]).plan().contacts
+    assert found.approach == 0.5
+    unknown = replace(ball("xy"), loads=[Pressure("ball", "top", lambda x: 1.0 + x[:, 0])]).plan().contacts[0]
+    assert (unknown.approach, unknown.share) == (None, None)
+    assert "of an unknown part of the approach" in str(unknown)
+    assert unknown.height > 3 * found.height, "where nothing is known of the approach all facets count"
+
+
+def test_facets_of_the_master_count_as_those_of_the_slave() -> None:
+    round_one, flat = hemisphere(10.0, 8), block((0, 0, -2), (3, 3, 0), (6, 6, 4))
+    pairs = [Surface("ball", "contact"), Surface("plate", "z1")]
+    guides = [Support("ball", "x0", (0.0, None, None)), Support("ball", "y0", (None, 0.0, None))]
+    for slave, master in (pairs, pairs[::-1]):
+        scene = Scene(
+            {"ball": Body(round_one, STEEL), "plate": Body(flat, STEEL)},
+            [Support("plate", "z0"), *guides, Support("ball", "top", (None, None, -0.05))],
+            contacts=[ContactPair(slave, master)],
+        )
+        (found,) = scene.plan().contacts
+        assert {found.slave, found.master} == {"Sphere", "flat"}
+        assert found.height > 1e-3

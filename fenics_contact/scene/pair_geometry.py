@@ -1,0 +1,148 @@
+"""What the gaps of contact pairs are measured between, and by how much flat facets would miss it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fenics_contact.geometry import Joined, Placed, SurfaceShape, asked
+from fenics_contact.scene.approach import displacement_along, force_along, hertz_approach, modulus_of
+from fenics_contact.scene.pairs import ContactPair, Surface
+from fenics_contact.scene.true_surfaces import surface_of
+from fenics_contact.surfaces import FacetedSurface, heights
+from fenics_contact.surfaces.projection import project
+
+if TYPE_CHECKING:
+    from fenics_contact.scene.scene import Scene
+
+#: Nodes of a slave that are looked at, those nearest to the master.
+MOST = 2000
+
+
+@dataclass(frozen=True)
+class PairGeometry:
+    """What gaps of a contact pair are measured between, and by how much flat facets miss that.
+
+    Attributes:
+        slave: The slave's surface: the name of its shape (``"Torus"``), ``"reconstructed"``, ``"flat"`` where
+            a surface through the nodes is that of the facets, or ``"facets"`` where these were asked for.
+        master: The same of the master; of a rigid obstacle the name of its class.
+        height: Largest height of the true surfaces over the middles of their facets, [length], where the gap
+            is larger than the smallest one by no more than the approach; everywhere if that is not known.
+        approach: Estimate of how far the bodies come closer, [length]: by Hertz's theory under the largest
+            resultant of the loads on one body, or by the largest displacement along the normal that a support
+            prescribes, if that is larger. None if neither can be said.
+    """
+
+    slave: str
+    master: str
+    height: float
+    approach: float | None
+
+    @property
+    def share(self) -> float | None:
+        """By how much facets miss the surfaces, relative to the approach; None if that is not known."""
+        return None if not self.approach else self.height / self.approach
+
+    def __str__(self) -> str:
+        """Say it in one line."""
+        words = f"{self.slave} on {self.master}; facets "
+        if self.height == 0.0:
+            return words + "miss nothing"
+        share = self.share
+        known = "of an unknown part" if share is None else f"{100 * share:.2g} %"
+        by = "" if self.approach is None else f" (about {self.approach:.2g})"
+        return words + f"miss it by up to {self.height:.2g}, {known} of the approach{by}"
+
+
+@dataclass(frozen=True)
+class _Meeting:
+    """Nodes of a slave that face the master.
+
+    Attributes:
+        node: Which of the slave's, shape (n,).
+        normal: Normals of the gaps, shape (n, dim).
+        gap: Gaps, shape (n,), [length].
+        facet: Facets of the master that they meet, shape (n,); none on an obstacle.
+    """
+
+    node: np.ndarray
+    normal: np.ndarray
+    gap: np.ndarray
+    facet: np.ndarray
+
+
+def pair_geometry(scene: Scene, pair: ContactPair) -> PairGeometry:
+    """Tell what the gaps of a pair are measured between."""
+    geometry = "best" if pair.geometry == "faceted" else pair.geometry
+    slave = surface_of(scene, pair.slave, geometry)
+    names, surfaces = [_name(scene, pair, pair.slave, slave)], [slave]
+    if isinstance(pair.master, Surface):
+        master = surface_of(scene, pair.master, geometry)
+        names.append(_name(scene, pair, pair.master, master))
+        surfaces.append(master)
+        met = _meeting(slave, master)
+    else:
+        names.append(_shape_name(pair.master))
+        met = _meeting_obstacle(slave, pair.master)
+    if len(met.node) == 0:
+        return PairGeometry(names[0], names[1], 0.0, None)
+    approach = _approach(scene, pair, slave, met)
+    near = met.gap <= met.gap.min() + (np.inf if approach is None else approach)
+    facets = [np.flatnonzero(np.isin(slave.facets, met.node[near]).any(axis=1)), np.unique(met.facet[near])]
+    height = max(_largest_height(each, which) for each, which in zip(surfaces, facets, strict=False))
+    return PairGeometry(names[0], names[1], height, approach)
+
+
+def _name(scene: Scene, pair: ContactPair, surface: Surface, found: FacetedSurface) -> str:
+    if pair.geometry == "faceted":
+        return "facets"
+    shape = scene.bodies[surface.body].mesh.origin.shapes.get(surface.name)
+    if pair.geometry == "best" and shape is not None:
+        return _shape_name(shape)
+    return "flat" if found.relief is None else "reconstructed"
+
+
+def _shape_name(shape: SurfaceShape) -> str:
+    if isinstance(shape, Placed):
+        return _shape_name(shape.shape)
+    if isinstance(shape, Joined):
+        return " and ".join(sorted({_shape_name(part) for part in shape.shapes}))
+    return type(shape).__name__
+
+
+def _meeting(slave: FacetedSurface, master: FacetedSurface) -> _Meeting:
+    away, _ = cKDTree(master.points).query(slave.points)
+    chosen = np.sort(np.argsort(away)[:MOST])
+    hit = project(slave.points[chosen], slave.normals[chosen], master)
+    gap = hit.gap - heights(master, hit.facet, hit.local).value
+    return _Meeting(chosen[hit.point], hit.normal, gap, hit.facet)
+
+
+def _meeting_obstacle(slave: FacetedSurface, obstacle: SurfaceShape) -> _Meeting:
+    normal = asked(obstacle, "normals", slave.points)
+    facing = np.flatnonzero(np.einsum("nd,nd->n", slave.normals, normal) < 0)
+    gap = asked(obstacle, "distance", slave.points[facing])
+    return _Meeting(facing, normal[facing], gap, np.zeros(len(facing), dtype=np.int64))
+
+
+def _approach(scene: Scene, pair: ContactPair, slave: FacetedSurface, met: _Meeting) -> float | None:
+    """Return the estimate of `PairGeometry.approach`."""
+    middle = np.argmin(met.gap)
+    normal, node = met.normal[middle], met.node[middle]
+    sizes = [displacement_along(scene, normal)]
+    force, modulus = force_along(scene, normal), modulus_of(scene, pair)
+    if force is not None and modulus is not None:
+        # Each plane of symmetry through the spot cuts the force in half.
+        whole = force * 2.0 ** np.count_nonzero(slave.mirrored[node])
+        sizes.append(hertz_approach(whole, modulus, slave.points[met.node], met.normal, met.gap) or 0.0)
+    return max(sizes) or None
+
+
+def _largest_height(surface: FacetedSurface, facets: np.ndarray) -> float:
+    middle = 1.0 / 3.0 if surface.corners == 3 else 0.0
+    local = np.full((len(facets), surface.dim - 1), middle)
+    return float(np.abs(heights(surface, facets, local).value).max(initial=0.0))
