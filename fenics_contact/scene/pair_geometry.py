@@ -30,8 +30,9 @@ class PairGeometry:
         slave: The slave's surface: the name of its shape (``"Torus"``), ``"reconstructed"``, ``"flat"`` where
             a surface through the nodes is that of the facets, or ``"facets"`` where these were asked for.
         master: The same of the master; of a rigid obstacle the name of its class.
-        height: Largest height of the true surfaces over the middles of their facets, [length], where the gap
-            is larger than the smallest one by no more than the approach; everywhere if that is not known.
+        height: Largest height of the true surface over the middles of its facets, [length], where the gap is
+            larger than the smallest one by no more than the approach; everywhere if that is not known. Of the
+            master, and with mortar contact of the slave, too; zero on obstacles: nodes lie on true surfaces.
         approach: Estimate of how far the bodies come closer, [length]: by Hertz's theory under the largest
             resultant of the loads on one body, or by the largest displacement along the normal that a support
             prescribes, if that is larger. None if neither can be said.
@@ -79,22 +80,19 @@ def pair_geometry(scene: Scene, pair: ContactPair) -> PairGeometry:
     """Tell what the gaps of a pair are measured between."""
     geometry = "best" if pair.geometry == "faceted" else pair.geometry
     slave = surface_of(scene, pair.slave, geometry)
-    names, surfaces = [_name(scene, pair, pair.slave, slave)], [slave]
-    if isinstance(pair.master, Surface):
-        master = surface_of(scene, pair.master, geometry)
-        names.append(_name(scene, pair, pair.master, master))
-        surfaces.append(master)
-        met = _meeting(slave, master)
-    else:
-        names.append(_shape_name(pair.master))
+    name = _name(scene, pair, pair.slave, slave)
+    if not isinstance(pair.master, Surface):
         met = _meeting_obstacle(slave, pair.master)
-    if len(met.node) == 0:
-        return PairGeometry(names[0], names[1], 0.0, None)
+        return PairGeometry(name, _shape_name(pair.master), 0.0, _approach(scene, pair, slave, met))
+    master = surface_of(scene, pair.master, geometry)
+    met = _meeting(slave, master)
     approach = _approach(scene, pair, slave, met)
-    near = met.gap <= met.gap.min() + (np.inf if approach is None else approach)
-    facets = [np.flatnonzero(np.isin(slave.facets, met.node[near]).any(axis=1)), np.unique(met.facet[near])]
-    height = max(_largest_height(each, which) for each, which in zip(surfaces, facets, strict=False))
-    return PairGeometry(names[0], names[1], height, approach)
+    near = met.gap <= met.gap.min(initial=np.inf) + (np.inf if approach is None else approach)
+    height = _largest_height(master, np.unique(met.facet[near]))
+    if pair.discretisation == "mortar":
+        touching = np.flatnonzero(np.isin(slave.facets, met.node[near]).any(axis=1))
+        height = max(height, _largest_height(slave, touching))
+    return PairGeometry(name, _name(scene, pair, pair.master, master), height, approach)
 
 
 def _name(scene: Scene, pair: ContactPair, surface: Surface, found: FacetedSurface) -> str:
@@ -131,6 +129,8 @@ def _meeting_obstacle(slave: FacetedSurface, obstacle: SurfaceShape) -> _Meeting
 
 def _approach(scene: Scene, pair: ContactPair, slave: FacetedSurface, met: _Meeting) -> float | None:
     """Return the estimate of `PairGeometry.approach`."""
+    if len(met.node) == 0:
+        return None
     middle = np.argmin(met.gap)
     normal, node = met.normal[middle], met.node[middle]
     sizes = [displacement_along(scene, normal)]
