@@ -19,6 +19,7 @@ from fenics_contact.feti.contact_points import (
     tangent_frames,
 )
 from fenics_contact.feti.copies import Tearing
+from fenics_contact.feti.surface_doubts import tell_of_surface
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.geometry import asked, coordinate_rounding
 from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie
@@ -109,6 +110,8 @@ def _points_of_pairs(
         geometry = pair.geometry if isinstance(pair, ContactPair) else "faceted"
         slave = _Side.of(scene, pair.slave, geometry, tearing, finer)
         movable = ~fixed[slave.nodes].all(axis=1)
+        if not finer:
+            tell_of_surface(scene, pair.slave, geometry, slave.surface, comm)
         if not isinstance(pair.master, Surface):
             with together(comm):
                 points = _on_obstacle(slave, movable, pair.master)
@@ -117,6 +120,8 @@ def _points_of_pairs(
         else:
             find = _by_mortar if pair.discretisation == "mortar" else _by_projection
             master = _Side.of(scene, pair.master, geometry, tearing, finer)
+            if not finer:
+                tell_of_surface(scene, pair.master, geometry, master.surface, comm)
             points = find(slave, movable, master, comm)
             points = replace(points, symmetric=_symmetric(points, slave, master))
         if comm.rank == 0 and not movable.all():

@@ -110,11 +110,13 @@ class Relief:
             (n_facets, corners, dim).
         rest: What the cubics leave at the midpoints of the edges, from each corner to the next, and in the
             middle, shape (n_facets, corners + 1); in the plane at the midpoint, (n_facets, 1), [length].
+        flattened: How many facets were left flat, as the surface over them would fold.
     """
 
     normals: np.ndarray
     corners: np.ndarray
     rest: np.ndarray
+    flattened: int = 0
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from fenics_contact.surfaces.facets import FacetedSurface, Relief, corner_products
+from fenics_contact.surfaces.relief import edges_at_corners, slopes
 
 #: Angle between the normals of neighbouring facets above which their common edge is a crease, in degrees.
 CREASE = 40.0
@@ -19,6 +20,8 @@ SEVERAL = 3.0
 ALIKE = 0.9
 #: Angles below this one are none, in radians.
 ROUNDING = 1e-6
+#: Surfaces that rise by more than this much of an edge at its end have a cusp there, or fold.
+STEEPEST = 1.0
 #: Directions of the fit that the neighbours tell less about than this part of the best known one stay as the
 #: facets have them.
 UNKNOWN = 1e-6
@@ -62,7 +65,26 @@ def reconstructed(surface: FacetedSurface, order: int = 2) -> FacetedSurface:
     whole = np.bincount(wedges.node)[wedges.node] == 1
     whole &= (wedges.mirrored == surface.mirrored[wedges.node]).all(axis=1)
     at_nodes[wedges.node[whole]] = normals[whole] - surface.averaged[wedges.node[whole]]
-    return replace(surface, relief=Relief(at_nodes, corners, rest))
+    return without_folds(replace(surface, relief=Relief(at_nodes, corners, rest)))
+
+
+def without_folds(surface: FacetedSurface) -> FacetedSurface:
+    """Return a surface that is flat over facets over which its relief has cusps or folds."""
+    relief = surface.relief
+    assert relief is not None
+    points, averaged = surface.points[surface.facets], surface.averaged[surface.facets]
+    length = np.linalg.norm(edges_at_corners(points), axis=3)
+    rising = slopes(surface, np.arange(len(surface.facets)))
+    over = np.einsum("nkd,nkd->nk", surface.normals[surface.facets], averaged + relief.corners)
+    folded = ((np.abs(rising) > STEEPEST * length).any(axis=2) | (over <= 0.0)).any(axis=1)
+    if not folded.any():
+        return surface
+    own = corner_products(surface.points, surface.facets[folded])
+    own /= np.linalg.norm(own, axis=2)[:, :, None]
+    corners, rest = relief.corners.copy(), relief.rest.copy()
+    corners[folded], rest[folded] = own - averaged[folded], 0.0
+    flattened = int(np.count_nonzero(folded))
+    return replace(surface, relief=replace(relief, corners=corners, rest=rest, flattened=flattened))
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import BodyMesh, Joined, SurfaceShape, asked, coordinate_rounding
 from fenics_contact.surfaces.facet_areas import nodal_areas
 from fenics_contact.surfaces.facets import FacetedSurface, Relief, faceted_surface, shape_values
@@ -24,6 +25,8 @@ _KNOWN: WeakKeyDictionary[BodyMesh, dict[Hashable, Relief | None]] = WeakKeyDict
 
 #: Steps of Newton's method along a ray to a shape; distances are nearly linear there.
 STEPS = 12
+#: Directions along a shape: the cosine of their angle to its normal is less than this.
+ALONG = 0.02
 #: By how much normals of shapes that meet may differ, in radians, where they meet smoothly.
 CREASE = 0.02
 #: A true surface has no relief if it stands over its facets by less than so many times their size.
@@ -185,13 +188,31 @@ def height_over(points: np.ndarray, directions: np.ndarray, shape: SurfaceShape)
         points: Points near the shape, shape (n, dim), [length].
         directions: Unit vectors that point out of it, shape (n, dim).
         shape: The shape.
+
+    Raises:
+        InvalidInputError: If a direction runs along the shape, where no point of it is the one above.
     """
     height = np.zeros(len(points))
     for _ in range(STEPS):
         place = points + height[:, None] * directions
         step = asked(shape, "distance", place)
-        step /= np.einsum("nd,nd->n", asked(shape, "normals", place), directions)
+        cosine = np.einsum("nd,nd->n", asked(shape, "normals", place), directions)
+        _check_across(cosine, place, shape)
+        step /= cosine
         height -= step
         if np.abs(step).max(initial=0.0) <= FLAT * np.ptp(points, axis=0).max(initial=0.0):
             break
     return height
+
+
+def _check_across(cosine: np.ndarray, place: np.ndarray, shape: SurfaceShape) -> None:
+    """Refuse directions that run along a shape."""
+    along = np.abs(cosine) < ALONG
+    if along.any():
+        where = ", ".join(f"{x:.6g}" for x in place[np.argmax(along)])
+        raise InvalidInputError(
+            f"each point of a facet needs one point of its shape above it, but at {np.count_nonzero(along)} "
+            f"of {len(along)} points {type(shape).__name__} is nearly parallel to the normal of the facets, "
+            f"the first at ({where}): refine the mesh there, give the surface another shape, or let the pair "
+            "take geometry='reconstructed'"
+        )
