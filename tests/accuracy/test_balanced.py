@@ -189,7 +189,7 @@ def test_a_body_that_is_factored_needs_no_estimate() -> None:
 def test_errors_can_be_read_and_add_up() -> None:
     errors = solved(PAIR).errors
     lines = str(errors).splitlines()
-    assert [line.split()[0] for line in lines] == ["algebraic", "friction", "discretisation"]
+    assert [line.split()[0] for line in lines] == ["algebraic", "friction", "discretisation", "geometry"]
     assert all("%" in line for line in lines)
     assert errors.discretisation == pytest.approx(np.linalg.norm(list(errors.by_body.values())))
     cells = np.concatenate([errors.by_cell(body) for body in errors.by_body])

@@ -115,7 +115,7 @@ def test_a_study_of_ones_own_scene_that_was_stopped_goes_on_and_reports(tmp_path
     again = start(*arguments)
     words = again.communicate(timeout=120.0)
     assert again.returncode == 0, words
-    assert words[0].startswith("For 10 %, 5 %, 1 %, 0.5 % in shortening: ")
+    assert words[0].startswith("For 10 %, 5 %, 2 %, 1 %, 0.5 % in shortening: ")
     assert "cells along an edge, quadrilaterals, contact by nodes, tolerance 1e-06: " in words[0]
     assert first.stat().st_mtime_ns == kept
     assert "1/2 size 3" in words[1], "one of three runs was there"

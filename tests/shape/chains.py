@@ -60,14 +60,14 @@ def crossed_links() -> TwoLinks:
     return TwoLinks(links.first, tilted)
 
 
-def chain(friction: Friction, geometry: Geometry = "best") -> Scene:
+def chain(friction: Friction, geometry: Geometry = "best", pull: float = PULL) -> Scene:
     """Link 1 is held at its far crown, link 2 pulled at its own; without friction a guide steadies it."""
     links = crossed_links()
     guide = [] if friction else [Support("link2", "grip", (None, 0.0, 0.0))]
     return Scene(
         {"link1": Body(links.first.mesh, BRONZE), "link2": Body(links.second.mesh, BRONZE)},
         [Support("link1", "grip"), *guide],
-        [TotalForce("link2", "grip", (PULL, 0.0, 0.0))],
+        [TotalForce("link2", "grip", (pull, 0.0, 0.0))],
         [ContactPair(Surface("link2", "contact"), Surface("link1", "contact"), friction, geometry=geometry)],
     )
 

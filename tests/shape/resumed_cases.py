@@ -30,7 +30,7 @@ def posed(name: str, comm: MPI.Comm, tolerance: float | AdaptiveTolerance | None
         scene = block_on_floor(Coulomb(0.3), load=(0.35, 0.1, -2.0))
         judge = ContactForces(normal_forces)
         return ShapeProblem(scene, partitions(scene), designs_of(scene), judge, comm, tolerance=tolerance)
-    scene = chain(Coulomb(0.3))
+    scene = chain(Coulomb(0.3), pull=80e3)
     cut = {body: box_partition(scene.bodies[body].mesh, BOXES) for body in scene.bodies}
     return ShapeProblem(scene, cut, chain_designs(), TotalPotential(), comm, tolerance=tolerance)
 
