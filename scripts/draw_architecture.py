@@ -42,6 +42,7 @@ FLOORS = [
         Room("linalg", "shared factors, cost model", "numbers"),
         Room("theory", "contacts known by formula", "numbers"),
     ],
+    [Room("surfaces", "what facets stand for: heights, normals, projection", "model")],
     [
         Room("scene", "bodies, materials, loads, pairs", "model", "1"),
         Room("qp", "dual solvers: NumPy and MPI alone", "numbers", "3"),
