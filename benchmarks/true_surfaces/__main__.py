@@ -1,4 +1,4 @@
-"""Write the study: `python -m benchmarks.true_surfaces [--draw]`; it goes to docs/studies/."""
+"""Write the study: `python -m benchmarks.true_surfaces [--draw | --links]`; it goes to docs/studies/."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 from benchmarks.report import write_json, write_text
 from benchmarks.true_surfaces.cases import CASES
+from benchmarks.true_surfaces.links import links
 from benchmarks.true_surfaces.measuring import BY_MORTAR, refined, study
 from benchmarks.true_surfaces.orders import SURFACES, gap_errors
 from benchmarks.true_surfaces.report import page
@@ -19,15 +20,18 @@ def main() -> None:
     """Measure, then write numbers and page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--draw", action="store_true", help="the page from numbers that are there")
-    record = PAGE.with_suffix(".json")
-    if not parser.parse_args().draw:
+    parser.add_argument("--links", action="store_true", help="measure the chain of links alone")
+    record, given = PAGE.with_suffix(".json"), parser.parse_args()
+    if given.links:
+        write_json(record, {**json.loads(record.read_text()), "links": links()})
+    elif not given.draw:
         cases = []
         for name in CASES:
             for way in ("node", "mortar") if name in BY_MORTAR else ("node",):
                 cases.append(study(name, way))
                 print(f"{name}, {way}: measured", flush=True)
         gaps = [gap_errors(name) for name in SURFACES]
-        write_json(record, {"cases": cases, "refined": refined(), "gaps": gaps})
+        write_json(record, {"cases": cases, "refined": refined(), "gaps": gaps, "links": links()})
     write_text(PAGE, page(json.loads(record.read_text())))
     print(f"page in {PAGE}")
 
