@@ -27,7 +27,6 @@ from fenics_contact.scene.true_surfaces import surface_of
 from fenics_contact.surfaces import Geometry
 from fenics_contact.surfaces.facets import FacetedSurface, shape_functions
 from fenics_contact.surfaces.projection import Projection, join, project
-from fenics_contact.surfaces.relief import heights
 
 #: A gap of so many roundings of coordinates is none: a few operations lie between the two.
 ROUNDING = 8
@@ -167,8 +166,7 @@ def _by_projection(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.C
     shape = (len(hit.point), slave.n_nodes)
     weight = sp.csr_matrix((values.ravel(), (row, corners.ravel())), shape=shape)
     chosen = candidates[hit.point]
-    gap = hit.gap - heights(master.surface, hit.facet, hit.local).value
-    return replace(_points(slave, chosen, hit.normal, gap, weight), facet=hit.facet, local=hit.local)
+    return replace(_points(slave, chosen, hit.normal, hit.gap, weight), facet=hit.facet, local=hit.local)
 
 
 def _tell_of_lost(places: np.ndarray, count: int) -> None:
@@ -195,7 +193,7 @@ def _by_mortar(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm)
         # Linear displacements close the gap's linear interpolant, not the mean of its bends between nodes,
         # which is a mean for nodes beside the master alone.
         hit = _shared_projection(slave.surface, found.node[kept], master.surface, comm)
-        gap[hit.point] = hit.gap - heights(master.surface, hit.facet, hit.local).value
+        gap[hit.point] = hit.gap
     points = _points(slave, found.node[kept], found.normal[kept], gap, weight)
     return replace(points, area=found.area[kept])
 

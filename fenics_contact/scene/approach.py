@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact.geometry import vector_areas
+from fenics_contact.geometry.shapes.closest import tangent_bases
 from fenics_contact.scene.loads import BodyForce, Load, Pressure, ThermalStrain, TotalForce
 from fenics_contact.scene.materials import PlaneStress
 from fenics_contact.scene.pairs import ContactPair, Surface
@@ -129,7 +130,7 @@ def _relative_curvatures(
         their directions, shape (dim − 1,), [length]; nothing if there are too few nodes.
     """
     dim = place.shape[1]
-    axes = np.linalg.svd(normal[None])[2][1:]  # all but the first are perpendicular to the normal
+    axes = tangent_bases(normal[None])[0]
     along = (place - place[np.argmin(gap)]) @ axes.T
     near = np.argsort((along**2).sum(axis=1))[:AROUND]
     if len(near) < dim * (dim + 1) // 2:

@@ -116,8 +116,7 @@ def _meeting(slave: FacetedSurface, master: FacetedSurface) -> _Meeting:
     away, _ = cKDTree(master.points).query(slave.points)
     chosen = np.sort(np.argsort(away)[:MOST])
     hit = project(slave.points[chosen], slave.normals[chosen], master)
-    gap = hit.gap - heights(master, hit.facet, hit.local).value
-    return _Meeting(chosen[hit.point], hit.normal, gap, hit.facet)
+    return _Meeting(chosen[hit.point], hit.normal, hit.gap, hit.facet)
 
 
 def _meeting_obstacle(slave: FacetedSurface, obstacle: SurfaceShape) -> _Meeting:

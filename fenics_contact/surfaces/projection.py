@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from fenics_contact.geometry import coordinate_rounding
 from fenics_contact.surfaces.facets import FacetedSurface, outside, shape_functions
+from fenics_contact.surfaces.relief import heights
 
 #: Facets tried for each point in the first round, nearest centroids first.
 NEAREST = 9
@@ -36,7 +37,7 @@ class Projection:
         point: Which of the given points, ascending, shape (n,).
         facet: Facet hit, shape (n,).
         local: Local coordinates on it, shape (n, dim − 1).
-        gap: Signed distance along the normal, positive outside, shape (n,), [length].
+        gap: Signed distance from the true surface along the normal, positive outside, shape (n,), [length].
         normal: Interpolated outward unit normal there, shape (n, dim).
         beside: How far outside its facet it lies, in local coordinates, shape (n,); 0 for rounding.
         lost: Points that look at a facet without a projection being found, ascending, shape (n_lost,).
@@ -91,13 +92,13 @@ def newton_matrix(
 
 
 def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> Projection:
-    """Project points onto a surface: find ξ, g with x(ξ) + g n(ξ) = point.
+    """Project points onto a surface: find ξ, g with x(ξ) + (h(ξ) + g) n(ξ) = point.
 
     x(ξ) is the (bi)linear facet, in the plane a straight edge, and n(ξ) the interpolated, normalised nodal
-    normal. Because n is continuous, so are gap, normal and weights while a point slides from facet to facet.
-    Of several projections the one with the smallest |g| counts; surfaces that face the same way do not touch.
-    Points without any that lie beside the surface by no more than a twentieth of a facet's width meet the
-    facet's continuation.
+    normal; h is what the true surface stands over the facet. Because n is continuous, so are gap, normal and
+    weights while a point slides from facet to facet. Of several projections the one with the smallest |h + g|
+    counts; surfaces that face the same way do not touch. Points without any that lie beside the surface by no
+    more than a twentieth of a facet's width meet the facet's continuation.
 
     Args:
         points: Slave nodes, shape (n, dim), [length].
@@ -113,7 +114,8 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
     waiting = np.setdiff1d(np.arange(len(points)), near.point)
     reached = _solve(points, normals, master, *_within_reach(tree, radius, points, waiting), rounding)
     found = join([near, _best(reached, rounding)])
-    return replace(found, lost=np.setdiff1d(found.lost, found.point))
+    gap = found.gap - heights(master, found.facet, found.local).value
+    return replace(found, gap=gap, lost=np.setdiff1d(found.lost, found.point))
 
 
 def _nearest(tree: cKDTree, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

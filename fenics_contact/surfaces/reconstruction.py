@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from fenics_contact.geometry.shapes.closest import tangent_bases
 from fenics_contact.surfaces.facets import FacetedSurface, Relief, corner_products
 from fenics_contact.surfaces.relief import edges_at_corners, slopes
 
@@ -248,7 +249,7 @@ def _fitted(surface: FacetedSurface, wedges: _Wedges, order: int) -> tuple[np.nd
     away, centre = _with_mirror_images(away, centre, mirrored)
     size = np.zeros(count)
     np.maximum.at(size, centre, np.linalg.norm(away, axis=1))
-    axes = _tangents(mean)
+    axes = tangent_bases(mean)
     place = np.einsum("nad,nd->na", axes[centre], away) / size[centre][:, None]
     height = np.einsum("nd,nd->n", mean[centre], away) / size[centre]
     powers = _powers(dim - 1, order)
@@ -293,16 +294,6 @@ def _with_mirror_images(
         image = away[across] * np.where(np.arange(away.shape[1]) == axis, -1.0, 1.0)
         away, centre = np.concatenate([away, image]), np.concatenate([centre, centre[across]])
     return away, centre
-
-
-def _tangents(normals: np.ndarray) -> np.ndarray:
-    """Return tangents of unit normals, shape (n, dim − 1, dim)."""
-    if normals.shape[1] == 2:
-        return np.stack([normals[:, 1], -normals[:, 0]], axis=1)[:, None]
-    axes = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
-    first = np.cross(normals, axes)
-    first = first / np.linalg.norm(first, axis=1)[:, None]
-    return np.stack([first, np.cross(normals, first)], axis=1)
 
 
 def _coefficients(

@@ -53,7 +53,7 @@ class Setting:
         master = self.master
         found = project(self.slave, np.tile(-UP, (len(self.slave), 1)), master)
         assert np.array_equal(found.point, np.arange(len(self.slave)))
-        return replace(found, gap=found.gap - heights(master, found.facet, found.local).value)
+        return found
 
     def projected(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         """Return the facets hit, and gap, normal, tangents and weights of every point."""

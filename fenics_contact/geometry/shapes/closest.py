@@ -55,13 +55,13 @@ def principal_curvatures(shape: SurfaceShape, points: np.ndarray) -> np.ndarray:
         InvalidInputError: If the shape answers with NaN or arrays of other shapes.
         UserCodeError: If it raises.
     """
-    tangents = _tangents(asked(shape, "normals", points))
+    tangents = tangent_bases(asked(shape, "normals", points))
     bend = asked(shape, "curvatures", points)
     return np.asarray(np.linalg.eigvalsh(tangents @ bend @ np.swapaxes(tangents, 1, 2)))
 
 
-def _tangents(normals: np.ndarray) -> np.ndarray:
-    """Return an orthonormal basis of each tangent plane, (n, dim) -> (n, dim − 1, dim).
+def tangent_bases(normals: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis of the plane across each unit normal, (n, dim) -> (n, dim − 1, dim).
 
     The reflection that takes ∓e_dim to the normal takes the other axes there.
     """
