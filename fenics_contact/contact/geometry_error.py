@@ -26,12 +26,10 @@ class GeometryError:
     Attributes:
         energy: Distance in energy norm, [√(force · length)].
         peak_pressure: Change of the largest contact pressure, relative to that of the better geometry.
-        gap: Largest change of a gap, [length].
     """
 
     energy: float = 0.0
     peak_pressure: float = 0.0
-    gap: float = 0.0
 
 
 def geometry_error(state: State) -> GeometryError:
@@ -49,8 +47,7 @@ def geometry_error(state: State) -> GeometryError:
     if torn.points.count == 0:
         return GeometryError()
     gap = torn.finer_gap()
-    change = float(np.abs(gap - torn.points.gap).max())
-    if change == 0.0 or not isinstance(state.solution, DualSolution):
+    if np.array_equal(gap, torn.points.gap) or not isinstance(state.solution, DualSolution):
         return GeometryError()
     solver = FaceNewton(tolerance=TOLERANCE)
     present = solve_dual(state.dual, solver, state.solution)
@@ -60,7 +57,7 @@ def geometry_error(state: State) -> GeometryError:
     square = float(system.problem.comm.allreduce(way @ system.apply(way)))
     peaks = [_peak(state.dual, present), _peak(system, better)]
     by_geometry = abs(peaks[0] - peaks[1]) / peaks[1] if peaks[1] > 0.0 else 0.0
-    return GeometryError(float(np.sqrt(max(square, 0.0))), by_geometry, change)
+    return GeometryError(float(np.sqrt(max(square, 0.0))), by_geometry)
 
 
 def _peak(system: DualSystem, solution: DualSolution) -> float:

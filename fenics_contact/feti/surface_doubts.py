@@ -7,8 +7,7 @@ import logging
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.errors import tell, together
-from fenics_contact.geometry.shape_fit import distance_in_edges
+from fenics_contact.errors import tell
 from fenics_contact.scene import Scene, Surface
 from fenics_contact.surfaces import FacetedSurface, Geometry
 
@@ -21,7 +20,7 @@ _LOG = logging.getLogger(__name__)
 def tell_of_surface(
     scene: Scene, surface: Surface, geometry: Geometry, found: FacetedSurface, comm: MPI.Comm
 ) -> None:
-    """Warn of nodes off their shape, and of reconstructed facets that stay flat. Collective.
+    """Warn of nodes off their shape, and of reconstructed facets that stay flat.
 
     Args:
         scene: The scene.
@@ -31,21 +30,19 @@ def tell_of_surface(
         comm: Communicator; rank 0 tells.
     """
     mesh = scene.bodies[surface.body].mesh.origin
-    shape = mesh.shapes.get(surface.name) if geometry == "best" else None
+    away = mesh.off_shapes.get(surface.name) if geometry == "best" else None
     name = f"surface {surface.name!r} of {surface.body!r}"
-    with together(comm):
-        if comm.rank == 0 and shape is not None:
-            away = distance_in_edges(mesh.points, mesh.surfaces[surface.name], shape)
-            off = np.count_nonzero(away > ON_SHAPE)
-            if off:
-                tell(
-                    _LOG.warning,
-                    "%d of %d nodes of %s lie off its shape, %s, by up to %.3g of an edge: gaps are measured "
-                    "from the nodes where they are; move them onto the shape, or correct it",
-                    off, len(away), name, type(shape).__name__, away.max(),
-                )  # fmt: skip
+    if comm.rank > 0:
+        return
+    if away is not None and (off := np.count_nonzero(away > ON_SHAPE)):
+        tell(
+            _LOG.warning,
+            "%d of %d nodes of %s lie off its shape, %s, by up to %.3g of an edge: gaps are measured "
+            "from the nodes where they are; move them onto the shape, or correct it",
+            off, len(away), name, type(mesh.shapes[surface.name]).__name__, away.max(),
+        )  # fmt: skip
     flattened = 0 if found.relief is None else found.relief.flattened
-    if comm.rank == 0 and flattened:
+    if flattened:
         tell(
             _LOG.warning,
             "%d of %d facets of %s stay flat, as the surface that their nodes suggest has cusps there or "

@@ -73,6 +73,7 @@ class BodyMesh:
     coincident_nodes: bool = False
     shapes: Mapping[str, SurfaceShape] = field(default_factory=dict)
     _origin: BodyMesh | None = field(default=None, init=False, repr=False)
+    _off_shapes: Mapping[str, np.ndarray] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check everything, cheap things first."""
@@ -90,7 +91,7 @@ class BodyMesh:
         if not self.coincident_nodes:
             check_no_coincident_nodes(points)
         self._set(surfaces=checked_surfaces(self.surfaces, cells, *points.shape))
-        check_shapes(self.points, self.surfaces, self.shapes)
+        self._set(_off_shapes=check_shapes(self.points, self.surfaces, self.shapes))
 
     def _set(self, **values: object) -> None:
         for name, value in values.items():
@@ -135,6 +136,14 @@ class BodyMesh:
         """The mesh for which its shapes were given, before it was `reshaped`; else the mesh itself."""
         return self if self._origin is None else self._origin
 
+    @property
+    def off_shapes(self) -> Mapping[str, np.ndarray]:
+        """Name of a surface with a shape to how far each of its nodes, ascending, lies off the shape.
+
+        Relative to the shortest edge around the node, as found when the mesh got its shapes.
+        """
+        return self._off_shapes
+
     def with_shapes(self, shapes: Mapping[str, SurfaceShape]) -> BodyMesh:
         """Return the same mesh with these shapes of its surfaces and no others.
 
@@ -144,9 +153,9 @@ class BodyMesh:
         Raises:
             InvalidInputError: If there is no such surface, or its nodes do not lie on the shape.
         """
-        check_shapes(self.points, self.surfaces, shapes)
+        off = check_shapes(self.points, self.surfaces, shapes)
         result = copy(self)
-        result._set(shapes=dict(shapes), _origin=None)
+        result._set(shapes=dict(shapes), _origin=None, _off_shapes=off)
         return result
 
     def placed(self, rotation: np.ndarray, translation: np.ndarray, scale: float = 1.0) -> BodyMesh:
@@ -184,7 +193,7 @@ class BodyMesh:
         motion = similarity(self.points, result.points) if self.shapes else None
         if motion is not None:
             return self.placed(*motion)
-        result._set(shapes={}, _origin=None)
+        result._set(shapes={}, _origin=None, _off_shapes={})
         return result
 
     def reshaped(self, points: np.ndarray) -> BodyMesh:

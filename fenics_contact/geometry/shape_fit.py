@@ -37,7 +37,7 @@ def distance_in_edges(points: np.ndarray, facets: np.ndarray, shape: SurfaceShap
 
 def check_shapes(
     points: np.ndarray, surfaces: Mapping[str, np.ndarray], shapes: Mapping[str, SurfaceShape]
-) -> None:
+) -> dict[str, np.ndarray]:
     """Refuse shapes that surfaces do not have.
 
     Args:
@@ -45,10 +45,14 @@ def check_shapes(
         surfaces: Name to facets.
         shapes: Name of a surface to its shape.
 
+    Returns:
+        Name of each of these surfaces to how far its nodes lie off, see `distance_in_edges`.
+
     Raises:
         InvalidInputError: If there is no such surface, the shape is of another dimension, or nodes lie off it
             by more than a tenth of an edge.
     """
+    found = {}
     for name, shape in shapes.items():
         if name not in surfaces:
             raise InvalidInputError(
@@ -69,3 +73,5 @@ def check_shapes(
                 f"lie off {type(shape).__name__} by more than a tenth of an edge, up to {away.max():.3g} "
                 "edges: check its place and size and the unit of length, or give the shape of another surface"
             )
+        found[name] = away
+    return found
