@@ -14,14 +14,17 @@ from fenics_contact.scene import Discretisation
 from fenics_contact.study.scenes.chain_links import GRADING, chain
 from fenics_contact.surfaces import Geometry
 
+#: Cells at the spot are a quarter as long as those of the same mesh without grading.
+FINEST = 4.0
 #: Refinement of the published mesh in all directions, grading, discretisation, geometry.
 RUNS: list[tuple[float, float, Discretisation, Geometry]] = [
     *[(1.0, 0.0, way, taken) for way in ("node", "mortar") for taken in ("faceted", "reconstructed", "best")],
     *[(size, 0.0, "node", taken) for size in (1.5, 2.0) for taken in ("faceted", "best")],
     *[(1.0, GRADING, way, taken) for way in ("node", "mortar") for taken in ("faceted", "best")],
-    (1.5, GRADING, "node", "best"),
-    (1.5, GRADING, "mortar", "best"),
-    (2.0, GRADING, "node", "best"),
+    *[(size, GRADING, way, "best") for size in (1.5, 2.0) for way in ("node", "mortar")],
+    *[(1.5, FINEST, way, "best") for way in ("node", "mortar")],
+    *[(size, 0.0, "mortar", "best") for size in (1.5, 2.0)],
+    *[(3.0, 0.0, way, "best") for way in ("node", "mortar")],
 ]
 
 

@@ -1,4 +1,4 @@
-"""Errors of every run in every quantity: against theory, the limit of the meshes, or the finest of them."""
+"""Errors of every run in every quantity: against the truth, the limit of the meshes, or the finest one."""
 
 from __future__ import annotations
 
@@ -19,16 +19,18 @@ class Reference:
     """What a quantity is compared with.
 
     Attributes:
-        kind: "theory", "extrapolated" or "finest mesh".
-        value: Its value; None for theory, which may differ from run to run.
+        kind: "extrapolated", "finest mesh", or the source of the true value, such as "theory".
+        value: Its value; None for a true one, which may differ from run to run.
         rate: Rate that the extrapolation found, None without one.
         note: Why nothing was extrapolated.
+        true: Whether it is a true value, which every run has beside its own.
     """
 
     kind: str
     value: float | Sequence[float] | None = None
     rate: float | None = None
     note: str = ""
+    true: bool = False
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ class Errors:
         if run.failed or found is None:
             return None
         reference = self.references[quantity]
-        if reference.kind == "theory":
+        if reference.true:
             error = found.get("error")
             return None if error is None else abs(float(error))
         if reference.value is None or (reference.kind == "finest mesh" and self._is_finest(run)):
@@ -102,8 +104,8 @@ class Errors:
         return measured_rate(spacing, [float((run.parts or {})["discretisation"] or 0.0) for run in runs])
 
     def _reference(self, quantity: QuantityFacts) -> Reference:
-        if quantity.exact:
-            return Reference("theory")
+        if quantity.source:
+            return Reference(quantity.source, true=True)
         runs = self.sequence(self.strictest(self.results.base))
         known = [(run, run.value(quantity.name)) for run in runs if run.value(quantity.name) is not None]
         if not known:

@@ -70,8 +70,9 @@ class Quantity:
         name: In words, "peak pressure".
         unit: Its unit, empty for a ratio.
         value: Measures it. Called by all ranks together; returns the same on each.
-        exact: What theory says: a number, or a function of the outcome where theory takes measured forces;
+        exact: The true value: a number, or a function of the outcome where theory takes measured forces;
             None where the study must extrapolate.
+        source: What the true value is from, in a few words.
         rate: Power of the mesh size with which theory lets the error fall, None where it says nothing.
         phases: What must be done beside the state to know it, such as "adjoint": its time counts.
     """
@@ -80,6 +81,7 @@ class Quantity:
     unit: str
     value: Measure
     exact: float | Measure | None = None
+    source: str = "theory"
     rate: float | None = None
     phases: tuple[str, ...] = ()
 
@@ -135,7 +137,8 @@ class StudyScene:
         """What the results need to know about the scene, without its functions."""
         runs = (*self.sweep.runs(), *self.quick.runs())
         quantities = tuple(
-            QuantityFacts(q.name, q.unit, q.exact is not None, q.rate, q.phases) for q in self.quantities
+            QuantityFacts(q.name, q.unit, "" if q.exact is None else q.source, q.rate, q.phases)
+            for q in self.quantities
         )
         spacing = {run.size: float(self.spacing(run.size)) for run in runs}
         return SceneFacts(
@@ -152,11 +155,11 @@ class StudyScene:
 
 @dataclass(frozen=True)
 class QuantityFacts:
-    """A quantity in stored results: as `Quantity`, `exact` being whether theory gives a value."""
+    """A quantity in stored results: as `Quantity`, the source being empty where no true value is known."""
 
     name: str
     unit: str
-    exact: bool
+    source: str
     rate: float | None
     phases: tuple[str, ...] = ()
 

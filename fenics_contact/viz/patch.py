@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.tri import Triangulation
 
-from fenics_contact.contact import State
+from fenics_contact.contact import State, Status
 from fenics_contact.viz.view import View, face_on
 
 #: Straight pieces by which the edge of a facet is cut to colour it.
@@ -45,6 +45,16 @@ class ContactPatch:
     rubs: bool
     low: np.ndarray
     high: np.ndarray
+
+    @property
+    def slips(self) -> np.ndarray:
+        """Which contact points slip against friction."""
+        return (self.status == Status.SLIP) & self.rubs
+
+    @property
+    def largest_slip(self) -> float:
+        """By how much they do at most, [length]."""
+        return float(np.linalg.norm(self.slip[self.slips], axis=1).max(initial=0.0))
 
 
 def contact_patch(state: State, pair: int, reach: float | None) -> ContactPatch:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, BinaryIO
 
-import numpy as np
 from matplotlib.collections import PolyCollection
 
-from fenics_contact.contact import State, Status
+from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import GREY, PRESSURE_MAP
 from fenics_contact.viz.patch import ContactPatch, contact_patch, refined
@@ -118,8 +117,7 @@ def _draw_status(axes: Any, patch: ContactPatch, units: Units) -> None:
     if not patch.rubs:
         axes.set_title("status, no friction")
         return
-    slips = patch.status == Status.SLIP
-    longest = float(np.linalg.norm(patch.slip[slips], axis=1).max(initial=0.0))
+    longest = patch.largest_slip
     axes.set_title(
         f"status, largest slip {written(longest, 2)} {units.length}" if longest > 0 else "status, no slip"
     )

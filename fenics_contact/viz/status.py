@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from matplotlib.collections import PolyCollection
 
-from fenics_contact.contact import State, Status
+from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import INK, PALE
 from fenics_contact.viz.patch import ContactPatch, contact_patch
@@ -94,8 +94,7 @@ def _draw(patches: Mapping[str, ContactPatch], paper: BinaryIO, title: str, unit
 
 
 def _words(patch: ContactPatch, units: Units) -> str:
-    slips = patch.status == Status.SLIP
-    longest = float(np.linalg.norm(patch.slip[slips], axis=1).max(initial=0.0))
+    longest, slips = patch.largest_slip, patch.slips
     share = f"{np.count_nonzero(slips)} of {len(slips)} slip"
     return f"{share}, by up to {written(longest, 2)} {units.length}" if longest > 0 else "none slips"
 
@@ -108,14 +107,13 @@ def draw_status(axes: Any, patch: ContactPatch, *, counted: bool = True) -> None
         chosen = patch.status == status
         label = f"{name} ({np.count_nonzero(chosen)})" if counted else name
         axes.scatter(*places[chosen].T, label=label, zorder=3, linewidths=1.0, **look)
-    slips = patch.status == Status.SLIP
-    longest = float(np.linalg.norm(patch.slip[slips], axis=1).max(initial=0.0))
+    longest = patch.largest_slip
     inside = np.all((places > patch.low) & (places < patch.high), axis=1)
     if longest > 0:
         reach = ARROW * float(np.max(patch.high - patch.low)) / longest
         arrows = {"angles": "xy", "scale_units": "xy", "scale": 1, "color": INK, "width": 0.004, "zorder": 4}
         # Short arrows stay arrows: dots would hide the symbols.
         arrows |= {"minlength": 0.0}
-        shown = slips & inside
+        shown = patch.slips & inside
         drawn = axes.quiver(*places[shown].T, *(reach * patch.slip[shown]).T, clip_on=False, **arrows)
         drawn.set_in_layout(False)  # its extent is not known before it is drawn

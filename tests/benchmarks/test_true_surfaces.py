@@ -8,10 +8,11 @@ from typing import Any
 import pytest
 
 from benchmarks.true_surfaces.cases import CASES
-from benchmarks.true_surfaces.links import RUNS, measured
+from benchmarks.true_surfaces.links import FINEST, RUNS, measured
 from benchmarks.true_surfaces.measuring import BY_MORTAR, FACETS, errors, known
 from benchmarks.true_surfaces.orders import SURFACES, gap_errors
 from benchmarks.true_surfaces.report import page
+from fenics_contact.study.scenes.chain_links import ENERGY, GRADING, PEAK
 from tests.conftest import ROOT
 
 PAGE = ROOT / "docs" / "studies" / "true_surfaces.md"
@@ -64,17 +65,19 @@ def test_gaps_converge_as_they_should(record: dict[str, Any]) -> None:
 
 def test_the_chain_is_right_on_true_crowns_alone(record: dict[str, Any]) -> None:
     """Hertz says 4384 MPa on 27.4 mm²; the meshes converge to one percent less."""
-    by = {(r["size"], r["grading"] > 0, r["discretisation"], r["geometry"]): r for r in record["links"]}
+    by = {(r["size"], r["grading"], r["discretisation"], r["geometry"]): r for r in record["links"]}
     assert len(by) == len(RUNS)
     for size in (1.0, 1.5, 2.0):
-        true, facets = (by[size, False, "node", way] for way in ("best", "faceted"))
+        true, facets = (by[size, 0.0, "node", way] for way in ("best", "faceted"))
         assert true["peak"] == pytest.approx(4384.0, rel=0.04)
         assert facets["peak"] > 1.5 * 4384.0
     for way in ("node", "mortar"):
-        graded = by[1.0, True, way, "best"]
-        assert graded["peak"] == pytest.approx(4342.0, rel=0.015)
+        graded = by[1.0, GRADING, way, "best"]
+        assert graded["peak"] == pytest.approx(PEAK, rel=0.015)
         assert graded["area"] == pytest.approx(27.4, rel=0.04)
-    potentials = [by[1.0, True, way, "best"]["potential"] for way in ("node", "mortar")]
+        assert by[1.5, FINEST, way, "best"]["peak"] == pytest.approx(PEAK, rel=0.004)
+        assert by[3.0, 0.0, way, "best"]["potential"] == pytest.approx(ENERGY, rel=0.006)
+    potentials = [by[1.0, GRADING, way, "best"]["potential"] for way in ("node", "mortar")]
     assert potentials[0] == pytest.approx(potentials[1], rel=0.01)
 
 

@@ -19,9 +19,9 @@ FACTS = SceneFacts(
     energy_rate=1.0,
     spacing={size: 1.0 / size for size in SIZES},
     quantities=(
-        QuantityFacts("peak pressure", "MPa", True, 1.0),
-        QuantityFacts("energy", "N mm", False, 2.0),
-        QuantityFacts("gradient", "N", False, None, ("adjoint",)),
+        QuantityFacts("peak pressure", "MPa", "theory", 1.0),
+        QuantityFacts("energy", "N mm", "", 2.0),
+        QuantityFacts("gradient", "N", "", None, ("adjoint",)),
     ),
 )
 
