@@ -1,6 +1,6 @@
 """Two links of a chain, the published experiment: link 1 is held, link 2 hangs in it and is pulled.
 
-There is no exact answer; what other meshes of up to 1.8 million unknowns give stands in for it. All measure
+There is no exact answer; what other meshes of up to 1.6 million unknowns give stands in for it. All measure
 contact between the smooth crowns.
 """
 
@@ -33,7 +33,7 @@ CELLS = (12, 2, 5)
 GRADING = 2.5
 #: Energy [N mm] and peak pressure [MPa] to 0.2 %, and where they are from: the table of
 #: `docs/studies/true_surfaces.md`, which also has Hertz's 4384 MPa.
-ENERGY, PEAK, FINER = -20260.0, 4350.0, "meshes of up to 1.8 million unknowns"
+ENERGY, PEAK, FINER = -20260.0, 4350.0, "meshes of up to 1.6 million unknowns"
 #: Displacements go like √r where the held grip ends on the smooth surface of the link.
 GRIP = 0.5
 
