@@ -112,6 +112,9 @@ def accuracy(
     plan = prepare(scene, runs or folder / "runs", sweep=sweep, settings=settings)
     with nullcontext() if report else only_run_in(folder, desk.comm):
         status = 0 if report else _measure(plan)
+        if status and (folder / "study.json").exists():
+            desk.say(f"results of an earlier run stay in {folder}/: --report writes those of what is done")
+            raise typer.Exit(status)
         words = _report(plan, folder, figures=not no_figures)
     if page:
         write_overview(folder.parent)

@@ -87,6 +87,11 @@ def test_an_interrupt_from_the_keyboard_leaves_a_report_of_what_was_done(
     assert "interrupted: what is done is kept" in capsys.readouterr().err
     assert [run.parameters.size for run in read_study(folder).good] == [2, 3]
     assert "## A pressed block" in (tmp_path / "README.md").read_text()
+    machine.answers[3] = KeyboardInterrupt()
+    settings = ["--output", str(folder), "--runs", str(tmp_path / "others"), "--quick", "--no-figures"]
+    assert main(["accuracy", str(scene), *settings]) == 130
+    assert "results of an earlier run stay in" in capsys.readouterr().out
+    assert [run.parameters.size for run in read_study(folder).good] == [2, 3]
 
 
 def start(*arguments: object) -> subprocess.Popen[str]:
