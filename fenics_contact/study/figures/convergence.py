@@ -73,7 +73,9 @@ def _draw(axes: Any, errors: Errors, quantity: QuantityFacts, ways: list[Series]
     if quantity.rate and first is not None:
         _slope(axes, errors, first, quantity.rate)
     axes.set_ylabel("relative error")
-    axes.set_title(f"{quantity.name} (against {against(errors.references[quantity.name].kind)})")
+    axes.set_title(
+        f"{quantity.name}\n(against {against(errors.references[quantity.name].kind)})", fontsize="medium"
+    )
 
 
 def _draw_estimate(axes: Any, errors: Errors, ways: list[Series]) -> None:
