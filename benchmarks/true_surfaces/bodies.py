@@ -13,7 +13,7 @@ from fenics_contact.geometry import (
     hemisphere,
     rectangle_lattice,
 )
-from fenics_contact.geometry.hemisphere import graded
+from fenics_contact.geometry.block import graded
 
 
 def stamp(dim: int, facets: int) -> BodyMesh:

@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.true_surfaces.bodies import bar, pad, ring, seat, stamp
 from fenics_contact.geometry import BodyMesh, half_cylinder
-from fenics_contact.geometry.hemisphere import graded
+from fenics_contact.geometry.block import graded
 from fenics_contact.scene import (
     Body,
     ContactPair,

@@ -80,8 +80,9 @@ def _check(instance: Any, cls: type, own: tuple[str, ...]) -> None:
         wrong = _misfit(getattr(instance, field.name), hints[field.name], name)
         if wrong is not None:
             place, hint, value = wrong
-            told = _meaning(type(instance), field.name)
-            raise InvalidInputError(f"{place} must be {_named(hint)}, got {reprlib.repr(value)}{told}")
+            told = meaning(type(instance), field.name)
+            given = f"{place} must be {_named(hint)}, got {reprlib.repr(value)}"
+            raise InvalidInputError(f"{given}: {told}" if told else given)
 
 
 @cache
@@ -162,11 +163,17 @@ def _named(hint: Any) -> str:
     return f"{name}({', '.join(needed)})"
 
 
-def _meaning(cls: type, field: str) -> str:
-    """Return what the documentation of a class says about a field, to follow a message."""
-    for known in cls.__mro__:
+def meaning(owner: Any, name: str) -> str:
+    """Return what the documentation of a class or function says about a field or an argument, "" if nothing.
+
+    Args:
+        owner: The class or function.
+        name: Name of the field or argument.
+    """
+    for known in getattr(owner, "__mro__", (owner,)):
         text = inspect.cleandoc(known.__doc__ or "")
-        if found := re.search(rf"^    {field}: (.*(?:\n {{8}}.*)*)", text, re.MULTILINE):
+        if found := re.search(rf"^    {name}: (.*(?:\n {{8}}.*)*)", text, re.MULTILINE):
             words = re.split(r"\.(?: |$)", " ".join(found[1].split()))[0].replace("``", "")
-            return f": {words[0].lower() if words[1:2].islower() else words[0]}{words[1:]}"
+            ordinary = words[1:2].islower() and "'s" not in words.split()[0]  # neither ΔT nor Poisson's
+            return f"{words[0].lower() if ordinary else words[0]}{words[1:]}"
     return ""

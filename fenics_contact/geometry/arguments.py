@@ -13,6 +13,8 @@ from fenics_contact.errors import InvalidInputError
 MOST = 1_000_000
 #: Coordinates and sizes lie below: their products, and the squares of these, must be numbers, too.
 LARGEST = 1e60
+#: Largest logarithm of the ratio of two cells of one mesh.
+STEEPEST = 8.0
 
 
 def check_count(value: int, name: str, least: int = 1) -> None:
@@ -37,7 +39,7 @@ def check_numbers(**given: Any) -> None:
 def check_grading(value: Any) -> None:
     """Refuse a logarithm of the ratio of two cells of one mesh that is negative or too large for it."""
     check_numbers(grading=value)
-    if not 0.0 <= value <= 8.0:
+    if not 0.0 <= value <= STEEPEST:
         raise InvalidInputError(
             f"grading must lie between 0 and 8, got {value}: 0 gives equal cells, 3 makes the smallest 20 "
             "times smaller than the largest"

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry.arguments import LARGEST, check_count, shown
+from fenics_contact.geometry.arguments import LARGEST, STEEPEST, check_count, check_row, shown
 from fenics_contact.geometry.faces import boundary_faces, vector_areas
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.room import require_room
@@ -22,14 +22,18 @@ def block(
     upper: Sequence[float],
     counts: tuple[int, int, int],
     cell: str = "hexahedron",
+    *,
+    grading: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> BodyMesh:
     """Mesh the box between two corners.
 
     Args:
-        lower: Coordinates of the lower corner, (3,).
-        upper: Coordinates of the upper corner, (3,).
+        lower: Coordinates of the lower corner, (3,), [length].
+        upper: Coordinates of the upper corner, (3,), [length].
         counts: Number of hexahedra along x, y and z.
         cell: ``"hexahedron"``, or ``"tetrahedron"`` to split each of them into six.
+        grading: Logarithm of the ratio of the largest to the smallest cell along each axis; positive: small
+            cells at the lower corner, negative: at the upper one, 0: equal cells.
 
     Returns:
         The mesh with surfaces ``x0, x1, y0, y1, z0, z1`` (lower and upper face in each direction); the
@@ -44,8 +48,7 @@ def block(
         (16, ['x0', 'x1', 'y0', 'y1', 'z0', 'z1'])
     """
     check_cell_type(cell)
-    low, high = checked_corners(lower, upper, "xyz")
-    return box_lattice(even_ticks(low, high, checked_counts(counts, "xyz")), cell)
+    return box_lattice(checked_ticks(lower, upper, counts, grading, "xyz"), cell)
 
 
 def checked_corners(lower: ArrayLike, upper: ArrayLike, axes: str) -> tuple[np.ndarray, np.ndarray]:
@@ -91,9 +94,45 @@ def _listed(axes: str) -> str:
     return f"{', '.join(axes[:-1])} and {axes[-1]}"
 
 
-def even_ticks(low: np.ndarray, high: np.ndarray, counts: Sequence[int]) -> list[np.ndarray]:
-    """Divide the sides of a box into equal cells; the coordinates of their ends along every axis."""
-    return [np.linspace(*each) for each in zip(low, high, [count + 1 for count in counts], strict=True)]
+def checked_ticks(
+    lower: ArrayLike, upper: ArrayLike, counts: Sequence[int], grading: Sequence[float], axes: str
+) -> list[np.ndarray]:
+    """Return the coordinates of the ends of cells along every axis, as `block` takes its arguments.
+
+    Raises:
+        InvalidInputError: If there is no box, a count is none or cells would be too many or too unlike.
+    """
+    low, high = checked_corners(lower, upper, axes)
+    whole = checked_counts(counts, axes)
+    check_row(grading, "grading", len(axes))
+    if max(map(abs, grading)) > STEEPEST:
+        raise InvalidInputError(
+            f"grading must lie between {-STEEPEST:g} and {STEEPEST:g}, got {shown(grading)}: 0 gives equal "
+            "cells, 3 makes the smallest 20 times smaller than the largest"
+        )
+    return [_ticks(*each) for each in zip(low, high, whole, grading, strict=True)]
+
+
+def _ticks(low: float, high: float, count: int, grading: float) -> np.ndarray:
+    """Divide an interval into cells that grow, or, where the grading is negative, shrink."""
+    if grading == 0.0:
+        return np.linspace(low, high, count + 1)
+    share = graded(count, abs(grading))
+    return low + (high - low) * share if grading > 0 else high - (high - low) * share[::-1]
+
+
+def graded(n: int, grading: float) -> np.ndarray:
+    """Divide [0, 1] into intervals that grow geometrically; those for 2 n halve those for n.
+
+    Args:
+        n: Number of intervals.
+        grading: Logarithm of the growth over the whole of [0, 1], 0 for equal intervals.
+
+    Returns:
+        Ascending ticks, (n + 1,).
+    """
+    uniform = np.linspace(0.0, 1.0, n + 1)
+    return uniform if grading == 0.0 else np.asarray(np.expm1(grading * uniform) / np.expm1(grading))
 
 
 def box_lattice(ticks: Sequence[np.ndarray], cell: str = "hexahedron") -> BodyMesh:

@@ -32,10 +32,10 @@ def drilled_plate(
     """Mesh half a strip with a round hole at the z-axis.
 
     Args:
-        hole: Radius of the hole.
-        half_width: The strip reaches from y = 0 to y = half_width.
-        ends: The strip reaches from x = ends[0] to x = ends[1]; at or beyond the square around the hole.
-        heights: z of the planes between layers of cells, ascending, (n_layers + 1,).
+        hole: Radius of the hole, [length].
+        half_width: The strip reaches from y = 0 to y = half_width, [length].
+        ends: x of both ends, at or beyond the square around the hole, [length].
+        heights: z of the planes between layers of cells, ascending, (n_layers + 1,), [length].
         n: Cells along an eighth of the hole.
         n_radial: Cells from the hole to the square around it; n unless given.
 
@@ -87,10 +87,10 @@ def bolt(
     """Mesh half a bolt along the z-axis with a round head above and a round nut below, in one piece.
 
     Args:
-        shank: Radius of the shank.
-        head: Radius of head and nut.
-        grip: z between which the shank is free: what is clamped.
-        head_height: Height of head and nut.
+        shank: Radius of the shank, [length].
+        head: Radius of head and nut, [length].
+        grip: z between which the shank is free: what is clamped, [length].
+        head_height: Height of head and nut, [length].
         n: Cells along an eighth of the circumference.
         n_radial: Cells from the shank's surface to that of the head; n unless given.
         layers: Cells along the shank, and through head and nut.

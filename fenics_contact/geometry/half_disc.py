@@ -16,7 +16,7 @@ def half_disc(radius: float, n: int, *, symmetry: str = "x", grading: float = 3.
     It is the end of a `half_cylinder`, which has the same cells.
 
     Args:
-        radius: Radius; the flat top lies at y = radius.
+        radius: Radius, [length]; the flat top lies at y = radius.
         n: Cells from the point of contact to the edge of the contact surface, and through the shell.
         symmetry: "x" keeps x >= 0, "" keeps all.
         grading: Logarithm of the ratio of the largest to the smallest cell on the way to the point of

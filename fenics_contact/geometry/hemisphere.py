@@ -13,7 +13,7 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry.arguments import check_count, check_grading, check_numbers
-from fenics_contact.geometry.block import box_lattice, box_sides
+from fenics_contact.geometry.block import box_lattice, box_sides, graded
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.room import require_room
 from fenics_contact.geometry.shapes import Cylinder, Sphere, SurfaceShape
@@ -72,7 +72,7 @@ def hemisphere(radius: float, n: int, *, symmetry: str = "xy", grading: float = 
     Doubling ``n`` halves every cell in the body's own coordinates, so that errors fall at clean rates.
 
     Args:
-        radius: Radius; the flat top lies at z = radius.
+        radius: Radius, [length]; the flat top lies at z = radius.
         n: Cells from the pole to the edge of the contact surface, and through the shell.
         symmetry: Planes of symmetry the body is cut at: "xy" keeps x >= 0 and y >= 0, "x" keeps x >= 0, ""
             keeps all.
@@ -99,12 +99,13 @@ def half_cylinder(
     """Mesh the lower half of a cylinder along y that rests on the plane z = 0 along the y axis.
 
     Args:
-        radius: Radius; the flat top lies at z = radius.
-        length: The body reaches from y = 0 to y = length.
+        radius: Radius, [length]; the flat top lies at z = radius.
+        length: The body reaches from y = 0 to y = length, [length].
         n: Cells from the line of contact to the edge of the contact surface, and through the shell.
         n_length: Cells along the axis.
         symmetry: "x" keeps x >= 0, "" keeps all.
-        grading: As in `hemisphere`.
+        grading: Logarithm of the ratio of the largest to the smallest cell on the way to the line of contact;
+            0 for uniform.
 
     Returns:
         Hexahedra with surfaces "contact" (the cylinder up to 45 degrees from the line of contact), "side"
@@ -165,20 +166,6 @@ def _flat_sides(points: np.ndarray, cells: np.ndarray, curved: np.ndarray) -> di
     sides = {side: facets[~on_curve[facets].all(axis=1)] for side, facets in box_sides(points, cells).items()}
     sides["top"] = sides.pop("z1")
     return {side: facets for side, facets in sides.items() if facets.shape[0]}
-
-
-def graded(n: int, grading: float) -> np.ndarray:
-    """Divide [0, 1] into intervals that grow geometrically; those for 2 n halve those for n.
-
-    Args:
-        n: Number of intervals.
-        grading: Logarithm of the growth over the whole of [0, 1], 0 for equal intervals.
-
-    Returns:
-        Ascending ticks, (n + 1,).
-    """
-    uniform = np.linspace(0.0, 1.0, n + 1)
-    return uniform if grading == 0.0 else np.asarray(np.expm1(grading * uniform) / np.expm1(grading))
 
 
 def _lateral(n: int, grading: float, symmetric: bool) -> np.ndarray:

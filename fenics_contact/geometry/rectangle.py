@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry.block import box_sides, checked_corners, checked_counts, even_ticks
+from fenics_contact.geometry.block import box_sides, checked_ticks
 from fenics_contact.geometry.mesh import BodyMesh
 from fenics_contact.geometry.room import require_room
 from fenics_contact.geometry.structured import check_cell_type, repeated_regions, structured_cells
@@ -18,14 +18,18 @@ def rectangle(
     upper: Sequence[float],
     counts: tuple[int, int],
     cell: str = "quadrilateral",
+    *,
+    grading: Sequence[float] = (0.0, 0.0),
 ) -> BodyMesh:
     """Mesh the rectangle between two corners.
 
     Args:
-        lower: Coordinates of the lower left corner, (2,).
-        upper: Coordinates of the upper right corner, (2,).
+        lower: Coordinates of the lower left corner, (2,), [length].
+        upper: Coordinates of the upper right corner, (2,), [length].
         counts: Number of quadrilaterals along x and y.
         cell: ``"quadrilateral"``, or ``"triangle"`` to split each of them into two.
+        grading: Logarithm of the ratio of the largest to the smallest cell along each axis; positive: small
+            cells at the lower corner, negative: at the upper one, 0: equal cells.
 
     Returns:
         The mesh with surfaces ``x0, x1, y0, y1`` (lower and upper edge in each direction); the grid index is
@@ -35,8 +39,7 @@ def rectangle(
         InvalidInputError: If the rectangle has no area, a count is not positive or the cell type is unknown.
     """
     check_cell_type(cell, 2)
-    low, high = checked_corners(lower, upper, "xy")
-    return rectangle_lattice(even_ticks(low, high, checked_counts(counts, "xy")), cell)
+    return rectangle_lattice(checked_ticks(lower, upper, counts, grading, "xy"), cell)
 
 
 def rectangle_lattice(ticks: Sequence[np.ndarray], cell: str = "quadrilateral") -> BodyMesh:

@@ -33,12 +33,12 @@ class LinkShape:
     width of 22.
 
     Attributes:
-        inner_radius: Radius of the inner side of the crowns; half the inner width of the link.
-        straight: Length of the straight legs; the pitch is ``straight + 2 * inner_radius``.
-        thickness: Size of the wire in the plane of the ring.
-        width: Size of the wire across the plane of the ring.
-        roundness: See `WireSection`; 0.9 keeps corner cells sound and the crown 1.13 times flatter than a
-            disc.
+        inner_radius: Radius of the inner side of the crowns, half the inner width of the link, [length].
+        straight: Length of the straight legs, [length]; the pitch is ``straight + 2 * inner_radius``.
+        thickness: Size of the wire in the plane of the ring, [length].
+        width: Size of the wire across the plane of the ring, [length].
+        roundness: 1 for a round wire, less for a flatter one. See `WireSection`; 0.9 keeps corner cells sound
+            and the crown 1.13 times flatter than a disc.
         n_around: Cells around the ring, a multiple of 6 (four quarter turns and two legs) and at least 12.
         n_a: Cells through the thickness.
         n_b: Cells across the width.

@@ -25,7 +25,7 @@ class Traction:
     Attributes:
         body: Name of the body.
         surface: Name of its surface.
-        value: Force a reference area, [force / length²] (in the plane: a unit of thickness); a function gets
+        value: Force a reference area, [force / length²] (in the plane: a unit of thickness). A function gets
             points, shape (n, dim), and returns the traction there, shape (n, dim).
 
     Example:
@@ -76,7 +76,7 @@ class Pressure:
     Attributes:
         body: Name of the body.
         surface: Name of its surface.
-        value: p, [force / length²].
+        value: Pressure p, [force / length²].
     """
 
     body: str

@@ -36,7 +36,7 @@ class Coulomb:
     """Coulomb friction: ‖τ‖ ≤ friction_coefficient · λ_N.
 
     Attributes:
-        friction_coefficient: μ ≥ 0, dimensionless. Zero is frictionless contact.
+        friction_coefficient: Friction coefficient μ ≥ 0, dimensionless. Zero is frictionless contact.
     """
 
     friction_coefficient: float
@@ -59,7 +59,7 @@ class Tresca:
     problem with given friction. Use it where surfaces are known to touch.
 
     Attributes:
-        traction: Bound on the tangential traction, ≥ 0, [force / length²].
+        traction: Largest tangential traction, ≥ 0, [force / length²].
     """
 
     traction: float
@@ -83,17 +83,17 @@ class ContactPair:
     """Two surfaces that may touch. The slave is kept out of the master.
 
     Attributes:
-        slave: Surface whose nodes carry the contact forces.
+        slave: Surface whose nodes carry the contact forces: the finer or softer one.
         master: Surface of another body, or a rigid obstacle.
-        friction: Friction law, or None for frictionless contact.
-        discretisation: ``"node"`` keeps every slave node out of the master facet that it projects on: simple,
-            and what shape derivatives know. ``"mortar"`` keeps weighted means of the gap positive (dual
-            basis, integration over the common segments of both meshes): passes the contact patch test on
+        friction: Law of friction; without one (None) contact is frictionless.
+        discretisation: ``"node"`` keeps every slave node out of its master facet; ``"mortar"`` keeps weighted
+            means of the gap positive. The former is simple, and what shape derivatives know. The latter (dual
+            basis, integration over the common segments of both meshes) passes the contact patch test on
             meshes that do not match. Nodes are kept off a rigid obstacle one by one, whatever is given.
-        geometry: What gaps and normals are measured between. ``"best"``: the shapes that the bodies' meshes
-            carry, see `BodyMesh`; a smooth surface through the nodes where there is none.
-            ``"reconstructed"``: always the latter. ``"faceted"``: the flat facets, for comparison; between
-            round bodies their error is often larger than the approach of the bodies.
+        geometry: What gaps and normals are measured between: ``"best"``, true shapes that the meshes know,
+            else smooth surfaces through the nodes; ``"reconstructed"``, always the latter; ``"faceted"``, the
+            flat facets, for comparison. Between round bodies the error of facets is often larger than the
+            approach of the bodies. For the shapes of meshes see `BodyMesh`.
 
     Raises:
         InvalidInputError: If a body shall touch itself, or the discretisation or geometry is unknown.
@@ -138,7 +138,8 @@ class Tie:
         slave: Surface whose nodes carry the forces; the finer mesh is the better slave.
         master: Surface of another body.
         sliding: Whether the surfaces may shift along each other: contact known to be closed.
-        discretisation: As for `ContactPair`.
+        discretisation: ``"node"`` ties every slave node to its master facet, ``"mortar"`` weighted means. See
+            `ContactPair`.
     """
 
     slave: Surface

@@ -12,7 +12,7 @@ from fenics_contact.scene import Body, Material, Scene
 from fenics_contact.scene_file.document import Document
 from fenics_contact.scene_file.evaluation import check_formulas
 from fenics_contact.scene_file.mistakes import Mistake, SceneFileError
-from fenics_contact.scene_file.names import Reference, surface_parts
+from fenics_contact.scene_file.names import surface_parts, unknown
 from fenics_contact.scene_file.places import Path, written
 from fenics_contact.scene_file.placing import Shaped
 from fenics_contact.scene_file.source import Source
@@ -81,8 +81,8 @@ class Builder:
                 f"{written(path)} must have 'part', one of {parts}: the mesh {body.mesh!r} has several bodies"
             )
             raise SceneFileError(self._source.name, [self._source.mistake(path, words)])
-        wrong = Reference(path, body.part, f"a body of the mesh {body.mesh!r}")
-        raise SceneFileError(self._source.name, [wrong.wrong(self._source, parts)])
+        wrong = unknown(self._source, path, body.part, f"a body of the mesh {body.mesh!r}", parts)
+        raise SceneFileError(self._source.name, [wrong])
 
     def scene(self, bodies: Mapping[str, Body]) -> Scene:
         """Return the scene of the bodies.
@@ -98,7 +98,7 @@ class Builder:
             built[key] = []
             for number, part in enumerate(getattr(document, key)):
                 with self._at(key, number):
-                    one = part.build(dim) if key == "supports" else part.build()
+                    one = part.build(dim) if hasattr(part, "build") else part.made()
                     _refuse(empty, {key: (one,)})
                     built[key].append(one)
                     with self._at(key, number, *_FORMULAS.get(key, ())):
@@ -110,8 +110,8 @@ class Builder:
         for path, part in surface_parts(self._document):
             surfaces = bodies[part.body].mesh.surfaces
             if part.surface not in surfaces:
-                one = Reference((*path, "surface"), part.surface, f"a surface of the body {part.body!r}")
-                self._mistakes.append(one.wrong(self._source, sorted(surfaces)))
+                what, where = f"a surface of the body {part.body!r}", (*path, "surface")
+                self._mistakes.append(unknown(self._source, where, part.surface, what, sorted(surfaces)))
         self._check()
 
     @contextmanager

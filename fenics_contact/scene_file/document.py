@@ -2,20 +2,63 @@
 
 from __future__ import annotations
 
+from typing import Annotated, Any, Literal, TypeAlias
+
 from pydantic import Field
 
-from fenics_contact.scene_file.bodies import BodyPart
 from fenics_contact.scene_file.contacts import ContactPart, TiePart
 from fenics_contact.scene_file.design import DesignPart
-from fenics_contact.scene_file.loads import AnyLoad
+from fenics_contact.scene_file.loads import AnyLoad, SupportPart
 from fenics_contact.scene_file.materials import AnyMaterial
 from fenics_contact.scene_file.meshes import Mesh
-from fenics_contact.scene_file.output import OutputPart
+from fenics_contact.scene_file.part import Part
 from fenics_contact.scene_file.solver import SolverPart
 from fenics_contact.scene_file.steps import StepPart
-from fenics_contact.scene_file.supports import SupportPart
-from fenics_contact.scene_file.units import UnitNames
-from fenics_contact.scene_file.values import Part
+from fenics_contact.scene_file.values import PlaceOfFile, Read, said
+
+FileKind: TypeAlias = Literal["vtu", "vtx", "xdmf"]
+PictureKind: TypeAlias = Literal["stress", "pressure", "status", "decomposition", "error"]
+_ByRegion = Annotated[dict[str, str], Field(min_length=1)]
+Materials: TypeAlias = Annotated[
+    Any,
+    Read(Annotated[str | _ByRegion, said("the name of a material, or a table: region = material")]),
+]
+
+
+class UnitNames(Part):
+    """Names of the units of all numbers of the file; labels use them, nothing is converted."""
+
+    length: str = Field(default="mm", description="unit of coordinates and displacements")
+    force: str = Field(default="N", description="unit of forces")
+    stress: str = Field(default="MPa", description="unit of stresses, moduli and pressures: force / length²")
+
+
+class BodyPart(Part):
+    """A body: a mesh and what it is made of."""
+
+    mesh: str = Field(description="name of a mesh of [meshes]")
+    part: str | None = Field(
+        None, description="which body of a mesh that has several, such as a group of a file"
+    )
+    material: Materials = Field(
+        description="name of a material of [materials], or one for each region of the mesh"
+    )
+
+
+class OutputPart(Part):
+    """What is written, and where."""
+
+    folder: PlaceOfFile | None = Field(
+        default=None,
+        description="folder of the results, relative to where the command runs (output/NAME of the file)",
+    )
+    files: list[FileKind] = Field(
+        default=["vtu"], description="files of fields, for ParaView; vtx needs ADIOS2"
+    )
+    pictures: list[PictureKind] = Field(default=["stress"], description="pictures as PNG files")
+    checkpoint: bool = Field(
+        default=True, description="keep a file from which interrupted load steps or optimisations go on"
+    )
 
 
 class Document(Part):
@@ -26,13 +69,11 @@ class Document(Part):
     meshes: dict[str, Mesh] = Field(min_length=1, description="meshes by name: shapes, or files")
     materials: dict[str, AnyMaterial] = Field(min_length=1, description="materials by name")
     bodies: dict[str, BodyPart] = Field(min_length=1, description="bodies by name")
-    supports: list[SupportPart] = Field(default_factory=list, description="prescribed displacements")
-    loads: list[AnyLoad] = Field(default_factory=list, description="forces and changes of temperature")
-    contacts: list[ContactPart] = Field(default_factory=list, description="pairs that may touch")
-    ties: list[TiePart] = Field(default_factory=list, description="pairs that stay together")
-    steps: list[StepPart] = Field(
-        default_factory=list, description="load steps; without them all acts at once"
-    )
+    supports: list[SupportPart] = Field([], description="prescribed displacements")
+    loads: list[AnyLoad] = Field([], description="forces and changes of temperature")
+    contacts: list[ContactPart] = Field([], description="pairs that may touch")
+    ties: list[TiePart] = Field([], description="pairs that stay together")
+    steps: list[StepPart] = Field([], description="load steps; without them all acts at once")
     solver: SolverPart = Field(SolverPart(), description="how it is solved")
     output: OutputPart = Field(OutputPart(), description="what is written, and where")
     design: DesignPart | None = Field(None, description="a shape optimisation, for `fenics-contact optimize`")

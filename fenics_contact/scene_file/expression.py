@@ -153,11 +153,17 @@ class VectorExpression:
         return np.column_stack(columns)
 
 
-def between(start: float | str, end: float | str, share: float) -> float | str:
+def between(start: float | Expression, end: float | Expression, share: float) -> float | Expression:
     """Return the value on the way from ``start`` (share 0) to ``end`` (share 1), number or formula."""
-    if isinstance(start, str) or isinstance(end, str):
-        return end if share == 1.0 else f"(1 - {share!r}) * ({start}) + {share!r} * ({end})"
-    return end if share == 1.0 else start + share * (end - start)
+    if share == 1.0:
+        return end
+    if isinstance(start, Expression) or isinstance(end, Expression):
+        return Expression(f"(1 - {share!r}) * ({_text(start)}) + {share!r} * ({_text(end)})")
+    return start + share * (end - start)
+
+
+def _text(value: float | Expression) -> str:
+    return value.text if isinstance(value, Expression) else repr(value)
 
 
 def is_finite(value: float) -> bool:

@@ -1,126 +1,112 @@
-"""Loads on surfaces and volumes."""
+"""Loads on surfaces and volumes, and displacements that are prescribed."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
-from pydantic import Field, Tag
+from pydantic import Field, PositiveFloat
 
 from fenics_contact import scene
-from fenics_contact.scene import Load
+from fenics_contact.scene import Load, Support
 from fenics_contact.scene_file.expression import Expression, VectorExpression
-from fenics_contact.scene_file.values import Part, Scalar, Vector, VectorOrFormulas, kind_of
-
-#: What a load is given as: one number or formula, or one a component.
-LoadValue: TypeAlias = float | str | tuple[float | str, ...]
+from fenics_contact.scene_file.part import Part, keys_of
+from fenics_contact.scene_file.values import FREE, Components, Scalar, one_of
 
 
-class _Load(Part):
+class _Named(Part):
+    """What load steps change.
+
+    Attributes:
+        changed: The argument that they change.
+    """
+
+    changed: ClassVar[str] = "value"
     name: str | None = Field(None, description="how load steps call it")
-    body: str = Field(description="name of the body")
 
     @property
-    def size(self) -> LoadValue:
+    def size(self) -> Any:
         """What load steps change."""
-        return getattr(self, "value")  # type: ignore[no-any-return]
+        return getattr(self, self.changed)
 
 
+class _Load(_Named):
+    def build(self, dim: int, value: Any = None) -> Load:
+        """Return the load, with the value of a load step if given."""
+        value = self.size if value is None else value
+        if isinstance(value, tuple) and any(isinstance(entry, Expression) for entry in value):
+            value = VectorExpression(value)
+        load: Load = self.made(**{self.changed: value})
+        return load
+
+
+@keys_of(scene.Traction)
 class TractionLoad(_Load):
     """Force a reference area on a surface."""
 
     kind: Literal["traction"]
-    surface: str = Field(description="name of its surface")
-    value: VectorOrFormulas = Field(description="numbers, or formulas in x, y, z, [force / length²]")
-
-    def build(self, value: Any = None) -> Load:
-        """Return the load, with the value of a load step if given."""
-        return scene.Traction(self.body, self.surface, vector(value or self.value))
 
 
+@keys_of(scene.TotalForce)
 class TotalForceLoad(_Load):
     """A resultant, spread evenly over a surface."""
 
     kind: Literal["total_force"]
-    surface: str = Field(description="name of its surface")
-    value: Vector = Field(description="resultant along x, y and z, [force]")
-
-    def build(self, value: Any = None) -> Load:
-        """Return the load, with the value of a load step if given."""
-        return scene.TotalForce(self.body, self.surface, value or self.value)
 
 
+@keys_of(scene.Pressure)
 class PressureLoad(_Load):
     """Pressure, normal to the surface; positive presses on the body."""
 
     kind: Literal["pressure"]
-    surface: str = Field(description="name of its surface")
-    value: Scalar = Field(description="number, or formula in x, y, z, [force / length²]")
-
-    def build(self, value: Any = None) -> Load:
-        """Return the load, with the value of a load step if given."""
-        return scene.Pressure(self.body, self.surface, scalar(self.value if value is None else value))
 
 
+@keys_of(scene.BodyForce)
 class BodyForceLoad(_Load):
     """Force a volume."""
 
     kind: Literal["body_force"]
-    value: VectorOrFormulas = Field(description="numbers, or formulas in x, y, z, [force / length³]")
-
-    def build(self, value: Any = None) -> Load:
-        """Return the load, with the value of a load step if given."""
-        return scene.BodyForce(self.body, vector(value or self.value))
 
 
+@keys_of(scene.gravity)
 class GravityLoad(_Load):
     """Weight of a body."""
 
+    changed: ClassVar[str] = "acceleration"
     kind: Literal["gravity"]
-    density: float = Field(gt=0, description="mass a volume, in the units of the file")
-    acceleration: Vector = Field(description="of gravity along x, y and z, [length / time²]")
-
-    @property
-    def size(self) -> LoadValue:
-        """The acceleration is what load steps change."""
-        return self.acceleration
-
-    def build(self, value: Any = None) -> Load:
-        """Return the load, with the acceleration of a load step if given."""
-        return scene.gravity(self.body, self.density, value or self.acceleration)
+    density: PositiveFloat
 
 
+@keys_of(scene.ThermalStrain)
 class ThermalLoad(_Load):
     """A change of temperature."""
 
+    changed: ClassVar[str] = "temperature_change"
     kind: Literal["thermal"]
-    value: Scalar = Field(
-        description="change against the temperature without stress, in degrees: number, or formula in x, y, z"
+    temperature_change: Scalar = Field(alias="value")
+
+
+@keys_of(Support)
+class SupportPart(_Named):
+    """Displacement prescribed on a surface, component by component."""
+
+    value: Components | None = Field(
+        None,
+        description=f'displacement along x, y and z (x, y of a plane body), [length]: a number, "{FREE}", or '
+        "a formula in x, y, z in quotes; zero in all directions by default",
     )
 
-    def build(self, value: Any = None) -> Load:
-        """Return the load, with the value of a load step if given."""
-        return scene.ThermalStrain(self.body, scalar(self.value if value is None else value))
+    def build(self, dim: int, value: tuple[Any, ...] | None = None) -> Support:
+        """Return the support.
+
+        Args:
+            dim: Dimension of the bodies.
+            value: What a load step prescribes instead.
+        """
+        support: Support = self.made(value=value or self.value or (0.0,) * dim)
+        return support
 
 
-KINDS = ("traction", "total_force", "pressure", "body_force", "gravity", "thermal")
 AnyLoad: TypeAlias = Annotated[
-    Annotated[TractionLoad, Tag("<traction>")]
-    | Annotated[TotalForceLoad, Tag("<total_force>")]
-    | Annotated[PressureLoad, Tag("<pressure>")]
-    | Annotated[BodyForceLoad, Tag("<body_force>")]
-    | Annotated[GravityLoad, Tag("<gravity>")]
-    | Annotated[ThermalLoad, Tag("<thermal>")],
-    kind_of("kind", KINDS),
+    Any,
+    one_of("kind", TractionLoad, TotalForceLoad, PressureLoad, BodyForceLoad, GravityLoad, ThermalLoad),
 ]
-
-
-def scalar(value: float | str) -> float | Expression:
-    """Return a number as it is, a formula as a function of points."""
-    return Expression(value) if isinstance(value, str) else value
-
-
-def vector(value: tuple[float | str, ...]) -> Any:
-    """Return numbers as they are, with formulas a function of points."""
-    if not any(isinstance(entry, str) for entry in value):
-        return value
-    return VectorExpression(tuple(map(scalar, value)))

@@ -1,94 +1,76 @@
-"""What bodies are made of."""
+"""What bodies are made of: the materials of the package by their constants, and classes of one's own."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import Field, PlainValidator, Tag, WithJsonSchema
+from pydantic import AfterValidator, Field, PositiveFloat
 
 from fenics_contact import scene
 from fenics_contact.errors import InvalidInputError, running
 from fenics_contact.scene import Material
 from fenics_contact.scene_file.own_python import is_reference, load
-from fenics_contact.scene_file.values import Pair, Part, Triple, chooser, needs
+from fenics_contact.scene_file.part import Part, keys_of
+from fenics_contact.scene_file.values import Triple, one_of
 
-_EXPANSION = "thermal expansion α, strain a degree"
+ISOTROPIC: dict[str, Callable[..., Material]] = {
+    "isotropic": scene.IsotropicElasticity,
+    "plane_strain": scene.PlaneStrain,
+    "plane_stress": scene.PlaneStress,
+}
 
 
-class IsotropicMaterial(Part):
+class _Material(Part):
+    def build(self, folder: Path) -> Material:
+        """Return the material."""
+        material: Material = self.made()
+        return material
+
+
+@keys_of(scene.IsotropicElasticity)
+class IsotropicMaterial(_Material):
     """Isotropic elasticity: of bodies in space, or of plane ones in plane strain or plane stress."""
 
     model: Literal["isotropic", "plane_strain", "plane_stress"] = Field(
         "isotropic", description="isotropic for bodies in space, the others for plane bodies"
     )
-    young_modulus: float = Field(gt=0, description="Young's modulus E, [force / length²]")
-    poisson_ratio: float = Field(
-        gt=-1, lt=0.5, description="Poisson's ratio ν, between -1 and 0.5, dimensionless"
-    )
-    thermal_expansion: float | None = Field(None, description=_EXPANSION)
+    young_modulus: PositiveFloat
+    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)]
 
     def build(self, folder: Path) -> Material:
         """Return the material."""
-        classes: dict[str, Callable[..., Material]] = {
-            "isotropic": scene.IsotropicElasticity,
-            "plane_strain": scene.PlaneStrain,
-            "plane_stress": scene.PlaneStress,
-        }
-        return classes[self.model](self.young_modulus, self.poisson_ratio, self.thermal_expansion)
+        return ISOTROPIC[self.model](**{name: getattr(self, name) for name in self.given})
 
 
-class OrthotropicMaterial(Part):
+@keys_of(scene.OrthotropicElasticity, without=["orientation"])
+class OrthotropicMaterial(_Material):
     """Orthotropic elasticity in space by nine engineering constants in material axes 1, 2, 3."""
 
     model: Literal["orthotropic"]
-    young_moduli: Triple = Field(description="E_1, E_2, E_3, [force / length²]")
-    poisson_ratios: Triple = Field(description="ν_12, ν_13, ν_23, dimensionless")
-    shear_moduli: Triple = Field(description="G_12, G_13, G_23, [force / length²]")
     axis_1: Triple = Field((1.0, 0.0, 0.0), description="direction of material axis 1, any length")
     axis_2: Triple = Field(
         (0.0, 1.0, 0.0), description="a direction in the plane of the axes 1 and 2, any length"
     )
-    thermal_expansion: Triple | None = Field(None, description=f"{_EXPANSION}, along the material axes")
 
     def build(self, folder: Path) -> Material:
         """Return the material."""
-        orientation = scene.material_axes(self.axis_1, self.axis_2)
-        return scene.OrthotropicElasticity(
-            self.young_moduli, self.poisson_ratios, self.shear_moduli, orientation, self.thermal_expansion
-        )
+        material: Material = self.made(orientation=scene.material_axes(self.axis_1, self.axis_2))
+        return material
 
 
-class OrthotropicPlate(Part):
+@keys_of(scene.OrthotropicPlaneStress)
+class OrthotropicPlate(_Material):
     """A thin orthotropic plate without stress normal to it, for plane bodies."""
 
     model: Literal["orthotropic_plane_stress"]
-    young_moduli: Pair = Field(description="E_1, E_2, [force / length²]")
-    poisson_ratio: float = Field(description="ν_12, dimensionless")
-    shear_modulus: float = Field(gt=0, description="G_12, [force / length²]")
-    angle: float = Field(0.0, description="from the x-axis to material axis 1, counterclockwise, in radians")
-    thermal_expansion: Pair | None = Field(None, description=f"{_EXPANSION}, along the material axes")
-
-    def build(self, folder: Path) -> Material:
-        """Return the material."""
-        return scene.OrthotropicPlaneStress(
-            self.young_moduli, self.poisson_ratio, self.shear_modulus, self.angle, self.thermal_expansion
-        )
-
-
-def _parameters(value: Any) -> dict[str, Any]:
-    """Check arguments of a class, lists become tuples: materials are hashable."""
-    if not isinstance(value, Mapping):
-        raise needs("a table of what the class takes")
-    return {name: _frozen(entry) for name, entry in value.items()}
+    shear_modulus: PositiveFloat
 
 
 def _frozen(value: Any) -> Any:
+    """Make tuples of lists: materials are hashable."""
     return tuple(map(_frozen, value)) if isinstance(value, list) else value
-
-
-_TABLE = WithJsonSchema({"type": "object"})
 
 
 class OwnMaterial(Part):
@@ -98,7 +80,7 @@ class OwnMaterial(Part):
         description='"file.py:Class", relative to the folder of the scene file; the file is run',
         pattern=r"^.+\.py:[A-Za-z_]\w*$",
     )
-    parameters: Annotated[dict[str, Any], PlainValidator(_parameters), _TABLE] = Field(
+    parameters: dict[str, Annotated[Any, AfterValidator(_frozen)]] = Field(
         default_factory=dict, description="what the class takes, by name"
     )
 
@@ -119,22 +101,15 @@ class OwnMaterial(Part):
         return material
 
 
-MODELS = ("isotropic", "plane_strain", "plane_stress", "orthotropic", "orthotropic_plane_stress")
-
-
-def _tag(value: Any) -> str | None:
-    model = value.get("model", "isotropic") if isinstance(value, Mapping) else getattr(value, "model", None)
-    if is_reference(model):
-        return "<python>"
-    return {name: "<isotropic>" for name in MODELS[:3]}.get(
-        str(model), f"<{model}>" if model in MODELS else None
-    )  # type: ignore[call-overload,no-any-return]
-
-
 AnyMaterial: TypeAlias = Annotated[
-    Annotated[IsotropicMaterial, Tag("<isotropic>")]
-    | Annotated[OrthotropicMaterial, Tag("<orthotropic>")]
-    | Annotated[OrthotropicPlate, Tag("<orthotropic_plane_stress>")]
-    | Annotated[OwnMaterial, Tag("<python>")],
-    chooser(_tag, "model", (*MODELS, "file.py:Class")),
+    Any,
+    one_of(
+        "model",
+        IsotropicMaterial,
+        OrthotropicMaterial,
+        OrthotropicPlate,
+        default="isotropic",
+        other=OwnMaterial,
+        when=lambda table: is_reference(table.get("model")),
+    ),
 ]

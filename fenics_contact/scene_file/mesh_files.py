@@ -6,67 +6,45 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
-from pydantic import Field, PlainValidator, WithJsonSchema
+from pydantic import Field, PositiveFloat
 
 from fenics_contact import geometry
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import BodyMesh
 from fenics_contact.scene_file.placing import Placed, Shaped
-from fenics_contact.scene_file.values import PlaceOfFile, needs
+from fenics_contact.scene_file.values import PlaceOfFile, Read, said
 
 if TYPE_CHECKING:
     from mpi4py import MPI
 
 #: CAD files that only say what is there; a .geo file is a program, which is for Python to run.
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
-_LABEL = {"anyOf": [{"type": "string"}, {"type": "integer"}]}
 
-
-def _is_label(value: object) -> bool:
-    return isinstance(value, str | int) and not isinstance(value, bool)
-
-
-def _is_labels(value: object) -> bool:
-    return isinstance(value, list) and bool(value) and all(map(_is_label, value))
-
-
-def _bodies(value: Any) -> Any:
-    """Check names of groups, or a table from bodies to groups or to regions."""
-    if _is_labels(value):
-        return value
-    if isinstance(value, Mapping) and value:
-        regions = [part for part in value.values() if isinstance(part, Mapping)]
-        plain = [part for part in value.values() if not isinstance(part, Mapping)]
-        if all(_is_label(part) or _is_labels(part) for part in plain) and all(
-            all(map(_is_label, part.values())) for part in regions
-        ):
-            return value
-    raise needs(
-        "a list of groups, or a table: body = group, body = [groups], or body = {region = group}, where a "
-        "group is a name or a number"
-    )
-
-
-def _surfaces(value: Any) -> Any:
-    """Check names of groups, or a table from surfaces to groups."""
-    if _is_labels(value):
-        return value
-    if isinstance(value, Mapping) and all(_is_label(part) or _is_labels(part) for part in value.values()):
-        return value
-    raise needs("a list of groups, or a table: surface = group, or surface = [groups]")
-
-
-_LABELS: dict[str, Any] = {"type": "array", "items": _LABEL}
-_OF_SURFACES = {"anyOf": [_LABELS, {"type": "object", "additionalProperties": {"anyOf": [_LABEL, _LABELS]}}]}
-_REGIONS = {"type": "object", "additionalProperties": _LABEL}
-_OF_BODIES = {
-    "anyOf": [
-        _LABELS,
-        {"type": "object", "additionalProperties": {"anyOf": [_LABEL, _LABELS, _REGIONS]}},
-    ]
-}
-BodyGroups: TypeAlias = Annotated[Any, PlainValidator(_bodies), WithJsonSchema(_OF_BODIES)]
-SurfaceGroups: TypeAlias = Annotated[Any, PlainValidator(_surfaces), WithJsonSchema(_OF_SURFACES)]
+_Label = str | int
+_Labels = Annotated[list[_Label], Field(min_length=1, strict=False)]
+_OfBodies = Annotated[dict[str, _Label | _Labels | dict[str, _Label]], Field(min_length=1)]
+_OfSurfaces = dict[str, _Label | _Labels]
+BodyGroups: TypeAlias = Annotated[
+    Any,
+    Read(
+        Annotated[
+            _Labels | _OfBodies,
+            said(
+                "a list of groups, or a table: body = group, body = [groups], or body = {region = group}, "
+                "where a group is a name or a number"
+            ),
+        ]
+    ),
+]
+SurfaceGroups: TypeAlias = Annotated[
+    Any,
+    Read(
+        Annotated[
+            _Labels | _OfSurfaces,
+            said("a list of groups, or a table: surface = group, or surface = [groups]"),
+        ]
+    ),
+]
 
 
 class MeshFile(Placed):
@@ -79,9 +57,8 @@ class MeshFile(Placed):
     surfaces: SurfaceGroups | None = Field(
         None, description="groups of facets that are surfaces; or surface to group or groups (all)"
     )
-
-    size: float | None = Field(
-        None, gt=0, description="largest edge of a cell, for CAD files, which gmsh meshes, [length]"
+    size: PositiveFloat | None = Field(
+        None, description="largest edge of a cell, for CAD files, which gmsh meshes, [length]"
     )
     labels: str | None = Field(
         None,
@@ -92,33 +69,32 @@ class MeshFile(Placed):
         False, description="drop all nodes but the corners of quadratic cells (not for CAD, .msh and .xdmf)"
     )
 
-    def build(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:
+    def shapes(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:
         """Read the file on rank 0. Collective.
 
         Raises:
             InvalidInputError: If it is missing, of no known format, or does not hold what is asked for.
         """
-        return {name: self.arranged(Shaped(mesh)) for name, mesh in self._read(folder, comm).items()}
+        return {name: Shaped(mesh) for name, mesh in self._read(folder / self.file, comm).items()}
 
-    def _read(self, folder: Path, comm: MPI.Comm) -> Mapping[str, BodyMesh]:
-        path = folder / self.file
-        kind = path.suffix.lower()
+    def _read(self, path: Path, comm: MPI.Comm) -> Mapping[str, BodyMesh]:
+        kind, groups = path.suffix.lower(), (self.bodies, self.surfaces)
         if kind in (*CAD, ".msh", ".xdmf") and (self.labels is not None or self.corners_only):
             raise InvalidInputError(
                 f"labels and corners_only are for other formats than CAD, .msh and .xdmf, got {self.file!r}: "
                 "choose groups with bodies and surfaces"
             )
         if kind in CAD:
-            return geometry.read_cad(path, self.size, self.bodies, self.surfaces, comm=comm)
+            return geometry.read_cad(path, self.size, *groups, comm=comm)
         if self.size is not None:
             raise InvalidInputError(
                 f"size is for CAD files ({', '.join(CAD)}), got {self.file!r}: leave it away, or mesh the "
                 "body anew"
             )
         if kind == ".msh":
-            return geometry.read_msh(path, self.bodies, self.surfaces, comm=comm)
+            return geometry.read_msh(path, *groups, comm=comm)
         if kind == ".xdmf":
-            return geometry.read_xdmf(path, self.bodies, self.surfaces, comm=comm)
+            return geometry.read_xdmf(path, *groups, comm=comm)
         return geometry.read_mesh(
-            path, self.bodies, self.surfaces, labels=self.labels, corners_only=self.corners_only, comm=comm
+            path, *groups, labels=self.labels, corners_only=self.corners_only, comm=comm
         )

@@ -2,51 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any
 
-from fenics_contact.scene_file.contacts import SurfaceOfBody
 from fenics_contact.scene_file.document import Document
+from fenics_contact.scene_file.expression import Expression
 from fenics_contact.scene_file.mistakes import Mistake, listed, suggestion
-from fenics_contact.scene_file.places import Path, as_toml, written
+from fenics_contact.scene_file.part import Part
+from fenics_contact.scene_file.places import Path, as_toml, branches, written
 from fenics_contact.scene_file.source import Source
 from fenics_contact.scene_file.values import FREE
 
 
-@dataclass(frozen=True)
-class Reference:
-    """A name that a part uses.
+def unknown(source: Source, path: Path, given: str, what: str, known: Iterable[str]) -> Mistake:
+    """Return the mistake of a name that is not known.
 
-    Attributes:
-        path: Where.
+    Args:
+        source: Where the scene comes from.
+        path: Where the name stands.
         given: The name.
         what: What it must be a name of.
+        known: The names that there are.
     """
-
-    path: Path
-    given: str
-    what: str
-
-    def wrong(self, source: Source, known: Iterable[str]) -> Mistake:
-        """Return the mistake of a name that is not known."""
-        names = list(known)
-        words = f"{written(self.path)} must be {self.what}, one of {listed(names)}, got {as_toml(self.given)}"
-        meant = suggestion(self.given, names).rstrip()
-        return source.mistake(self.path, f"{words}: {meant}" if meant else words)
+    names = list(known)
+    words = f"{written(path)} must be {what}, one of {listed(names)}, got {as_toml(given)}"
+    meant = suggestion(given, names).rstrip()
+    return source.mistake(path, f"{words}: {meant}" if meant else words)
 
 
 def wrong_names(source: Source, document: Document) -> list[Mistake]:
     """Return every name that leads nowhere, as far as no mesh need be built to know it."""
-    known: dict[str, Iterable[str]] = {
+    known: dict[str, Collection[str]] = {
         "a mesh": document.meshes,
         "a material": document.materials,
         "a body": document.bodies,
         "the name of a support": _names(document.supports),
         "the name of a load": _names(document.loads),
     }
-    used = [*_of_bodies(document), *body_references(document), *_of_steps(document)]
-    wrong = [one.wrong(source, known[one.what]) for one in used if one.given not in known[one.what]]
+    used = _references(document)
+    wrong = [
+        unknown(source, path, name, what, known[what]) for path, name, what in used if name not in known[what]
+    ]
     return wrong or [*_twice(source, document), *_unlike(source, document)]
 
 
@@ -54,49 +50,32 @@ def _names(parts: Iterable[Any]) -> list[str]:
     return [part.name for part in parts if part.name]
 
 
-def _of_bodies(document: Document) -> Iterator[Reference]:
+def _references(document: Document) -> Iterator[tuple[Path, str, str]]:
+    """Yield every name that is used, with where it stands and what it must be a name of."""
     for name, body in document.bodies.items():
-        yield Reference(("bodies", name, "mesh"), body.mesh, "a mesh")
-        if isinstance(body.material, str):
-            yield Reference(("bodies", name, "material"), body.material, "a material")
-        else:
-            for region, material in body.material.items():
-                yield Reference(("bodies", name, "material", region), material, "a material")
-
-
-def body_references(document: Document) -> Iterator[Reference]:
-    """Yield every name of a body that supports, loads, pairs, solver and design use."""
-    for path, part in surface_parts(document):
-        yield Reference((*path, "body"), part.body, "a body")
-    for number, load in enumerate(document.loads):
-        if not hasattr(load, "surface"):
-            yield Reference(("loads", number, "body"), load.body, "a body")
-    if isinstance(document.solver.subdomains, Mapping):
-        for name in document.solver.subdomains:
-            yield Reference(("solver", "subdomains", name), name, "a body")
-    for number, surface in enumerate(document.design.surfaces if document.design else ()):
-        yield Reference(("design", "surfaces", number, "body"), surface.body, "a body")
+        yield ("bodies", name, "mesh"), body.mesh, "a mesh"
+        made_of: Any = body.material
+        for region in made_of if isinstance(made_of, Mapping) else ():
+            yield ("bodies", name, "material", region), made_of[region], "a material"
+        if isinstance(made_of, str):
+            yield ("bodies", name, "material"), made_of, "a material"
+    for path, part in branches(document):
+        if isinstance(part, Part) and hasattr(part, "body"):
+            yield (*path, "body"), part.body, "a body"
+    cuts = document.solver.subdomains
+    for name in cuts if isinstance(cuts, Mapping) else ():
+        yield ("solver", "subdomains", name), name, "a body"
+    for number, step in enumerate(document.steps):
+        for key, named in (("supports", step.supports), ("loads", step.loads)):
+            for name in named:
+                yield ("steps", number, key, name), name, f"the name of a {key[:-1]}"
 
 
 def surface_parts(document: Document) -> Iterator[tuple[Path, Any]]:
-    """Yield every part that names a surface of a body, with its path."""
-    for key in ("supports", "loads"):
-        for number, part in enumerate(getattr(document, key)):
-            if hasattr(part, "surface"):
-                yield (key, number), part
-    for key in ("contacts", "ties"):
-        for number, pair in enumerate(getattr(document, key)):
-            yield (key, number, "slave"), pair.slave
-            if isinstance(pair.master, SurfaceOfBody):
-                yield (key, number, "master"), pair.master
-
-
-def _of_steps(document: Document) -> Iterator[Reference]:
-    for number, step in enumerate(document.steps):
-        for name in step.supports:
-            yield Reference(("steps", number, "supports", name), name, "the name of a support")
-        for name in step.loads:
-            yield Reference(("steps", number, "loads", name), name, "the name of a load")
+    """Yield every part that names a surface of a body's mesh, with its path."""
+    for path, part in branches(document):
+        if isinstance(part, Part) and hasattr(part, "surface") and path[0] != "design":
+            yield path, part
 
 
 def _twice(source: Source, document: Document) -> Iterator[Mistake]:
@@ -112,25 +91,26 @@ def _twice(source: Source, document: Document) -> Iterator[Mistake]:
 
 def _unlike(source: Source, document: Document) -> Iterator[Mistake]:
     """Yield values of load steps that have another form than those of their supports and loads."""
-    values: dict[str, dict[str, Any]] = {
-        "supports": {part.name: part.value for part in document.supports if part.name},
-        "loads": {part.name: part.size for part in document.loads if part.name},
-    }
     for number, step in enumerate(document.steps):
         for key in ("supports", "loads"):
+            own = {part.name: part.size for part in getattr(document, key) if part.size is not None}
             for name, value in getattr(step, key).items():
-                path, own = ("steps", number, key, name), values[key][name]
-                if own is not None and _form(own) != _form(value):
+                if name in own and _form(own[name]) != _form(value):
+                    path: Path = ("steps", number, key, name)
                     words = (
-                        f"{written(path)} must have the form of {name!r} itself, {as_toml(_plain(own))}, "
-                        f"with the same components free, got {as_toml(_plain(value))}"
+                        f"{written(path)} must have the form of {name!r} itself, "
+                        f"{as_toml(_plain(own[name]))}, with the same components free, got "
+                        f"{as_toml(_plain(value))}"
                     )
                     yield source.mistake(path, words)
 
 
 def _form(value: Any) -> Any:
-    return tuple(entry == FREE for entry in value) if isinstance(value, tuple) else None
+    return tuple(entry is None for entry in value) if isinstance(value, tuple) else None
 
 
 def _plain(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
+    """Return a value as the file has it."""
+    if isinstance(value, tuple):
+        return [FREE if entry is None else _plain(entry) for entry in value]
+    return value.text if isinstance(value, Expression) else value

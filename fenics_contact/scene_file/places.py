@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import tomlkit
 import tomlkit.items
+from pydantic import BaseModel
 
 from fenics_contact.progress.words import visible
 
@@ -53,6 +54,20 @@ def _as_toml(value: Any) -> str:
         return tomlkit.item(value).as_string()
     except (TypeError, ValueError):
         return repr(value)
+
+
+def branches(data: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
+    """Yield everything in plain data or tables, and itself, with paths."""
+    waiting = [(path, data)]
+    while waiting:  # data may be nested deeper than Python calls
+        path, data = waiting.pop()
+        yield path, data
+        inner: Any = ()
+        if isinstance(data, list | tuple):
+            inner = enumerate(data)
+        elif isinstance(data, Mapping | BaseModel):
+            inner = data.items() if isinstance(data, Mapping) else data
+        waiting += [((*path, key), part) for key, part in inner]
 
 
 def value_at(data: Any, path: Path) -> Any:

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, PositiveFloat
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import BodyMesh, DesignSurface, quadratic
-from fenics_contact.scene_file.values import Part, Triple, Vector
+from fenics_contact.scene_file.part import Part
+from fenics_contact.scene_file.values import Triple, Vector
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,15 +41,29 @@ class Shaped:
 
 
 class Placed(Part):
-    """Keys that every mesh may have."""
+    """A mesh, and keys that every mesh may have."""
 
     quadratic: bool = Field(False, description="cells of second order (not for tetrahedra)")
-    scale: float = Field(1.0, gt=0, description="factor on all coordinates, about the origin, applied first")
+    scale: PositiveFloat = Field(
+        1.0, description="factor on all coordinates, about the origin, applied first"
+    )
     axis: Triple = Field(
         (0.0, 0.0, 1.0), description="axis through the origin about which the mesh is turned"
     )
     degrees: float = Field(0.0, description="angle by which the mesh is turned about `axis`, in degrees")
     translate: Vector | None = Field(None, description="displacement of the mesh, applied last, [length]")
+
+    def build(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:
+        """Return the bodies by the names that `part` takes, "" for the only one. Collective.
+
+        Raises:
+            InvalidInputError: If they cannot be meshed or placed.
+        """
+        return {name: self.arranged(shape) for name, shape in self.shapes(folder, comm).items()}
+
+    def shapes(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:
+        """Return the bodies before they are placed. Collective."""
+        return {"": Shaped(self.made())}
 
     def arranged(self, shape: Shaped) -> Shaped:
         """Return a shape as the keys ask for it.

@@ -7,13 +7,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, PlainValidator, WithJsonSchema
+from pydantic import AfterValidator, Field, PositiveInt
 
 from fenics_contact.contact.equilibrium import default_solver
 from fenics_contact.geometry import box_partition, graph_partition
 from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG, Smalse
 from fenics_contact.scene import Scene, choose_solver
-from fenics_contact.scene_file.values import Part, is_number, needs
+from fenics_contact.scene_file.part import Part
+from fenics_contact.scene_file.values import Read, said
 
 if TYPE_CHECKING:
     from fenics_contact.contact.tolerance import Tolerance
@@ -21,40 +22,15 @@ if TYPE_CHECKING:
 BALANCED = "balanced"
 
 
-def _tolerance(value: Any) -> float | str:
-    if value == BALANCED:
-        return BALANCED
-    if not is_number(value) or not 0.0 < value < 1.0:
-        raise needs(f'a number between 0 and 1, or "{BALANCED}"')
-    return float(value)
-
-
-def _is_count(value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and value > 0
-
-
-def _is_cut(value: object) -> bool:
-    boxes = isinstance(value, list | tuple) and len(value) in (2, 3) and all(map(_is_count, value))
-    return boxes or _is_count(value)
-
-
-def _subdomains(value: Any) -> Any:
-    if value == "auto" or _is_cut(value):
-        return tuple(value) if isinstance(value, list) else value
-    if isinstance(value, Mapping) and value and all(map(_is_cut, value.values())):
-        return {name: tuple(cut) if isinstance(cut, list) else cut for name, cut in value.items()}
-    raise needs(
-        '"auto", a positive integer, three integers in brackets (boxes of a structured mesh; two in the '
-        "plane), or a table: body = integer or boxes"
-    )
-
-
-_COUNT: dict[str, Any] = {"type": "integer", "minimum": 1}
-_CUT: dict[str, Any] = {"anyOf": [_COUNT, {"type": "array", "items": _COUNT, "minItems": 2, "maxItems": 3}]}
-_CUTS = {"anyOf": [{"const": "auto"}, *_CUT["anyOf"], {"type": "object", "additionalProperties": _CUT}]}
-_TOLERANCE = {
-    "anyOf": [{"const": BALANCED}, {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}]
-}
+_TOLERANCES = said(f'a number between 0 and 1, or "{BALANCED}"')
+_Tolerance = Annotated[Annotated[float, Field(gt=0, lt=1)] | Literal["balanced"], _TOLERANCES]
+_Boxes = Annotated[list[PositiveInt], Field(min_length=2, max_length=3, strict=False), AfterValidator(tuple)]
+_ByBody = Annotated[dict[str, PositiveInt | _Boxes], Field(min_length=1)]
+_CUTS = said(
+    '"auto", a positive integer, three integers in brackets (boxes of a structured mesh; two in the plane), '
+    "or a table: body = integer or boxes"
+)
+_Cuts = Annotated[Literal["auto"] | PositiveInt | _Boxes | _ByBody, _CUTS]
 
 
 class SolverPart(Part):
@@ -63,14 +39,14 @@ class SolverPart(Part):
     method: Literal["auto", "face_newton", "smalse", "projected_cg"] = Field(
         default="auto", description="dual solver; auto takes the one that suits the scene"
     )
-    tolerance: Annotated[float | str, PlainValidator(_tolerance), WithJsonSchema(_TOLERANCE)] = Field(
+    tolerance: Annotated[float | str, Read(_Tolerance)] = Field(
         default=BALANCED,
         description="largest relative residual, or balanced: as accurate as the mesh deserves",
     )
-    max_products: int | None = Field(
-        default=None, ge=1, description="give up after that many products with F"
+    max_products: PositiveInt | None = Field(
+        default=None, description="give up after that many products with F"
     )
-    subdomains: Annotated[Any, PlainValidator(_subdomains), WithJsonSchema(_CUTS)] = Field(
+    subdomains: Annotated[Any, Read(_Cuts)] = Field(
         default="auto",
         description="subdomains of every body, or by body: a number, or boxes of a structured mesh",
     )

@@ -4,50 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from pydantic import Field, PlainValidator, WithJsonSchema
+from pydantic import Field
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene import Body, LoadStep
 from fenics_contact.scene_file.evaluation import check_formulas
 from fenics_contact.scene_file.expression import between
-from fenics_contact.scene_file.values import (
-    FREE,
-    Components,
-    Line,
-    Part,
-    Scalar,
-    VectorOrFormulas,
-    formula,
-    is_number,
-    needs,
-)
+from fenics_contact.scene_file.part import Part
+from fenics_contact.scene_file.values import Components, Line, LoadValue
 
 if TYPE_CHECKING:
-    from fenics_contact.scene_file.loads import AnyLoad
-    from fenics_contact.scene_file.supports import SupportPart
-
+    from fenics_contact.scene_file.loads import AnyLoad, SupportPart
 
 #: Load steps of a file in all; longer histories are driven from Python, step by step.
 MOST = 100_000
-
-
-def _load_value(value: Any) -> Any:
-    if isinstance(value, list | tuple) and len(value) in (2, 3):
-        return tuple(map(_entry, value))
-    return _entry(value)
-
-
-def _entry(value: Any) -> float | str:
-    if isinstance(value, str):
-        return formula(value)
-    if not is_number(value):
-        raise needs("a number or a formula, or two or three of them in brackets, like the load's own value")
-    return float(value)
-
-
-_LOAD = {"anyOf": [{"type": "number"}, {"type": "string"}, {"type": "array", "minItems": 2, "maxItems": 3}]}
 
 
 class StepPart(Part):
@@ -55,12 +27,8 @@ class StepPart(Part):
 
     name: Line = Field("step", description="what it does, for records")
     count: int = Field(1, ge=1, le=MOST, description="number of load steps in which the values are reached")
-    supports: dict[str, Components] = Field(
-        default_factory=dict, description="name of a support -> its value at the end"
-    )
-    loads: dict[str, Annotated[Any, PlainValidator(_load_value), WithJsonSchema(_LOAD)]] = Field(
-        default_factory=dict, description="name of a load -> its value at the end"
-    )
+    supports: dict[str, Components] = Field({}, description="name of a support -> its value at the end")
+    loads: dict[str, LoadValue] = Field({}, description="name of a load -> its value at the end")
 
 
 def load_steps(
@@ -101,7 +69,7 @@ def load_steps(
                 found.append(
                     LoadStep(
                         name,
-                        loads=tuple(part.build(loaded.get(part.name or "")) for part in loads),
+                        loads=tuple(part.build(dim, loaded.get(part.name or "")) for part in loads),
                         supports=tuple(part.build(dim, supported.get(part.name or "")) for part in supports),
                     )
                 )
@@ -129,7 +97,4 @@ def way(start: Any, end: Any, share: float) -> Any:
     """Return the value, numbers or formulas, on the way from ``start`` to ``end``."""
     if isinstance(end, tuple):
         return tuple(way(one, other, share) for one, other in zip(start, end, strict=True))
-    return FREE if FREE in (start, end) else between(start, end, share)
-
-
-__all__ = ["Scalar", "StepPart", "VectorOrFormulas", "load_steps", "way"]
+    return None if start is None or end is None else between(start, end, share)

@@ -107,12 +107,7 @@ def shape_task(
         for side in ("lower", "upper")
     )
     start = np.zeros(problem.size) if design.start is None else _fitting("start", design.start, problem.size)
-    method = BundleTrust(
-        tolerance=design.tolerance,
-        max_iterations=design.max_iterations,
-        max_evaluations=design.max_evaluations,
-        raise_on_failure=False,
-    )
+    method = design.made(raise_on_failure=False)
     return ShapeTask(problem, start, (lower, upper), _constraints(design, problem, start), method)
 
 

@@ -1,31 +1,44 @@
-"""What the parts of a scene file have in common: unknown keys are mistakes, and values say what they need."""
+"""Values of a scene file: numbers in rows, formulas, places of files; each says what it needs."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, TypeAlias
+from dataclasses import dataclass
+from functools import reduce
+from operator import or_
+from typing import Annotated, Any, Literal, TypeAlias, get_args
 
-from pydantic import BaseModel, ConfigDict, Discriminator, PlainValidator, WithJsonSchema
-from pydantic_core import PydanticCustomError
+from pydantic import AfterValidator, Discriminator, Field, GetCoreSchemaHandler, Tag, WrapValidator
+from pydantic_core import PydanticCustomError, ValidationError
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry.arguments import MOST
-from fenics_contact.scene_file.expression import Expression, is_finite
+from fenics_contact.scene_file.expression import Expression
 
 #: What a support's component is called that it leaves alone.
 FREE = "free"
 #: Stands in the message of an error of kind "choice" between the key and the values that it may have.
 SEPARATOR = "|"
+#: Begins what pydantic puts among the keys of an error's place and is none: files hold no such characters.
+MARK = "\0"
 #: What Linux allows, in bytes.
 LONGEST_NAME, LONGEST_PATH = 255, 4000
-_COUNTS = {2: "two", 3: "three"}
 
 
-class Part(BaseModel):
-    """A table of a scene file."""
+@dataclass(frozen=True, eq=False)
+class Read:
+    """Lets pydantic read a key by another annotation than the one that type checkers see.
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+    Attributes:
+        annotation: What pydantic reads.
+    """
+
+    annotation: Any
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> Any:
+        """Return the schema of the annotation."""
+        return handler.generate_schema(self.annotation)
 
 
 def needs(needed: str) -> PydanticCustomError:
@@ -33,47 +46,65 @@ def needs(needed: str) -> PydanticCustomError:
     return PydanticCustomError("needed", "must be {needed}", {"needed": needed})
 
 
-def kind_of(key: str, allowed: tuple[str, ...], default: str | None = None) -> Discriminator:
-    """Tell tables apart by the value of one key; tags are the values in angle brackets.
+def said(needed: str) -> WrapValidator:
+    """Say of what is refused what is ``needed``, unless a formula in it says that itself."""
+
+    def check(value: Any, handler: Callable[[Any], Any]) -> Any:
+        try:
+            return handler(value)
+        except ValidationError as error:
+            told = (each["ctx"] for each in error.errors() if each["type"] == "sentence")
+            sentence = next(told, None)
+            raise PydanticCustomError("sentence", "{sentence}", sentence) if sentence else needs(needed)
+
+    return WrapValidator(check)
+
+
+def one_of(
+    key: str, *tables: Any, default: str = "", other: Any = None, when: Callable[[Any], bool] | None = None
+) -> Read:
+    """Tell tables apart by the value of one key.
 
     Args:
-        key: The key.
-        allowed: Its values.
-        default: The value where the key is missing.
+        key: The key, a `Literal` of every table.
+        *tables: The tables.
+        default: Its value where the key is missing.
+        other: Table without such a key.
+        when: Tells from the data whether they are that table.
     """
+    kinds = {kind: table for table in tables for kind in get_args(table.model_fields[key].annotation)}
 
     def tag(value: Any) -> str | None:
         if not isinstance(value, Mapping):
-            return None if not isinstance(value, BaseModel) else f"<{getattr(value, key)}>"
+            return None
+        if when is not None and when(value):
+            return MARK
         kind = value.get(key, default)
-        return f"<{kind}>" if kind in allowed else None
+        return f"{MARK}{kind}" if isinstance(kind, str) and kind in kinds else None
 
-    return chooser(tag, key, allowed)
-
-
-def chooser(tag: Callable[[Any], str | None], key: str, allowed: tuple[str, ...]) -> Discriminator:
-    """Tell tables apart by a function that returns a tag, or None for what is not ``allowed``."""
-    return Discriminator(
-        tag,
-        custom_error_type="choice",
-        custom_error_message=SEPARATOR.join([key, *allowed]),  # a context would make the type unhashable
-    )
+    tagged = [Annotated[table, Tag(f"{MARK}{kind}")] for kind, table in kinds.items()]
+    tagged += [] if other is None else [Annotated[other, Tag(MARK)]]
+    message = SEPARATOR.join([key, *kinds])  # a context would make the type unhashable
+    choice = Discriminator(tag, custom_error_type="choice", custom_error_message=message)
+    return Read(Annotated[reduce(or_, tagged), choice])
 
 
-def is_number(value: object) -> bool:
-    """Tell whether a value is a finite number, which true and false are not."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and is_finite(value)
+def _row(kind: Any, least: int, most: int | None, needed: str) -> Read:
+    """Read a list with so many entries, which becomes a tuple."""
+    length = Field(min_length=least, max_length=most, strict=False)
+    return Read(Annotated[list[kind], length, AfterValidator(tuple), said(needed)])
 
 
-def _line(value: Any) -> str:
-    if not isinstance(value, str) or not value.isprintable():
-        raise needs("one line of text in quotes")
-    return value
+def _formula(text: str) -> Expression:
+    try:
+        return Expression(text)
+    except InvalidInputError as error:
+        raise PydanticCustomError("sentence", "{sentence}", {"sentence": str(error)}) from error
 
 
-def _place_of_file(value: Any) -> str:
+def _place_of_file(value: str) -> str:
     """Check a path as far as that can be without looking whether it is there."""
-    if not isinstance(value, str) or not value.strip():
+    if not value.strip():
         raise needs("the path of a file or folder, in quotes")
     longest = max(len(os.fsencode(part)) for part in value.split("/"))
     if longest > LONGEST_NAME or len(os.fsencode(value)) > LONGEST_PATH:
@@ -83,89 +114,32 @@ def _place_of_file(value: Any) -> str:
     return value
 
 
-def _numbers(*counts: int) -> Callable[[Any], tuple[float, ...]]:
-    said = " or ".join(_COUNTS[count] for count in counts)
+_COUNT = Annotated[int, Field(ge=1, le=MOST)]
+_AXES = "in brackets, for x, y and z (two for a plane body)"
+_COUNTS = f"integers from 1 to {MOST} in brackets"
 
-    def validate(value: Any) -> tuple[float, ...]:
-        if not isinstance(value, list | tuple) or len(value) not in counts or not all(map(is_number, value)):
-            raise needs(f"{said} finite numbers in brackets")
-        return tuple(float(entry) for entry in value)
+Pair: TypeAlias = Annotated[tuple[float, float], _row(float, 2, 2, "two finite numbers in brackets")]
+Triple: TypeAlias = Annotated[
+    tuple[float, float, float], _row(float, 3, 3, "three finite numbers in brackets")
+]
+Vector: TypeAlias = Annotated[tuple[float, ...], _row(float, 2, 3, "two or three finite numbers in brackets")]
+CountPair: TypeAlias = Annotated[tuple[int, int], _row(_COUNT, 2, 2, f"two {_COUNTS}")]
+CountTriple: TypeAlias = Annotated[tuple[int, int, int], _row(_COUNT, 3, 3, f"three {_COUNTS}")]
+Row: TypeAlias = Annotated[
+    tuple[float, ...], _row(float, 1, None, "finite numbers in brackets, one for each design variable")
+]
 
-    return validate
-
-
-def _integers(*counts: int) -> Callable[[Any], tuple[int, ...]]:
-    said = " or ".join(_COUNTS[count] for count in counts)
-
-    def validate(value: Any) -> tuple[int, ...]:
-        whole = isinstance(value, list | tuple) and all(
-            isinstance(entry, int) and not isinstance(entry, bool) and entry > 0 for entry in value
-        )
-        if not whole or len(value) not in counts:
-            raise needs(f"{said} positive integers in brackets")
-        if max(value) > MOST:
-            raise needs(f"{said} integers of at most {MOST} in brackets")
-        return tuple(value)
-
-    return validate
-
-
-def _array(kind: Mapping[str, Any], *counts: int) -> WithJsonSchema:
-    return WithJsonSchema(
-        {"type": "array", "items": dict(kind), "minItems": min(counts), "maxItems": max(counts)}
-    )
-
-
-_NUMBER, _TEXT = {"type": "number"}, {"type": "string"}
-_NUMBER_OR_FORMULA = {"anyOf": [{"type": "number"}, {"type": "string"}]}
-_COUNT = {"type": "integer", "minimum": 1, "maximum": MOST}
-
-Line: TypeAlias = Annotated[str, PlainValidator(_line), WithJsonSchema(_TEXT)]
-PlaceOfFile: TypeAlias = Annotated[str, PlainValidator(_place_of_file), WithJsonSchema(_TEXT)]
-Pair: TypeAlias = Annotated[tuple[float, float], PlainValidator(_numbers(2)), _array(_NUMBER, 2)]
-Triple: TypeAlias = Annotated[tuple[float, float, float], PlainValidator(_numbers(3)), _array(_NUMBER, 3)]
-Vector: TypeAlias = Annotated[tuple[float, ...], PlainValidator(_numbers(2, 3)), _array(_NUMBER, 2, 3)]
-CountPair: TypeAlias = Annotated[tuple[int, int], PlainValidator(_integers(2)), _array(_COUNT, 2)]
-CountTriple: TypeAlias = Annotated[tuple[int, int, int], PlainValidator(_integers(3)), _array(_COUNT, 3)]
-Counts: TypeAlias = Annotated[tuple[int, ...], PlainValidator(_integers(2, 3)), _array(_COUNT, 2, 3)]
-
-
-def _scalar(value: Any) -> float | str:
-    """Check a number or a formula."""
-    if isinstance(value, str):
-        return formula(value)
-    if not is_number(value):
-        raise needs("a finite number, or a formula in x, y and z in quotes")
-    return float(value)
-
-
-def _vector(value: Any) -> tuple[float | str, ...]:
-    """Check two or three numbers or formulas."""
-    if not isinstance(value, list | tuple) or len(value) not in _COUNTS:
-        raise needs("three numbers or formulas in brackets, for x, y and z (two for a plane body)")
-    return tuple(_scalar(entry) for entry in value)
-
-
-def _components(value: Any) -> tuple[float | str, ...]:
-    """Check what a support prescribes."""
-    if not isinstance(value, list | tuple) or len(value) not in _COUNTS:
-        raise needs(f"three numbers, formulas or '{FREE}' in brackets, for x, y and z (two for a plane body)")
-    return tuple(FREE if entry == FREE else _scalar(entry) for entry in value)
-
-
-def formula(text: str) -> str:
-    """Check a formula."""
-    try:
-        Expression(text)
-    except InvalidInputError as error:
-        raise PydanticCustomError("sentence", "{sentence}", {"sentence": str(error)}) from error
-    return text
-
-
-Scalar: TypeAlias = Annotated[float | str, PlainValidator(_scalar), WithJsonSchema(_NUMBER_OR_FORMULA)]
+Formula: TypeAlias = Annotated[Any, Read(Annotated[str, AfterValidator(_formula)])]
+#: A number or a formula in x, y, z; a formula becomes an `Expression`, a free component None.
+Scalar: TypeAlias = Annotated[float | Formula, said("a finite number, or a formula in x, y and z in quotes")]
+_FREE = Annotated[Literal["free"], AfterValidator(lambda _: None)]
 VectorOrFormulas: TypeAlias = Annotated[
-    tuple[float | str, ...], PlainValidator(_vector), _array(_NUMBER_OR_FORMULA, 2, 3)
+    Any, _row(float | Formula, 2, 3, f"three numbers or formulas {_AXES}")
 ]
 Components: TypeAlias = Annotated[
-    tuple[float | str, ...], PlainValidator(_components), _array(_NUMBER_OR_FORMULA, 2, 3)
+    Any, _row(float | _FREE | Formula, 2, 3, f"three numbers, formulas or '{FREE}' {_AXES}")
 ]
+_LOAD = said("a number or a formula, or two or three of them in brackets, like the load's own value")
+LoadValue: TypeAlias = Annotated[Any, Read(Annotated[float | Formula | VectorOrFormulas, _LOAD])]
+Line: TypeAlias = Annotated[str, Field(pattern=r"^[^\n\r]*$"), said("one line of text in quotes")]
+PlaceOfFile: TypeAlias = Annotated[str, AfterValidator(_place_of_file)]

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from fenics_contact.cli.tables import pairs
 from fenics_contact.contact import solve_scene
 from fenics_contact.scene import Coulomb, Scene
-from fenics_contact.scene_file.units import UnitNames
+from fenics_contact.scene_file.document import UnitNames
 from tests.contact.gallery import partitions, pressed_block, two_blocks
 
 RUBBING = r"\w+ \w+ on \w+ \w+: \d+ points, \d+ open, \d+ stick, \d+ slip; force [1-9.]"

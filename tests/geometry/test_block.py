@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh, block, box_lattice, split_hexahedra, vector_areas
+from fenics_contact.geometry import BodyMesh, block, box_lattice, rectangle, split_hexahedra, vector_areas
 from fenics_contact.geometry.quality import scaled_jacobian
 
 CELLS = ["hexahedron", "tetrahedron"]
@@ -50,6 +50,25 @@ def test_planes_may_be_spaced_as_one_likes() -> None:
     mesh = box_lattice([np.array([0.0, 1.0, 4.0]), np.array([0.0, 1.0]), np.array([0.0, 2.0])])
     assert sorted(np.unique(mesh.points[:, 0])) == [0.0, 1.0, 4.0]
     assert mesh.volume == pytest.approx(8.0)
+
+
+def test_a_grading_makes_cells_small_at_one_corner() -> None:
+    points = block((0, 0, 0), (2, 1, 1), (4, 4, 4), grading=(2.0, -2.0, 0.0)).points
+    x, y, z = (np.diff(np.unique(points[:, axis].round(12))) for axis in range(3))
+    assert x[-1] / x[0] == pytest.approx(np.exp(2.0 * 3 / 4))
+    np.testing.assert_allclose(x / 2, y[::-1])
+    np.testing.assert_allclose(z, 0.25)
+    plane = rectangle((0, 0), (2, 1), (4, 4), grading=(2.0, -2.0)).points
+    np.testing.assert_array_equal(np.unique(plane[:, 0]), np.unique(points[:, 0]))
+
+
+@pytest.mark.parametrize(
+    ("grading", "message"),
+    [((9.0, 0, 0), "grading must lie between -8 and 8, got"), ((1.0,), "grading must be 3 finite numbers")],
+)
+def test_a_grading_that_cannot_be_is_refused(grading: tuple[float, ...], message: str) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        block((0, 0, 0), (1, 1, 1), (2, 2, 2), grading=grading)
 
 
 def test_mirrored_layers_still_fit_together() -> None:

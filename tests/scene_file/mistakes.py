@@ -38,25 +38,25 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         "poisson_ratio = 0.3\n",
         "",
         "scene.toml, line 15: materials.steel must have 'poisson_ratio', got only young_modulus: Poisson's "
-        "ratio ν, between -1 and 0.5, dimensionless",
+        "ratio ν in (−1, 0.5), dimensionless",
     ),
     "a number is out of range": (
         "poisson_ratio = 0.3",
         "poisson_ratio = 0.5",
         "scene.toml, line 17: materials.steel.poisson_ratio must be a number less than 0.5, got 0.5: "
-        "Poisson's ratio ν, between -1 and 0.5, dimensionless",
+        "Poisson's ratio ν in (−1, 0.5), dimensionless",
     ),
     "a number is text": (
         "coefficient = 0.3",
         'coefficient = "0.3"',
         'scene.toml, line 40: contacts.0.friction.coefficient must be a number, got "0.3": friction '
-        "coefficient μ, dimensionless",
+        "coefficient μ ≥ 0, dimensionless",
     ),
     "a vector is too short": (
         "counts = [2, 2, 1]",
         "counts = [2, 2]",
-        "scene.toml, line 7: meshes.lower.counts must be three positive integers in brackets, got [2, 2]: "
-        "cells along x, y and z",
+        "scene.toml, line 7: meshes.lower.counts must be three integers from 1 to 1000000 in brackets, got "
+        "[2, 2]: number of hexahedra along x, y and z",
     ),
     "a shape is not known": (
         'shape = "block"',
@@ -142,26 +142,28 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         "1" + "0" * 400,
         "scene.toml, line 16: materials.steel.young_modulus must be a number below 1.8e308, the largest "
         "that there is, got 100000000000000000000000000000000000000000000000000000000...: Young's modulus"
-        " E, [force / length²]",
+        " E > 0, [force / length²]",
     ),
     "a vector has four hundred digits": (
         "value = [10.0,",
         f"value = [1{'0' * 400},",
-        "scene.toml, line 35: loads.0.value must be a finite number, or a formula in x, y and z in "
-        "quotes, got [10000000000000000000000000000000000000000000000000000000...: numbers, or formulas "
-        "in x, y, z, [force / length²]",
+        "scene.toml, line 35: loads.0.value must be three numbers or formulas in brackets, for x, y "
+        "and z (two for a plane body), got [10000000000000000000000000000000000000000000000000000000...: "
+        "force a reference area, [force / length²] (in the plane: a unit of thickness); numbers, or "
+        "formulas in x, y, z in quotes",
     ),
     "a count has four hundred digits": (
         "counts = [2, 2, 1]",
         f"counts = [1{'0' * 400}, 2, 1]",
-        "scene.toml, line 7: meshes.lower.counts must be three integers of at most 1000000 in brackets, "
-        "got [10000000000000000000000000000000000000000000000000000000...: cells along x, y and z",
+        "scene.toml, line 7: meshes.lower.counts must be three integers from 1 to 1000000 in brackets, "
+        "got [10000000000000000000000000000000000000000000000000000000...: number of hexahedra along x, "
+        "y and z",
     ),
     "cells are too many in a row": (
         "counts = [2, 2, 1]",
         "counts = [1_000_000_000, 2, 1]",
-        "scene.toml, line 7: meshes.lower.counts must be three integers of at most 1000000 in brackets, "
-        "got [1000000000, 2, 1]: cells along x, y and z",
+        "scene.toml, line 7: meshes.lower.counts must be three integers from 1 to 1000000 in brackets, "
+        "got [1000000000, 2, 1]: number of hexahedra along x, y and z",
     ),
     "load steps are too many": (
         "[solver]",

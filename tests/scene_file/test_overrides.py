@@ -33,7 +33,7 @@ def test_a_key_can_be_given_elsewhere(tmp_path: Path) -> None:
         "loads.0.value.2=-5", 'output.folder="there"', "contacts.0.discretisation=mortar",
     )  # fmt: skip
     (pair,) = file.document.contacts
-    assert getattr(pair.friction, "coefficient", None) == 0.2
+    assert getattr(pair.friction, "friction_coefficient", None) == 0.2
     assert pair.discretisation == "mortar"
     assert file.document.solver.tolerance == "balanced"
     assert (file.title, str(file.folder)) == ("Other blocks", "there")

@@ -41,9 +41,10 @@ class IsotropicElasticity(Isotropic):
     """Small-strain isotropic linear elasticity in space, σ = λ tr(ε) I + 2 G ε − ΔT (3λ + 2G) α I.
 
     Attributes:
-        young_modulus: E > 0, [force / length²].
-        poisson_ratio: ν in (−1, 0.5), dimensionless.
-        thermal_expansion: α, strain a degree, or None for a body that no temperature changes.
+        young_modulus: Young's modulus E > 0, [force / length²].
+        poisson_ratio: Poisson's ratio ν in (−1, 0.5), dimensionless.
+        thermal_expansion: Thermal expansion α, strain a degree, or None for a body that no temperature
+            changes.
     """
 
     @property

@@ -17,9 +17,10 @@ class PlaneStrain(Isotropic):
     """A slice of a long body that cannot strain along its length, σ = λ tr(ε) I + 2 G ε − ΔT (3λ + 2G) α I.
 
     Attributes:
-        young_modulus: E > 0, [force / length²].
-        poisson_ratio: ν in (−1, 0.5), dimensionless.
-        thermal_expansion: α, strain a degree, or None for a body that no temperature changes.
+        young_modulus: Young's modulus E > 0, [force / length²].
+        poisson_ratio: Poisson's ratio ν in (−1, 0.5), dimensionless.
+        thermal_expansion: Thermal expansion α, strain a degree, or None for a body that no temperature
+            changes.
     """
 
     @property
@@ -55,9 +56,10 @@ class PlaneStress(Isotropic):
     """A thin plate without stress normal to it, σ = E/(1−ν²) ((1−ν) ε + ν tr(ε) I) − ΔT E/(1−ν) α I.
 
     Attributes:
-        young_modulus: E > 0, [force / length²].
-        poisson_ratio: ν in (−1, 0.5), dimensionless.
-        thermal_expansion: α, strain a degree, or None for a body that no temperature changes.
+        young_modulus: Young's modulus E > 0, [force / length²].
+        poisson_ratio: Poisson's ratio ν in (−1, 0.5), dimensionless.
+        thermal_expansion: Thermal expansion α, strain a degree, or None for a body that no temperature
+            changes.
     """
 
     @property

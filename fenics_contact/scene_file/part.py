@@ -1,0 +1,122 @@
+"""Tables of a scene file, whose keys are the arguments of what is built from them."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Collection, Sequence
+from typing import Annotated, Any, ClassVar, TypeVar, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, create_model, model_validator
+from pydantic.fields import FieldInfo
+from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
+
+from fenics_contact.errors.checked import meaning
+from fenics_contact.scene.values import ScalarValue, VectorValue
+from fenics_contact.scene_file.values import (
+    CountPair,
+    CountTriple,
+    Pair,
+    Scalar,
+    Triple,
+    Vector,
+    VectorOrFormulas,
+)
+
+_FORMULAS = "; numbers, or formulas in x, y, z in quotes"
+#: What files have where arguments are declared so, and what is said of it; others are read as declared.
+IN_FILES: list[tuple[Any, Any, str]] = [
+    (Sequence[float], Vector, ""),
+    (tuple[float, ...], Vector, ""),
+    (tuple[float, float], Pair, ""),
+    (tuple[float, float] | None, Pair | None, ""),
+    (tuple[float, float, float], Triple, ""),
+    (tuple[float, float, float] | None, Triple | None, ""),
+    (tuple[int, int], CountPair, ""),
+    (tuple[int, int, int], CountTriple, ""),
+    (ScalarValue, Scalar, _FORMULAS),
+    (VectorValue, VectorOrFormulas, _FORMULAS),
+]
+Table = TypeVar("Table", bound="type[Part]")
+
+
+class Part(BaseModel):
+    """A table of a scene file.
+
+    Attributes:
+        of: What is built from it.
+        given: The arguments of that which are keys.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+    of: ClassVar[Callable[..., Any]]
+    given: ClassVar[tuple[str, ...]] = ()
+
+    def made(self, **other: Any) -> Any:
+        """Return what the table is of, with other values for some arguments."""
+        own = {name: getattr(self, name) for name in self.given}
+        parts = {name: value.made() for name, value in own.items() if isinstance(value, Part)}
+        return type(self).of(**{**own, **parts, **other})
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _explained(cls, data: Any, handler: ModelWrapValidatorHandler[Any]) -> Any:
+        """Add to errors what this table knows: which keys there are, and what the wrong one means."""
+        try:
+            return handler(data)
+        except ValidationError as error:
+            told = [cls._explain(each) for each in error.errors()]
+            raise ValidationError.from_exception_data(cls.__name__, told) from None
+
+    @classmethod
+    def _explain(cls, error: Any) -> InitErrorDetails:
+        context = error.get("ctx", {})
+        if error["type"] != "told":
+            known = {field.alias or name: field.description for name, field in cls.model_fields.items()}
+            hint = known.get(error["loc"][0]) if error["loc"] else None
+            context = {
+                **context, "kind": error["type"], "text": error["msg"], "keys": list(known), "hint": hint
+            }  # fmt: skip
+        told = PydanticCustomError("told", "{kind}", context)
+        return {"type": told, "loc": error["loc"], "input": error["input"]}
+
+
+def keys_of(
+    of: Any, *, without: Collection[str] = (), only: Collection[str] = ()
+) -> Callable[[Table], Table]:
+    """Give a table the arguments of a class or function as keys, with their types, defaults and meaning.
+
+    What the table itself declares of a key stays: another type, a default, a description, or an alias, which
+    is then the key.
+
+    Args:
+        of: What is built from the table.
+        without: Arguments that are no keys.
+        only: Arguments that are keys; all unless given.
+    """
+
+    def derive(table: Table) -> Table:
+        hints, own = get_type_hints(of), table.__pydantic_fields__
+        fields: dict[str, Any] = {}
+        for name, argument in inspect.signature(of).parameters.items():
+            if name not in without and (not only or name in only):
+                fields[name] = _field(own.get(name), hints[name], argument, meaning(of, name))
+        derived: Any = create_model(
+            table.__name__, __base__=table, __doc__=table.__doc__, __module__=table.__module__, **fields
+        )
+        derived.of, derived.given = staticmethod(of), tuple(fields)
+        return derived  # type: ignore[no-any-return]
+
+    return derive
+
+
+def _field(own: FieldInfo | None, hint: Any, argument: inspect.Parameter, words: str) -> tuple[Any, Any]:
+    """Return type and further facts of a key, the table's own ones where there are some."""
+    default = ... if argument.default is argument.empty else argument.default
+    found = ((read, beside) for declared, read, beside in IN_FILES if declared == hint)
+    kind, beside = next(found, (hint, ""))
+    words += beside
+    if own is None:
+        return kind, Field(default, description=words)
+    kind = Annotated[(own.annotation, *own.metadata)] if own.metadata else own.annotation
+    default = default if own.is_required() else own.default
+    return kind, Field(default, description=own.description or words, alias=own.alias)
