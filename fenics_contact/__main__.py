@@ -6,16 +6,27 @@ import os
 import sys
 from collections.abc import Sequence
 
+#: `fenics_contact.cli.Ending.MISSING`, which cannot be imported where something is missing.
+MISSING = 5
+
 for _name in ("stdout", "stderr"):
     if getattr(sys, _name) is None:  # closed by who started the program; UFL asks for it when imported
         setattr(sys, _name, open(os.devnull, "w", encoding="utf-8"))
 
-from fenics_contact import cli  # noqa: E402
-from fenics_contact._libraries import MPI  # noqa: E402
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command that the arguments name on all ranks; return the exit status."""
+    from fenics_contact._libraries import MPI
+    from fenics_contact._requirements import require_extra
+    from fenics_contact.errors import MissingRequirementError
+
+    try:
+        require_extra("commands", "cli", "pydantic", "rich", "tomlkit", "typer")
+    except MissingRequirementError as error:
+        sys.stderr.write(f"error: {error}\n")
+        return MISSING
+    from fenics_contact import cli
+
     return cli.main(MPI.COMM_WORLD, arguments)
 
 

@@ -131,6 +131,24 @@ def load_petsc(world: MPI.Comm | None = None) -> Any:
     return petsc
 
 
+def require_extra(use: str, extra: str, *modules: str) -> None:
+    """Check libraries that only a part of the package needs, without loading them.
+
+    Args:
+        use: What needs them, in the plural.
+        extra: The extra of the package that installs them.
+        *modules: Names by which they are imported.
+
+    Raises:
+        MissingRequirementError: One of them is not installed.
+    """
+    for module in modules:
+        if importlib.util.find_spec(module) is None:
+            raise MissingRequirementError(
+                f"{use} need {module}, found none: pip install 'fenics_contact[{extra}]'", name=module
+            )
+
+
 def check_gmsh() -> None:
     """Check gmsh, which only the construction of geometries needs.
 

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
-import meshio
 import numpy as np
 
 from fenics_contact.contact import State, gathered_fields, in_space
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.io.names import checked_name, file_of_each
 from fenics_contact.io.replacing import replacing
+
+if TYPE_CHECKING:
+    import meshio
 
 _MESHIO_NAMES = {
     "hexahedron": "hexahedron",
@@ -62,7 +65,7 @@ def write_vtu(
             # The index last: whoever finds it finds what it names.
             with replacing(*files, index) as paths:
                 for path, mesh in zip(paths, meshes.values(), strict=False):
-                    meshio.write(path, mesh, file_format="vtu")
+                    mesh.write(path, file_format="vtu")
                 paths[-1].write_text(_multi_block(list(meshes), files), encoding="utf-8")
     return index
 
@@ -85,6 +88,8 @@ def _checked(
 def _gathered(state: State, body: str, more: Mapping[str, np.ndarray]) -> meshio.Mesh:
     mesh = state.scene.bodies[body].mesh
     fields = gathered_fields(state, body)
+    import meshio  # costs a tenth of a second
+
     return meshio.Mesh(
         in_space(mesh.points),
         [(_MESHIO_NAMES[mesh.cell_type], mesh.cells)],

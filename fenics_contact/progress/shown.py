@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import logging
 import sys
 import time
@@ -73,7 +74,7 @@ def _presenter(tracker: Tracker, stream: TextIO | None, *, own: bool, interval: 
 
         return Notebook(tracker)
     width = None if stream is None else terminal_width(stream)
-    if stream is None or width is None:
+    if stream is None or width is None or importlib.util.find_spec("rich") is None:
         return Lines(tracker, interval)
     from fenics_contact.progress.terminal import Terminal  # costs a tenth of a second, for terminals alone
 

@@ -5,6 +5,7 @@
 and what was given.
 """
 
+from fenics_contact.scene_file import _libraries  # noqa: F401
 from fenics_contact.scene_file.document import Document
 from fenics_contact.scene_file.expression import Expression, VectorExpression
 from fenics_contact.scene_file.mistakes import Mistake, SceneFileError

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
-
-from fenics_contact.errors import MissingRequirementError
+from fenics_contact._requirements import require_extra
 
 
 def check_libraries() -> None:
@@ -13,11 +11,7 @@ def check_libraries() -> None:
     Raises:
         MissingRequirementError: One of them is not installed.
     """
-    for module in ("pyvista", "matplotlib"):
-        if importlib.util.find_spec(module) is None:
-            raise MissingRequirementError(
-                f"pictures need {module}, found none: pip install 'fenics_contact[viz]'", name=module
-            )
+    require_extra("pictures", "viz", "pyvista", "matplotlib")
 
 
 check_libraries()

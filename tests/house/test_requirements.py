@@ -5,8 +5,11 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import logging
+import sys
+import tomllib
 from collections.abc import Callable
 from importlib import metadata
+from io import StringIO
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,7 +18,10 @@ import pytest
 
 from fenics_contact import _requirements
 from fenics_contact.errors import MissingRequirementError
-from tests.conftest import launch
+from fenics_contact.progress.lines import Lines
+from fenics_contact.progress.shown import _presenter
+from fenics_contact.progress.tracker import Tracker
+from tests.conftest import ROOT, launch
 
 LIBRARIES = ["numpy", "scipy", "clarabel", "mpi4py", "petsc4py", "dolfinx"]
 find_spec = importlib.util.find_spec
@@ -196,22 +202,84 @@ def test_a_gmsh_without_metadata_is_judged_by_its_own_version(
         _requirements.check_gmsh()
 
 
-@pytest.mark.parametrize("module", LIBRARIES)
-def test_the_package_itself_reports_what_is_missing(module: str) -> None:
-    hiding = f"""
+HIDING = """
 import importlib.abc, sys
 
 class Hidden(importlib.abc.MetaPathFinder):
     def find_spec(self, name, path, target=None):
-        if name.partition(".")[0] == {module!r}:
-            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+        if name.partition(".")[0] == "{module}":
+            raise ModuleNotFoundError(name)
 
 sys.meta_path.insert(0, Hidden())
 find_spec = importlib.util.find_spec
-importlib.util.find_spec = lambda name: None if name == {module!r} else find_spec(name)
-import fenics_contact
+importlib.util.find_spec = lambda name: None if name == "{module}" else find_spec(name)
 """
-    answer = launch(1, "-c", hiding)
+
+
+@pytest.mark.parametrize("module", LIBRARIES)
+def test_the_package_itself_reports_what_is_missing(module: str) -> None:
+    answer = launch(1, "-c", HIDING.format(module=module) + "import fenics_contact")
     assert answer.returncode == 1, answer.stderr
     last = answer.stderr.strip().splitlines()[-1]
     assert last.startswith("fenics_contact.errors.MissingRequirementError: fenics_contact needs " + module)
+
+
+#: What solves, and what it never loads.
+SOLVING = (
+    "accuracy",
+    "checkpoint",
+    "contact",
+    "geometry",
+    "io",
+    "optimize",
+    "outer",
+    "progress",
+    "scene",
+    "shape",
+    "theory",
+)
+EXTRAS = {"matplotlib", "pydantic", "pyvista", "rich", "tomlkit", "typer"}
+
+
+def test_what_solves_loads_no_extra() -> None:
+    imports = "; ".join(f"import fenics_contact.{name}" for name in SOLVING)
+    answer = launch(1, "-c", f"import sys; {imports}; sys.stdout.write(' '.join(sys.modules))")
+    loaded = {name.partition(".")[0] for name in answer.stdout.split()}
+    assert "scipy" in loaded, answer.stderr
+    assert loaded & EXTRAS == set()
+
+
+def test_extras_are_listed_as_such() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    needed, cli = (
+        {line.partition(">")[0] for line in lines}
+        for lines in (project["dependencies"], project["optional-dependencies"]["cli"])
+    )
+    assert "scipy" in needed
+    assert needed & EXTRAS == set()
+    assert cli == {"pydantic", "rich", "tomlkit", "typer"}
+
+
+@pytest.mark.parametrize(
+    ("script", "use", "module"),
+    [
+        ("import fenics_contact.scene_file", "scene files", "tomlkit"),
+        ("import fenics_contact.scene_file", "scene files", "pydantic"),
+        ("from fenics_contact.__main__ import main; sys.exit(main([]))", "commands", "typer"),
+        ("import fenics_contact.viz", "pictures", "pyvista"),
+    ],
+)
+def test_a_missing_extra_is_named_with_its_remedy(script: str, use: str, module: str) -> None:
+    answer = launch(1, "-c", HIDING.format(module=module) + script)
+    extra = "viz" if use == "pictures" else "cli"
+    assert answer.returncode == (5 if use == "commands" else 1)
+    last = answer.stderr.strip().splitlines()[-1]
+    assert last.endswith(f"{use} need {module}, found none: pip install 'fenics_contact[{extra}]'"), last
+
+
+def test_progress_is_told_in_lines_where_nothing_draws_bars(
+    without: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    without("rich")
+    monkeypatch.setattr(sys.modules[_presenter.__module__], "terminal_width", lambda _: 80)
+    assert isinstance(_presenter(Tracker(), StringIO(), own=True, interval=1.0), Lines)
