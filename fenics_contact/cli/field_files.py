@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.errors import InvalidInputError, MissingRequirementError
+from fenics_contact._requirements import require_extra
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene_file.mistakes import suggestion
 
 FIELD_FILES = (".vtu", ".vtm", ".pvd")
@@ -37,13 +38,9 @@ def newest_member(path: Path) -> Path:
 
 def _blocks(path: Path) -> dict[str, Any]:
     """Read the meshes of a file by name."""
-    try:
-        import pyvista
-    except ImportError as error:
-        raise MissingRequirementError(
-            "files of fields are read with pyvista, found none: pip install 'fenics_contact[viz]'",
-            name="pyvista",
-        ) from error
+    require_extra("files of fields", "viz", "pyvista")
+    import pyvista
+
     member = newest_member(path)
     if not member.is_file():
         raise InvalidInputError(f"a file of fields must exist, '{member}' does not: write the result again")

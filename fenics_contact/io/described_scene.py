@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from enum import Enum
 from functools import partial
 from typing import Any
 
-import numpy as np
+from fenics_contact.io.json_file import plain
+from fenics_contact.scene import Body, ContactPair, Material, Scene, Surface, Tie
 
-from fenics_contact.scene import Body, ContactPair, Load, Material, Scene, Support, Surface, Tie
+#: Any value as plain data.
+readable = partial(plain, lenient=True)
 
 
 def described_scene(scene: Scene, subdomains: Mapping[str, int]) -> dict[str, Any]:
@@ -27,38 +27,11 @@ def described_scene(scene: Scene, subdomains: Mapping[str, int]) -> dict[str, An
     return {
         "dimension": scene.dim,
         "bodies": {name: _body(body, subdomains[name]) for name, body in scene.bodies.items()},
-        "supports": [_part(support) for support in scene.supports],
-        "loads": [_part(load) for load in scene.loads],
+        "supports": readable(scene.supports),
+        "loads": readable(scene.loads),
         "contacts": [_pair(pair) for pair in scene.contacts],
         "ties": [_pair(tie) for tie in scene.ties],
     }
-
-
-def readable(value: Any) -> Any:
-    """Return any value as plain data: dataclasses by type and fields, functions by name, NaN as None."""
-    if isinstance(value, Enum):
-        return readable(value.value)
-    if isinstance(value, np.ndarray | np.generic):
-        return readable(value.tolist())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if value is None or isinstance(value, str | bool | int):
-        return value
-    if isinstance(value, Mapping):
-        return {str(key): readable(part) for key, part in value.items()}
-    if is_dataclass(value) and not isinstance(value, type):
-        return {"type": type(value).__name__, **_fields(value)}
-    if isinstance(value, Sequence) and not isinstance(value, bytes | bytearray):
-        return [readable(part) for part in value]
-    if isinstance(value, partial):
-        return readable(value.func)
-    return (
-        {"function": value.__qualname__} if hasattr(value, "__qualname__") else {"type": type(value).__name__}
-    )
-
-
-def _fields(value: Any) -> dict[str, Any]:
-    return {part.name: readable(getattr(value, part.name)) for part in fields(value)}
 
 
 def _body(body: Body, subdomains: int) -> dict[str, Any]:
@@ -81,16 +54,12 @@ def _materials(material: Material | Mapping[str, Material]) -> dict[str, Any]:
 
 def _material(material: Material) -> dict[str, Any]:
     """Return the fields of a material, or its parameters where it is no dataclass."""
-    known = _fields(material) if is_dataclass(material) else {"parameters": readable(material.parameters)}
-    return {"type": type(material).__name__, **known}
-
-
-def _part(part: Support | Load) -> dict[str, Any]:
-    return {"type": type(part).__name__, **_fields(part)}
+    known = readable(material)
+    return known if is_dataclass(material) else {**known, "parameters": readable(material.parameters)}
 
 
 def _pair(pair: ContactPair | Tie) -> dict[str, Any]:
-    found = _fields(pair)
+    found = {part.name: readable(getattr(pair, part.name)) for part in fields(pair)}
     for side in ("slave", "master"):
         surface = getattr(pair, side)
         if isinstance(surface, Surface):

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import fields, is_dataclass
 from enum import Enum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -51,43 +52,59 @@ def write_json(path: str | Path, data: Any, *, comm: MPI.Comm | None = None) -> 
     return target
 
 
-def plain(data: Any, place: str = "data") -> Any:
+def plain(data: Any, place: str = "data", *, lenient: bool = False) -> Any:
     """Convert data to what JSON knows.
 
     Args:
         data: The data.
         place: How error messages call it.
+        lenient: Tell in words what JSON does not know: dataclasses with their type, functions by their name,
+            other objects by their type, keys as text, and what is no number as None.
 
     Raises:
         InvalidInputError: If some part cannot be converted; says which.
     """
+
+    def inside(part: Any, where: str) -> Any:
+        return plain(part, f"{place}{where}", lenient=lenient)
+
     if isinstance(data, Enum):
-        return plain(data.value, place)
+        return inside(data.value, "")
     if is_dataclass(data) and not isinstance(data, type):
-        return {
-            field.name: plain(getattr(data, field.name), f"{place}.{field.name}") for field in fields(data)
-        }
+        kind = {"type": type(data).__name__} if lenient else {}
+        return kind | {part.name: inside(getattr(data, part.name), f".{part.name}") for part in fields(data)}
     if isinstance(data, np.ndarray | np.generic):
-        return plain(data.tolist(), place)
+        return inside(data.tolist(), "")
     if isinstance(data, Mapping):
-        return {_key(key, place): plain(value, f"{place}[{key!r}]") for key, value in data.items()}
-    if isinstance(data, float) and not math.isfinite(data):
+        return {_key(key, place, lenient): inside(value, f"[{key!r}]") for key, value in data.items()}
+    if isinstance(data, float) and not math.isfinite(data) and not lenient:
         raise InvalidInputError(
             f"{place} must be finite, got {data}: JSON has no such number; leave it out or write None"
         )
-    if data is None or isinstance(data, str | bool | int | float):
+    if isinstance(data, float):
+        return data if math.isfinite(data) else None
+    if data is None or isinstance(data, str | bool | int):
         return data
     if isinstance(data, Path):
         return str(data)
     if isinstance(data, Sequence) and not isinstance(data, bytes | bytearray):
-        return [plain(value, f"{place}[{index}]") for index, value in enumerate(data)]
+        return [inside(value, f"[{index}]") for index, value in enumerate(data)]
+    if lenient:
+        return _told(data)
     raise InvalidInputError(
         f"{place} must be a mapping, sequence, string, number, truth value, None or array, got a "
         f"{type(data).__name__}: convert it first"
     )
 
 
-def _key(key: Any, place: str) -> str:
-    if not isinstance(key, str):
+def _key(key: Any, place: str, lenient: bool) -> str:
+    if not isinstance(key, str) and not lenient:
         raise InvalidInputError(f"keys of {place} must be strings, got {key!r}: convert it first")
-    return key
+    return str(key)
+
+
+def _told(data: Any) -> dict[str, str]:
+    """Tell a function by its name, any other object by its type."""
+    if isinstance(data, partial):
+        return _told(data.func)
+    return {"function": data.__qualname__} if hasattr(data, "__qualname__") else {"type": type(data).__name__}

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import Field, PositiveFloat
+from scipy.spatial.transform import Rotation
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import BodyMesh, DesignSurface, quadratic
@@ -85,11 +86,9 @@ class Placed(Part):
 
 
 def _rotation(axis: tuple[float, ...], degrees: float) -> np.ndarray:
-    """Return the rotation matrix (Rodrigues), (3, 3)."""
+    """Return the rotation matrix, (3, 3)."""
     length = float(np.linalg.norm(axis))
     if length == 0.0:
         raise InvalidInputError(f"axis must not be zero, got {list(axis)}: (0, 0, 1) turns about z")
-    a, angle = np.array(axis) / length, np.radians(degrees)
-    cross = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
-    rotation = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
-    return np.asarray(np.round(rotation, 15))  # quarter turns are exact
+    turn = Rotation.from_rotvec(degrees / length * np.array(axis), degrees=True)
+    return np.asarray(np.round(turn.as_matrix(), 15))  # quarter turns are exact
