@@ -28,8 +28,8 @@ def block(
     """Mesh the box between two corners.
 
     Args:
-        lower: Coordinates of the lower corner, (3,), [length].
-        upper: Coordinates of the upper corner, (3,), [length].
+        lower: Lower corner, (3,), [length].
+        upper: Upper corner, (3,), [length].
         counts: Number of hexahedra along x, y and z.
         cell: ``"hexahedron"``, or ``"tetrahedron"`` to split each of them into six.
         grading: Logarithm of the ratio of the largest to the smallest cell along each axis; positive: small

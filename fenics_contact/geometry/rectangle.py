@@ -24,8 +24,8 @@ def rectangle(
     """Mesh the rectangle between two corners.
 
     Args:
-        lower: Coordinates of the lower left corner, (2,), [length].
-        upper: Coordinates of the upper right corner, (2,), [length].
+        lower: Lower left corner, (2,), [length].
+        upper: Upper right corner, (2,), [length].
         counts: Number of quadrilaterals along x and y.
         cell: ``"quadrilateral"``, or ``"triangle"`` to split each of them into two.
         grading: Logarithm of the ratio of the largest to the smallest cell along each axis; positive: small

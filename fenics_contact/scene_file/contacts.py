@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
 
 from fenics_contact import scene
 from fenics_contact.scene import ContactPair, Surface, Tie
+from fenics_contact.scene_file.expression import Expression
 from fenics_contact.scene_file.part import Part, keys_of
-from fenics_contact.scene_file.values import Formula, Triple, one_of, said
+from fenics_contact.scene_file.values import Scalar, Triple, one_of
 
 
 @keys_of(Surface)
@@ -50,12 +51,16 @@ class Cylinder(Part):
     radius: PositiveFloat
 
 
+def _function(value: float | Expression) -> Expression:
+    return value if isinstance(value, Expression) else Expression(repr(value))
+
+
 @keys_of(scene.DistanceObstacle, only=["function"])
 class Distance(Part):
     """A rigid obstacle given by its signed distance."""
 
     obstacle: Literal["distance"]
-    function: Annotated[Formula, said("a formula in x, y and z in quotes")] = Field(
+    function: Annotated[Scalar, AfterValidator(_function)] = Field(
         alias="formula",
         description="signed distance, negative inside, as a formula in x, y, z whose gradient has length "
         "one, [length]",

@@ -111,5 +111,6 @@ AnyMaterial: TypeAlias = Annotated[
         default="isotropic",
         other=OwnMaterial,
         when=lambda table: is_reference(table.get("model")),
+        called="file.py:Class",
     ),
 ]

@@ -61,7 +61,12 @@ def said(needed: str) -> WrapValidator:
 
 
 def one_of(
-    key: str, *tables: Any, default: str = "", other: Any = None, when: Callable[[Any], bool] | None = None
+    key: str,
+    *tables: Any,
+    default: str = "",
+    other: Any = None,
+    when: Callable[[Any], bool] | None = None,
+    called: str = "",
 ) -> Read:
     """Tell tables apart by the value of one key.
 
@@ -71,6 +76,7 @@ def one_of(
         default: Its value where the key is missing.
         other: Table without such a key.
         when: Tells from the data whether they are that table.
+        called: What messages call the key's value in that table.
     """
     kinds = {kind: table for table in tables for kind in get_args(table.model_fields[key].annotation)}
 
@@ -84,7 +90,7 @@ def one_of(
 
     tagged = [Annotated[table, Tag(f"{MARK}{kind}")] for kind, table in kinds.items()]
     tagged += [] if other is None else [Annotated[other, Tag(MARK)]]
-    message = SEPARATOR.join([key, *kinds])  # a context would make the type unhashable
+    message = SEPARATOR.join(filter(None, [key, *kinds, called]))  # a context would make the type unhashable
     choice = Discriminator(tag, custom_error_type="choice", custom_error_message=message)
     return Read(Annotated[reduce(or_, tagged), choice])
 

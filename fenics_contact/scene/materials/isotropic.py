@@ -43,8 +43,7 @@ class IsotropicElasticity(Isotropic):
     Attributes:
         young_modulus: Young's modulus E > 0, [force / length²].
         poisson_ratio: Poisson's ratio ν in (−1, 0.5), dimensionless.
-        thermal_expansion: Thermal expansion α, strain a degree, or None for a body that no temperature
-            changes.
+        thermal_expansion: Thermal expansion α, strain a degree. None for a body that no temperature changes.
     """
 
     @property

@@ -68,8 +68,8 @@ class OrthotropicElasticity(Elasticity):
         poisson_ratios: ν_12, ν_13, ν_23, dimensionless.
         shear_moduli: G_12, G_13, G_23 > 0, [force / length²].
         orientation: Material axes as rows of a rotation matrix; see `material_axes`.
-        thermal_expansion: Thermal expansion, strain a degree along the material axes, or None for a body that
-            no temperature changes.
+        thermal_expansion: Thermal expansion, strain a degree along the material axes. None for a body that no
+            temperature changes.
     """
 
     young_moduli: Triple
@@ -149,8 +149,8 @@ class OrthotropicPlaneStress(Elasticity):
         poisson_ratio: ν_12, dimensionless.
         shear_modulus: G_12 > 0, [force / length²].
         angle: From the x-axis to material axis 1, counterclockwise, in radians.
-        thermal_expansion: Thermal expansion, strain a degree along the material axes, or None for a body that
-            no temperature changes.
+        thermal_expansion: Thermal expansion, strain a degree along the material axes. None for a body that no
+            temperature changes.
     """
 
     young_moduli: tuple[float, float]
