@@ -85,7 +85,7 @@ def test_no_argument_may_be_of_another_type(kind: type) -> None:
 def test_what_is_no_law_of_friction_is_not_taken_for_none(friction: Any) -> None:
     message = (
         r"^ContactPair.friction must be Coulomb\(friction_coefficient\), Tresca\(traction\) or None, got .*: "
-        "friction law, or None for frictionless contact$"
+        "law of friction; without one \\(None\\) contact is frictionless$"
     )
     with pytest.raises(InvalidInputError, match=message):
         ContactPair(FACE, FLOOR, friction)
@@ -98,8 +98,8 @@ WRONG: list[tuple[Any, str]] = [
     (lambda: Tie(FACE, FLOOR), r"Tie.master must be Surface\(body, name\), got RigidPlane.*: surface of"),
     (lambda: Tie(FACE, OTHER, 1), "Tie.sliding must be True or False, got 1: whether the surfaces"),
     (lambda: ContactPair(FACE, FLOOR, None, "Mortar"), "discretisation must be 'node' or 'mortar', got 'Mor"),
-    (lambda: Coulomb(True), "friction_coefficient must be a number, got True: μ ≥ 0"),
-    (lambda: Coulomb("0.3"), "friction_coefficient must be a number, got '0.3': μ ≥ 0"),
+    (lambda: Coulomb(True), "friction_coefficient must be a number, got True: friction coefficient μ ≥ 0"),
+    (lambda: Coulomb("0.3"), "friction_coefficient must be a number, got '0.3': friction coefficient μ ≥ 0"),
     (lambda: IsotropicElasticity("steel", 0.3), "IsotropicElasticity.young_modulus must be a number, got 's"),
     (lambda: PlaneStrain(1.0, 0.3, "hot"), "PlaneStrain.thermal_expansion must be a number or None"),
     (lambda: Body("cube.msh", STEEL), "Body.mesh must be BodyMesh.*, got 'cube.msh': the mesh"),
@@ -145,5 +145,5 @@ def test_a_material_of_ones_own_is_left_to_its_author() -> None:
 
     known: Any = Named
     assert known(1.0, 0.3, names="x").names == "x"
-    with pytest.raises(InvalidInputError, match=r"Named.young_modulus must be a number, got 'x': E > 0"):
+    with pytest.raises(InvalidInputError, match=r"number, got 'x': Young's modulus E > 0"):
         known("x", 0.3)
