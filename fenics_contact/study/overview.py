@@ -31,8 +31,8 @@ other say that the setting in which they differ does not matter; a line far abov
 
 **`convergence.png`**: the same errors against the mesh size, with the slope that theory gives as a dashed
 line. The last panel shows the estimate that every state carries of its own error in energy norm. A quantity
-is compared with theory where there is one, else with the limit of the meshes (Richardson's extrapolation of
-the three finest), and where they do not converge monotonically with the finest of them.
+is compared with theory or with far finer meshes where there are such, else with the limit of the meshes
+(Richardson's extrapolation of the three finest), and where they do not converge monotonically with the last.
 
 **`parts.png`**: what the error consists of: mesh (an estimate), solver (a certificate; with Coulomb's law
 for the slip bounds of the state; true errors are marked by crosses), and law of friction (an estimate).
