@@ -5,13 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 from benchmarks.plan import Run
-from fenics_contact.launching import last_words
+from fenics_contact.launching import finished, last_words
 
 ROOT = Path(__file__).resolve().parents[1]
 RAW = ROOT / "output" / "benchmarks" / "raw"
@@ -43,28 +42,20 @@ def measure(run: Run) -> Record:
         RunFailed: With the end of its output.
     """
     load = os.getloadavg()[0]
-    threads = ["env", f"OPENBLAS_NUM_THREADS={run.threads}"] if run.threads > 1 else []
+    threads = [f"OPENBLAS_NUM_THREADS={run.threads}"] if run.threads > 1 else []
     module = [sys.executable, "-m", f"benchmarks.cases.{run.case}", *run.options]
     command = [str(ROOT / "scripts" / "launch.sh"), str(run.ranks), *threads, *module]
-    process = subprocess.Popen(
-        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
+    ending = finished(command, run.seconds, folder=ROOT)
+    if ending.status is None:
+        raise RunFailed(f"{run.name} must end within {run.seconds:g} s, and did not")
     try:
-        output, errors = process.communicate(timeout=run.seconds)
-    except BaseException as stopped:  # also an interrupt from the keyboard: the process has its own session
-        process.terminate()  # mpirun ends its ranks
-        process.communicate()
-        if isinstance(stopped, subprocess.TimeoutExpired):
-            raise RunFailed(f"{run.name} must end within {run.seconds:g} s, and did not") from None
-        raise
-    try:
-        record = json.loads(output.splitlines()[-1]) if process.returncode == 0 else None
+        record = json.loads(ending.output.splitlines()[-1]) if ending.status == 0 else None
     except (IndexError, json.JSONDecodeError):
         record = None
     if not isinstance(record, dict):
         raise RunFailed(
-            f"{run.name} must print one JSON object on its last line, got exit status {process.returncode} "
-            f"from {' '.join(command)} and:\n{last_words(command, output + errors, 3000)}"
+            f"{run.name} must print one JSON object on its last line, got exit status {ending.status} from "
+            f"{' '.join(command)} and:\n{last_words(command, ending.output + ending.errors, 3000)}"
         )
     return {**record, "load_average": load}
 

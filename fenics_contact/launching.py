@@ -9,11 +9,15 @@ Also a program, for shells: ``python -P launching.py RANKS`` prints how the comm
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shlex
 import shutil
+import signal
+import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from fenics_contact.errors import MissingRequirementError
@@ -64,6 +68,61 @@ def launcher(ranks: int) -> list[str]:
             name="mpirun",
         )
     return [found[0], "-n", str(ranks)]
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a process ended.
+
+    Attributes:
+        status: Its exit status, None if it was not over in time.
+        output: What it wrote to stdout.
+        errors: What it wrote to stderr.
+    """
+
+    status: int | None
+    output: str
+    errors: str
+
+
+def finished(
+    command: Sequence[str],
+    limit: float,
+    *,
+    environment: Mapping[str, str] | None = None,
+    folder: Path | None = None,
+) -> Ending:
+    """Run a command in a session of its own, free of the traces of MPI, and wait for its end.
+
+    Args:
+        command: What to run.
+        limit: Seconds after which it is ended with all that it started.
+        environment: Its environment, by default that of this process.
+        folder: Where it runs, by default where this process does.
+    """
+    process = subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        errors="replace", env=clean_environment(environment), cwd=folder, start_new_session=True,
+    )  # fmt: skip
+    try:
+        output, errors = process.communicate(timeout=limit)
+        return Ending(process.returncode, output, errors)
+    except subprocess.TimeoutExpired:
+        _end(process)
+        return Ending(None, *process.communicate())
+    except BaseException:  # an interrupt from the keyboard does not reach a session of its own
+        _end(process)
+        process.communicate()
+        raise
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End a process with all that it started; mpirun needs a moment to end its ranks."""
+    process.terminate()
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(timeout=5.0)
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
 
 
 def last_words(command: Sequence[str], output: str, most: int = 2000) -> str:

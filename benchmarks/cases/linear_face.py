@@ -14,7 +14,7 @@ from benchmarks.cases.chain import cold_state
 from benchmarks.cases.measuring import run_case, state_record
 from fenics_contact.contact import State
 from fenics_contact.qp import CountedOperator, FaceSystems, Stop, classify, contact_step, projected_cg
-from fenics_contact.qp.face_newton import residual_weights
+from fenics_contact.qp.newton_steps import residual_weights
 
 MAX_ITERATIONS = 2000
 
@@ -40,7 +40,7 @@ def solve_face(state: State, tolerance: float = 1e-6) -> LinearSolve:
     Raises:
         RuntimeError: If conjugate gradients end early; a face that was found can be solved.
     """
-    problem, solution = state.system.problem, state.solution
+    problem, solution = state.dual.problem, state.dual_solution
     operator = CountedOperator(problem.operator)
     step = contact_step(problem.layout, problem.diagonal)
     face = classify(problem.layout, solution.slip_bound, solution.multiplier, solution.residual, step)
