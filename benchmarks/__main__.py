@@ -1,4 +1,7 @@
-"""Measure, and write the results: `python -m benchmarks [--quick] [--only NAME ...] [--report]`."""
+"""Measure, and write the results: `python -m benchmarks [--quick] [--only NAME ...] [--report]`.
+
+Results are replaced when all runs are there; those of some runs go to output/benchmarks/partial/.
+"""
 
 from __future__ import annotations
 
@@ -6,22 +9,60 @@ import argparse
 import signal
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.plan import WARM_UP, Run, all_runs, chosen
-from benchmarks.plot import plot_results
-from benchmarks.report import write_json, write_results
+from benchmarks.files import write_results
+from benchmarks.held import broken
+from benchmarks.plan import WARM_UP, Run, chosen
 from benchmarks.row import Summaries
-from benchmarks.running import ROOT, RunFailed, fingerprint, measure, raw_file, read
+from benchmarks.running import OUTPUT, RunFailed, fingerprint, measure, raw_file, read
 from benchmarks.summary import summarise
+from fenics_contact.io import write_json
 from fenics_contact.progress import Task, shown
+
+#: Where the results of the full benchmark are kept.
+FOLDER = Path(__file__).parent
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the benchmark with the settings of the command line."""
+    parser = _settings()
+    settings = parser.parse_args(arguments)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the running case ends, too
+    try:
+        runs = chosen(settings.only, settings.quick)
+    except ValueError as error:
+        parser.error(str(error))
+    mark = f"{fingerprint()}-quick" if settings.quick else fingerprint()
+    failed = [] if settings.report else _measure_all(runs, mark, settings)
+    wrong = [f"failed: {name}" for name in failed] + _report(runs, mark, settings, good=not failed)
+    if wrong:
+        sys.exit("\n".join(wrong))
+
+
+def _report(runs: Sequence[Run], mark: str, settings: argparse.Namespace, *, good: bool) -> list[str]:
+    """Write the results of all raw files; return what is wrong with their counts."""
+    # What one of several partial runs measured counts in all later reports.
+    known = {run.name: run for run in (*chosen([], settings.quick), *runs)}
+    records = {name: read(run, mark, settings.folder) for name, run in known.items()}
+    summaries = Summaries({name: summarise(name, found) for name, found in records.items() if found})
+    if not summaries:
+        return ["a report needs measurements of the present code, found none: run without --report first"]
+    wrong = broken(summaries)
+    folder = settings.folder / "quick" if settings.quick else FOLDER
+    if wrong or not good or any(len(found) < known[name].repeats for name, found in records.items()):
+        folder = settings.folder / "partial"
+    missing = write_results(folder, summaries)
+    print(f"results in {folder}/")
+    if missing:
+        print(f"not measured or refused: {', '.join(missing)}")
+    return wrong
+
+
+def _settings() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Measure and write results.")
-    parser.add_argument("--quick", action="store_true", help="only small runs, once each; results in output/")
+    parser.add_argument("--quick", action="store_true", help="only small runs, once each")
     parser.add_argument(
         "--only", nargs="+", default=[], metavar="NAME", help="runs with this name or beginning"
     )
@@ -29,37 +70,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--report", action="store_true", help="measure nothing, write the results of raw files"
     )
     parser.add_argument("--again", action="store_true", help="measure also what was measured with this code")
-    settings = parser.parse_args(arguments)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the running case ends, too
-    try:
-        runs = chosen(settings.only, settings.quick)
-    except ValueError as error:
-        parser.error(str(error))
-    mark = fingerprint()
-    if settings.quick:
-        runs, mark = [replace(run, repeats=1) for run in runs], f"{mark}-quick"
-    failed = [] if settings.report else _measure_all(runs, mark, again=settings.again)
-    # What one of several partial runs measured counts in all later reports.
-    known = runs if settings.quick else all_runs()
-    records = {run.name: read(run, mark) for run in known}
-    summaries = Summaries({name: summarise(name, found) for name, found in records.items() if found})
-    if not summaries:
-        sys.exit("a report needs measurements of the present code, found none: run without --report first")
-    folder = ROOT / "output" / "benchmarks" / "quick" if settings.quick else Path(__file__).parent
-    folder.mkdir(parents=True, exist_ok=True)
-    missing = write_results(folder, summaries)
-    plot_results(folder / "results.png", summaries)
-    print(f"results in {folder.relative_to(ROOT)}/")
-    if missing:
-        print(f"not measured or refused: {', '.join(missing)}")
-    if failed:
-        sys.exit(f"failed: {', '.join(failed)}")
+    parser.add_argument(
+        "--folder",
+        type=Path,
+        default=OUTPUT,
+        help="for raw files and results; those of the full benchmark go to benchmarks/ when it is complete",
+    )
+    return parser
 
 
-def _measure_all(runs: Sequence[Run], mark: str, *, again: bool) -> list[str]:
+def _measure_all(runs: Sequence[Run], mark: str, settings: argparse.Namespace) -> list[str]:
     """Measure what is not there yet; return the names of the runs that failed."""
-    files = {(run, repeat): raw_file(run, mark, repeat) for run in runs for repeat in range(run.repeats)}
-    wanted = [key for key, path in files.items() if again or not path.exists()]
+    every = [(run, repeat) for run in runs for repeat in range(run.repeats)]
+    files = {(run, repeat): raw_file(run, mark, repeat, settings.folder) for run, repeat in every}
+    wanted = [key for key, path in files.items() if settings.again or not path.exists()]
     failed: list[str] = []
     for run in WARM_UP if wanted else ():
         measure(run)

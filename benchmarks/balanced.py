@@ -14,8 +14,7 @@ from time import process_time
 import numpy as np
 from mpi4py import MPI
 
-from benchmarks.cases.scenes import block_mesh, block_on_plane, chain, chain_links
-from benchmarks.report import table
+from benchmarks.cases.scenes import block_mesh, block_on_plane
 from fenics_contact.accuracy import Balanced
 from fenics_contact.contact import State, solve_steps
 from fenics_contact.geometry import (
@@ -39,6 +38,8 @@ from fenics_contact.scene import (
     Surface,
     TotalForce,
 )
+from fenics_contact.study.scenes.chain_links import chain, graded_links
+from fenics_contact.study.words import table
 
 TOLERANCES: tuple[Balanced | float, ...] = (Balanced(), 1e-6, 1e-8)
 Partition = dict[str, np.ndarray] | None
@@ -112,7 +113,7 @@ def cattaneo_mindlin(n: int) -> Measured:
 
 def links(cells: tuple[int, int, int]) -> Measured:
     """The two links of the demo, with friction."""
-    scene = chain(chain_links(cells, MPI.COMM_SELF), 0.3)
+    scene = chain(graded_links(cells, MPI.COMM_SELF))
     return Measured(scene, {name: box_partition(body.mesh, (8, 1, 2)) for name, body in scene.bodies.items()})
 
 

@@ -8,8 +8,10 @@ from typing import Any
 
 from benchmarks.cases.scene_data import LEVELS  # not from the case: its MPI would end the ranks
 from benchmarks.plan import Run
-from benchmarks.report import table, write_json, write_text
 from benchmarks.running import ROOT, measure
+from fenics_contact.io import write_json
+from fenics_contact.io.replacing import write_text
+from fenics_contact.study.words import table
 
 REPEATS = 5
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from benchmarks.cases.scene_data import PAPER_BOXES, PAPER_CELLS
 
@@ -11,6 +11,8 @@ from benchmarks.cases.scene_data import PAPER_BOXES, PAPER_CELLS
 BLOCKS = {"28k": (32, 16, 16), "92k": (48, 24, 24), "212k": (64, 32, 32)}
 BLOCK_BOXES = {"28k": (6, 3, 3), "92k": (8, 4, 4), "212k": (10, 5, 5)}
 
+#: Solvers of one linear system that the state is held against.
+LINEAR = {"gamg": "CG + GAMG", "cholesky": "MUMPS's Cholesky"}
 #: Friction coefficients of the chain beside 0.3.
 OTHER_FRICTION = ("0.1", "0.6", "0.01", "0")
 #: Tolerance at which forces and energies of different ranks and partitions are compared.
@@ -71,6 +73,7 @@ def chain_runs() -> list[Run]:
         for ranks in (1, 2, 4)
     ]
     runs += [
+        Run("chain-default", "chain", options=("--default-partition",), quick=True),
         Run("chain-compared-boxes", "chain", options=(*COMPARED, *option("boxes", (6, 2, 2))), repeats=1),
         Run("chain-compared-bisection", "chain", options=(*COMPARED, "--parts", "16"), repeats=1),
     ]
@@ -86,6 +89,11 @@ def block_runs() -> list[Run]:
         boxes = option("boxes", BLOCK_BOXES[size])
         runs += [
             Run(f"block-{size}", "sliding_block", options=(*counts, *boxes), quick=smallest),
+            Run(f"block-{size}-default", "sliding_block", options=counts, quick=smallest),
+            *(
+                Run(f"{solver}-{size}", "linear_block", 2, (*counts, "--solver", solver), quick=smallest)
+                for solver in LINEAR
+            ),
             Run(f"newton-{size}-ranks", "newton_block", 2, counts, 1, seconds=seconds),
             Run(
                 f"newton-{size}-threads",
@@ -119,6 +127,7 @@ WARM_UP = (
     Run("warm-up-chain", "chain", 1, (*option("cells", (24, 4, 8)), *option("boxes", (4, 1, 2)))),
     Run("warm-up-block", "sliding_block", 1, (*option("counts", (8, 4, 4)), *option("boxes", (2, 1, 1)))),
     Run("warm-up-newton", "newton_block", 1, option("counts", (8, 4, 4))),
+    Run("warm-up-linear", "linear_block", 1, (*option("counts", (8, 4, 4)), "--solver", "gamg")),
 )
 
 
@@ -127,12 +136,12 @@ def chosen(names: Sequence[str], quick: bool) -> list[Run]:
 
     Args:
         names: Only these; a name that no run has stands for all that begin with it. All if empty.
-        quick: Only those of the quick benchmark.
+        quick: Only those of the quick benchmark; each once, also those that are named.
 
     Raises:
         ValueError: If no run begins with a name.
     """
-    runs = all_runs()
+    runs = [replace(run, repeats=1) for run in all_runs()] if quick else all_runs()
     if not names:
         return [run for run in runs if run.quick or not quick]
     known = [run.name for run in runs]

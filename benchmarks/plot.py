@@ -62,6 +62,8 @@ def _plot_blocks(axes: Any, summaries: Summaries) -> None:
     series = {
         "GetFEM, its contact brick": (["getfem-{}"], "s", "#b279a2"),
         "monolithic Newton + MUMPS": (newton_names("{}"), "^", "#4c78a8"),
+        "one linear solve by CG + GAMG": (["gamg-{}"], "v", "#54a24b"),
+        "one linear solve by MUMPS's Cholesky": (["cholesky-{}"], "D", "#bab0ac"),
         "fenics_contact": (["block-{}"], "o", "#f58518"),
     }
     for label, (names, marker, colour) in series.items():

@@ -13,7 +13,6 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 from benchmarks.cases.scenes import block_mesh, block_on_plane
-from benchmarks.report import table
 from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.feti.condensation import Condensations
 from fenics_contact.feti.explicit import ExplicitOperator
@@ -21,6 +20,7 @@ from fenics_contact.feti.implicit import ImplicitOperator
 from fenics_contact.feti.subdomain import Subdomain
 from fenics_contact.linalg.cost_model import explicit_cost, implicit_cost, prefers_explicit
 from fenics_contact.qp import CoarseSpace
+from fenics_contact.study.words import table
 
 #: Elements along an edge of a cubic subdomain.
 EDGES = (4, 5, 6, 7, 8, 10, 12)

@@ -1,15 +1,19 @@
-"""The results as JSON, as a Markdown table, and as a plot."""
+"""The results as a Markdown page."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from benchmarks.comparing import force_difference
+from benchmarks.held import work
+from benchmarks.plan import LINEAR
 from benchmarks.row import NoValue, Record, Row, Summaries, unknowns
 from benchmarks.targets import ROWS, newton_names
+from fenics_contact.study.words import table
+
+#: What the steps of a solver are called in its counts.
+STEPS = ("newton_steps", "solver_steps", "iterations")
 
 Result = tuple[Row, dict[str, Any]]
 
@@ -26,23 +30,9 @@ def results(summaries: Summaries) -> tuple[list[Result], list[str]]:
     return found, missing
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a file whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.tmp")
-    temporary.write_text(text, encoding="utf-8")
-    temporary.replace(path)
-
-
-def write_json(path: Path, data: Any) -> None:
-    """Write a JSON file whole or not at all."""
-    write_text(path, json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
-
-
-def write_results(folder: Path, summaries: Summaries) -> list[str]:
-    """Write ``results.json`` and ``results.md`` and return the names of the rows that are missing."""
+def page(summaries: Summaries) -> str:
+    """Return ``results.md``."""
     found, missing = results(summaries)
-    write_json(folder / "results.json", [record for _, record in found])
     sections = [
         "# Results",
         "Written by `make benchmark`. Seconds and memory are medians; memory is the sum over the ranks.",
@@ -56,14 +46,7 @@ def write_results(folder: Path, summaries: Summaries) -> list[str]:
         blocks_table(summaries),
         "![Seconds an unknown by phase, and the block beside other solvers](results.png)",
     ]
-    write_text(folder / "results.md", "\n\n".join(section for section in sections if section) + "\n")
-    return missing
-
-
-def table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:
-    """Return a Markdown table."""
-    lines = [head, ["---"] * len(head), *body]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return "\n\n".join(section for section in sections if section) + "\n"
 
 
 def targets_table(found: Sequence[Result]) -> str:
@@ -77,16 +60,25 @@ def targets_table(found: Sequence[Result]) -> str:
             "yes" if row.met(record["value"]) else "**no**",
             str(record["ranks"]),
             f"{record['unknowns']:,}".replace(",", " "),
-            row.comparison,
         )
         for row, record in found
     ]
-    return table(("quantity", "measured", "target", "met", "ranks", "unknowns", "for comparison"), body)
+    return table(("quantity", "measured", "target", "met", "ranks", "unknowns"), body)
 
 
 def runs_table(summaries: Summaries) -> str:
     """Return seconds, memory and load of every run."""
-    head = ("run", "ranks", "unknowns", "products", "seconds", "memory", "above the imports", "load", "runs")
+    head = (
+        "run",
+        "ranks",
+        "unknowns",
+        "products or steps",
+        "seconds",
+        "memory",
+        "above the imports",
+        "load",
+        "runs",
+    )
     return table(head, [_run_line(name, run) for name, run in summaries.items()])
 
 
@@ -96,12 +88,11 @@ def _run_line(name: str, run: Record) -> tuple[str, ...]:
         why = f"refused: {run['refused']}" if "refused" in run else "skipped"
         return (name, "", "", why, "", "", "", load, repeats)
     counts = run.get("counts", {})
-    products = counts.get("f_products", counts.get("products", ""))
     return (
         name,
         str(run["ranks"]),
         str(unknowns(run)) if counts else "",
-        str(products),
+        "" if work(run) is None else str(work(run)),
         f"{run['seconds']:.2f}" if "seconds" in run else "",
         f"{run['peak_memory'] / 1e6:.0f} MB",
         f"{(run['peak_memory'] - run['import_memory']) / 1e6:.0f} MB",
@@ -135,17 +126,19 @@ def blocks_table(summaries: Summaries) -> str:
     """Return seconds and memory of each solver of the block, and how far forces differ."""
     body = []
     for size in ("28k", "92k", "212k"):
-        for name in (f"block-{size}", *newton_names(size), f"getfem-{size}"):
+        ours = f"block-{size}"
+        others = (*newton_names(size), f"getfem-{size}", *(f"{solver}-{size}" for solver in LINEAR))
+        for name in (ours, f"{ours}-default", *others):
             run = summaries.get(name)
             if run is None:
                 continue
             if "skipped" in run:
                 body.append((name, "", run["skipped"], "", ""))
                 continue
-            steps = run["counts"].get("newton_steps", run["counts"].get("solver_steps"))
+            steps = next(run["counts"][key] for key in STEPS if key in run["counts"])
             memory = f"{run['peak_memory'] / 1e6:.0f} MB"
-            ours = summaries.get(f"block-{size}")
-            apart = f"{force_difference(ours, run):.1e}" if ours and "forces" in run else ""
+            known = ours in summaries and "forces" in run
+            apart = f"{force_difference(summaries[ours], run):.1e}" if known else ""
             body.append((name, str(unknowns(run)), f"{run['seconds']:.2f} s in {steps} steps", memory, apart))
     head = ("run", "unknowns", "seconds", "memory", "forces differ by")
     return table(head, body) if body else "Not measured."

@@ -32,7 +32,6 @@ class Row:
         better: ``"lower"`` or ``"higher"``.
         value: Computes it from the summaries of runs.
         of: Run that tells ranks and unknowns.
-        comparison: What others need, or what it was before.
     """
 
     name: str
@@ -42,7 +41,6 @@ class Row:
     better: str
     value: Callable[[Summaries], float]
     of: str = "chain"
-    comparison: str = ""
 
     def met(self, value: float) -> bool:
         """Tell whether a value reaches the target."""

@@ -13,7 +13,7 @@ from benchmarks.plan import Run
 from fenics_contact.launching import finished, last_words
 
 ROOT = Path(__file__).resolve().parents[1]
-RAW = ROOT / "output" / "benchmarks" / "raw"
+OUTPUT = ROOT / "output" / "benchmarks"
 MEASURED = ("fenics_contact", "benchmarks/cases", "demos")
 
 Record = dict[str, Any]
@@ -60,12 +60,12 @@ def measure(run: Run) -> Record:
     return {**record, "load_average": load}
 
 
-def raw_file(run: Run, mark: str, repeat: int, folder: Path = RAW) -> Path:
+def raw_file(run: Run, mark: str, repeat: int, folder: Path = OUTPUT) -> Path:
     """Return where one measurement is kept."""
-    return folder / mark / f"{run.name}-{repeat}.json"
+    return folder / "raw" / mark / f"{run.name}-{repeat}.json"
 
 
-def read(run: Run, mark: str, folder: Path = RAW) -> list[Record]:
+def read(run: Run, mark: str, folder: Path = OUTPUT) -> list[Record]:
     """Return all measurements of a run that are there."""
     found = (raw_file(run, mark, repeat, folder) for repeat in range(run.repeats))
     return [json.loads(path.read_text()) for path in found if path.exists()]

@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from benchmarks.cases.measuring import nodal_forces, run_case, slowest, state_record
+from benchmarks.cases.measuring import nodal_forces, run_case, state_record
 from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, PAPER_BOXES, PAPER_CELLS, Counts
-from benchmarks.cases.scenes import chain, chain_links
 from fenics_contact.contact import State, find_state
 from fenics_contact.errors import FenicsContactError
 from fenics_contact.feti import decompose
 from fenics_contact.geometry import BodyMesh, bisection_partition, box_partition
 from fenics_contact.qp import FaceNewton
+from fenics_contact.study.scenes.chain_links import chain, graded_links
+from fenics_contact.study.solving import slowest
 from fenics_contact.timing import PhaseTimer
 
 
@@ -26,6 +27,7 @@ def cold_state(
     boxes: Counts = PAPER_BOXES,
     *,
     parts: int | None = None,
+    default_partition: bool = False,
     friction_coefficient: float = FRICTION_COEFFICIENT,
     tolerance: float = 1e-6,
 ) -> tuple[State, float]:
@@ -36,6 +38,7 @@ def cold_state(
         cells: Cells of a link around, through and across.
         boxes: Subdomains of a link in the same directions.
         parts: If given, subdomains of a link by bisection instead of boxes.
+        default_partition: Whether the scene is cut as it is by default.
         friction_coefficient: Of the pair.
         tolerance: Of every residual.
 
@@ -45,13 +48,14 @@ def cold_state(
     comm.Barrier()
     start, timer = perf_counter(), PhaseTimer()
     with timer.phase("mesh"):
-        scene = chain(chain_links(cells, comm), friction_coefficient)
+        scene = chain(graded_links(cells, comm), friction_coefficient)
 
     def cut(mesh: BodyMesh) -> np.ndarray:
         return box_partition(mesh, boxes) if parts is None else bisection_partition(mesh, parts)
 
     with timer.phase("decompose"):
-        decomposition = decompose(scene, {name: cut(body.mesh) for name, body in scene.bodies.items()}, comm)
+        cuts = {name: cut(body.mesh) for name, body in scene.bodies.items()}
+        decomposition = decompose(scene, scene.partition(comm.size) if default_partition else cuts, comm)
     state = find_state(scene, decomposition, solver=FaceNewton(tolerance=tolerance), timer=timer)
     return state, comm.allreduce(perf_counter() - start, op=MPI.MAX)
 
@@ -82,6 +86,7 @@ def settings() -> argparse.ArgumentParser:
     parser.add_argument("--cells", type=int, nargs=3, default=PAPER_CELLS)
     parser.add_argument("--boxes", type=int, nargs=3, default=PAPER_BOXES)
     parser.add_argument("--parts", type=int)
+    parser.add_argument("--default-partition", action="store_true")
     parser.add_argument("--friction-coefficient", type=float, default=FRICTION_COEFFICIENT)
     parser.add_argument("--tolerance", type=float, default=1e-6)
     parser.add_argument("--forces", action="store_true")

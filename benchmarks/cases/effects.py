@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from benchmarks.cases.measuring import run_case, slowest, state_record
+from benchmarks.cases.measuring import run_case, state_record
 from benchmarks.cases.scene_data import LEVELS
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.geometry import BodyMesh, DesignSurface, block, box_partition
@@ -28,6 +28,7 @@ from fenics_contact.scene import (
     Tresca,
 )
 from fenics_contact.shape import ShapeProblem, SurfaceDesign, TotalPotential
+from fenics_contact.study.solving import slowest
 
 CELLS, BOXES = 24, 4
 PRESSED, SHEARED, HEAT, WEIGHT = -0.004, 0.006, 10.0, -50.0

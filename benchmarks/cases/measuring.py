@@ -34,14 +34,6 @@ class MemoryMeter:
         }
 
 
-def slowest(comm: MPI.Comm, seconds: Mapping[str, float]) -> dict[str, float]:
-    """Return the seconds of the slowest rank in each phase, which every rank must know. Collective."""
-    names = comm.bcast(list(seconds))
-    spent = np.array([seconds[name] for name in names])
-    comm.Allreduce(MPI.IN_PLACE, spent, op=MPI.MAX)
-    return dict(zip(names, spent.tolist(), strict=True))
-
-
 def state_record(state: State) -> dict[str, Any]:
     """Return what can be counted and compared of a state, the same on every rank."""
     return {

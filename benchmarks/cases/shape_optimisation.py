@@ -9,8 +9,9 @@ import numpy as np
 from mpi4py import MPI
 
 from benchmarks.cases.chain_design import BOUND, chain_shape_problem
-from benchmarks.cases.measuring import run_case, slowest
+from benchmarks.cases.measuring import run_case
 from fenics_contact.optimize import BundleTrust, LinearConstraints, minimize
+from fenics_contact.study.solving import slowest
 
 
 def measure(comm: MPI.Comm) -> dict[str, Any]:

@@ -8,18 +8,19 @@ from typing import Any
 
 from mpi4py import MPI
 
-from benchmarks.cases.measuring import nodal_forces, run_case, slowest, state_record
+from benchmarks.cases.measuring import nodal_forces, run_case, state_record
 from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, Counts
 from benchmarks.cases.scenes import block_mesh, block_on_plane
 from fenics_contact.contact import solve_scene
 from fenics_contact.geometry import box_partition
 from fenics_contact.qp import FaceNewton
+from fenics_contact.study.solving import slowest
 
 
 def measure(
     comm: MPI.Comm,
     counts: Counts,
-    boxes: Counts,
+    boxes: Counts | None,
     friction_coefficient: float = FRICTION_COEFFICIENT,
     tolerance: float = 1e-6,
 ) -> dict[str, Any]:
@@ -28,7 +29,7 @@ def measure(
     Args:
         comm: Communicator.
         counts: Cells along x, y and z.
-        boxes: Subdomains along x, y and z.
+        boxes: Subdomains along x, y and z; by default the block is cut as any body.
         friction_coefficient: Between block and plane.
         tolerance: Of every residual.
     """
@@ -37,7 +38,8 @@ def measure(
     mesh = block_mesh(counts)
     scene = block_on_plane(mesh, friction_coefficient)
     solver = FaceNewton(tolerance=tolerance)
-    state = solve_scene(scene, {"block": box_partition(mesh, boxes)}, comm, solver=solver)
+    partition = {"block": box_partition(mesh, boxes)} if boxes else None
+    state = solve_scene(scene, partition, comm, solver=solver)
     seconds = comm.allreduce(perf_counter() - start, op=MPI.MAX)
     record = state_record(state)
     record["counts"]["unknowns"] = mesh.points.size
@@ -53,7 +55,7 @@ def settings() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--counts", type=int, nargs=3, required=True)
-    parser.add_argument("--boxes", type=int, nargs=3, required=True)
+    parser.add_argument("--boxes", type=int, nargs=3)
     parser.add_argument("--friction-coefficient", type=float, default=FRICTION_COEFFICIENT)
     return parser
 

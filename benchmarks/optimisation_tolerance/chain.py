@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 from mpi4py import MPI
 
-from benchmarks.cases.scenes import chain, chain_links
 from fenics_contact.geometry import TwoLinks, box_partition
 from fenics_contact.optimize import BundleTrust, LinearConstraints, Result, minimize
 from fenics_contact.shape import AdaptiveTolerance, ShapeProblem, SurfaceDesign, TotalPotential
+from fenics_contact.study.scenes.chain_links import chain, graded_links
 
 #: Cells around, through and across each link.
 SIZES = {"small": (36, 6, 14), "paper": (48, 8, 20)}
@@ -28,7 +28,7 @@ class Chain:
     def problem(self, tolerance: float | AdaptiveTolerance) -> ShapeProblem:
         """Return the design problem."""
         links = _links(self.size)
-        scene = chain(links, 0.3)
+        scene = chain(links)
         partitions = {name: box_partition(body.mesh, (8, 1, 2)) for name, body in scene.bodies.items()}
         design = SurfaceDesign("link 1", links.first.crown, net=(7, 4))
         return ShapeProblem(scene, partitions, design, TotalPotential(), MPI.COMM_SELF, tolerance=tolerance)
@@ -48,4 +48,4 @@ class Chain:
 
 @cache
 def _links(size: str) -> TwoLinks:
-    return chain_links(SIZES[size], MPI.COMM_SELF)
+    return graded_links(SIZES[size], MPI.COMM_SELF)

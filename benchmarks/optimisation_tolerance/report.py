@@ -11,7 +11,7 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
-from benchmarks.report import table
+from fenics_contact.study.words import table
 
 ORANGE, BLUE, GREEN = "#f58518", "#4c78a8", "#54a24b"
 #: What the adaptive runs are compared with.

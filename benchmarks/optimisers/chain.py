@@ -10,7 +10,6 @@ from time import perf_counter
 import numpy as np
 from mpi4py import MPI
 
-from benchmarks.cases.scenes import chain, chain_links
 from fenics_contact.contact import ContactResult, State
 from fenics_contact.errors import ConvergenceError, InvalidDesignError
 from fenics_contact.geometry import TwoLinks, box_partition
@@ -23,6 +22,7 @@ from fenics_contact.shape import (
     SurfaceDesign,
     TotalPotential,
 )
+from fenics_contact.study.scenes.chain_links import chain, graded_links
 
 #: Cells around, through and across each link, boxes, control points.
 SIZES = {
@@ -164,4 +164,4 @@ class Book:
 
 @cache
 def _links(cells: tuple[int, int, int]) -> TwoLinks:
-    return chain_links(cells, MPI.COMM_SELF)
+    return graded_links(cells, MPI.COMM_SELF)

@@ -12,7 +12,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 from benchmarks.optimisers.measuring import ALLOWED
-from benchmarks.report import table
+from fenics_contact.study.words import table
 
 LOOKS = {
     "bundle": ("#0072b2", "o", "-"),

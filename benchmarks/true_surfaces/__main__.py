@@ -6,12 +6,13 @@ import argparse
 import json
 from pathlib import Path
 
-from benchmarks.report import write_json, write_text
 from benchmarks.true_surfaces.cases import CASES
 from benchmarks.true_surfaces.links import links
 from benchmarks.true_surfaces.measuring import BY_MORTAR, refined, study
 from benchmarks.true_surfaces.orders import SURFACES, gap_errors
 from benchmarks.true_surfaces.report import page
+from fenics_contact.io import write_json
+from fenics_contact.io.replacing import write_text
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "studies" / "true_surfaces.md"
 

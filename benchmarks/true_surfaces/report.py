@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from benchmarks.report import table
 from benchmarks.true_surfaces.measuring import WAYS
 from benchmarks.true_surfaces.orders import CELLS
+from fenics_contact.study.words import table
 
 NAMES = {"faceted": "facets", "reconstructed": "reconstructed", "best": "true"}
 

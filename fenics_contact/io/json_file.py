@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.io.replacing import replacing
+from fenics_contact.io.replacing import write_text
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -47,8 +47,7 @@ def write_json(path: str | Path, data: Any, *, comm: MPI.Comm | None = None) -> 
     with nullcontext() if comm is None else together(comm):
         if comm is None or comm.rank == 0:
             text = json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-            with replacing(target) as (temporary,):
-                temporary.write_text(text, encoding="utf-8")
+            write_text(target, text)
     return target
 
 

@@ -59,6 +59,12 @@ def replacing(*targets: Path) -> Iterator[tuple[Path, ...]]:
         raise _output_error(targets, error) from error
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a text file whole or not at all; raises as `replacing` does."""
+    with replacing(path) as (temporary,):
+        temporary.write_text(text, encoding="utf-8")
+
+
 def replacing_together(
     comm: MPI.Comm,
     targets: Sequence[Path],

@@ -16,7 +16,7 @@ from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.io.collection import Member, collection, read_collection, stem_of
 from fenics_contact.io.names import checked_name, file_of_each
-from fenics_contact.io.replacing import remove_abandoned, replacing
+from fenics_contact.io.replacing import remove_abandoned, write_text
 from fenics_contact.io.temporal_xdmf import grid_of, temporal
 from fenics_contact.io.vtu import write_vtu
 from fenics_contact.io.vtx import require_vtx, write_vtx
@@ -174,8 +174,7 @@ class ResultSeries:
         if not self.members:  # readers know no series without members
             self.path.unlink(missing_ok=True)
             return
-        with replacing(self.path) as (temporary,):
-            temporary.write_text(collection(self._name, self.members), encoding="utf-8")
+        write_text(self.path, collection(self._name, self.members))
 
     def _write_temporal(self, body: str, target: Path, bodies: Sequence[str]) -> None:
         folder, grids = self.path.with_suffix(""), []
@@ -186,8 +185,7 @@ class ResultSeries:
             if (body, member) in self._grids:
                 grids.append(self._grids[body, member])
         if grids:
-            with replacing(target) as (temporary,):
-                temporary.write_text(temporal(body, grids), encoding="utf-8")
+            write_text(target, temporal(body, grids))
         else:
             target.unlink(missing_ok=True)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.io.replacing import replacing
+from fenics_contact.io.replacing import write_text
 from fenics_contact.study.advice import advice
 from fenics_contact.study.certificates import check_certificates
 from fenics_contact.study.errors import Errors
@@ -62,8 +62,7 @@ def write_overview(folder: str | Path) -> Path:
         raise InvalidInputError(
             f"a page of studies needs some, {folder} holds none: run a study into it first"
         )
-    with replacing(target) as (temporary,):
-        temporary.write_text("\n".join([GUIDE, *map(_section, found)]), encoding="utf-8")
+    write_text(target, "\n".join([GUIDE, *map(_section, found)]))
     return target
 
 

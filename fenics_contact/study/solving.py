@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -93,9 +94,9 @@ def reached(state: State) -> float:
     return float(max(state.solution.natural_residual, state.solution.gluing_residual))
 
 
-def slowest(comm: MPI.Comm, timer_seconds: dict[str, float]) -> dict[str, float]:
+def slowest(comm: MPI.Comm, timer_seconds: Mapping[str, float]) -> dict[str, float]:
     """Return the seconds of the slowest rank in each phase. Collective."""
-    names = comm.bcast(sorted(timer_seconds))
+    names = comm.bcast(list(timer_seconds))
     spent = np.array([timer_seconds.get(name, 0.0) for name in names])
     comm.Allreduce(MPI.IN_PLACE, spent, op=MPI.MAX)
     return dict(zip(names, spent.tolist(), strict=True))

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from fenics_contact.io.replacing import replacing
+from fenics_contact.io.replacing import write_text
 from fenics_contact.study.certificates import CertificateCheck
 from fenics_contact.study.errors import Errors
 from fenics_contact.study.progress import described
 from fenics_contact.study.results import Run
+from fenics_contact.study.words import table
 
 
 def write_table(path: Path, errors: Errors, advice: Sequence[str], check: CertificateCheck) -> Path:
@@ -23,8 +24,7 @@ def write_table(path: Path, errors: Errors, advice: Sequence[str], check: Certif
         _runs(errors),
         _failures(errors),
     ]
-    with replacing(path) as (temporary,):
-        temporary.write_text("\n".join(filter(None, parts)), encoding="utf-8")
+    write_text(path, "\n".join(filter(None, parts)))
     return path
 
 
@@ -49,16 +49,16 @@ def _advice(advice: Sequence[str]) -> str:
 def rates_table(errors: Errors) -> str:
     """Tell, for each quantity, what it is compared with and how fast its error falls, beside theory."""
     strict = errors.strictest(errors.results.base)
-    lines = ["| quantity | compared with | value | rate found | rate of theory |", "|---|---|---|---|---|"]
+    head, body = ("quantity", "compared with", "value", "rate found", "rate of theory"), []
     for quantity in errors.results.scene.quantities:
         reference = errors.references[quantity.name]
         kind = reference.kind + (f": {reference.note}" if reference.note else "")
         value = f"{reference.value:.6g} {quantity.unit}" if isinstance(reference.value, float) else ""
         found, theory = errors.rate(strict, quantity.name), quantity.rate
-        lines.append(f"| {quantity.name} | {kind} | {value} | {_number(found)} | {_number(theory)} |")
+        body.append((quantity.name, kind, value, _number(found), _number(theory)))
     found, theory = errors.estimate_rate(strict), errors.results.scene.energy_rate
-    lines.append(f"| error of the displacement | its own estimate | | {_number(found)} | {_number(theory)} |")
-    return "\n".join([*lines, "", f'Of the runs that differ from "{described(strict)}" in size alone.\n'])
+    body.append(("error of the displacement", "its own estimate", "", _number(found), _number(theory)))
+    return f'{table(head, body)}\n\nOf the runs that differ from "{described(strict)}" in size alone.\n'
 
 
 def _certificates(check: CertificateCheck) -> str:
@@ -88,9 +88,7 @@ def _runs(errors: Errors) -> str:
     ]
     head += [f"{name}, error" for name in quantities]
     head += ["solver's error ≤", "true", "friction", "mesh"]
-    lines = ["## Runs\n", "| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
-    lines += ["| " + " | ".join(_row(errors, run, quantities)) + " |" for run in errors.results.good]
-    return "\n".join(lines) + "\n"
+    return f"## Runs\n\n{table(head, [_row(errors, run, quantities) for run in errors.results.good])}\n"
 
 
 def _row(errors: Errors, run: Run, quantities: Sequence[str]) -> list[str]:

@@ -38,6 +38,13 @@ ENERGY, PEAK, FINER = -20260.0, 4350.0, "meshes of up to 1.6 million unknowns"
 GRIP = 0.5
 
 
+def graded_links(cells: tuple[int, int, int], comm: MPI.Comm, cell: str = "hexahedron") -> TwoLinks:
+    """Mesh the links with gmsh as the demo does, with so many cells around, through and across each."""
+    around, through, across = cells
+    shape = LinkShape(n_around=around, n_a=through, n_b=across, grading=GRADING, cell=cell)
+    return two_links(shape, comm=comm)
+
+
 def chain(links: TwoLinks, friction_coefficient: float = FRICTION) -> Scene:
     """Return the chain of the demo: link 1 is held, link 2 hangs in it and is pulled with 80 kN, [N, mm]."""
     steel = IsotropicElasticity(2.1e5, 0.3)
@@ -57,8 +64,7 @@ def chain(links: TwoLinks, friction_coefficient: float = FRICTION) -> Scene:
 def build(parameters: Parameters, comm: MPI.Comm) -> Problem:
     """Mesh the links with gmsh and return the scene with its design."""
     around, through, across = (parameters.size * count for count in CELLS)
-    shape = LinkShape(n_around=around, n_a=through, n_b=across, grading=GRADING, cell=parameters.cell)
-    links = two_links(shape, comm=comm)
+    links = graded_links((around, through, across), comm, parameters.cell)
     scene = chain(links)
     pairs = [replace(pair, discretisation=parameters.discretisation) for pair in scene.contacts]
     # Shape derivatives know contact by nodes.

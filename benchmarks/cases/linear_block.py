@@ -1,0 +1,49 @@
+"""One linear solve on the mesh of `sliding_block`, without contact, by PETSc alone."""
+
+from __future__ import annotations
+
+import argparse
+from time import perf_counter
+from typing import Any
+
+from mpi4py import MPI
+
+from benchmarks.cases.measuring import run_case
+from benchmarks.cases.monolithic.elasticity import assemble_block
+from benchmarks.cases.monolithic.linear import solve_linear
+from benchmarks.cases.scene_data import Counts
+from fenics_contact.study.solving import slowest
+
+
+def measure(comm: MPI.Comm, counts: Counts, solver: str) -> dict[str, Any]:
+    """Return the record of one solve from the mesh on. Collective.
+
+    Args:
+        comm: Communicator.
+        counts: Cells along x, y and z.
+        solver: ``"gamg"`` or ``"cholesky"``, see `solve_linear`.
+    """
+    comm.Barrier()
+    start = perf_counter()
+    block = assemble_block(comm, counts)
+    assembled = perf_counter()
+    solved = solve_linear(block, solver)
+    end = perf_counter()
+    return {
+        "counts": {"unknowns": block.stiffness.size[0], "iterations": solved.iterations},
+        "residual": solved.residual,
+        "seconds": comm.allreduce(end - start, op=MPI.MAX),
+        "phases": slowest(comm, {"assemble": assembled - start, "solve": end - assembled}),
+    }
+
+
+def settings() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--counts", type=int, nargs=3, required=True)
+    parser.add_argument("--solver", choices=("gamg", "cholesky"), required=True)
+    return parser
+
+
+if __name__ == "__main__":
+    run_case(measure, settings())

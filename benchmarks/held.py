@@ -1,0 +1,49 @@
+"""The counts that runs of the quick benchmark must keep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from benchmarks.row import Record, Summaries, unknowns
+
+#: More work than held is let pass up to this factor: other versions of BLAS and PETSc round differently.
+MARGIN = 1.05
+
+
+@dataclass(frozen=True)
+class Held:
+    """Size of a run, exactly, and the work that it may take.
+
+    Attributes:
+        unknowns: Of the problem, see `unknowns`.
+        work: See `work`.
+    """
+
+    unknowns: int
+    work: int
+
+
+HELD: dict[str, Held] = {}
+
+
+def work(run: Record) -> int | None:
+    """Return products with F, steps of Newton's method or iterations: what a run counts."""
+    counts = run.get("counts", {})
+    names = ("f_products", "products", "newton_steps", "iterations")
+    return next((counts[name] for name in names if name in counts), None)
+
+
+def broken(summaries: Summaries) -> list[str]:
+    """Return one sentence for each run whose counts are not those that are held."""
+    found = []
+    for name, held in HELD.items():
+        run = summaries.get(name, {})
+        spent = work(run)
+        if spent is None:  # not measured, or skipped
+            continue
+        if unknowns(run) != held.unknowns or spent > MARGIN * held.work:
+            found.append(
+                f"{name} must have {held.unknowns} unknowns and take {held.work} products or steps, got "
+                f"{unknowns(run)} and {spent}: find out why, or hold the new counts in benchmarks/held.py"
+            )
+    return found
