@@ -25,6 +25,7 @@ import numpy as np
 
 from fenics_contact._requirements import load_pymetis, pymetis_error
 from fenics_contact.geometry import metis_call
+from fenics_contact.launching import clean_environment
 
 
 def part_graph(indptr: np.ndarray, indices: np.ndarray, parts: int) -> np.ndarray:
@@ -66,7 +67,7 @@ def _part_graph_elsewhere(indptr: np.ndarray, indices: np.ndarray, parts: int) -
         [sys.executable, "-P", metis_call.__file__],  # -P: modules beside the program are none of its imports
         input=given.getvalue(),
         capture_output=True,
-        env={**os.environ, "PYTHONPATH": path},
+        env=clean_environment() | {"PYTHONPATH": path},
     )
     if done.returncode != 0:
         raise pymetis_error(

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from functools import lru_cache
 
 from fenics_contact.errors import MissingRequirementError
+from fenics_contact.launching import clean_environment
 
 #: Renders a window of four pixels. Where VTK finds OpenGL depends on environment and shared libraries only.
 _PROBE = """
@@ -79,7 +80,7 @@ def check_renderer() -> None:
 @lru_cache(maxsize=4)
 def _probe(environment: tuple[str | None, ...]) -> str:
     """Return how the trial rendering ended, empty if well; all but the window only tells answers apart."""
-    variables = {name: value for name, value in os.environ.items() if name != _CHOICE}
+    variables = {name: value for name, value in clean_environment().items() if name != _CHOICE}
     if environment[0]:
         variables[_CHOICE] = environment[0]
     try:

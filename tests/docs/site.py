@@ -11,6 +11,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+from fenics_contact.launching import clean_environment
 from tests.docs.pages import DOCS, ROOT
 
 #: Seconds that a build may take on a busy machine.
@@ -89,7 +90,13 @@ def build(folder: Path) -> Site:
         command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-E", "-c", str(DOCS)]
         command += ["-d", str(folder / "doctrees"), str(ROOT), str(html)]
         done = subprocess.run(
-            command, cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE, check=False
+            command,
+            cwd=ROOT,
+            env=clean_environment(),
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=False,
         )
         log.write_text(done.stdout + done.stderr)
         unfinished = folder / "unfinished"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -16,6 +15,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.fingerprint import described, differences
+from fenics_contact.launching import finished
 from fenics_contact.scene import Coulomb
 
 
@@ -92,10 +92,10 @@ def test_another_process_finds_the_same_words() -> None:
     )
     root = Path(__file__).resolve().parents[2]
     command = [sys.executable, "-c", script]
-    answer = subprocess.run(command, capture_output=True, text=True, check=True, cwd=root)
+    answer = finished(command, 60.0, folder=root)
     expected = described([Coulomb(0.3), {"a": np.arange(3.0)}, np.sin], "it")
-    assert json.loads(answer.stdout) == expected
-    assert "0.3" in answer.stdout
+    assert json.loads(answer.output) == expected
+    assert "0.3" in answer.output
 
 
 def test_only_the_first_differences_are_spelt_out() -> None:

@@ -12,6 +12,7 @@ import pytest
 
 from fenics_contact.geometry import LinkShape, chain_link
 from fenics_contact.geometry.gmsh_session import gmsh_model
+from fenics_contact.launching import clean_environment
 from tests.house.source import ROOT
 
 SMALL = LinkShape(n_around=12, n_a=1, n_b=2)
@@ -79,6 +80,11 @@ assert gmsh.option.getNumber("General.Terminal") == 1
 gmsh.finalize()
 """
     answer = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=60
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        env=clean_environment(),
+        capture_output=True,
+        text=True,
+        timeout=60,
     )
     assert (answer.returncode, answer.stdout, answer.stderr) == (0, "", "")

@@ -23,7 +23,7 @@ def names_used(tree: ast.AST) -> set[str]:
 
 def python_files() -> list[Path]:
     """Return every Python file of the project."""
-    folders = ("fenics_contact", "tests", "demos", "benchmarks")
+    folders = ("fenics_contact", "tests", "demos", "benchmarks", "docs", "notebooks", "scripts")
     return [path for folder in folders for path in sorted((ROOT / folder).rglob("*.py"))]
 
 
@@ -49,6 +49,27 @@ def test_a_forbidden_name_is_found(code: str) -> None:
 
 def test_a_name_in_a_docstring_is_not_code() -> None:
     assert not names_used(ast.parse('"""Call print(MPI.COMM_WORLD)."""  # print')) & {"print", "COMM_WORLD"}
+
+
+#: Ways to start a process, and what frees its environment of the traces of MPI.
+STARTS, FREES = {"run", "Popen", "check_call", "check_output"}, {"clean_environment", "LAUNCH"}
+
+
+def starts_processes(tree: ast.AST) -> bool:
+    """Tell whether the code calls one of the functions of `subprocess`."""
+    called = (node.func for node in ast.walk(tree) if isinstance(node, ast.Call))
+    return any(
+        isinstance(name, ast.Attribute) and name.attr in STARTS and ast.unparse(name.value) == "subprocess"
+        for name in called
+    )
+
+
+def test_whoever_starts_a_process_frees_it_of_mpi() -> None:
+    trees = {path.relative_to(ROOT): ast.parse(path.read_text()) for path in python_files()}
+    starting = {path: names_used(tree) & FREES for path, tree in trees.items() if starts_processes(tree)}
+    assert len(starting) > 10, "hardly any files start processes: nothing was tested"
+    assert [path for path, free in starting.items() if not free] == []
+    assert [path for path, free in starting.items() if "tests" not in path.parts and free == {"LAUNCH"}] == []
 
 
 def test_files_are_short() -> None:

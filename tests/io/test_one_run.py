@@ -17,6 +17,7 @@ from mpi4py import MPI
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.io import OutputError, only_run_in, write_json
 from fenics_contact.io.one_run import LOCK
+from fenics_contact.launching import clean_environment
 from tests.conftest import ROOT
 
 #: Takes the lock of a folder, says so and waits.
@@ -67,7 +68,7 @@ def test_a_run_that_is_killed_stops_nobody(tmp_path: Path) -> None:
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env=clean_environment() | {"PYTHONPATH": str(ROOT)},
     ) as holder:
         assert holder.stdout is not None
         assert holder.stdout.readline() == "taken\n"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import sys
@@ -10,6 +9,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+
+from fenics_contact.launching import clean_environment
 
 ROOT = Path(__file__).parents[2]
 #: What the tests of a mutation need.
@@ -64,7 +65,7 @@ class Copy:
     @property
     def environment(self) -> dict[str, str]:
         """The environment of a process that shall use the copy; compiled files would outlive a mutation."""
-        return {**os.environ, "PYTHONPATH": str(self.folder), "PYTHONDONTWRITEBYTECODE": "1"}
+        return clean_environment() | {"PYTHONPATH": str(self.folder), "PYTHONDONTWRITEBYTECODE": "1"}
 
     @contextmanager
     def mutated(self, mutation: Mutation) -> Iterator[None]:

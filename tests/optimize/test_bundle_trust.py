@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from dataclasses import replace
 from itertools import pairwise
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import ConvergenceError, InvalidInputError
+from fenics_contact.launching import finished
 from fenics_contact.optimize import (
     BundleTrust,
     InvalidDesignError,
@@ -116,9 +116,9 @@ def test_same_input_gives_the_same_bits_in_another_process() -> None:
         "print(minimize(case.fun, case.start, BundleTrust(tolerance=1e-6)).x.tobytes().hex())\n"
     )
     command = [sys.executable, "-c", script]
-    run = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT, timeout=60)
+    run = finished(command, 60.0, folder=ROOT)
     case = BY_NAME["Maxquad"]
-    assert run.stdout.strip() == minimize(case.fun, case.start, FINE).x.tobytes().hex()
+    assert run.output.strip() == minimize(case.fun, case.start, FINE).x.tobytes().hex()
 
 
 def test_invalid_designs_shorten_the_step_and_are_recorded() -> None:

@@ -16,6 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
+from fenics_contact.launching import clean_environment
 from tests.random_scenes.judge import Outcome, Verdict, judge
 
 ROOT = Path(__file__).parents[2]
@@ -101,6 +102,7 @@ class _Worker:
         self._process = subprocess.Popen(
             command,
             cwd=ROOT,
+            env=clean_environment(),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -11,6 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from fenics_contact.errors import MissingRequirementError
+from fenics_contact.launching import clean_environment
 from fenics_contact.viz import check_libraries, check_renderer, renderer
 
 #: Draws a ball, and tells whether the environment is changed afterwards.
@@ -69,7 +69,7 @@ def test_without_a_display_pictures_are_drawn_without_complaints(monkeypatch: py
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "VTK_DEFAULT_OPENGL_WINDOW"):
         monkeypatch.delenv(name, raising=False)
     done = subprocess.run(
-        [sys.executable, "-c", DRAWN], env=dict(os.environ), capture_output=True, text=True, timeout=120
+        [sys.executable, "-c", DRAWN], env=clean_environment(), capture_output=True, text=True, timeout=120
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "(20, 40, 3) False\n", "")
 
