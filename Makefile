@@ -45,8 +45,9 @@ demos: $(prepare) ## Run every demo
 notebooks: $(prepare) ## Run the notebooks and store what they show, or NOTEBOOKS="01 04"; pages in output/notebooks/
 	$(launch) 1 $(python) notebooks/execute.py $(NOTEBOOKS)
 
-test: lint ## Check style and types, run the quick tests
+test: lint ## Check style and types, run the quick tests and the quick benchmark, of which counts are judged
 	$(launch) 1 $(python) -m pytest -n $(JOBS) -m "not slow and not hard"
+	$(python) -m benchmarks --quick
 
 test-slow: $(prepare) ## Run the tests that take long
 	$(launch) 1 $(python) -m pytest -m slow

@@ -7,7 +7,7 @@ the peak pressure against that of the finest fixed tolerance.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from time import process_time
 
@@ -55,7 +55,7 @@ class Measured:
     steps: Sequence[LoadStep] = AT_ONCE
 
 
-def pressed(mesh: BodyMesh, guides: dict[str, tuple[float | None, ...]], force: float) -> Measured:
+def pressed(mesh: BodyMesh, guides: Mapping[str, tuple[float | None, ...]], force: float) -> Measured:
     """Press a round body on a rigid plane, without friction."""
     scene = Scene(
         {"body": Body(mesh, IsotropicElasticity(1000.0, 0.3))},
@@ -172,8 +172,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.balanced", description=__doc__)
     parser.add_argument("scenes", nargs="*", choices=[*SCENES, []], default=[], help="all by default")
     chosen = parser.parse_args(arguments).scenes or list(SCENES)
-    head = ("scene", "tolerance", "unknowns", "products", "CPU [s]", "errors' wall [s]", "algebraic")
-    head = (*head, "friction", "discretisation", "peak pressure")
+    head = ["scene", "tolerance", "unknowns", "products", "CPU [s]", "errors' wall [s]", "algebraic"]
+    head += ["friction", "discretisation", "peak pressure"]
     print(table(head, [line for name in chosen for line in rows(name)]))
 
 

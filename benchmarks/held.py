@@ -23,7 +23,20 @@ class Held:
     work: int
 
 
-HELD: dict[str, Held] = {}
+HELD = {
+    "chain": Held(66528, 90),
+    "chain-1-rank": Held(66528, 90),
+    "chain-compared-1": Held(66528, 121),
+    "chain-compared-2": Held(66528, 121),
+    "chain-default": Held(66528, 90),
+    "linear-face": Held(66528, 90),
+    "frictionless-block": Held(34992, 24),
+    "block-28k": Held(28611, 37),
+    "block-28k-default": Held(28611, 36),
+    "gamg-28k": Held(28611, 10),
+    "cholesky-28k": Held(28611, 1),
+    "newton-28k-threads": Held(28611, 9),
+}
 
 
 def work(run: Record) -> int | None:

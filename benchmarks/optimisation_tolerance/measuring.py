@@ -10,6 +10,7 @@ import numpy as np
 
 from benchmarks.optimisation_tolerance.chain import BOUND, Chain
 from fenics_contact.shape import AdaptiveTolerance, DesignPoint
+from fenics_contact.study.scenes.chain_links import GRADING
 
 #: What everything is compared with.
 REFERENCE = 1e-11
@@ -87,4 +88,5 @@ def study(size: str, random_designs: int, *, few: bool) -> dict[str, Any]:
     stopping = FEW_STOPPING if few else STOPPING
     optima = [optimum(chain, name, limit) for limit in stopping for name in names]
     best = min(optima, key=lambda run: run["value"])["design"]
-    return {"size": size, "optima": optima, "errors": errors(chain, best, random_designs)}
+    found = errors(chain, best, random_designs)
+    return {"size": size, "grading": GRADING, "optima": optima, "errors": found}

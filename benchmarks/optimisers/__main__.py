@@ -10,6 +10,7 @@ from benchmarks.optimisers.measuring import FULL, METHODS, QUICK, budget_of, run
 from benchmarks.optimisers.report import page, plot
 from fenics_contact.io import versions, write_json
 from fenics_contact.io.replacing import write_text
+from fenics_contact.study.scenes.chain_links import GRADING
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "studies" / "optimisers"
 
@@ -38,7 +39,7 @@ def main() -> None:
             print(f"{case.name}, {method}: J = {last['value']:.2f}, {last['stop']}", flush=True)
             write_json(so_far, runs)
     if not chosen.draw:
-        write_json(known, {"runs": runs, "quick": chosen.quick, "versions": versions()})
+        write_json(known, {"runs": runs, "quick": chosen.quick, "grading": GRADING, "versions": versions()})
     study = json.loads(known.read_text())
     write_text(folder / "README.md", page(study))
     plot(folder / "optimisers.png", study["runs"])

@@ -148,5 +148,7 @@ def _stiff_and_soft(stiff: str, round_: BodyMesh, soft: str, other: BodyMesh) ->
 
 def _symmetric(body: str, dim: int) -> list[Support]:
     """Hold the planes of symmetry."""
-    across = np.where(np.eye(dim, dtype=bool), 0.0, None)[: dim - 1]
-    return [Support(body, f"{axis}0", tuple(row)) for axis, row in zip("xy", across, strict=False)]
+    return [
+        Support(body, f"{axis}0", tuple(0.0 if other == axis else None for other in "xyz"[:dim]))
+        for axis in "xyz"[: dim - 1]
+    ]

@@ -9,11 +9,15 @@ from pathlib import Path
 import pytest
 
 from benchmarks.comparing import force_difference, potential_difference, require_agreement
+from benchmarks.files import write_results
+from benchmarks.held import HELD, broken, work
+from benchmarks.plan import chosen
 from benchmarks.plot import plot_results
-from benchmarks.report import results, write_results
+from benchmarks.report import results
 from benchmarks.row import Summaries
 from benchmarks.summary import summarise
 from benchmarks.targets import ROWS
+from fenics_contact.errors import InvalidInputError
 from tests.benchmarks.small_records import all_summaries, record
 
 FIELDS = ["name", "quantity", "value", "unit", "target", "better", "ranks", "unknowns"]
@@ -48,6 +52,10 @@ def test_the_targets_are_those_that_were_set() -> None:
         "optimisation": (60, "lower"),
         "newton-seconds": (15, "higher"),
         "newton-memory": (0.25, "lower"),
+        "gamg-seconds": (1, "higher"),
+        "cholesky-seconds": (1, "higher"),
+        "default-partition": (1.2, "lower"),
+        "default-partition-chain": (1.2, "lower"),
         "growth": (1.5, "lower"),
         "memory": (6, "lower"),
         "efficiency": (0.85, "higher"),
@@ -98,6 +106,61 @@ def test_the_table_says_what_was_not_met(tmp_path: Path) -> None:
     write_results(tmp_path, summaries)
     (line,) = (line for line in (tmp_path / "results.md").read_text().splitlines() if "μ = 0.3" in line)
     assert "| 91 products | ≤ 90 | **no** |" in line
+
+
+def test_results_that_cannot_be_written_whole_leave_those_that_are_there(tmp_path: Path) -> None:
+    write_results(tmp_path, all_summaries())
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert set(before) == {"results.md", "results.png", "results.json"}
+    wrong = all_summaries()
+    wrong["block-92k"] = record(total_potential=-3.0)
+    with pytest.raises(ValueError, match="the problems differ"):
+        write_results(tmp_path, wrong)
+    unfit = all_summaries()
+    unfit["chain"] = record(seconds=float("nan"))
+    with pytest.raises(InvalidInputError):
+        write_results(tmp_path, unfit)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_the_default_partition_counts_only_with_the_same_answer() -> None:
+    summaries = all_summaries()
+    summaries["block-92k-default"] = record(seconds=3.0)
+    values = {row.name: entry["value"] for row, entry in results(summaries)[0]}
+    assert values["default-partition"] == 1.5
+    summaries["block-92k-default"] = record(total_potential=-2.1)
+    with pytest.raises(ValueError, match="both solvers of block-92k-default must find the same state"):
+        results(summaries)
+
+
+def test_a_linear_solve_is_held_against_the_whole_state() -> None:
+    summaries = all_summaries()
+    summaries["gamg-92k"], summaries["cholesky-92k"] = record(seconds=3.0), record(seconds=1.0)
+    values = {row.name: entry["value"] for row, entry in results(summaries)[0]}
+    assert (values["gamg-seconds"], values["cholesky-seconds"]) == (1.5, 0.5)
+
+
+def test_every_quick_run_is_held_but_the_one_that_may_be_skipped() -> None:
+    assert {run.name for run in chosen([], quick=True)} - set(HELD) == {"getfem-28k"}
+
+
+def test_more_work_or_another_size_breaks_what_is_held() -> None:
+    held = HELD["chain"]
+
+    def found(unknowns: int, products: int) -> list[str]:
+        counts = {"torn_unknowns": unknowns, "f_products": products}
+        return broken(Summaries({"chain": record(counts=counts)}))
+
+    assert found(held.unknowns, held.work) == found(held.unknowns, held.work - 10) == []
+    assert found(held.unknowns, held.work + 1) == [], "another BLAS rounds differently"
+    assert "chain must have 66528 unknowns and take 90 products" in found(held.unknowns, 2 * held.work)[0]
+    assert len(found(held.unknowns - 1, held.work)) == 1
+    assert broken(Summaries({"chain": {"skipped": "no gmsh"}})) == []
+
+
+@pytest.mark.parametrize("name", ["f_products", "products", "newton_steps", "iterations"])
+def test_the_work_of_a_run_is_what_it_counts(name: str) -> None:
+    assert work({"counts": {"unknowns": 3, name: 7}}) == 7
 
 
 def test_seconds_are_medians_and_the_rest_is_kept() -> None:

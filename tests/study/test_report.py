@@ -67,7 +67,7 @@ def test_the_page_of_all_studies_takes_its_numbers_from_them(tmp_path: Path) -> 
     assert "![accuracy](second/accuracy.png)" in text
     assert "- For 2 %, 1 % in peak pressure: 4 cells on the radius" in text
     assert "| energy | extrapolated | -10 N mm | 2.00 | 2.00 |" in text
-    assert "| error of the displacement | its own estimate | | 1.00 | 1.00 |" in text
+    assert "| error of the displacement | its own estimate |  | 1.00 | 1.00 |" in text
     assert "2.00 to 2.00 times the true error in 6 runs, 0 of them out of bounds" in text
 
 
