@@ -116,9 +116,9 @@ if comm.rank == 0:
     print("                 peak pressure [N/mm²]      contact radius [mm]")
     print(f"  Hertz          {p0:10.1f}                {a:10.4f}")
     for name, got in found.items():
-        errors = got["peak"] / p0 - 1, got["a"] / a - 1
+        off = got["peak"] / p0 - 1, got["a"] / a - 1
         print(
-            f"  {name:12s}   {got['peak']:10.1f} ({errors[0]:+7.2%})     {got['a']:10.4f} ({errors[1]:+7.2%})"
+            f"  {name:12s}   {got['peak']:10.1f} ({off[0]:+7.2%})     {got['a']:10.4f} ({off[1]:+7.2%})"
         )
 
 # ## How far off it says it is

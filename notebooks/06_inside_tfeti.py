@@ -358,14 +358,14 @@ plot_contact_pressure(state, width=900)
 # %%
 u, lam, contact = state.torn_displacement, state.solution.multiplier, state.contact
 load, norm = torn.load, np.linalg.norm
-found = {
+checks = {
     "equilibrium, ‖K u − f + Bᵀλ‖ / ‖f‖": norm(K @ u - load + B.T @ lam) / norm(load),
     "balance, ‖G λ − e‖ / ‖e‖": norm(G @ lam - R.T @ load) / norm(R.T @ load),
     "largest jump between copies / displacement": abs(B_E @ u).max() / abs(u).max(),
     "|Σ force × gap| / energy": abs(contact.normal_force @ contact.gap) / state.energies.strain,
     "gap between primal and dual energy": abs(state.energies.primal / state.energies.dual - 1),
 }
-for name, size in found.items():
+for name, size in checks.items():
     print(f"{name:44s} {size:.1e}")
     assert size < 1e-8
 print(f"energy {state.energies.primal:.6f} N mm")

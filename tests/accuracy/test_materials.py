@@ -81,7 +81,7 @@ def test_models_written_by_users_have_the_estimate_of_those_of_the_package(cell:
     )
     assert expected.total > 0.01
     for model in (FromEnergy, FromStress, *([EnergyByEntries] if cell in PLANE else [])):
-        found = estimated(scene_of(mesh, model(*LAME)), field)
+        found = estimated(scene_of(mesh, model(*LAME)), field)  # type: ignore[abstract]
         np.testing.assert_allclose(found.by_cell("body"), expected.by_cell("body"), rtol=1e-9)
 
 
@@ -106,7 +106,7 @@ def test_what_varies_and_what_does_not_share_a_body() -> None:
     np.testing.assert_allclose(mixed.by_cell("body"), alone.by_cell("body"), rtol=1e-9)
 
 
-PAIRS = {
+PAIRS: dict[str, list[Any]] = {
     "hexahedron": [WOOD, OrthotropicElasticity((22.0, 1.8, 1.0), (0.37, 0.42, 0.6), (1.4, 1.2, 0.1), AXES)],
     "triangle": [PlaneStress(5.0, 0.3), PlaneStress(10.0, 0.3)],
     "quadrilateral": [OrthotropicPlaneStress((e, e / 2), 0.3, e / 3) for e in (11.0, 22.0)],

@@ -59,7 +59,7 @@ class Blocks:
         lower, upper = block((0, 0, 0), (1, 1, 1), counts), block((0.05, 0.05, 1), (0.95, 0.95, 1.9), counts)
         bodies = {"lower": Body(lower, law["lower"]), "upper": Body(crowned(upper, 0.005), law["upper"])}
         faces = Surface("upper", "z0"), Surface("lower", "z1")
-        pair = ContactPair(*faces[:: 1 if self.slave == "upper" else -1], self.friction, self.discretisation)
+        pair = ContactPair(*faces[:: 1 if self.slave == "upper" else -1], self.friction, self.discretisation)  # type: ignore[call-arg]
         supports = [Support("lower", "z0")]
         if self.friction is None:
             supports += [Support("upper", "x0", (0.0, None, None)), Support("upper", "y0", (None, 0.0, None))]

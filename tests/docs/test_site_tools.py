@@ -55,7 +55,8 @@ def test_nobody_calls_an_enumeration() -> None:
 
 def test_attributes_have_their_types_beside_their_names() -> None:
     lines = docstrings.types_beside_names(
-        [".. attribute:: first", "", "   The first."], signatures.annotations(Values)
+        [".. attribute:: first", "", "   The first."],
+        signatures.annotations(Values),  # type: ignore[attr-defined]
     )
     assert lines == [".. attribute:: first", "   :type: np.ndarray", "", "   The first."]
 

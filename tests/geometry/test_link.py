@@ -207,7 +207,7 @@ def test_a_shape_that_is_no_link_is_refused(change: dict[str, Any], message: str
 
 def test_a_mesh_that_is_not_the_expected_lattice_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     shape = LinkShape(n_around=12, n_a=1, n_b=2)
-    points, cells, facets = link.mesh_ring(shape)
+    points, cells, facets = link.mesh_ring(shape)  # type: ignore[attr-defined]
     monkeypatch.setattr(link, "mesh_ring", lambda _: (points * 1.001, cells, facets))
     with pytest.raises(
         FenicsContactError, match=r"lattice of 72 nodes and 24 hexahedra, got 72 nodes, 24 hex.* off"

@@ -19,7 +19,7 @@ def test_a_process_of_its_own_cuts_alike(parts: int, monkeypatch: pytest.MonkeyP
     here = metis.part_graph(GRAPH.indptr, GRAPH.indices, parts)
     asked = []
     monkeypatch.setattr(metis, "_may_have_lost_its_calls", lambda: asked.append(parts) or True)
-    monkeypatch.setattr(metis.metis_call, "part_graph", None)
+    monkeypatch.setattr(metis.metis_call, "part_graph", None)  # type: ignore[attr-defined]
     elsewhere = metis.part_graph(GRAPH.indptr, GRAPH.indices, parts)
     assert asked, "nothing was asked: the same way was taken twice"
     assert np.array_equal(here, elsewhere)
@@ -29,7 +29,7 @@ def test_a_process_of_its_own_cuts_alike(parts: int, monkeypatch: pytest.MonkeyP
 
 def test_a_process_that_fails_is_told_with_its_words(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(metis, "_may_have_lost_its_calls", lambda: True)
-    monkeypatch.setattr(metis.metis_call, "__file__", "/nowhere/metis_call.py")
+    monkeypatch.setattr(metis.metis_call, "__file__", "/nowhere/metis_call.py")  # type: ignore[attr-defined]
     message = r"needs pymetis .* does not run in a process of its own \(exit status 2: .*No such file"
     with pytest.raises(MissingRequirementError, match=message):
         metis.part_graph(GRAPH.indptr, GRAPH.indices, 3)

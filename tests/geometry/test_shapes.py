@@ -162,6 +162,7 @@ def test_two_motions_are_one() -> None:
     other = TURN @ TURN.T[::-1]
     once = placed(ball, TURN, (1.0, 2.0, 3.0), 2.0)
     twice = placed(once, other, (-1.0, 0.5, 0.2), 0.3)
+    assert isinstance(twice, Placed)
     assert twice.shape == ball
     unmerged = Placed(once, tuple(map(tuple, other)), (-1.0, 0.5, 0.2), 0.3)
     np.testing.assert_allclose(twice.distance(x), unmerged.distance(x), atol=1e-14)

@@ -223,7 +223,7 @@ def test_a_state_that_no_solver_finds_is_a_rejected_trial_and_no_end(
             calls.append(tolerance)
             # The second design's solver, warm and cold, may do one step only.
             return (
-                FaceNewton(tolerance, max_steps=1) if len(calls) == 2 else accurate.with_tolerance(tolerance)
+                FaceNewton(tolerance, max_steps=1) if len(calls) == 2 else accurate.with_tolerance(tolerance)  # type: ignore[return-value]
             )
 
     problem.solver = Hasty()

@@ -14,7 +14,6 @@ from fenics_contact.scene import (
     BodyForce,
     ContactPair,
     LoadStep,
-    Material,
     Pressure,
     RigidCylinder,
     RigidPlane,
@@ -70,11 +69,11 @@ def steps_in_units(
 
 
 def _body_in_units(body: Body, length: float, stress: float) -> Body:
-    def scaled(material: Material) -> Material:
+    def scaled(material: Any) -> Any:
         assert is_dataclass(material)
         moduli = {name: getattr(material, name) for name in MODULI if hasattr(material, name)}
         assert moduli, material
-        return replace(  # type: ignore[no-any-return]
+        return replace(
             material, **{name: tuple(stress * np.atleast_1d(value)) if np.ndim(value) else stress * value
                          for name, value in moduli.items()}
         )  # fmt: skip

@@ -72,11 +72,11 @@ def test_clean_is_the_environment_of_this_process(monkeypatch: pytest.MonkeyPatc
 def test_several_ranks_need_mpirun(monkeypatch: pytest.MonkeyPatch) -> None:
     assert launcher(1) == []
     assert launcher(2)[1:] == ["-n", "2"]
-    monkeypatch.setattr(launching.os, "access", lambda *_: False)
-    monkeypatch.setattr(launching.shutil, "which", lambda _: None)
+    monkeypatch.setattr(launching.os, "access", lambda *_: False)  # type: ignore[attr-defined]
+    monkeypatch.setattr(launching.shutil, "which", lambda _: None)  # type: ignore[attr-defined]
     with pytest.raises(MissingRequirementError, match=r"2 ranks need mpirun, found none beside .* install"):
         launcher(2)
-    monkeypatch.setattr(launching.sys, "argv", ["launching.py", "2"])
+    monkeypatch.setattr(launching.sys, "argv", ["launching.py", "2"])  # type: ignore[attr-defined]
     with pytest.raises(SystemExit) as ended:
         launching.main()
     assert ended.value.code == 2

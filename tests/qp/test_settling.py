@@ -29,11 +29,11 @@ def gallery(**parameters) -> tuple[DualProblem, np.ndarray, np.ndarray]:
     return dual, multiplier, dual.operator(multiplier) - dual.rhs
 
 
-@pytest.mark.parametrize("law", ["Tresca", "Coulomb"])
-def test_trial_forces_balance_the_load_of_the_floating_brick(law: str):
+@pytest.mark.parametrize("kind", ["Tresca", "Coulomb"])
+def test_trial_forces_balance_the_load_of_the_floating_brick(kind: str):
     dual, multiplier, residual = gallery()
     ones = np.ones(dual.layout.n_friction)
-    law = Tresca(dual.layout, 1e-3 * ones) if law == "Tresca" else Coulomb(dual.layout, 0.4 * ones)
+    law = Tresca(dual.layout, 1e-3 * ones) if kind == "Tresca" else Coulomb(dual.layout, 0.4 * ones)
     motions = Settling(dual, law).motions
     assert motions.shape[1] == 6
     missing = []

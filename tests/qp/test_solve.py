@@ -218,8 +218,8 @@ def test_a_gap_between_supports_excuses_errors_of_its_own_point_alone():
 def test_one_large_residual_keeps_an_answer_from_being_within_a_tolerance(one):
     residuals = np.zeros(4)
     residuals[one] = 0.1
-    assert Residuals(*residuals, 1.0, 1.0).within(0.1)
-    assert not Residuals(*residuals, 1.0, 1.0).within(0.099)
+    assert Residuals(*residuals, 1.0, 1.0).within(0.1)  # type: ignore[call-arg]
+    assert not Residuals(*residuals, 1.0, 1.0).within(0.099)  # type: ignore[call-arg]
 
 
 def test_not_a_number_is_never_within_a_tolerance():

@@ -145,7 +145,7 @@ def test_a_refusal_for_a_reason_that_does_not_hold_or_is_not_known_is_noticed() 
 def test_a_scene_without_end_and_a_process_that_dies_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     (late,) = runner.judged([20_000], processes=1, limit=0.0)
     assert late.outcome is Outcome.HANG
-    monkeypatch.setattr(runner.sys, "executable", "/bin/false")
+    monkeypatch.setattr(runner.sys, "executable", "/bin/false")  # type: ignore[attr-defined]
     (dead,) = runner.judged([20_000], processes=1, limit=60.0)
     assert dead.outcome is Outcome.DIED
     told = runner.table(

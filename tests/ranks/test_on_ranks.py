@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.conftest import run_on_ranks
-from tests.ranks.on_ranks import CASES
+from tests.ranks.on_ranks import CASES  # type: ignore[attr-defined]
 
 SCRIPT = Path(__file__).with_name("on_ranks.py")
 BUG = "failed with RuntimeError: a bug on one rank ("

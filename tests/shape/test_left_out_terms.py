@@ -37,11 +37,11 @@ def without(*terms: str) -> Callable[[Patch], None]:
 
 
 def without_growth_of_friction(patch: Patch) -> None:
-    patch.setattr(problem, "linearise_face", partial(problem.linearise_face, coupling=False))
+    patch.setattr(problem, "linearise_face", partial(problem.linearise_face, coupling=False))  # type: ignore[attr-defined]
 
 
 def without_turning_of_friction(patch: Patch) -> None:
-    whole = problem.linearise_face
+    whole = problem.linearise_face  # type: ignore[attr-defined]
 
     def stiff(*arguments: Any) -> LinearisedFace:
         found = whole(*arguments)
@@ -52,7 +52,7 @@ def without_turning_of_friction(patch: Patch) -> None:
 
 
 def without_stiffness(patch: Patch) -> None:
-    whole = problem.work_by_shape
+    whole = problem.work_by_shape  # type: ignore[attr-defined]
     patch.setattr(problem, "work_by_shape", lambda *given: np.zeros_like(whole(*given)))
 
 
@@ -66,7 +66,7 @@ def without_own_shape(patch: Patch) -> None:
 
 
 def without_areas(patch: Patch) -> None:
-    whole = contact_derivative.areas_pulled_back
+    whole = contact_derivative.areas_pulled_back  # type: ignore[attr-defined]
     patch.setattr(
         contact_derivative, "areas_pulled_back", lambda *arguments: np.zeros_like(whole(*arguments))
     )
@@ -78,7 +78,7 @@ def without_weight(patch: Patch) -> None:
 
 def without_slopes(patch: Patch) -> None:
     """Let true surfaces keep their height over a facet when its nodes move."""
-    whole = projection_derivative.slopes_pulled_back
+    whole = projection_derivative.slopes_pulled_back  # type: ignore[attr-defined]
 
     def none(*arguments: Any) -> Any:
         return tuple(np.zeros_like(part) for part in whole(*arguments))

@@ -93,7 +93,7 @@ def test_names_stand_in_their_bodies() -> None:
 
 def test_the_title_says_by_how_much_the_objective_fell(monkeypatch: pytest.MonkeyPatch) -> None:
     titles: list[str] = []
-    draw = before_after.sheet
+    draw = before_after.sheet  # type: ignore[attr-defined]
 
     def noted(paper: Any, size: Any, title: str, layout: str) -> Any:
         titles.append(title)
