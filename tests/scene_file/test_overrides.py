@@ -34,7 +34,7 @@ def test_a_key_can_be_given_elsewhere(tmp_path: Path) -> None:
     )  # fmt: skip
     (pair,) = file.document.contacts
     assert getattr(pair.friction, "friction_coefficient", None) == 0.2
-    assert pair.discretisation == "mortar"
+    assert pair.discretisation == "mortar"  # type: ignore[attr-defined]
     assert file.document.solver.tolerance == "balanced"
     assert (file.title, str(file.folder)) == ("Other blocks", "there")
     assert getattr(file.document.loads[0], "value", None) == (10.0, 0.0, -5.0)
