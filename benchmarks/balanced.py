@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 from benchmarks.cases.scenes import block_mesh, block_on_plane
 from fenics_contact.accuracy import Balanced
-from fenics_contact.contact import State, solve_steps
+from fenics_contact.contact import ContactProblem, State, solve_steps
 from fenics_contact.geometry import (
     BodyMesh,
     bisection_partition,
@@ -138,7 +138,10 @@ def rows(name: str) -> list[tuple[str, ...]]:
     case, found = SCENES[name](), []
     for tolerance in (TOLERANCES[1], *TOLERANCES):  # the first time warms up
         start = process_time()
-        states = solve_steps(case.scene, case.steps, case.partition, MPI.COMM_SELF, tolerance=tolerance)
+        states = solve_steps(
+            ContactProblem(case.scene, MPI.COMM_SELF, partitions=case.partition, tolerance=tolerance),
+            case.steps,
+        )
         found.append((tolerance, states, process_time() - start))
     exact = peak(found[-1][1][-1])
     return [row(name, *entry, exact) for entry in found[1:]]

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import LoadSequence, Status
+from fenics_contact.contact import ContactProblem, LoadSequence, Status
 from fenics_contact.geometry import block, bolt, drilled_plate
 from fenics_contact.io import ResultSeries, write_result
 from fenics_contact.progress import shown
@@ -114,7 +114,7 @@ if comm.rank == 0:
 # percent that we look for.
 
 moved, pulled, clamped, counts = [0.0, 0.02, 0.04, 0.06, 0.08, 0.11], [], [], []
-steps = LoadSequence(scene, None, comm, solver=FaceNewton(tolerance=1e-5), count=len(moved))
+steps = LoadSequence(ContactProblem(scene, comm, solver=FaceNewton(tolerance=1e-5)), count=len(moved))
 series = ResultSeries(output, "pulling", comm)
 with shown(comm):
     for displacement in moved:

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import Status, solve_steps
+from fenics_contact.contact import ContactProblem, Status, solve_steps
 from fenics_contact.geometry import BodyMesh, rectangle_lattice
 from fenics_contact.io import ResultSeries, write_result
 from fenics_contact.progress import shown
@@ -87,7 +87,7 @@ steps = [
     for name, shift in shifts.items()
 ]
 with shown(comm):
-    states = dict(zip(shifts, solve_steps(scene, steps, None, comm, tolerance=1e-6), strict=True))
+    states = dict(zip(shifts, solve_steps(ContactProblem(scene, comm, tolerance=1e-6), steps), strict=True))
 
 # ## Theory for measured forces
 #

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import Status, contact_area
+from fenics_contact.contact import ContactProblem, Status, contact_area
 from fenics_contact.geometry import LinkShape, box_partition, two_links
 from fenics_contact.io import ResultSeries, write_optimisation_result, write_vtu, write_xdmf
 from fenics_contact.optimize import BundleTrust, LinearConstraints, minimize
@@ -110,7 +110,7 @@ partitions = {name: box_partition(body.mesh, (8, 1, 2)) for name, body in scene.
 # The rest of the mesh follows smoothly; away from the crown it stays.
 
 design = SurfaceDesign("link 1", links.first.crown, net=(7, 4))
-problem = ShapeProblem(scene, partitions, design, TotalPotential(), comm)
+problem = ShapeProblem(ContactProblem(scene, comm, partitions=partitions), design, TotalPotential())
 start = np.zeros(problem.size)
 
 # The link may not lose volume. The volume is almost linear in the design, so its linearisation bounds it:

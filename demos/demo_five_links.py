@@ -78,7 +78,7 @@ if comm.rank == 0:
 
 partitions = scene.partition(comm.size)
 with shown(comm):
-    state = solve_scene(scene, partitions, comm, tolerance=1e-6)
+    state = solve_scene(scene, comm, partitions=partitions, tolerance=1e-6)
 
 # ## Result
 #

@@ -85,7 +85,7 @@ if comm.rank == 0:
     print(scene("mortar").plan(ranks=comm.size))
 
 with shown(comm):
-    states = {name: solve_scene(scene(name), None, comm, tolerance=1e-6) for name in ("mortar", "node")}
+    states = {name: solve_scene(scene(name), comm, tolerance=1e-6) for name in ("mortar", "node")}
 
 # ## Result
 #

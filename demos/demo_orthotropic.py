@@ -117,8 +117,8 @@ if comm.rank == 0:
     print(block_of(wood).plan(ranks=comm.size))
 
 with shown(comm):
-    state = solve_scene(block_of(wood), None, comm, tolerance=1e-6)
-    compared = solve_scene(block_of(reference), None, comm, tolerance=1e-6)
+    state = solve_scene(block_of(wood), comm, tolerance=1e-6)
+    compared = solve_scene(block_of(reference), comm, tolerance=1e-6)
 
 # ## Result
 #

@@ -59,7 +59,7 @@ errors = {}
 for slave, master in CELLS:
     for discretisation in ("node", "mortar"):
         scene = pressed(slave, master, discretisation)
-        state = solve_scene(scene, None, comm, solver=FaceNewton(tolerance=1e-12))
+        state = solve_scene(scene, comm, solver=FaceNewton(tolerance=1e-12))
         stress = np.concatenate([state.gather_von_mises(name) for name in scene.bodies])
         errors[slave, master, discretisation] = float(np.abs(stress - pressure).max() / pressure)
         if slave == master == "hexahedron":

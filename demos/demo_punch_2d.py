@@ -55,7 +55,7 @@ scene = Scene(
 )
 partitions = scene.partition(comm.size)
 with shown(comm):
-    state = solve_scene(scene, partitions, comm, tolerance=1e-6)
+    state = solve_scene(scene, comm, partitions=partitions, tolerance=1e-6)
 
 # ## Hertz
 #

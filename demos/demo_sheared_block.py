@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import Status, solve_steps
+from fenics_contact.contact import ContactProblem, Status, solve_steps
 from fenics_contact.geometry import block
 from fenics_contact.io import ResultSeries, write_result
 from fenics_contact.progress import shown
@@ -63,7 +63,7 @@ steps = [
     LoadStep(f"{shift:+.2f} mm", supports=[Support("block", "z1", (shift, 0.0, -0.5))]) for shift in path
 ]
 with shown(comm):
-    states = solve_steps(scene, steps, None, comm, tolerance=1e-6)
+    states = solve_steps(ContactProblem(scene, comm, tolerance=1e-6), steps)
 
 # ## Shear force
 #

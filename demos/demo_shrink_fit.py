@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_steps
+from fenics_contact.contact import ContactProblem, solve_steps
 from fenics_contact.geometry import BodyMesh
 from fenics_contact.io import ResultSeries, write_result
 from fenics_contact.progress import shown
@@ -99,7 +99,7 @@ angles = np.concatenate([np.linspace(0.0, 0.016, 9), np.linspace(0.016, -0.008, 
 shrunk = [ThermalStrain("hub", -cooling)]
 steps = [LoadStep(f"{angle:g}", loads=shrunk, supports=held(angle)) for angle in angles]
 with shown(comm):
-    states = solve_steps(scene, steps, None, comm, tolerance=1e-6)
+    states = solve_steps(ContactProblem(scene, comm, tolerance=1e-6), steps)
 
 # ## Lamé
 #

@@ -98,7 +98,7 @@ print(scene.plan())
 # communicator makes the same script run on many processes with `mpirun`.
 
 # %%
-state = solve_scene(scene, None, MPI.COMM_WORLD)
+state = solve_scene(scene, MPI.COMM_WORLD)
 
 # %% [markdown]
 # ## What came out

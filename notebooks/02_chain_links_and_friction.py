@@ -81,10 +81,10 @@ def chain(friction_coefficient, pull=(0.25, 0.0, 0.0)):
 # %%
 from mpi4py import MPI
 
-from fenics_contact.contact import Status, solve_scene
+from fenics_contact.contact import ContactProblem, Status, solve_scene
 
 mu = 0.3
-state = solve_scene(chain(mu), None, MPI.COMM_WORLD, tolerance=1e-8)
+state = solve_scene(chain(mu), MPI.COMM_WORLD, tolerance=1e-8)
 contact = state.contact
 print(f"the links pull at each other with {-contact.force[:, 0].sum() / 1e3:.1f} kN")
 print(", ".join(f"{contact.count(status)} points {status.name.lower()}" for status in Status))
@@ -139,7 +139,7 @@ assert cosine.min() > 0.999
 states = {}
 print("          pull [kN]   peak pressure [N/mm²]   stick   slip   dissipated [N mm]")
 for mu in (0.0, 0.3, 0.6):
-    found = solve_scene(chain(mu), None, MPI.COMM_WORLD, tolerance=1e-8)
+    found = solve_scene(chain(mu), MPI.COMM_WORLD, tolerance=1e-8)
     states[f"μ = {mu:g}"], pair = found, found.contact
     lost, pull = float(np.sum(pair.friction_force * pair.slip)), -pair.force[:, 0].sum() / 1e3
     counts = f"{pair.count(Status.STICK):7d} {pair.count(Status.SLIP):6d}"
@@ -179,7 +179,7 @@ steps = [
     )
     for shift in path
 ]
-history = solve_steps(chain(0.3), steps, None, MPI.COMM_WORLD, tolerance=1e-8)
+history = solve_steps(ContactProblem(chain(0.3), MPI.COMM_WORLD, tolerance=1e-8), steps)
 
 # %% [markdown]
 # The force that shifts the link over the shift, with the bounds $\pm \mu N$ of the friction that the normal

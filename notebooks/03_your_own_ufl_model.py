@@ -131,7 +131,7 @@ def shortening(angle):
     theta = np.radians(angle)
     wood = Wood((12000, 800, 700), (0.4, 0.3), (float(np.sin(theta)), 0.0, float(np.cos(theta))))
     scene = on_floor(wood, Pressure("block", "z1", 8.0))
-    state = solve_scene(scene, None, MPI.COMM_WORLD, tolerance=1e-9)
+    state = solve_scene(scene, MPI.COMM_WORLD, tolerance=1e-9)
     top = mesh.points[:, 2] == 40
     return -state.gather_displacement("block")[top, 2].mean(), state
 
@@ -225,7 +225,7 @@ from fenics_contact.errors import InvalidInputError
 refused = []
 for model in wrong:
     try:
-        solve_scene(on_floor(model, Pressure("block", "z1", 8.0)), None, MPI.COMM_WORLD)
+        solve_scene(on_floor(model, Pressure("block", "z1", 8.0)), MPI.COMM_WORLD)
     except InvalidInputError as error:
         refused.append(model)
         print(fill(f"- {error}", 100, subsequent_indent="  "))
@@ -246,7 +246,7 @@ by_form = Pressure("block", "z1", Ufl(lambda x: 2 * (1 + x[0] / 20) ** 2))
 by_nodes = Pressure("block", "z1", lambda x: 2 * (1 + x[:, 0] / 20) ** 2)
 forces = []
 for name, load in {"UFL": by_form, "nodes": by_nodes}.items():
-    loaded = solve_scene(on_floor(Wood(*spruce), load), None, MPI.COMM_WORLD)
+    loaded = solve_scene(on_floor(Wood(*spruce), load), MPI.COMM_WORLD)
     forces.append(float(loaded.contact.normal_force.sum()))
     print(f"{name:6s} {forces[-1]:.4f} N, exactly {5600 / 3:.4f} N")
 assert abs(forces[0] - 5600 / 3) < 1e-8
@@ -289,7 +289,7 @@ errors = []
 for n in (4, 8, 16):
     mesh = block((0, 0, 0), (20, 20, 40), (2, 2, n))
     scene = on_floor(Graded(1000.0, 3000.0, 40.0), Pressure("block", "z1", 8.0))
-    state = solve_scene(scene, None, MPI.COMM_WORLD, tolerance=1e-10)
+    state = solve_scene(scene, MPI.COMM_WORLD, tolerance=1e-10)
     exact = 8.0 * 40 / 2000 * np.log(3)
     errors.append(abs(-state.gather_displacement("block")[:, 2].min() / exact - 1))
     print(f"{n:3d} cells in the height: error {errors[-1]:.2e}")
@@ -326,7 +326,7 @@ class Bedded(Elasticity):
 
 # %%
 try:
-    solve_scene(on_floor(Bedded(1000.0, 1.0), Pressure("block", "z1", 8.0)), None, MPI.COMM_WORLD)
+    solve_scene(on_floor(Bedded(1000.0, 1.0), Pressure("block", "z1", 8.0)), MPI.COMM_WORLD)
 except InvalidInputError as error:
     print(fill(str(error), 100))
 
@@ -346,7 +346,7 @@ class Pile(Bedded):
 mesh, m = block((0, 0, 0), (20, 20, 40), (2, 2, 32)), np.sqrt(1.0 / 1000.0)
 for p in (8.0, -8.0):
     scene = on_floor(Pile(1000.0, 1.0), Pressure("block", "z1", p))
-    state = solve_scene(scene, None, MPI.COMM_WORLD, tolerance=1e-9)
+    state = solve_scene(scene, MPI.COMM_WORLD, tolerance=1e-9)
     head = -state.gather_displacement("block")[mesh.points[:, 2] == 40, 2].mean()
     foot, pressed = state.contact.normal_force.sum() / 400, p > 0
     exact = p / np.sqrt(1000.0) * (np.tanh(m * 40) if pressed else 1 / np.tanh(m * 40))

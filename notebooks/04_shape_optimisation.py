@@ -40,6 +40,7 @@
 # The links of notebook 02; link 2 now is pulled by a force of 60 kN and held by contact and friction alone.
 
 # %%
+from fenics_contact.contact import ContactProblem
 from fenics_contact.geometry import LinkShape, two_links
 from fenics_contact.scene import (
     Body,
@@ -101,7 +102,7 @@ from mpi4py import MPI
 from fenics_contact.shape import ShapeProblem, SurfaceDesign
 
 design = SurfaceDesign("link 1", links.first.crown, net=(5, 3))
-problem = ShapeProblem(scene, scene.partition(), design, objective, MPI.COMM_WORLD, tolerance=1e-8)
+problem = ShapeProblem(ContactProblem(scene, MPI.COMM_WORLD, tolerance=1e-8), design, objective)
 print(f"{problem.size} design variables; the B_k sum up to one: {np.ptp(design.basis.sum(axis=1)):.1e} off")
 
 # %% [markdown]

@@ -326,7 +326,7 @@ plot_curves(curves, **labels, connected=True, width=900)
 # %%
 from fenics_contact.contact import Status, solve_scene
 
-state = solve_scene(scene, partitions, MPI.COMM_WORLD, tolerance=1e-10)
+state = solve_scene(scene, MPI.COMM_WORLD, partitions=partitions, tolerance=1e-10)
 print("step  products  closed  stick  slip  residual")
 for step in state.solution.history:
     counts = f"{step.products:9d} {step.closed:7d} {step.stick:6d} {step.slip:5d}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
@@ -11,9 +12,8 @@ from mpi4py import MPI
 
 from benchmarks.cases.measuring import nodal_forces, run_case, state_record
 from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, PAPER_BOXES, PAPER_CELLS, Counts
-from fenics_contact.contact import State, find_state
+from fenics_contact.contact import State, solve_scene
 from fenics_contact.errors import FenicsContactError
-from fenics_contact.feti import decompose
 from fenics_contact.geometry import BodyMesh, bisection_partition, box_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.study.scenes.chain_links import chain, graded_links
@@ -46,17 +46,16 @@ def cold_state(
         The state and the wall seconds of the slowest rank.
     """
     comm.Barrier()
-    start, timer = perf_counter(), PhaseTimer()
-    with timer.phase("mesh"):
+    start, meshing = perf_counter(), PhaseTimer()
+    with meshing.phase("mesh"):
         scene = chain(graded_links(cells, comm), friction_coefficient)
 
     def cut(mesh: BodyMesh) -> np.ndarray:
         return box_partition(mesh, boxes) if parts is None else bisection_partition(mesh, parts)
 
-    with timer.phase("decompose"):
-        cuts = {name: cut(body.mesh) for name, body in scene.bodies.items()}
-        decomposition = decompose(scene, scene.partition(comm.size) if default_partition else cuts, comm)
-    state = find_state(scene, decomposition, solver=FaceNewton(tolerance=tolerance), timer=timer)
+    partitions = None if default_partition else {name: cut(body.mesh) for name, body in scene.bodies.items()}
+    state = solve_scene(scene, comm, partitions=partitions, solver=FaceNewton(tolerance=tolerance))
+    state = replace(state, seconds={**meshing.seconds, **state.seconds})
     return state, comm.allreduce(perf_counter() - start, op=MPI.MAX)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from mpi4py import MPI
 
 from benchmarks.cases.scene_data import PAPER_BOXES, PAPER_CELLS
+from fenics_contact.contact import ContactProblem
 from fenics_contact.geometry import box_partition
 from fenics_contact.shape import ShapeProblem, SurfaceDesign, TotalPotential
 from fenics_contact.study.scenes.chain_links import chain, graded_links
@@ -19,4 +20,4 @@ def chain_shape_problem(comm: MPI.Comm) -> ShapeProblem:
     scene = chain(links)
     partitions = {name: box_partition(body.mesh, PAPER_BOXES) for name, body in scene.bodies.items()}
     design = SurfaceDesign("link 1", links.first.crown, net=(7, 4))
-    return ShapeProblem(scene, partitions, design, TotalPotential(), comm)
+    return ShapeProblem(ContactProblem(scene, comm, partitions=partitions), design, TotalPotential())

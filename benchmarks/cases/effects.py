@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from benchmarks.cases.measuring import run_case, state_record
 from benchmarks.cases.scene_data import LEVELS
-from fenics_contact.contact import State, solve_scene
+from fenics_contact.contact import ContactProblem, State, solve_scene
 from fenics_contact.geometry import BodyMesh, DesignSurface, block, box_partition
 from fenics_contact.scene import (
     Body,
@@ -70,7 +70,9 @@ def upper_face(mesh: BodyMesh) -> DesignSurface:
 def with_gradient(scene: Scene, comm: MPI.Comm) -> State:
     """Return the state after value and subgradient of the total potential by the lower contact face."""
     design = SurfaceDesign("lower", upper_face(scene.bodies["lower"].mesh), net=(4, 4))
-    problem = ShapeProblem(scene, partitions_of(scene), design, TotalPotential(), comm)
+    problem = ShapeProblem(
+        ContactProblem(scene, comm, partitions=partitions_of(scene)), design, TotalPotential()
+    )
     point = problem.evaluate(np.zeros(problem.size))
     assert np.abs(point.gradient).max() > 0.0
     return point.state
@@ -85,7 +87,7 @@ def measure(comm: MPI.Comm, level: str) -> dict[str, Any]:
         state = with_gradient(scene, comm)
     else:
         tolerance = 1e-6 if scene.contacts else 1e-10
-        state = solve_scene(scene, partitions_of(scene), comm, tolerance=tolerance)
+        state = solve_scene(scene, comm, partitions=partitions_of(scene), tolerance=tolerance)
     seconds = comm.allreduce(perf_counter() - start, op=MPI.MAX)
     plan = scene.plan(partitions_of(scene), sensitivity=level == "sensitivity")
     return {

@@ -22,7 +22,9 @@ def measure(comm: MPI.Comm) -> dict[str, Any]:
     comm.Barrier()
     start = perf_counter()
     mesh = block_mesh((32, 16, 16))
-    state = solve_scene(block_on_plane(mesh), {"block": box_partition(mesh, (4, 2, 2))}, comm, tolerance=1e-6)
+    state = solve_scene(
+        block_on_plane(mesh), comm, partitions={"block": box_partition(mesh, (4, 2, 2))}, tolerance=1e-6
+    )
     seconds = comm.allreduce(perf_counter() - start, op=MPI.MAX)
     record = {**state_record(state), "seconds": seconds, "phases": slowest(comm, state.seconds)}
     record["counts"]["closed"] = int((state.contact.normal_force > 0).sum())

@@ -38,8 +38,8 @@ def measure(
     mesh = block_mesh(counts)
     scene = block_on_plane(mesh, friction_coefficient)
     solver = FaceNewton(tolerance=tolerance)
-    partition = {"block": box_partition(mesh, boxes)} if boxes else None
-    state = solve_scene(scene, partition, comm, solver=solver)
+    partitions = {"block": box_partition(mesh, boxes)} if boxes else None
+    state = solve_scene(scene, comm, partitions=partitions, solver=solver)
     seconds = comm.allreduce(perf_counter() - start, op=MPI.MAX)
     record = state_record(state)
     record["counts"]["unknowns"] = mesh.points.size

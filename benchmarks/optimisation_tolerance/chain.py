@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 from mpi4py import MPI
 
+from fenics_contact.contact import ContactProblem
 from fenics_contact.geometry import TwoLinks, box_partition
 from fenics_contact.optimize import BundleTrust, LinearConstraints, Result, minimize
 from fenics_contact.shape import AdaptiveTolerance, ShapeProblem, SurfaceDesign, TotalPotential
@@ -31,7 +32,12 @@ class Chain:
         scene = chain(links)
         partitions = {name: box_partition(body.mesh, (8, 1, 2)) for name, body in scene.bodies.items()}
         design = SurfaceDesign("link 1", links.first.crown, net=(7, 4))
-        return ShapeProblem(scene, partitions, design, TotalPotential(), MPI.COMM_SELF, tolerance=tolerance)
+        return ShapeProblem(
+            ContactProblem(scene, MPI.COMM_SELF, partitions=partitions),
+            design,
+            TotalPotential(),
+            tolerance=tolerance,
+        )
 
     def minimised(self, problem: ShapeProblem, tolerance: float) -> Result:
         """Minimise within the box, without losing volume."""

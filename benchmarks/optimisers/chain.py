@@ -10,7 +10,7 @@ from time import perf_counter
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactResult, State
+from fenics_contact.contact import ContactProblem, ContactResult, State
 from fenics_contact.errors import ConvergenceError, InvalidDesignError
 from fenics_contact.geometry import TwoLinks, box_partition
 from fenics_contact.optimize import LinearConstraints, nearest_feasible
@@ -94,7 +94,12 @@ class Book:
         partitions = {name: box_partition(body.mesh, boxes) for name, body in scene.bodies.items()}
         design = SurfaceDesign("link 1", links.first.crown, net=net)
         objective, self._judge = OBJECTIVES[case.objective]
-        self.problem = ShapeProblem(scene, partitions, design, objective, MPI.COMM_SELF, tolerance=tolerance)
+        self.problem = ShapeProblem(
+            ContactProblem(scene, MPI.COMM_SELF, partitions=partitions),
+            design,
+            objective,
+            tolerance=tolerance,
+        )
         size = self.problem.size
         self.bound = case.bound
         self.bounds = (np.full(size, -case.bound), np.full(size, case.bound))

@@ -74,7 +74,7 @@ def run(case: Case, method: str, budget: int) -> dict[str, Any]:
         "value_claimed": book.rows[best][0], "value": value, "violation": book.rows[best][1],
         "products": book.rows[-1][2], "seconds": seconds,
         "design": design, "variables": book.problem.size,
-        "unknowns": book.problem.decomposition.torn_unknowns,
+        "unknowns": book.problem.contact.decomposition.torn_unknowns,
         "history": [[None if np.isnan(row[0]) else row[0], *row[1:]] for row in book.rows],
         "notes": sorted(set(book.notes)),
     }  # fmt: skip

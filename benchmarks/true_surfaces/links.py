@@ -38,7 +38,7 @@ def measured(
     scene = replace(scene, contacts=pairs)
     boxes = (8, 1, 2) if size < 2 else (16, 2, 4)
     parts = {name: box_partition(body.mesh, boxes) for name, body in scene.bodies.items()}
-    state = solve_scene(scene, parts, MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-6))
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=parts, solver=FaceNewton(tolerance=1e-6))
     return {
         "size": size,
         "grading": grading,

@@ -25,7 +25,7 @@ def solved(model: Model, geometry: Geometry, discretisation: Discretisation = "n
     """Return peak pressure, area of contact, and about how many slave nodes lie on its radius."""
     pairs = [replace(pair, geometry=geometry, discretisation=discretisation) for pair in model.scene.contacts]
     scene = replace(model.scene, contacts=pairs)
-    state = solve_scene(scene, None, MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-8))
+    state = solve_scene(scene, MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-8))
     closed = float((state.contact.status > 0).sum())
     return {
         "peak": float(state.contact.pressure.max()),

@@ -39,7 +39,7 @@ class Balanced:
         InvalidInputError: If the share or the tolerances are not positive or in the wrong order.
 
     Example:
-        >>> state = solve_scene(scene, None, comm, tolerance=Balanced(share=0.01))  # doctest: +SKIP
+        >>> state = solve_scene(scene, comm, tolerance=Balanced(share=0.01))  # doctest: +SKIP
     """
 
     share: float = 0.1

@@ -32,7 +32,7 @@ class Checkpoint:
 
     Example:
         >>> kept = Checkpoint("output/run.npz", every=5)
-        >>> states = solve_steps(scene, steps, None, comm, checkpoint=kept)  # doctest: +SKIP
+        >>> states = solve_steps(ContactProblem(scene, comm), steps, checkpoint=kept)  # doctest: +SKIP
         >>> result = minimize(problem, start, bounds=(-1.0, 1.0), checkpoint=kept)  # doctest: +SKIP
     """
 

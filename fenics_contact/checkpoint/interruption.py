@@ -126,7 +126,7 @@ def interruptible(comm: MPI.Comm | None = None, signals: Sequence[int] = SIGNALS
 
     Example:
         >>> with interruptible(comm):  # doctest: +SKIP
-        ...     solve_steps(scene, steps, partitions, comm, checkpoint=Checkpoint("run.npz"))
+        ...     solve_steps(problem, steps, checkpoint=Checkpoint("run.npz"))
     """
     if threading.current_thread() is not threading.main_thread():
         raise InvalidInputError(

@@ -45,7 +45,7 @@ class FixedPoint:
         contact problems with Coulomb friction, CMAME 191 (2002).
 
     Example:
-        >>> state = solve_scene(scene, partitions, comm, solver=FixedPoint(Smalse()))  # doctest: +SKIP
+        >>> state = solve_scene(scene, comm, solver=FixedPoint(Smalse()))  # doctest: +SKIP
     """
 
     solver: DualSolver

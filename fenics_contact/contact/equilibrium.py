@@ -1,33 +1,24 @@
-"""From a scene to its state."""
+"""From a torn system to its state."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fenics_contact._libraries import MPI, check_not_forked
 from fenics_contact.contact.coulomb import FixedPoint
 from fenics_contact.contact.energies import compute_energies
-from fenics_contact.contact.held import check_held
 from fenics_contact.contact.result import ContactResult, Status, no_contact
 from fenics_contact.contact.state import State
-from fenics_contact.contact.tolerance import Tolerance, checked_tolerance
 from fenics_contact.contact.warm_start import carried_over
-from fenics_contact.errors import collectively, together
 from fenics_contact.feti import (
-    Decomposition,
     DirectSystem,
     DualSystem,
     TornSystem,
-    build_torn_system,
-    decompose,
 )
-from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.qp import DualSolution, DualSolver, FaceNewton, ProjectedCG, Smalse, contact_step, solve
-from fenics_contact.scene import Scene, SolverKind, choose_solver
+from fenics_contact.scene import SolverKind
 from fenics_contact.timing import PhaseTimer
 
 if TYPE_CHECKING:
@@ -37,120 +28,42 @@ if TYPE_CHECKING:
 LINEAR_TOLERANCE = 1e-10
 
 
-@collectively("solve_scene", lambda scene, partitions, comm, **_: comm)
-def solve_scene(
-    scene: Scene,
-    partitions: Mapping[str, np.ndarray] | None,
-    comm: MPI.Comm,
-    *,
-    solver: DualSolver | None = None,
-    tolerance: Tolerance = None,
+def dual_state(
+    torn: TornSystem,
+    previous: State | None,
+    solver: DualSolver,
+    tolerance: float | Balanced | None,
+    timer: PhaseTimer,
 ) -> State:
-    """Find the equilibrium of a scene. Collective on ``comm``.
+    """Find a state by its multipliers. Collective.
 
     Args:
-        scene: Bodies, supports, loads and contact pairs, the same on every rank.
-        partitions: Body name -> subdomain of every cell, numbered from 0 within the body; None lets
-            `Scene.partition` cut the bodies into subdomains of a good size.
-        comm: Communicator over which the subdomains are spread.
-        solver: Dual solver with its tolerance; `Scene.plan` tells which one is chosen if it is None.
-        tolerance: Largest relative residual of the answer, or `fenics_contact.accuracy.Balanced`, which
-            solves as well as the mesh deserves. By default the solver's own, and without a solver `Balanced`.
-            Give a number, 1e-6 or less, where the status of single contact points matters, or small
-            differences between states.
-
-    Raises:
-        InvalidInputError: If scene or partition cannot be used.
-        InfeasibleError: If nothing holds some body against its load.
-        ConvergenceError: If the solver does not reach its tolerance.
-
-    Example:
-        >>> parts = {"block": box_partition(mesh, (2, 1, 1))}  # doctest: +SKIP
-        >>> state = solve_scene(scene, parts, MPI.COMM_WORLD)  # doctest: +SKIP
-    """
-    decomposition, timer = decomposed(scene, partitions, comm)
-    return find_state(scene, decomposition, solver=solver, tolerance=tolerance, timer=timer)
-
-
-def decomposed(
-    scene: Scene, partitions: Mapping[str, np.ndarray] | None, comm: MPI.Comm
-) -> tuple[Decomposition, PhaseTimer]:
-    """Cut a scene, as given or into subdomains of a good size; return the time that took, too. Collective."""
-    timer = PhaseTimer()
-    with timer.phase("decompose"):
-        with together(comm):
-            cut = scene.partition(comm.size) if partitions is None else partitions
-        return decompose(scene, cut, comm), timer
-
-
-@collectively("find_state", lambda scene, decomposition, **_: decomposition.comm)
-def find_state(
-    scene: Scene,
-    decomposition: Decomposition,
-    *,
-    solver: DualSolver | None = None,
-    tolerance: Tolerance = None,
-    previous: State | None = None,
-    slip_from: State | None = None,
-    start_geometry: bool = True,
-    sensitivity: bool = False,
-    timer: PhaseTimer | None = None,
-) -> State:
-    """Find the equilibrium of a decomposed scene, possibly moved since. Collective.
-
-    Args:
-        scene: The scene, with the coordinates to use.
-        decomposition: Its decomposition; only topology and numbering are taken from it.
-        solver: Dual solver with its tolerance; `default_solver` chooses if it is None.
-        tolerance: As for `solve_scene`; with ``sensitivity`` the default is a number, too.
-        previous: State of a neighbouring geometry or load to start from; what did not change is not
-            assembled and factored again.
-        slip_from: State from which slip is measured, that of the last load step; by default the undeformed
-            one.
-        start_geometry: Refuse bodies that overlap before they are loaded.
-        sensitivity: Whether derivatives of the state are wanted, which live on the dual system.
+        torn: The torn system.
+        previous: State of a neighbouring geometry or load to start from, or None.
+        solver: The dual solver.
+        tolerance: Its tolerance, or how much of the mesh's error it may make; None: `Balanced()`.
         timer: Collects the seconds.
     """
-    check_not_forked()
-    timer = timer or PhaseTimer()
-    check_same_input(decomposition.comm, scene, solver=solver, tolerance=tolerance)
-    with together(decomposition.comm):
-        tolerance = checked_tolerance(tolerance)
-        kind = choose_solver(scene, decomposition.tearing.n_subdomains, sensitivity=sensitivity)
-    with timer.phase("assemble"):
-        torn = build_torn_system(
-            scene,
-            decomposition,
-            start_geometry=start_geometry,
-            previous=None if previous is None else previous.torn,
-        )
-        if slip_from is not None:
-            earlier, moved = slip_from.torn, slip_from.torn_displacement
-            torn = torn.with_slip_from(earlier.relative(moved), earlier.sliding(moved))
-        same = previous is not None and torn.points is previous.torn.points
-        if previous is None or not same or torn.scene.loads != previous.scene.loads:
-            check_held(torn)
-    if solver is None and kind is SolverKind.DIRECT:
-        return _found_directly(torn, previous, timer)
-    chosen = solver or default_solver(kind)
     system, start = _dual_system(torn, previous, timer)
     if isinstance(tolerance, float):
-        return _to_tolerance(system, chosen.with_tolerance(tolerance), start, timer)
-    # Derivatives belong to the statuses of single points, which a balanced state leaves open.
-    if tolerance is None and (solver is not None or sensitivity):
-        return _to_tolerance(system, chosen, start, timer)
-    return _balanced(system, chosen, tolerance, start, timer)
+        return _to_tolerance(system, solver.with_tolerance(tolerance), start, timer)
+    return _balanced(system, solver, tolerance, start, timer)
 
 
 def _dual_system(
     torn: TornSystem, previous: State | None, timer: PhaseTimer
 ) -> tuple[DualSystem, np.ndarray | None]:
     """Return the dual system and where to start, both with what an earlier state knows. Collective."""
-    known = previous.system if previous is not None and isinstance(previous.system, DualSystem) else None
+    known = known_system(previous)
     system = DualSystem(torn, timer, previous=known)
     if previous is not None and known is not None and isinstance(previous.solution, DualSolution):
         return system, carried_over(known, previous.solution, system)
     return system, None
+
+
+def known_system(state: State | None) -> DualSystem | None:
+    """Return the dual system of a state, from which the next one takes what did not change."""
+    return state.system if state is not None and isinstance(state.system, DualSystem) else None
 
 
 def _to_tolerance(
@@ -194,8 +107,8 @@ def state_of(
     return State(system, solution, displacement, contact, energies, dict(timer.seconds))
 
 
-def _found_directly(torn: TornSystem, previous: State | None, timer: PhaseTimer) -> State:
-    """Find the state of one body without multipliers."""
+def direct_state(torn: TornSystem, previous: State | None, timer: PhaseTimer) -> State:
+    """Find the state of one body without multipliers. Collective."""
     known = previous.system if previous is not None and isinstance(previous.system, DirectSystem) else None
     system = DirectSystem(torn, timer, previous=known)
     with timer.phase("solve"):

@@ -55,7 +55,7 @@ class State:
         tolerance: What it was solved to, a relative residual or `Balanced`; None where no solver iterated.
 
     Example:
-        >>> state = solve_scene(scene, None, comm)  # doctest: +SKIP
+        >>> state = solve_scene(scene, comm)  # doctest: +SKIP
         >>> state.displacement["block"]  # a dolfinx Function on the block's own mesh  # doctest: +SKIP
         >>> state.contact.count(Status.SLIP)  # doctest: +SKIP
         >>> print(state.errors)  # doctest: +SKIP

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
-import numpy as np
-
-from fenics_contact._libraries import MPI
 from fenics_contact.checkpoint import Checkpoint, safe_point, telling_what_is_kept
-from fenics_contact.contact.equilibrium import decomposed, find_state
+from fenics_contact.contact.problem import ContactProblem
 from fenics_contact.contact.state import State
 from fenics_contact.contact.steps_done import StepsDone
-from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.errors import collectively, together
-from fenics_contact.feti import Decomposition
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.progress import Task
-from fenics_contact.qp import DualSolver
-from fenics_contact.scene import LoadStep, Scene
-from fenics_contact.timing import PhaseTimer
+from fenics_contact.scene import LoadStep
 
 
 class LoadSequence:
@@ -31,10 +24,10 @@ class LoadSequence:
 
     Attributes:
         scene: The scene with the loads of the last step.
-        state: State after the last step, None before the first.
+        problem: What its equilibria are found with.
 
     Example:
-        >>> steps = LoadSequence(scene, None, comm)  # doctest: +SKIP
+        >>> steps = LoadSequence(ContactProblem(scene, comm))  # doctest: +SKIP
         >>> for push in (0.0, 0.1, 0.2, 0.0):  # doctest: +SKIP
         ...     supports = [Support("block", "z1", (push, 0.0, -0.01))]
         ...     state = steps.advance(LoadStep(f"pushed by {push} mm", supports=supports))
@@ -45,23 +38,16 @@ class LoadSequence:
 
     def __init__(
         self,
-        scene: Scene,
-        partitions: Mapping[str, np.ndarray] | None,
-        comm: MPI.Comm,
+        problem: ContactProblem,
         *,
-        solver: DualSolver | None = None,
-        tolerance: Tolerance = None,
         checkpoint: Checkpoint | None = None,
         count: int | None = None,
     ) -> None:
-        """Start unloaded; arguments as for `solve_scene`. Collective on ``comm``.
+        """Start unloaded. Collective on the problem's communicator.
 
         Args:
-            scene: Bodies, contact pairs, and the supports and loads that the steps do not give.
-            partitions: As for `solve_scene`; give them if a run may go on with another number of ranks.
-            comm: Communicator over which the subdomains are spread.
-            solver: As for `solve_scene`.
-            tolerance: As for `solve_scene`, for every step.
+            problem: Bodies, contact pairs, and the supports and loads that the steps do not give. Give it
+                partitions if a run may go on with another number of ranks.
             checkpoint: File that is written after the steps and that an interrupted history goes on from.
             count: How many steps there will be, which progress tells; not needed.
 
@@ -69,21 +55,16 @@ class LoadSequence:
             InvalidInputError: If the checkpoint cannot be read or is one of another scene, or if some ranks
                 have one and others none.
         """
-        self.scene, self.state = scene, None
+        self.problem, self.scene, self._comm = problem, problem.scene, problem.comm
         kept = None if checkpoint is None else (checkpoint.every, checkpoint.resume)
-        require_alike(comm, described({"count": count, "checkpoint (every, resume)": kept}, "steps"))
-        if checkpoint is not None and partitions is None:
-            with together(comm):
-                partitions = scene.partition(comm.size)
-        problem = {"scene": scene, "partitions": partitions, "solver": solver, "tolerance": tolerance}
-        self._done = StepsDone(checkpoint, problem, comm)
-        self._partitions, self._comm = partitions, comm
-        self._solver, self._tolerance = solver, tolerance
-        self._decomposition: Decomposition | None = None
-        self._timer = PhaseTimer()
+        require_alike(self._comm, described({"count": count, "checkpoint (every, resume)": kept}, "steps"))
+        self._done = StepsDone(checkpoint, problem)
         self._task, self._count, self._number = Task("load steps", unit="done", total=count), count, 0
 
-    state: State | None
+    @property
+    def state(self) -> State | None:
+        """State after the last step, None before the first."""
+        return self.problem.state if self._number else None
 
     @collectively("LoadSequence.advance", lambda self, *_, **__: self._comm)
     def advance(self, step: LoadStep) -> State:
@@ -124,16 +105,11 @@ class LoadSequence:
     def _advanced(self, step: LoadStep) -> State:
         with together(self._comm):
             scene = step.applied_to(self.scene)
-        if self._decomposition is None:
-            self._decomposition, self._timer = decomposed(scene, self._partitions, self._comm)
-        state = self._done.recalled(step, scene, self._decomposition, self.state, self._timer)
+        state = self._done.recalled(step, scene, self.problem)
         if state is None:
-            state = find_state(
-                scene, self._decomposition, solver=self._solver, tolerance=self._tolerance,
-                previous=self.state, slip_from=self.state, timer=self._timer,
-            )  # fmt: skip
+            state = self.problem.solve(scene, slip_from=self.state)
             self._done.keep(step, state)
-        self.scene, self.state = scene, state
+        self.scene = scene
         return state
 
     @collectively("LoadSequence.finish", lambda self: self._comm)
@@ -145,33 +121,20 @@ class LoadSequence:
 
 
 def solve_steps(
-    scene: Scene,
-    steps: Sequence[LoadStep],
-    partitions: Mapping[str, np.ndarray] | None,
-    comm: MPI.Comm,
-    *,
-    solver: DualSolver | None = None,
-    tolerance: Tolerance = None,
-    checkpoint: Checkpoint | None = None,
+    problem: ContactProblem, steps: Sequence[LoadStep], *, checkpoint: Checkpoint | None = None
 ) -> tuple[State, ...]:
-    """Find the states at the end of every load step, see `LoadSequence`. Collective on ``comm``.
+    """Find the states at the end of every load step, see `LoadSequence`. Collective.
 
     Args:
-        scene: Bodies, contact pairs, and the supports and loads that the steps do not give.
+        problem: Bodies, contact pairs, and the supports and loads that the steps do not give.
         steps: The steps in their order.
-        partitions: As for `solve_scene`.
-        comm: Communicator over which the subdomains are spread.
-        solver: As for `solve_scene`.
-        tolerance: As for `solve_scene`, for every step.
         checkpoint: As for `LoadSequence`.
 
     Example:
         >>> push = [LoadStep(f"push {s}", loads=[weight, pull(s)]) for s in (0.5, 1.0, 0.0)]  # doctest: +SKIP
-        >>> states = solve_steps(scene, push, partitions, comm)  # doctest: +SKIP
+        >>> states = solve_steps(ContactProblem(scene, comm), push)  # doctest: +SKIP
     """
-    sequence = LoadSequence(
-        scene, partitions, comm, solver=solver, tolerance=tolerance, checkpoint=checkpoint, count=len(steps)
-    )
+    sequence = LoadSequence(problem, checkpoint=checkpoint, count=len(steps))
     states = tuple(sequence.advance(step) for step in steps)
     sequence.finish()
     return states

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any
 
 import numpy as np
 
-from fenics_contact._libraries import MPI
 from fenics_contact.checkpoint import Checkpoint, CheckpointError, without_checkpoint
+from fenics_contact.contact.problem import ContactProblem
 from fenics_contact.contact.state import State
-from fenics_contact.contact.stored import restored_state, stored_state
+from fenics_contact.contact.stored import stored_state
 from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.feti import Decomposition
 from fenics_contact.fingerprint import described, differences
 from fenics_contact.scene import LoadStep, Scene
-from fenics_contact.timing import PhaseTimer
 
 KIND = "load history"
 
@@ -25,26 +21,25 @@ KIND = "load history"
 class StepsDone:
     """Reads the states of steps that were done before, and writes new ones; nothing without a checkpoint."""
 
-    def __init__(self, checkpoint: Checkpoint | None, problem: Mapping[str, Any], comm: MPI.Comm) -> None:
+    def __init__(self, checkpoint: Checkpoint | None, problem: ContactProblem) -> None:
         """Read what there is. Collective.
 
         Args:
             checkpoint: The file, or None.
-            problem: What the history belongs to, by name.
-            comm: Communicator.
+            problem: What the history belongs to.
 
         Raises:
             InvalidInputError: If the file is no checkpoint of this problem; says what to do.
         """
-        self._checkpoint, self._comm = checkpoint, comm
+        self._checkpoint, self._comm = checkpoint, problem.comm
         self._arrays: dict[str, np.ndarray] = {}
         self._fingerprint: dict[str, str] = {}
         self._here, self._stored, self._written = 0, 0, 0
         if checkpoint is None:
             return
-        for name, part in problem.items():
-            self._fingerprint.update(described(part, name))
-        found = checkpoint.read(KIND, self._fingerprint, comm)
+        for name in ("scene", "partitions", "solver", "tolerance"):
+            self._fingerprint.update(described(getattr(problem, name), name))
+        found = checkpoint.read(KIND, self._fingerprint, problem.comm)
         if found is not None:
             self._stored = self._written = int(found.pop("steps"))
             self._arrays = found
@@ -58,18 +53,14 @@ class StepsDone:
         self,
         step: LoadStep,
         scene: Scene,
-        decomposition: Decomposition,
-        previous: State | None,
-        timer: PhaseTimer,
+        problem: ContactProblem,
     ) -> State | None:
         """Return the state after the next step if it is stored, else None. Collective.
 
         Args:
             step: The step.
             scene: The scene with its loads and supports.
-            decomposition: Decomposition of the scene.
-            previous: State before the step.
-            timer: Collects the seconds.
+            problem: The problem, whose last answer is the state before the step.
 
         Raises:
             InvalidInputError: If another step was done there.
@@ -86,7 +77,8 @@ class StepsDone:
                     f"{'; '.join(unlike)}: give the same steps to go on, or a new name to start anew"
                 )
         self._here += 1
-        return restored_state(scene, decomposition, stored, previous=previous, timer=timer)
+        problem.state = problem.restore(stored, scene)
+        return problem.state
 
     def keep(self, step: LoadStep, state: State) -> None:
         """Add the state after a step and write it where that is due. Collective.

@@ -176,7 +176,7 @@ def build_torn_system(
     scene: Scene,
     decomposition: Decomposition,
     *,
-    start_geometry: bool = True,
+    overlap: bool = False,
     previous: TornSystem | None = None,
 ) -> TornSystem:
     """Assemble all numbers of the torn system for the scene's present coordinates. Collective.
@@ -184,8 +184,8 @@ def build_torn_system(
     Args:
         scene: The scene whose decomposition is given, possibly moved.
         decomposition: Meshes and numbering.
-        start_geometry: Refuse bodies that overlap. A shape being optimised may overlap its partner: the gap
-            is then negative and the state presses the bodies apart.
+        overlap: Whether bodies may overlap, as a shape being optimised may its partner: the gap is then
+            negative and the state presses the bodies apart.
         previous: System of another geometry or load; subdomains for which nothing changed are taken over.
 
     Raises:
@@ -207,7 +207,7 @@ def build_torn_system(
         # Only loads and prescribed values changed: B stays the same object, which tells that F stays too.
         system = replace(previous, scene=scene, subdomains=subdomains)
     else:
-        system = _joined(scene, decomposition, subdomains, start_geometry, previous, prescribed)
+        system = _joined(scene, decomposition, subdomains, overlap, previous, prescribed)
     with together(comm):
         gap = gap_with_room(system.relations[1], decomposition.fixed, prescribed)
     supported = np.concatenate([relation.of_supports(prescribed) for relation in system.relations])
@@ -230,12 +230,12 @@ def _joined(
     scene: Scene,
     decomposition: Decomposition,
     subdomains: tuple[Subdomain, ...],
-    start_geometry: bool,
+    overlap: bool,
     previous: TornSystem | None,
     prescribed: np.ndarray,
 ) -> TornSystem:
     """Search for contact and build B; the right side is left empty. Collective."""
-    points, ties = _meeting_points(scene, decomposition, start_geometry)
+    points, ties = _meeting_points(scene, decomposition, overlap)
     has_friction, coefficient, tresca = friction_data(scene.contacts, points)
     frictional = np.flatnonzero(has_friction)
     gluing, tearing, fixed = decomposition.gluing.rows, decomposition.tearing, decomposition.fixed
@@ -260,14 +260,14 @@ def _tell_of_held(rows: Relations, fixed: np.ndarray) -> None:
 
 
 def _meeting_points(
-    scene: Scene, decomposition: Decomposition, start_geometry: bool
+    scene: Scene, decomposition: Decomposition, overlap: bool
 ) -> tuple[ContactPoints, ContactPoints]:
     """Search for contact and tied points, only where the scene has pairs. Collective."""
     tearing, fixed, comm = decomposition.tearing, decomposition.fixed, decomposition.comm
     points = ties = join_points([], scene.dim, tearing.n_nodes)
     if scene.contacts:
         points = find_contact_points(scene, tearing, fixed, comm)
-        if start_geometry:
+        if not overlap:
             check_no_penetration(scene, points)
     if scene.ties:
         ties = find_tied_points(scene, tearing, fixed, comm)

@@ -45,7 +45,7 @@ def only_run_in(folder: str | Path, comm: MPI.Comm) -> Iterator[None]:
 
     Example:
         >>> with only_run_in("output", comm):  # doctest: +SKIP
-        ...     write_result(solve_scene(scene, None, comm), "output")
+        ...     write_result(solve_scene(scene, comm), "output")
     """
     path, lock, made = Path(folder) / LOCK, None, False
     with together(comm):

@@ -53,7 +53,7 @@ class ResultSeries:
 
     Example:
         >>> series = ResultSeries("output", "history", comm)  # doctest: +SKIP
-        >>> for number, state in enumerate(solve_steps(scene, steps, None, comm)):  # doctest: +SKIP
+        >>> for number, state in enumerate(solve_steps(ContactProblem(scene, comm), steps)):  # doctest: +SKIP
         ...     series.add(state, number, steps[number].name)
     """
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fenics_contact._libraries import MPI
-from fenics_contact.contact import State, find_state
+from fenics_contact.contact import ContactProblem, State
 from fenics_contact.errors import (
     ConvergenceError,
     InfeasibleError,
@@ -21,7 +22,6 @@ from fenics_contact.errors import (
     collectively,
     together,
 )
-from fenics_contact.feti import Decomposition, decompose
 from fenics_contact.outer.answer import Answer
 from fenics_contact.qp import DualSolver
 from fenics_contact.scene import Scene
@@ -195,12 +195,16 @@ class SceneResponse(Response):
                 "a response needs at least one quantity of interest, got none: give {'name': function of "
                 "the state}"
             )
-        self._build, self._of_state, self._partitions = build, dict(quantities), partitions
-        self._solver, self._tolerance, self._warm = solver, tolerance, warm
-        self._decomposed: tuple[Scene, Decomposition] | None = None
-        self.state: State | None = None
+        self._build, self._of_state, self._warm = build, dict(quantities), warm
+        self._problem_of = partial(
+            ContactProblem, comm=comm, partitions=partitions, solver=solver, tolerance=tolerance
+        )
+        self._problem: ContactProblem | None = None
 
-    state: State | None
+    @property
+    def state(self) -> State | None:
+        """The last state, None before the first."""
+        return None if self._problem is None else self._problem.state
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -210,24 +214,11 @@ class SceneResponse(Response):
     def _answer(self, values: dict[str, float]) -> tuple[dict[str, float], dict[str, np.ndarray], int]:
         with together(self.comm), calling("the function that builds the scene of a response"):
             scene = self._build(**values)
-        decomposition = self._decomposition(scene)
-        state = find_state(
-            scene, decomposition, solver=self._solver, tolerance=self._tolerance,
-            previous=self.state if self._warm else None,
-        )  # fmt: skip
-        self.state = state
-        return evaluated(self._of_state, state, self.comm), {}, state.solution.products
-
-    def _decomposition(self, scene: Scene) -> Decomposition:
-        """Return the decomposition, a new one where topology or supported components changed. Collective."""
         with together(self.comm):
-            kept = self._decomposed is not None and _alike(scene, self._decomposed[0])
-        if not kept:
-            with together(self.comm):
-                cut = scene.partition(self.comm.size) if self._partitions is None else self._partitions
-            self._decomposed, self.state = (scene, decompose(scene, cut, self.comm)), None
-        assert self._decomposed is not None
-        return self._decomposed[1]
+            if self._problem is None or not _alike(scene, self._problem.scene):
+                self._problem = self._problem_of(scene)
+        state = self._problem.solve(scene, start="last" if self._warm else None)
+        return evaluated(self._of_state, state, self.comm), {}, state.solution.products
 
 
 class DesignResponse(Response):

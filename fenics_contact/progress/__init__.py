@@ -6,7 +6,7 @@ by default, and then a report costs less than a microsecond. `shown` listens and
 
 Example:
     >>> with shown(comm):  # doctest: +SKIP
-    ...     state = solve_scene(scene, None, comm)
+    ...     state = solve_scene(scene, comm)
 """
 
 from fenics_contact.progress.event import Event, Kind

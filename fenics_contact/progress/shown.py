@@ -44,7 +44,7 @@ def shown(
 
     Example:
         >>> with shown(MPI.COMM_WORLD):  # doctest: +SKIP
-        ...     state = solve_scene(scene, None, MPI.COMM_WORLD)
+        ...     state = solve_scene(scene, MPI.COMM_WORLD)
     """
     logger = logging.getLogger(LOGGER_NAME)
     shows = any(isinstance(handler, _Listener) for handler in logger.handlers)

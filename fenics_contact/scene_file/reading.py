@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.contact import LoadSequence, State, find_state
-from fenics_contact.contact.equilibrium import decomposed
+from fenics_contact.contact import ContactProblem, LoadSequence, State
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.geometry.files import require_file
 from fenics_contact.scene import LoadStep, Scene
@@ -92,6 +91,18 @@ class SceneFile:
         with self._at("solver", "subdomains"), together(self.comm):
             return self.document.solver.cut(scene, self.comm.size)
 
+    @property
+    def problem(self) -> ContactProblem:
+        """The scene with the solver of the file, nothing solved yet. Collective on first use."""
+        solver = self.document.solver
+        return ContactProblem(
+            self.scene,
+            self.comm,
+            partitions=self.partitions,
+            solver=solver.chosen(self.scene, self.partitions),
+            tolerance=solver.accuracy(),
+        )
+
     def solve(self) -> State:
         """Find the equilibrium, of the last load step where there are some. Collective.
 
@@ -102,15 +113,7 @@ class SceneFile:
         if self.steps:
             sequence = self.sequence()
             return [sequence.advance(step) for step in self.steps][-1]
-        solver, scene = self.document.solver, self.scene
-        decomposition, timer = decomposed(scene, self.partitions, self.comm)
-        return find_state(
-            scene,
-            decomposition,
-            solver=solver.chosen(scene, self.partitions),
-            tolerance=solver.accuracy(),
-            timer=timer,
-        )
+        return self.problem.solve()
 
     def sequence(self, checkpoint: Checkpoint | None = None) -> LoadSequence:
         """Return the history of the scene before its first load step. Collective.
@@ -118,16 +121,7 @@ class SceneFile:
         Args:
             checkpoint: File from which an interrupted history goes on, or None.
         """
-        solver, scene = self.document.solver, self.scene
-        return LoadSequence(
-            scene,
-            self.partitions,
-            self.comm,
-            solver=solver.chosen(scene, self.partitions),
-            tolerance=solver.accuracy(),
-            checkpoint=checkpoint,
-            count=len(self.steps),
-        )
+        return LoadSequence(self.problem, checkpoint=checkpoint, count=len(self.steps))
 
     def require_design(self) -> None:
         """Refuse a file without an optimisation.
@@ -150,8 +144,8 @@ class SceneFile:
         """
         self.require_design()
         with self._at("design"):
-            scene, shapes = self._built
-            return shape_task(self.source, self.document, scene, self.partitions, shapes, self.comm)
+            _, shapes = self._built
+            return shape_task(self.source, self.document, self.problem, shapes)
 
     def _at(self, *keys: str | int) -> _Located:
         return _Located(self.source, keys)

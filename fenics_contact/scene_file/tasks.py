@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fenics_contact.checkpoint import Checkpoint
+from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError, running, together
 from fenics_contact.optimize import BundleTrust, LinearConstraints, Result, minimize
 from fenics_contact.optimize.progress import Callback
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import Scene
 from fenics_contact.scene_file.design import TOTAL_POTENTIAL, DesignPart, VolumeConstraint
 from fenics_contact.scene_file.design_surfaces import design_surface
 from fenics_contact.scene_file.document import Document
@@ -21,9 +20,6 @@ from fenics_contact.scene_file.own_python import load
 from fenics_contact.scene_file.placing import Shaped
 from fenics_contact.scene_file.source import Source
 from fenics_contact.shape import AdaptiveTolerance, Objective, ShapeProblem, SurfaceDesign, TotalPotential
-
-if TYPE_CHECKING:
-    from mpi4py import MPI
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,20 +61,16 @@ class ShapeTask:
 def shape_task(
     source: Source,
     document: Document,
-    scene: Scene,
-    partitions: Mapping[str, np.ndarray],
+    contact: ContactProblem,
     shapes: Mapping[str, Shaped],
-    comm: MPI.Comm,
 ) -> ShapeTask:
     """Pose the optimisation of a scene file. Collective.
 
     Args:
         source: Where the document comes from.
         document: The file; it has a design.
-        scene: Its scene.
-        partitions: Body name -> subdomain of every cell.
+        contact: What finds the states of its scene.
         shapes: Body name -> what is known of its shape.
-        comm: Communicator.
 
     Raises:
         InvalidInputError: If a surface cannot be designed or numbers do not fit the number of variables.
@@ -91,17 +83,10 @@ def shape_task(
         )
         for part in design.surfaces
     )
-    with together(comm):
+    with together(contact.comm):
         objective = _objective(design.objective, source)
-    problem = ShapeProblem(
-        scene,
-        partitions,
-        moving,
-        objective,
-        comm,
-        solver=_solver(document, scene, partitions),
-        tolerance=_tolerance(document, design),
-    )
+    adaptive = AdaptiveTolerance() if design.adaptive else None
+    problem = ShapeProblem(contact, moving, objective, tolerance=adaptive)
     lower, upper = (
         np.concatenate([np.full(move.size, getattr(part, side)) for move, part in _paired(moving, design)])
         for side in ("lower", "upper")
@@ -113,17 +98,6 @@ def shape_task(
 
 def _paired(moving: tuple[SurfaceDesign, ...], design: DesignPart) -> Any:
     return zip(moving, design.surfaces, strict=True)
-
-
-def _solver(document: Document, scene: Scene, partitions: Mapping[str, np.ndarray]) -> Any:
-    return document.solver.chosen(scene, partitions) or FaceNewton()
-
-
-def _tolerance(document: Document, design: DesignPart) -> float | AdaptiveTolerance | None:
-    if design.adaptive:
-        return AdaptiveTolerance()
-    given = document.solver.tolerance
-    return given if isinstance(given, float) else None
 
 
 def _objective(name: str, source: Source) -> Objective:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fenics_contact.contact import State, restored_state, stored_state
+from fenics_contact.contact import State, stored_state
 from fenics_contact.shape.linearised_face import WeakChoice, WeakPoints
 
 if TYPE_CHECKING:
@@ -150,8 +150,7 @@ class DesignMemory:
     def _state(self, alpha: np.ndarray, parts: Stored) -> State:
         """Build a state; its one product counts among those of the problem. Collective."""
         problem = self._problem
-        scene = problem.scene_of(alpha)
-        state = restored_state(scene, problem.decomposition, parts, previous=self.state)
+        state = problem.contact.restore(parts, problem.scene_of(alpha))
         problem.products += state.system.products
         return state
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.contact import State, find_state
+from fenics_contact.contact import ContactProblem, State
 from fenics_contact.errors import (
     ConvergenceError,
     InfeasibleError,
@@ -19,9 +18,8 @@ from fenics_contact.errors import (
     collectively,
     tell,
 )
-from fenics_contact.feti import decompose
 from fenics_contact.fingerprint import described
-from fenics_contact.qp import DualSolver, FaceNewton
+from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import Scene
 from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
 from fenics_contact.shape.beside import with_fewest_weak_points
@@ -36,7 +34,6 @@ from fenics_contact.shape.pairs import check_pairs
 from fenics_contact.shape.state_error import state_error
 from fenics_contact.shape.tolerance import AdaptiveTolerance
 from fenics_contact.shape.volume import volume_by_points
-from fenics_contact.timing import PhaseTimer
 
 #: Tolerance of the adjoint relative to that of the state, and the least: no worse than the state it is of.
 ADJOINT_SHARE, ADJOINT_FLOOR = 1e-1, 1e-11
@@ -57,53 +54,44 @@ class ShapeProblem:
     partition and compiled forms are kept; each state starts from the one before.
 
     Attributes:
+        contact: What finds the states.
         designs: The moving surfaces; α is their variables one after the other.
         products: F-products of states and adjoints so far.
         evaluations: Number of designs evaluated, without those beside others.
 
     Example:
         >>> designs = SurfaceDesign("link1", links.first.crown, net=(7, 4))  # doctest: +SKIP
-        >>> problem = ShapeProblem(scene, partitions, designs, TotalPotential(), comm)  # doctest: +SKIP
+        >>> problem = ShapeProblem(ContactProblem(scene, comm), designs, TotalPotential())  # doctest: +SKIP
         >>> value, subgradient = problem(np.zeros(problem.size))  # doctest: +SKIP
         >>> result = minimize(problem, np.zeros(problem.size), bounds=(-1.0, 1.0))  # doctest: +SKIP
     """
 
     def __init__(
         self,
-        scene: Scene,
-        partitions: Mapping[str, np.ndarray],
+        contact: ContactProblem,
         designs: tuple[SurfaceDesign, ...] | SurfaceDesign,
         objective: Objective,
-        comm: MPI.Comm,
         *,
-        solver: DualSolver | None = None,
         choice: WeakChoice = WeakChoice.RELEASED,
         tolerance: float | AdaptiveTolerance | None = None,
     ) -> None:
-        """Decompose the scene and prepare the mesh motion. Collective on ``comm``.
+        """Decompose the scene and prepare the mesh motion. Collective.
 
         Args:
-            scene: The scene in its reference shape.
-            partitions: Body name -> subdomain of every cell.
+            contact: What finds the states of the scene, which it has in its reference shape.
             designs: What moves.
             objective: What is judged.
-            comm: Communicator.
-            solver: Dual solver of the states, `FaceNewton()` by default.
             choice: Branch for weakly active points.
             tolerance: Relative residual of the states: a number for all of them, or `AdaptiveTolerance()`,
-                with which an optimiser asks for no more than it needs; None for that of the solver.
+                with which an optimiser asks for no more than it needs; None for that of ``contact``, or of
+                its solver: a balanced state leaves open what derivatives belong to.
         """
-        self.scene, self.objective, self.choice = scene, objective, choice
+        self.contact, self.objective, self.choice = contact, objective, choice
         self.designs = (designs,) if isinstance(designs, SurfaceDesign) else tuple(designs)
-        self.solver = solver or FaceNewton()
         self._adaptive = tolerance if isinstance(tolerance, AdaptiveTolerance) else None
-        if isinstance(tolerance, AdaptiveTolerance):
-            self._tightest = tolerance.tightest
-        else:
-            self._tightest = self.solver.tolerance if tolerance is None else float(tolerance)
-        self._timer = PhaseTimer()
+        self._tightest = _tightest(contact, tolerance)
+        self._timer, scene = contact.timer, contact.scene
         self.evaluations, self.products = 0, 0
-        self._partitions = partitions
         self._memory = DesignMemory(self)
         self._forms: ShapeForms | None = None
         if scene.dim != 3:
@@ -111,10 +99,9 @@ class ShapeProblem:
                 "shape problems are three-dimensional, the scene is plane: give it the thickness of one "
                 "layer of cells between symmetry planes"
             )
-        with self._timer.phase("decompose"):
-            self.decomposition = decompose(scene, partitions, comm)
+        decomposition = contact.decomposition
         with self._timer.phase("mesh motion"):
-            self._motions = [motion_of(self.decomposition, scene, design) for design in self.designs]
+            self._motions = [motion_of(decomposition, scene, design) for design in self.designs]
         self._moving = moving_nodes(scene, self.designs, self._motions)
         check_pairs(scene, self._moving)
 
@@ -124,9 +111,14 @@ class ShapeProblem:
         return sum(design.size for design in self.designs)
 
     @property
+    def scene(self) -> Scene:
+        """The scene in its reference shape."""
+        return self.contact.scene
+
+    @property
     def comm(self) -> MPI.Comm:
         """Communicator over which the subdomains are spread."""
-        return self.decomposition.comm
+        return self.contact.comm
 
     @property
     def first(self) -> DesignPoint | None:
@@ -147,10 +139,10 @@ class ShapeProblem:
         """Say which problem it is, for a checkpoint."""
         parts: dict[str, Any] = {
             "scene": self.scene,
-            "partitions": self._partitions,
+            "partitions": self.contact.partitions,
             "designs": self.designs,
             "objective": self.objective,
-            "solver": self.solver,
+            "solver": self.contact.solver,
             "tolerance": self._adaptive or self._tightest,
             "choice": self.choice,
         }
@@ -304,25 +296,23 @@ class ShapeProblem:
         previous = self._memory.state if known is None else known.state
         with self._timer.phase("mesh motion"):
             scene = self.scene_of(alpha) if known is None else known.state.scene
-        solver = self.solver.with_tolerance(tolerance)
-        find = partial(
-            find_state, scene, self.decomposition, solver=solver, sensitivity=True, timer=self._timer
-        )
         try:
-            state = find(previous=previous, start_geometry=previous is None)
+            state = self.contact.solve(
+                scene, start=previous, tolerance=tolerance, overlap=previous is not None, sensitivity=True
+            )
         except InfeasibleError as error:
             raise InvalidDesignError(f"the design has no equilibrium: {error}") from error
         except ConvergenceError as error:
             if previous is None:
                 raise
             tell(logger.warning, "a warm start led nowhere, a cold one follows: %s", error)
-            state = self._solved_cold(find)
+            state = self._solved_cold(scene, tolerance)
         self._memory.passed(alpha, state)
         return state
 
-    def _solved_cold(self, find: Callable[..., State]) -> State:
+    def _solved_cold(self, scene: Scene, tolerance: float) -> State:
         try:
-            return find(previous=None, start_geometry=False)
+            return self.contact.solve(scene, start=None, tolerance=tolerance, overlap=True, sensitivity=True)
         except (ConvergenceError, InfeasibleError) as error:
             raise InvalidDesignError(f"no equilibrium of the design was found: {error}") from error
 
@@ -369,7 +359,7 @@ class ShapeProblem:
         """Return the volume of the designed bodies and its gradient, [length³]. Collective."""
         scene = self.scene_of(alpha)
         names = sorted({design.body for design in self.designs})
-        tearing = self.decomposition.tearing
+        tearing = self.contact.decomposition.tearing
         total, by_points = 0.0, np.zeros((int(tearing.node_offset[-1]), 3))
         for name in names:
             mesh = scene.bodies[name].mesh
@@ -390,7 +380,7 @@ class ShapeProblem:
         parts = []
         for design, motion in zip(self.designs, self._motions, strict=True):
             mesh = self.scene.bodies[design.body].mesh
-            nodes = self.decomposition.tearing.global_nodes(design.body, np.arange(mesh.n_nodes))
+            nodes = self.contact.decomposition.tearing.global_nodes(design.body, np.arange(mesh.n_nodes))
             parts.append(design.pull_back(motion.pull_back(by_points[nodes])))
         return np.concatenate(parts)
 
@@ -398,3 +388,11 @@ class ShapeProblem:
         if self._forms is None:
             self._forms = ShapeForms(state.torn, np.concatenate(list(self._moving.values())))
         return self._forms
+
+
+def _tightest(contact: ContactProblem, given: float | AdaptiveTolerance | None) -> float:
+    """Return the smallest tolerance of states."""
+    if isinstance(given, AdaptiveTolerance):
+        return given.tightest
+    number = contact.tolerance if given is None else given
+    return float(number) if isinstance(number, float | int) else (contact.solver or FaceNewton()).tolerance

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.contact import FixedPoint, State, solve_scene, solve_steps
+from fenics_contact.contact import ContactProblem, FixedPoint, State, solve_steps
 from fenics_contact.geometry import BodyMesh, default_partition
-from fenics_contact.qp import FaceNewton
+from fenics_contact.qp import DualSolver, FaceNewton
 from fenics_contact.scene import Scene
 from fenics_contact.shape import ShapeProblem, TotalPotential
 from fenics_contact.study.parameters import Parameters
@@ -21,18 +21,16 @@ from fenics_contact.timing import PhaseTimer
 def solve_problem(problem: Problem, parameters: Parameters, comm: MPI.Comm) -> tuple[State, ...]:
     """Return the states of all load steps. Collective."""
     partitions = cut(problem.scene, parameters.subdomains, comm.size)
-    options = solver_options(parameters)
-    if not problem.steps:
-        return (solve_scene(problem.scene, partitions, comm, **options),)
-    return solve_steps(problem.scene, problem.steps, partitions, comm, **options)
+    contact = ContactProblem(problem.scene, comm, partitions=partitions, solver=_solver(parameters))
+    return solve_steps(contact, problem.steps) if problem.steps else (contact.solve(),)
 
 
-def solver_options(parameters: Parameters) -> dict[str, Any]:
-    """Return how `solve_scene` is told about tolerance and method."""
+def _solver(parameters: Parameters) -> DualSolver | None:
+    """Return the solver with its tolerance; None: a balanced one."""
     if parameters.balanced:
-        return {}
+        return None
     newton = FaceNewton(tolerance=float(parameters.tolerance))
-    return {"solver": FixedPoint(newton) if parameters.solver == "fixed point" else newton}
+    return FixedPoint(newton) if parameters.solver == "fixed point" else newton
 
 
 def cut(scene: Scene, subdomains: int | None, ranks: int) -> dict[str, np.ndarray] | None:
@@ -65,13 +63,9 @@ class GradientOf(ShapeProblem):
     def __init__(self, problem: Problem, state: State) -> None:
         """Prepare the adjoint, as accurate as the state. Collective."""
         assert problem.design is not None
-        decomposition = state.torn.decomposition
-        solver = FaceNewton(tolerance=max(reached(state), 1e-11))
         self._state = state
-        super().__init__(
-            problem.scene, decomposition.partitions, problem.design, TotalPotential(), decomposition.comm,
-            solver=solver,
-        )  # fmt: skip
+        contact = ContactProblem.following(state, tolerance=max(reached(state), 1e-11))
+        super().__init__(contact, problem.design, TotalPotential())
 
     def state_of(self, alpha: np.ndarray) -> State:
         """Return the known state."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.accuracy import certify
-from fenics_contact.contact import State, find_state
+from fenics_contact.contact import ContactProblem, State
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp import DualSolution, FaceNewton, solve
 
@@ -55,10 +55,8 @@ def true_errors(states: tuple[State, ...]) -> TrueErrors | None:
 
 def _compared(states: tuple[State, ...], solver: FaceNewton) -> TrueErrors:
     state = states[-1]
-    exact = find_state(
-        state.scene, state.torn.decomposition, solver=solver, previous=state,
-        slip_from=states[-2] if len(states) > 1 else None,
-    )  # fmt: skip
+    problem = ContactProblem.following(state, solver=solver)
+    exact = problem.solve(slip_from=states[-2] if len(states) > 1 else None)
     norm = exact.energies.norm
     total = _distance(state, exact.dual_solution, exact.torn_displacement) / norm
     if not np.any(state.torn.friction_coefficient > 0.0):

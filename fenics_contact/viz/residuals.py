@@ -64,7 +64,7 @@ def plot_residuals(
 
     Example:
         >>> try:  # doctest: +SKIP
-        ...     state = solve_scene(scene, None, comm)
+        ...     state = solve_scene(scene, comm)
         ... except ConvergenceError as error:
         ...     plot_residuals(error.history, "residuals.png", comm=comm)
     """

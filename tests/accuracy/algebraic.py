@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.accuracy import Certificate, certify, friction_error
-from fenics_contact.contact import State, find_state, solve_scene
+from fenics_contact.contact import ContactProblem, State, solve_scene
 from fenics_contact.contact.equilibrium import solve_dual
 from fenics_contact.geometry import (
     bisection_partition,
@@ -148,7 +148,7 @@ def first_state(name: str) -> State:
     """The state that the others of a case share their factors with."""
     case = CASES[name]
     scene = case.make()
-    return solve_scene(scene, case.cut(scene), MPI.COMM_SELF, solver=solver_of(scene, 0.1))
+    return solve_scene(scene, MPI.COMM_SELF, partitions=case.cut(scene), solver=solver_of(scene, 0.1))
 
 
 def energy_norm(state: State, displacement: np.ndarray) -> float:
@@ -209,4 +209,4 @@ def solved(name: str, tolerance: float | None) -> State:
     """Return the state of a case to a tolerance, or to that which users get, from a cold start."""
     first = first_state(name)
     solver = None if tolerance is None else solver_of(first.scene, tolerance)
-    return find_state(first.scene, first.torn.decomposition, solver=solver)
+    return ContactProblem.following(first, solver=solver).solve(start=None)

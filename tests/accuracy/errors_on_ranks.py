@@ -17,7 +17,7 @@ def main(comm: MPI.Comm) -> None:
     found = {}
     for name in NAMES:
         scene = CASES[name].make()
-        state = solve_scene(scene, CASES[name].cut(scene), comm, solver=solver_of(scene, 1e-3))
+        state = solve_scene(scene, comm, partitions=CASES[name].cut(scene), solver=solver_of(scene, 1e-3))
         real, errors = measured(state), state.errors
         found[name] = {
             "bound": real.bound,
@@ -25,7 +25,7 @@ def main(comm: MPI.Comm) -> None:
             "algebraic": errors.algebraic,
             "friction": errors.friction,
             "discretisation": errors.discretisation,
-            "products": solve_scene(scene, CASES[name].cut(scene), comm).counts["f_products"],
+            "products": solve_scene(scene, comm, partitions=CASES[name].cut(scene)).counts["f_products"],
         }
     if comm.rank == 0:
         sys.stdout.write(json.dumps(found))

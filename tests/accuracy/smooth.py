@@ -101,6 +101,8 @@ def solved(mesh: BodyMesh, poisson: float = POISSON, parts: int = 1) -> Found:
     value = tuple(component(k) for k in range(dim))
     supports = [Support("body", side, value) for side in mesh.surfaces]
     scene = Scene({"body": Body(mesh, material)}, supports, [BodyForce("body", body_force(poisson))])
-    state = solve_scene(scene, {"body": bisection_partition(mesh, parts)}, MPI.COMM_SELF, tolerance=1e-10)
+    state = solve_scene(
+        scene, MPI.COMM_SELF, partitions={"body": bisection_partition(mesh, parts)}, tolerance=1e-10
+    )
     exact = error_by_cell(mesh, state.gather_displacement("body"), gradient, *lame(YOUNG, poisson))
     return Found(state, mesh, exact)

@@ -9,9 +9,8 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.accuracy import Balanced, SolverErrors
-from fenics_contact.contact import State, find_state, solve_scene, solve_steps
+from fenics_contact.contact import ContactProblem, State, solve_scene, solve_steps
 from fenics_contact.errors import ConvergenceError, InvalidInputError
-from fenics_contact.feti import decompose
 from fenics_contact.geometry import block, box_partition
 from fenics_contact.qp import DualProblem, DualSolution, FaceNewton, SlipLaw
 from fenics_contact.qp.iterate import Start
@@ -26,7 +25,7 @@ MODEST = ["a linear block", "a ball on a plane", "Tresca's law", PAIR, "a mortar
 
 def solved(name: str, tolerance: float | Balanced | None = None) -> State:
     scene = CASES[name].make()
-    return solve_scene(scene, CASES[name].cut(scene), MPI.COMM_SELF, tolerance=tolerance)
+    return solve_scene(scene, MPI.COMM_SELF, partitions=CASES[name].cut(scene), tolerance=tolerance)
 
 
 def remarks(state: State) -> list[str]:
@@ -78,7 +77,7 @@ def test_a_solution_that_the_mesh_holds_is_found_to_the_finest_tolerance() -> No
     sides = {"x0": (0.0, None, None), "y0": (None, 0.0, None), "z0": (None, None, 0.0)}
     supports = [Support("bar", side, held) for side, held in sides.items()]
     scene = Scene({"bar": bar}, supports, [Traction("bar", "x1", (1.0, 0.0, 0.0))])
-    state = solve_scene(scene, {"bar": box_partition(bar.mesh, (3, 1, 1))}, MPI.COMM_SELF)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions={"bar": box_partition(bar.mesh, (3, 1, 1))})
     assert state.errors.discretisation < 1e-6
     assert state.dual_solution.residuals.within(1e-10)
     stretched = state.gather_displacement("bar")[:, 0]
@@ -105,9 +104,9 @@ def test_a_fixed_tolerance_estimates_nothing() -> None:
 def test_a_number_beats_the_tolerance_of_the_solver() -> None:
     scene = CASES[PAIR].make()
     cut, comm = CASES[PAIR].cut(scene), MPI.COMM_SELF
-    own = solve_scene(scene, cut, comm, solver=FaceNewton(tolerance=1e-7))
-    number = solve_scene(scene, cut, comm, solver=FaceNewton(tolerance=1e-3), tolerance=1e-7)
-    share = solve_scene(scene, cut, comm, solver=FaceNewton(tolerance=1e-7), tolerance=Balanced())
+    own = solve_scene(scene, comm, partitions=cut, solver=FaceNewton(tolerance=1e-7))
+    number = solve_scene(scene, comm, partitions=cut, solver=FaceNewton(tolerance=1e-3), tolerance=1e-7)
+    share = solve_scene(scene, comm, partitions=cut, solver=FaceNewton(tolerance=1e-7), tolerance=Balanced())
     assert own.dual_solution.residuals.within(1e-7)
     assert number.counts["f_products"] == own.counts["f_products"]
     assert share.counts["f_products"] < own.counts["f_products"]
@@ -115,8 +114,7 @@ def test_a_number_beats_the_tolerance_of_the_solver() -> None:
 
 def test_derivatives_have_a_fixed_tolerance() -> None:
     scene = CASES[PAIR].make()
-    decomposition = decompose(scene, CASES[PAIR].cut(scene), MPI.COMM_SELF)
-    state = find_state(scene, decomposition, sensitivity=True)
+    state = ContactProblem(scene, MPI.COMM_SELF, partitions=CASES[PAIR].cut(scene)).solve(sensitivity=True)
     assert state.dual_solution.residuals.within(1e-6)
     assert not remarks(state)
 
@@ -124,8 +122,13 @@ def test_derivatives_have_a_fixed_tolerance() -> None:
 def test_every_load_step_is_balanced() -> None:
     scene = effect_cases.plane()
     steps = effect_cases.there_and_back()
-    states = solve_steps(scene, steps, CASES["two dimensions"].cut(scene), MPI.COMM_SELF)
-    fixed = solve_steps(scene, steps, CASES["two dimensions"].cut(scene), MPI.COMM_SELF, tolerance=1e-6)
+    states = solve_steps(
+        ContactProblem(scene, MPI.COMM_SELF, partitions=CASES["two dimensions"].cut(scene)), steps
+    )
+    fixed = solve_steps(
+        ContactProblem(scene, MPI.COMM_SELF, partitions=CASES["two dimensions"].cut(scene), tolerance=1e-6),
+        steps,
+    )
     for state, exact in zip(states, fixed, strict=True):
         assert state.errors.algebraic + state.errors.friction <= 0.1 * state.errors.discretisation
         shear, right = (each.contact.friction_force.sum() for each in (state, exact))
@@ -135,12 +138,12 @@ def test_every_load_step_is_balanced() -> None:
 
 def test_a_warm_start_is_balanced_too() -> None:
     scene = CASES[PAIR].make()
-    decomposition = decompose(scene, CASES[PAIR].cut(scene), MPI.COMM_SELF)
-    first = find_state(scene, decomposition)
+    problem = ContactProblem(scene, MPI.COMM_SELF, partitions=CASES[PAIR].cut(scene))
+    problem.solve()
     heavier = replace(
         scene, loads=[replace(load, value=tuple(1.1 * np.array(load.value))) for load in scene.loads]
     )
-    warm, cold = find_state(heavier, decomposition, previous=first), find_state(heavier, decomposition)
+    warm, cold = problem.solve(heavier), problem.solve(heavier, start=None)
     assert warm.errors.algebraic <= 0.1 * warm.errors.discretisation
     assert warm.counts["f_products"] <= cold.counts["f_products"]
 
@@ -165,7 +168,9 @@ def test_a_solver_that_fails_on_the_way_tells_all_steps() -> None:
     scene = CASES[PAIR].make()
     solver, tolerance = Limited(1e-3), Balanced(share=1e-9)
     with pytest.raises(ConvergenceError, match="needs") as failure:
-        solve_scene(scene, CASES[PAIR].cut(scene), MPI.COMM_SELF, solver=solver, tolerance=tolerance)
+        solve_scene(
+            scene, MPI.COMM_SELF, partitions=CASES[PAIR].cut(scene), solver=solver, tolerance=tolerance
+        )
     *before, last = failure.value.history
     assert "in energy norm" in before[-1].note
     assert last == "the step that failed"
@@ -174,14 +179,18 @@ def test_a_solver_that_fails_on_the_way_tells_all_steps() -> None:
 def test_a_good_solution_is_kept_where_the_solver_cannot_reach_a_better_one() -> None:
     scene = CASES[PAIR].make()
     solver, tolerance = Limited(1e-7), Balanced(share=1e-12, loosest=1e-7)
-    state = solve_scene(scene, CASES[PAIR].cut(scene), MPI.COMM_SELF, solver=solver, tolerance=tolerance)
+    state = solve_scene(
+        scene, MPI.COMM_SELF, partitions=CASES[PAIR].cut(scene), solver=solver, tolerance=tolerance
+    )
     assert "1.0e-10 was not reached, this is kept" in remarks(state)[-1]
     assert state.dual_solution.residuals.within(1e-7)
 
 
 def test_a_body_that_is_factored_needs_no_estimate() -> None:
     scene = CASES["a linear block"].make()
-    state = solve_scene(scene, {"block": np.zeros(scene.bodies["block"].mesh.n_cells, int)}, MPI.COMM_SELF)
+    state = solve_scene(
+        scene, MPI.COMM_SELF, partitions={"block": np.zeros(scene.bodies["block"].mesh.n_cells, int)}
+    )
     assert state.known_errors is None
     assert state.errors.algebraic < 1e-12 < state.errors.discretisation
 
@@ -217,7 +226,7 @@ def test_a_tolerance_lies_between_zero_and_one(tolerance: float) -> None:
 def test_a_tolerance_is_a_number_or_balanced() -> None:
     scene = gallery.block_on_plane(Coulomb(0.6))
     with pytest.raises(InvalidInputError, match=r"a number, Balanced\(...\) or None, got str"):
-        solve_scene(scene, None, MPI.COMM_SELF, tolerance="balanced")  # type: ignore[arg-type]
+        solve_scene(scene, MPI.COMM_SELF, tolerance="balanced")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -51,7 +51,7 @@ def test_the_bound_is_near_the_error_at_every_tolerance(name: str, tolerance: fl
 
 
 def state_of(scene: Scene, solver: DualSolver, boxes: tuple[int, int, int] = (2, 1, 1)) -> Measured:
-    state = solve_scene(scene, gallery.partitions(scene, boxes), MPI.COMM_SELF, solver=solver)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=gallery.partitions(scene, boxes), solver=solver)
     return measured(state)
 
 
@@ -114,14 +114,16 @@ def test_an_admissible_pair_is_what_it_says() -> None:
 
 def test_a_state_without_a_load_has_no_error() -> None:
     scene = replace(clamped(), loads=[])
-    state = solve_scene(scene, {"block": CASES["a linear block"].cut(scene)["block"]}, MPI.COMM_SELF)
+    state = solve_scene(
+        scene, MPI.COMM_SELF, partitions={"block": CASES["a linear block"].cut(scene)["block"]}
+    )
     assert (state.errors.algebraic, state.errors.friction, state.errors.discretisation) == (0.0, 0.0, 0.0)
 
 
 def test_the_error_of_a_factorisation_is_that_of_its_residual() -> None:
     scene = clamped()
     whole = {"block": np.zeros(scene.bodies["block"].mesh.n_cells, dtype=int)}
-    state = solve_scene(scene, whole, MPI.COMM_SELF)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=whole)
     system, solution = state.system, state.solution
     assert isinstance(system, DirectSystem)
     norm = energy_norm(state, solution.displacement)

@@ -56,7 +56,7 @@ def lying(push: float, cells: tuple[int, int], friction: Tresca | None = None) -
         contacts=[ContactPair(Surface("block", "y0"), RigidPlane((0.0, 0.0), (0.0, 1.0)), friction)],
     )
     whole = {"block": np.zeros(mesh.n_cells, dtype=int)}
-    return solve_scene(scene, whole, MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-11))
+    return solve_scene(scene, MPI.COMM_SELF, partitions=whole, solver=FaceNewton(tolerance=1e-11))
 
 
 def made(state: State, multiplier: np.ndarray, way: np.ndarray) -> DualSolution:
@@ -141,7 +141,7 @@ def test_friction_that_falls_short_of_its_bound_does_less_work(
 )
 def test_the_estimate_by_the_law_of_friction_is_needed(scene: Scene, solver: FaceNewton | FixedPoint) -> None:
     """What separates a state from Coulomb's law may be more than the bound at its own slip bounds."""
-    state = solve_scene(scene, gallery.partitions(scene), MPI.COMM_SELF, solver=solver)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=gallery.partitions(scene), solver=solver)
     found = measured(state)
     assert found.error <= found.bound
     assert found.bound < found.whole <= found.bound + found.friction
@@ -184,7 +184,7 @@ def test_the_bound_is_that_of_both_displacements(sewn: bool, monkeypatch: pytest
         contacts=[ContactPair(Surface("block", "y0"), RigidPlane((0.0, 0.0), (0.0, 1.0)))],
     )
     cut = {"block": box_partition(mesh, (2, 1))}
-    state = solve_scene(scene, cut, MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-12))
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=1e-12))
     system, exact = state.dual, state.dual_solution
     change = worst(state, sewn)
     change *= 0.01 * np.linalg.norm(exact.multiplier) / np.linalg.norm(change)
@@ -223,7 +223,7 @@ def test_slip_bounds_that_follow_normal_forces_are_raised_where_these_are_too_we
     resisted = np.hypot(1.0, 0.3) / 2.0
     scene = gallery.block_on_plane(Coulomb(1.001 * resisted))
     state = solve_scene(
-        scene, gallery.partitions(scene), MPI.COMM_SELF, solver=FixedPoint(Smalse(tolerance=0.1))
+        scene, MPI.COMM_SELF, partitions=gallery.partitions(scene), solver=FixedPoint(Smalse(tolerance=0.1))
     )
     system, solution = state.dual, state.dual_solution
     found = certify(system, solution)
@@ -243,7 +243,9 @@ def test_slip_bounds_that_follow_normal_forces_are_raised_where_these_are_too_we
 def test_friction_that_just_resists_is_balanced_within_given_bounds(reserve: float, tolerance: float) -> None:
     """The set of admissible multipliers is narrow; SMALSE's own are out of balance."""
     scene = gallery.block_on_plane(Tresca((1.0 + reserve) * np.hypot(1.0, 0.3)))
-    state = solve_scene(scene, gallery.partitions(scene), MPI.COMM_SELF, solver=Smalse(tolerance=tolerance))
+    state = solve_scene(
+        scene, MPI.COMM_SELF, partitions=gallery.partitions(scene), solver=Smalse(tolerance=tolerance)
+    )
     found = measured(state)
     known = found.certificate.known
     np.testing.assert_array_equal(known.slip_bound, state.dual_solution.slip_bound)

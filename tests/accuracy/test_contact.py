@@ -15,7 +15,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.accuracy import discretisation_error
-from fenics_contact.contact import State, Status, solve_scene, solve_steps
+from fenics_contact.contact import ContactProblem, State, Status, solve_scene, solve_steps
 from fenics_contact.geometry import BodyMesh, bisection_partition, box_lattice, rectangle_lattice
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
@@ -65,7 +65,7 @@ def hertz(line: np.ndarray, dim: int, poisson: float = POISSON) -> Solved:
     ball = RigidSphere((*[0.0] * (dim - 1), RADIUS), RADIUS)
     pair = ContactPair(Surface("body", f"{axes[-1]}1"), ball)
     scene = Scene({"body": Body(mesh, material)}, [*guides, lift], contacts=[pair])
-    state = solve_scene(scene, partitions(scene), MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-7))
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=partitions(scene), solver=FaceNewton(tolerance=1e-7))
     closed = np.count_nonzero(state.contact.normal_force)
     assert 3 <= closed < state.contact.points.count / 2, "contact must end on the surface"
     return with_estimate(state, {"body": lines})
@@ -142,7 +142,7 @@ def bulge(lines: list[np.ndarray], points: np.ndarray, lift: float) -> Solved:
     pair = ContactPair(Surface("body", "z1"), RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, -1.0)))
     body = Body(mesh, IsotropicElasticity(YOUNG, POISSON))
     scene = Scene({"body": body}, [*guides, Support("body", "z0", (0.0, 0.0, lift))], contacts=[pair])
-    state = solve_scene(scene, partitions(scene), MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-7))
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=partitions(scene), solver=FaceNewton(tolerance=1e-7))
     assert 1 < np.count_nonzero(state.contact.normal_force) < state.contact.points.count / 2
     return with_estimate(state, {"body": lines})
 
@@ -190,7 +190,9 @@ def sheared(across: np.ndarray, down: np.ndarray) -> Solved:
         for shift in (0.0, SHEAR)
     ]
     solver = FaceNewton(tolerance=1e-7)
-    *_, state = solve_steps(scene, steps, partitions(scene), MPI.COMM_SELF, solver=solver)
+    *_, state = solve_steps(
+        ContactProblem(scene, MPI.COMM_SELF, partitions=partitions(scene), solver=solver), steps
+    )
     assert state.contact.count(Status.STICK) >= 3
     assert state.contact.count(Status.SLIP) >= 2
     return with_estimate(state, {name: lines for name, (lines, _) in made.items()})

@@ -20,7 +20,7 @@ from typing import Any
 from mpi4py import MPI
 
 from fenics_contact.checkpoint import Checkpoint, interruptible
-from fenics_contact.contact import solve_steps
+from fenics_contact.contact import ContactProblem, solve_steps
 from fenics_contact.geometry import box_partition
 from fenics_contact.progress import LOGGER_NAME, Event
 from fenics_contact.qp import FaceNewton
@@ -59,7 +59,9 @@ def steps(checkpoint: Checkpoint | None) -> dict[str, Any]:
     scene = sheared_block()
     cut = {"block": box_partition(scene.bodies["block"].mesh, (2, 1, 1))}
     solver = FaceNewton(tolerance=1e-9)  # answers are compared to 1e-7
-    states = solve_steps(scene, shears(), cut, MPI.COMM_WORLD, solver=solver, checkpoint=checkpoint)
+    states = solve_steps(
+        ContactProblem(scene, MPI.COMM_WORLD, partitions=cut, solver=solver), shears(), checkpoint=checkpoint
+    )
     products = [state.solution.products for state in states]
     return {"answer": states[-1].contact.force.tolist(), "products": products}
 

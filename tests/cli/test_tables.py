@@ -23,6 +23,6 @@ SMOOTH = r"\w+ \w+ on rigid plane: \d+ points, \d+ open, [1-9]\d* closed; force 
     ids=["two bodies with friction", "rigid plane without"],
 )
 def test_a_pair_is_told_by_its_surfaces_and_its_points_by_what_they_can_do(scene: Scene, told: str) -> None:
-    state = solve_scene(scene, partitions(scene), MPI.COMM_SELF)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=partitions(scene))
     (words,) = pairs(state, UnitNames())
     assert re.match(told, words), words

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_steps
+from fenics_contact.contact import ContactProblem, State, solve_steps
 from fenics_contact.geometry import block, graph_partition, quadratic, rectangle
 from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG
 from fenics_contact.scene import (
@@ -115,7 +115,7 @@ def solved(comm: MPI.Comm, name: str, parts: int) -> State:
     cut = {name: graph_partition(body.mesh, parts) for name, body in scene.bodies.items()}
     linear = ProjectedCG(tolerance=TOLERANCE)
     solver: DualSolver = FaceNewton(tolerance=TOLERANCE) if scene.contacts else linear
-    return solve_steps(scene, steps, cut, comm, solver=solver)[-1]
+    return solve_steps(ContactProblem(scene, comm, partitions=cut, solver=solver), steps)[-1]
 
 
 def figures(state: State) -> dict[str, Any]:

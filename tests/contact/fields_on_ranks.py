@@ -72,7 +72,7 @@ SCENES = {"patched": patched, "pressed": pressed}
 
 
 def main(comm: MPI.Comm) -> None:
-    found = {name: fields(solve_scene(make(), cut(make()), comm)) for name, make in SCENES.items()}
+    found = {name: fields(solve_scene(make(), comm, partitions=cut(make()))) for name, make in SCENES.items()}
     if comm.rank == 0:
         sys.stdout.write(json.dumps(found))
 

@@ -37,7 +37,7 @@ def integrals(comm: MPI.Comm, order: int = 1) -> dict[str, float]:
         [Traction("block", "z1", (SHEAR, 0.0, -PRESSURE))],
         [ContactPair(Surface("block", "z0"), RigidPlane((0, 0, 0), (0, 0, 1)), Coulomb(0.3))],
     )
-    state = solve_scene(scene, parts, comm, tolerance=1e-9)
+    state = solve_scene(scene, comm, partitions=parts, tolerance=1e-9)
     fields = state.displacement, state.contact_pressure, state.von_mises
     u, pressure, von_mises = (field["block"] for field in fields)
     strain = ufl.sym(ufl.grad(u))

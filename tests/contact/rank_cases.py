@@ -74,7 +74,9 @@ def largest_stress(state: State, body: str) -> float:
 
 def contact_case(comm: MPI.Comm, cut: str) -> dict[str, Any]:
     scene = two_blocks(Coulomb(0.38))
-    state = solve_scene(scene, PARTITIONS[cut](scene), comm, solver=FaceNewton(tolerance=TOLERANCE))
+    state = solve_scene(
+        scene, comm, partitions=PARTITIONS[cut](scene), solver=FaceNewton(tolerance=TOLERANCE)
+    )
     largest = max(np.abs(state.gather_displacement(name)).max() for name in scene.bodies)
     return {
         "objective": state.energies.total_potential,
@@ -91,7 +93,7 @@ def contact_case(comm: MPI.Comm, cut: str) -> dict[str, Any]:
 
 def uniaxial_case(comm: MPI.Comm, cell: str) -> dict[str, Any]:
     scene = uniaxial(cell)
-    state = solve_scene(scene, partitions(scene, (4, 1, 1)), comm, tolerance=1e-10)
+    state = solve_scene(scene, comm, partitions=partitions(scene, (4, 1, 1)), tolerance=1e-10)
     space = state.von_mises["bar"].function_space
     own = space.dofmap.index_map.size_local
     stress = state.von_mises["bar"].x.array[:own]
@@ -113,7 +115,7 @@ def refusals(comm: MPI.Comm) -> list[str]:
     hasty = FaceNewton(max_steps=1)
     for scene, solver in ((loose, None), (lifted, None), (two_blocks(Coulomb(0.38)), hasty)):
         try:
-            solve_scene(scene, partitions(scene, (4, 1, 1)), comm, solver=solver)
+            solve_scene(scene, comm, partitions=partitions(scene, (4, 1, 1)), solver=solver)
             said.append("nothing")
         except (InfeasibleError, ConvergenceError) as error:
             said.append(f"{type(error).__name__}: {error}")

@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.contact import LoadSequence, State
+from fenics_contact.contact import ContactProblem, LoadSequence, State
 from fenics_contact.geometry import block, box_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
@@ -49,7 +49,9 @@ def shears(path: tuple[float, ...] = PATH) -> list[LoadStep]:
 def sequence(checkpoint: Checkpoint | None, comm: MPI.Comm) -> LoadSequence:
     scene = sheared_block()
     cut = {"block": box_partition(scene.bodies["block"].mesh, (2, 1, 1))}
-    return LoadSequence(scene, cut, comm, solver=FaceNewton(tolerance=1e-8), checkpoint=checkpoint)
+    return LoadSequence(
+        ContactProblem(scene, comm, partitions=cut, solver=FaceNewton(tolerance=1e-8)), checkpoint=checkpoint
+    )
 
 
 def forces(state: State) -> np.ndarray:

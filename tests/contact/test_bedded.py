@@ -51,7 +51,9 @@ def pushed(material: Bedded, parts: tuple[int, int, int], *, on_floor: bool = Tr
     floor = ContactPair(Surface("block", "z0"), RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
     contacts = [floor] if on_floor else []
     scene = Scene({"block": Body(mesh, material)}, [], [TotalForce("block", "z1", FORCE)], contacts)
-    return solve_scene(scene, {"block": box_partition(mesh, parts)}, MPI.COMM_WORLD, tolerance=1e-9)
+    return solve_scene(
+        scene, MPI.COMM_WORLD, partitions={"block": box_partition(mesh, parts)}, tolerance=1e-9
+    )
 
 
 @pytest.mark.parametrize("on_floor", [True, False])

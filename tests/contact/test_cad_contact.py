@@ -129,7 +129,7 @@ def pressed(upper: BodyMesh, lower: BodyMesh, force: float) -> Scene:
 
 
 def peak(scene: Scene) -> float:
-    state = solve_scene(scene, None, MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-8))
+    state = solve_scene(scene, MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-8))
     assert np.count_nonzero(state.contact.status) > 3
     return float(state.contact.pressure.max())
 

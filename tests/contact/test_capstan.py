@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status, solve_scene, solve_steps
+from fenics_contact.contact import ContactProblem, State, Status, solve_scene, solve_steps
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.geometry import BodyMesh, block, box_partition, rectangle
 from fenics_contact.qp import FaceNewton
@@ -52,7 +52,10 @@ def drawn(friction_coefficient: float, towards: int) -> State:
     mesh = belt()
     scene = Scene({"belt": Body(mesh, PlaneStress(1e6, 0.3))}, [turn], [load], [disc])
     return solve_scene(
-        scene, {"belt": box_partition(mesh, (6, 1))}, MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-8)
+        scene,
+        MPI.COMM_SELF,
+        partitions={"belt": box_partition(mesh, (6, 1))},
+        solver=FaceNewton(tolerance=1e-8),
     )
 
 
@@ -122,7 +125,7 @@ def on_slope(friction_coefficient: float, supports: list[Support]) -> Scene:
 
 def solved(scene: Scene) -> State:
     cut = {name: box_partition(body.mesh, (2, 1, 1)) for name, body in scene.bodies.items()}
-    return solve_scene(scene, cut, MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-8))
+    return solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=1e-8))
 
 
 def test_a_block_rests_on_a_slope_that_is_not_too_steep() -> None:
@@ -156,7 +159,7 @@ def test_a_block_that_a_later_step_pushes_rubs_where_it_was_held_first() -> None
     first, later = (on_slope(0.3, [Support("block", "x0", (push, None, None))]) for push in (0.0, 0.02))
     steps = [LoadStep("held", supports=first.supports), LoadStep("pushed", supports=later.supports)]
     cut = {name: box_partition(body.mesh, (2, 1, 1)) for name, body in first.bodies.items()}
-    *_, state = solve_steps(first, steps, cut, MPI.COMM_SELF, tolerance=1e-8)
+    *_, state = solve_steps(ContactProblem(first, MPI.COMM_SELF, partitions=cut, tolerance=1e-8), steps)
     pushed = 2.0 * np.tan(SLOPE + np.arctan(0.3))
     assert -state.contact.force[:, 0].sum() == pytest.approx(pushed, rel=0.01)
 

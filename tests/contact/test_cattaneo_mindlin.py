@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import Status, solve_steps
+from fenics_contact.contact import ContactProblem, Status, solve_steps
 from fenics_contact.qp import FaceNewton
 from fenics_contact.study import Outcome, Parameters
 from fenics_contact.study.scenes.cattaneo_mindlin import FRICTION, build, stick_half_width, theory, tractions
@@ -28,7 +28,7 @@ def sheared(n: int) -> Outcome:
     parameters = Parameters(n, cell="quadrilateral")
     problem = build(parameters)
     states = solve_steps(
-        problem.scene, problem.steps, None, MPI.COMM_SELF, solver=FaceNewton(tolerance=TOLERANCE)
+        ContactProblem(problem.scene, MPI.COMM_SELF, solver=FaceNewton(tolerance=TOLERANCE)), problem.steps
     )
     for state in states:
         assert_solved(state, TOLERANCE)

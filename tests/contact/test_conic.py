@@ -36,7 +36,7 @@ def problem(name: str, cell: str) -> tuple[Scene, ConicReference, ConicSolution]
 
 
 def solved(scene: Scene, solver: DualSolver) -> State:
-    return solve_scene(scene, partitions(scene), MPI.COMM_SELF, solver=solver)
+    return solve_scene(scene, MPI.COMM_SELF, partitions=partitions(scene), solver=solver)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

@@ -35,7 +35,7 @@ def ball(force: float, size: int = 12) -> State:
         [TotalForce("ball", "top", (0, 0, -force / 4))],
         [ContactPair(Surface("ball", "contact"), RigidPlane((0, 0, 0), (0, 0, 1)))],
     )
-    return solve_scene(scene, None, MPI.COMM_WORLD, solver=FaceNewton(tolerance=1e-8))
+    return solve_scene(scene, MPI.COMM_WORLD, solver=FaceNewton(tolerance=1e-8))
 
 
 def test_the_area_under_a_ball_is_that_of_hertz() -> None:
@@ -57,7 +57,7 @@ def test_the_width_under_a_disc_is_that_of_hertz() -> None:
         [TotalForce("disc", "top", (0, -force / 2))],
         [ContactPair(Surface("disc", "contact"), RigidPlane((0, 0), (0, 1)))],
     )
-    state = solve_scene(scene, None, MPI.COMM_WORLD, solver=FaceNewton(tolerance=1e-8))
+    state = solve_scene(scene, MPI.COMM_WORLD, solver=FaceNewton(tolerance=1e-8))
     assert contact_area(state) == pytest.approx(hertz_line(force, 0.1, MODULUS).half_width, rel=0.05)
 
 
@@ -77,7 +77,7 @@ def test_a_face_that_is_pressed_all_over_touches_all_over(cell: str) -> None:
         [TotalForce("block", f"{side}1", down)],
         [ContactPair(Surface("block", f"{side}0"), floor)],
     )
-    state = solve_scene(scene, None, MPI.COMM_WORLD)
+    state = solve_scene(scene, MPI.COMM_WORLD)
     assert contact_area(state) == pytest.approx(3.0 if plane else 6.0, rel=1e-12)
     assert state.contact.travel(np.array(down)) == 0.0
     assert state.contact.travel(-np.array(down)) == np.inf

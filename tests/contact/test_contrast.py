@@ -114,7 +114,7 @@ Case = Blocks | Regions
 def solved(case: Case, contrast: float) -> State:
     scene = case.scene(contrast)
     cuts = {name: box_partition(body.mesh, (2, 2, 2)) for name, body in scene.bodies.items()}
-    return solve_scene(scene, cuts, MPI.COMM_SELF, tolerance=1e-6 if scene.contacts else 1e-10)
+    return solve_scene(scene, MPI.COMM_SELF, partitions=cuts, tolerance=1e-6 if scene.contacts else 1e-10)
 
 
 def products(case: Case) -> list[int]:
@@ -172,7 +172,7 @@ def test_a_stiff_body_acts_on_a_soft_one_as_a_rigid_one() -> None:
     upper = scene.bodies["upper"]
     rigid = Scene({"upper": upper}, supports, scene.loads, [floor])
     expected = solve_scene(
-        rigid, {"upper": box_partition(upper.mesh, (2, 2, 2))}, MPI.COMM_SELF, tolerance=1e-6
+        rigid, MPI.COMM_SELF, partitions={"upper": box_partition(upper.mesh, (2, 2, 2))}, tolerance=1e-6
     )
     u = expected.gather_displacement("upper")
     states = [solved(case, contrast) for contrast in CONTRASTS]

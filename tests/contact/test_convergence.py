@@ -25,6 +25,6 @@ def test_a_solver_stopped_too_early_raises_with_its_history(name: str) -> None:
     scene = two_blocks(friction)
     message = r"needs (a natural residual|residuals) below \S+e-(09|10)\b"
     with pytest.raises(ConvergenceError, match=message) as caught:
-        solve_scene(scene, partitions(scene), MPI.COMM_SELF, solver=solver)
+        solve_scene(scene, MPI.COMM_SELF, partitions=partitions(scene), solver=solver)
     assert len(caught.value.history) > 0
     assert all(step.products > 0 for step in caught.value.history)

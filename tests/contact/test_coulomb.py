@@ -60,7 +60,9 @@ def solved(name: str, solver: str = "face Newton") -> tuple[State, ConicReferenc
 
 
 def solve(scene: Scene, solver: DualSolver | None = None) -> State:
-    return solve_scene(scene, partitions(scene), MPI.COMM_SELF, solver=solver or SOLVERS["face Newton"])
+    return solve_scene(
+        scene, MPI.COMM_SELF, partitions=partitions(scene), solver=solver or SOLVERS["face Newton"]
+    )
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

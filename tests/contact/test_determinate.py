@@ -39,7 +39,7 @@ def moments(state: State) -> np.ndarray:
 
 @pytest.mark.parametrize("rows", [1, 2, 3])
 def test_a_contact_force_that_equilibrium_gives(rows: int) -> None:
-    state = solve_scene(beam_on_a_block(rows, tied=False), None, MPI.COMM_SELF)
+    state = solve_scene(beam_on_a_block(rows, tied=False), MPI.COMM_SELF)
 
     assert state.contact.points.count == 1
     np.testing.assert_allclose(moments(state)[1], 6e-3, rtol=1e-9)
@@ -48,7 +48,7 @@ def test_a_contact_force_that_equilibrium_gives(rows: int) -> None:
 @pytest.mark.parametrize("rows", [1, 2])
 def test_a_tie_that_equilibrium_gives_bends_the_beam_as_contact_does(rows: int) -> None:
     tied, touching = (
-        solve_scene(beam_on_a_block(rows, tied=tied), None, MPI.COMM_SELF, tolerance=1e-11)
+        solve_scene(beam_on_a_block(rows, tied=tied), MPI.COMM_SELF, tolerance=1e-11)
         for tied in (True, False)
     )
 

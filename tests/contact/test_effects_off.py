@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import LoadSequence, State, find_state, held, solve_scene
-from fenics_contact.feti import TornSystem, contact_search, decompose, dual, mortar, torn
+from fenics_contact.contact import ContactProblem, LoadSequence, State, held, solve_scene
+from fenics_contact.feti import TornSystem, contact_search, dual, mortar, torn
 from fenics_contact.geometry import block, box_partition
 from fenics_contact.qp import coupled, face_newton, slip_law
 from fenics_contact.scene import (
@@ -164,7 +164,7 @@ def cuts(case: Case) -> dict[str, np.ndarray]:
 
 def solved(case: Case) -> State:
     """Solve to a fixed tolerance: by default a state also estimates the error of its mesh."""
-    return solve_scene(case.scene, cuts(case), MPI.COMM_SELF, tolerance=tolerance_of(case.scene))
+    return solve_scene(case.scene, MPI.COMM_SELF, partitions=cuts(case), tolerance=tolerance_of(case.scene))
 
 
 def tolerance_of(scene: Scene) -> float:
@@ -215,8 +215,8 @@ def test_the_direct_solve_has_no_coarse_problem_and_no_products() -> None:
 @pytest.mark.parametrize("sensitivity", [False, True])
 def test_only_sensitivities_put_one_held_body_on_multipliers(sensitivity: bool, calls: Counter[str]) -> None:
     case = CASES["surface load"]
-    decomposition = decompose(case.scene, cuts(case), MPI.COMM_SELF)
-    state = find_state(case.scene, decomposition, sensitivity=sensitivity, tolerance=1e-10)
+    problem = ContactProblem(case.scene, MPI.COMM_SELF, partitions=cuts(case), tolerance=1e-10)
+    state = problem.solve(sensitivity=sensitivity)
     assert set(calls) == (LINEAR if sensitivity else set())
     compiled = {kind for kind, *_ in state.torn.decomposition.forms.compiled}
     assert compiled == {"stiffness", "surface load"}, "derivatives by the shape are not compiled for a state"
@@ -254,7 +254,7 @@ def test_tresca_bounds_stay_what_they_were() -> None:
 
 def test_slip_is_carried_from_the_second_load_step_on_only(calls: Counter[str]) -> None:
     case = CASES["Coulomb"]
-    sequence = LoadSequence(case.scene, cuts(case), MPI.COMM_SELF, tolerance=1e-6)
+    sequence = LoadSequence(ContactProblem(case.scene, MPI.COMM_SELF, partitions=cuts(case), tolerance=1e-6))
     sequence.advance(LoadStep("first"))
     assert "slip of earlier steps" not in calls
     sequence.advance(LoadStep("second"))
@@ -281,7 +281,7 @@ scene = Scene(
     [pair],
 )
 cuts = {{name: box_partition(body.mesh, (2, 1, 1)) for name, body in scene.bodies.items()}}
-state = solve_scene(scene, cuts, MPI.COMM_SELF, tolerance={tolerance})
+state = solve_scene(scene, MPI.COMM_SELF, partitions=cuts, tolerance={tolerance})
 assert state.contact.normal_force.sum() > 0.01
 print(*sys.modules)
 """

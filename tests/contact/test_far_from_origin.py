@@ -65,7 +65,7 @@ def torn(scene: Scene) -> TornSystem:
 
 
 def solved(scene: Scene) -> State:
-    return solve_scene(scene, partitions(scene), MPI.COMM_SELF, tolerance=1e-9)
+    return solve_scene(scene, MPI.COMM_SELF, partitions=partitions(scene), tolerance=1e-9)
 
 
 @pytest.mark.parametrize("discretisation", ["node", "mortar"])
@@ -100,7 +100,7 @@ def test_forces_balance_the_load_far_from_the_origin_at_the_default_tolerance() 
     scene = turned(blocks(3), TURN)
     for shift in (0.0, 1e7):
         far = shifted(scene, shift)
-        state = solve_scene(far, partitions(far), MPI.COMM_SELF)
+        state = solve_scene(far, MPI.COMM_SELF, partitions=partitions(far))
         expected = 1.5 * 1.1 * (TURN @ [0.4, 0.1, -2.0])
         np.testing.assert_allclose(-state.contact.force.sum(axis=0), expected, rtol=1e-6)
 

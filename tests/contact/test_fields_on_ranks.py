@@ -43,7 +43,7 @@ def test_displacement_and_stress_are_the_same_on_any_number_of_ranks(
 def test_the_displacement_of_a_state_is_one_of_whole_bodies(name: str) -> None:
     """Copies of nodes agree, supports hold, and contact points are where the solver has them."""
     scene = SCENES[name]()
-    state = solve_scene(scene, cut(scene), MPI.COMM_SELF)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=cut(scene))
     torn, system = state.torn, state.dual
     size = np.abs(state.torn_displacement).max()
     equality = system.problem.layout.equality
@@ -67,7 +67,7 @@ def test_the_displacement_of_a_state_is_one_of_whole_bodies(name: str) -> None:
 
 def test_only_what_is_next_to_seams_and_supports_moves_and_forces_inside_stay() -> None:
     scene = SCENES["patched"]()
-    state = solve_scene(scene, cut(scene), MPI.COMM_SELF)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=cut(scene))
     moved = state.conforming_displacement - state.torn_displacement
     interface = state.dual.inverse.interface
     start = 0

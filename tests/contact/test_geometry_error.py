@@ -79,7 +79,7 @@ def without_shapes(scene: Scene) -> Scene:
 
 
 def solved(scene: Scene) -> State:
-    return solve_scene(scene, None, MPI.COMM_WORLD, solver=FaceNewton(tolerance=1e-8))
+    return solve_scene(scene, MPI.COMM_WORLD, solver=FaceNewton(tolerance=1e-8))
 
 
 def distance(state: State, true: State) -> tuple[float, float]:
@@ -125,7 +125,7 @@ def test_reconstructed_surfaces_are_no_worse_than_they_are_said_to_be(
 
 def test_the_estimate_at_default_settings_is_that_of_a_solved_state() -> None:
     scene = with_geometry(crossed_cylinders(6), "faceted")
-    loose, tight = solve_scene(scene, None, MPI.COMM_WORLD), solved(scene)
+    loose, tight = solve_scene(scene, MPI.COMM_WORLD), solved(scene)
     assert loose.errors.geometry == pytest.approx(tight.errors.geometry, rel=1e-2)
     assert "in peak pressure" in str(loose.errors)
 

@@ -183,7 +183,9 @@ def test_a_thin_plate_lifted_at_its_clamped_edge_is_solved() -> None:
         {"block": Body(mesh, IsotropicElasticity(1e9, 0.3))}, [Support("block", "x0")], contacts=[pair]
     )
     scene = pulled(scene, "block", (0.0, 0.0, 1e-3))
-    state = solve_scene(scene, partitions(scene, (1, 1, 1)), MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-6))
+    state = solve_scene(
+        scene, MPI.COMM_SELF, partitions=partitions(scene, (1, 1, 1)), solver=FaceNewton(tolerance=1e-6)
+    )
     assert state.contact.count(Status.OPEN) == state.contact.points.count
     assert state.gather_displacement("block")[:, 2].max() > 0.0
 
@@ -195,7 +197,7 @@ def test_a_scene_that_is_moved_without_any_load_needs_no_holding() -> None:
 def test_a_body_that_is_just_held_is_solved() -> None:
     limit = np.hypot(1.0, 0.3) / 2.0  # push over weight
     scene = block_on_plane(Coulomb(1.0002 * limit))
-    state = solve_scene(scene, partitions(scene), MPI.COMM_SELF, tolerance=1e-6)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=partitions(scene), tolerance=1e-6)
     assert state.contact.count(Status.STICK) == 0
     assert state.contact.count(Status.SLIP) > 0
     friction = np.linalg.norm(state.contact.force[:, :2].sum(axis=0))
@@ -205,7 +207,7 @@ def test_a_body_that_is_just_held_is_solved() -> None:
 def test_solving_refuses_what_is_not_held() -> None:
     scene = block_on_plane(Coulomb(0.3))
     with pytest.raises(InfeasibleError, match="body 'block' can move away"):
-        solve_scene(scene, partitions(scene), MPI.COMM_SELF)
+        solve_scene(scene, MPI.COMM_SELF, partitions=partitions(scene))
 
 
 def test_friction_of_a_gap_that_supports_keep_open_holds_nothing() -> None:
@@ -218,7 +220,7 @@ def test_friction_of_a_gap_that_supports_keep_open_holds_nothing() -> None:
         [ContactPair(Surface("block", "z0"), FLOOR, Coulomb(2.0))],
     )
     with pytest.raises(InfeasibleError, match=r"all contacts stay open, and \d+ % of the load drive motions"):
-        solve_scene(scene, None, MPI.COMM_SELF)
+        solve_scene(scene, MPI.COMM_SELF)
 
 
 @pytest.mark.parametrize("parts", [1, 3])
@@ -235,7 +237,7 @@ def test_displacements_are_right_where_loads_go_straight_into_supports(parts: in
             [ContactPair(Surface("block", "x1"), RigidPlane((1.2, 0.0, 0.0), (-1.0, 0.0, 0.0)))],
         )
         cut = {"block": graph_partition(mesh, parts)}
-        return solve_scene(scene, cut, MPI.COMM_SELF, tolerance=1e-6).gather_displacement("block")
+        return solve_scene(scene, MPI.COMM_SELF, partitions=cut, tolerance=1e-6).gather_displacement("block")
 
     np.testing.assert_allclose(lifted(1e4), lifted(0.0), atol=1e-5 * lift)
 
@@ -253,9 +255,9 @@ def test_friction_between_surfaces_that_supports_hold_apart_holds_nothing(discre
         [ContactPair(Surface("right", "x0"), Surface("left", "x1"), Coulomb(1.4), discretisation)],
     )
     with pytest.raises(InfeasibleError, match="body 'right' can move away"):
-        solve_scene(scene, None, MPI.COMM_SELF)
+        solve_scene(scene, MPI.COMM_SELF)
     free = replace(scene, supports=[scene.supports[0]])
-    state = solve_scene(free, None, MPI.COMM_SELF)
+    state = solve_scene(free, MPI.COMM_SELF)
     np.testing.assert_allclose(state.contact.force.sum(axis=0), [1.0, 0.0, 0.01], atol=1e-3)
 
 
@@ -270,9 +272,9 @@ def test_friction_that_nothing_presses_is_refused_where_the_solver_gets_nowhere(
         [ContactPair(Surface("left", "x1"), Surface("right", "x0"), Coulomb(0.3))],
     )
     with pytest.raises(InfeasibleError, match="friction needs surfaces that are pressed together"):
-        solve_scene(scene, None, MPI.COMM_SELF)
+        solve_scene(scene, MPI.COMM_SELF)
     free = replace(scene, supports=[scene.supports[0]], loads=[TotalForce("right", "x1", (-4.0, 0.0, -1.0))])
-    state = solve_scene(free, None, MPI.COMM_SELF)
+    state = solve_scene(free, MPI.COMM_SELF)
     np.testing.assert_allclose(state.contact.force.sum(axis=0), [-4.0, 0.0, -1.0], atol=1e-2)
 
 
@@ -286,13 +288,11 @@ def test_friction_that_is_pressed_too_little_is_refused_once_the_solver_has_trie
         [],
         [ContactPair(Surface("left", "x1"), Surface("right", "x0"), Coulomb(0.3))],
     )
-    press = abs(float(solve_scene(pushed, None, MPI.COMM_SELF).contact.force[:, 0].sum()))
+    press = abs(float(solve_scene(pushed, MPI.COMM_SELF).contact.force[:, 0].sum()))
     loads = {share: TotalForce("right", "x1", (0.0, 0.0, -share * 0.3 * press)) for share in (0.3, 10.0)}
-    state = solve_scene(replace(pushed, loads=[loads[0.3]]), None, MPI.COMM_SELF)
+    state = solve_scene(replace(pushed, loads=[loads[0.3]]), MPI.COMM_SELF)
     assert state.contact.force[:, 2].sum() == pytest.approx(-0.09 * press, rel=1e-4)
     with pytest.raises(InfeasibleError, match="even 2 times the forces") as caught:
-        solve_scene(
-            replace(pushed, loads=[loads[10.0]]), None, MPI.COMM_SELF, solver=FaceNewton(max_products=1000)
-        )
+        solve_scene(replace(pushed, loads=[loads[10.0]]), MPI.COMM_SELF, solver=FaceNewton(max_products=1000))
     assert isinstance(caught.value.__cause__, ConvergenceError)
     assert caught.value.__cause__.history

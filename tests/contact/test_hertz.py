@@ -71,7 +71,7 @@ def pressed(mesh: BodyMesh, guides: dict[str, tuple[float | None, ...]], force: 
         [ContactPair(Surface("body", "contact"), FLOOR)],
     )
     parts = {"body": bisection_partition(mesh, max(2, mesh.n_cells // 500))}
-    state = solve_scene(scene, parts, MPI.COMM_SELF, solver=FaceNewton(tolerance=TOLERANCE))
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=parts, solver=FaceNewton(tolerance=TOLERANCE))
     assert_solved(state, TOLERANCE)
     return state
 

@@ -40,7 +40,7 @@ def test_bodies_of_a_msh_file_press_on_each_other() -> None:
         [Traction("tool", "top", (0.2, 0.0, -1.0))],
         [ContactPair(Surface("tool", "interface"), Surface("table", "interface"), Coulomb(0.5), "mortar")],
     )
-    state = solve_scene(scene, None, MPI.COMM_SELF, tolerance=1e-6)
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-6)
     np.testing.assert_allclose(state.contact.force.sum(axis=0), [-0.2, 0.0, 1.0], atol=1e-5)
     assert state.contact.count(Status.STICK) > 0
     assert state.contact.count(Status.OPEN) < state.contact.points.count
@@ -69,8 +69,8 @@ def test_regions_of_a_plane_msh_file_are_two_materials_or_two_tied_bodies() -> N
         [Traction("copper", "right", pull)],
         ties=[Tie(Surface("copper", "side"), Surface("steel", "side"), discretisation="node")],
     )
-    expected = solve_scene(one, None, MPI.COMM_SELF, tolerance=1e-10)
-    found = solve_scene(two, None, MPI.COMM_SELF, tolerance=1e-10)
+    expected = solve_scene(one, MPI.COMM_SELF, tolerance=1e-10)
+    found = solve_scene(two, MPI.COMM_SELF, tolerance=1e-10)
     assert found.energies.total_potential == pytest.approx(expected.energies.total_potential, rel=1e-8)
     assert expected.energies.total_potential < -1e-5
 
@@ -83,7 +83,7 @@ def test_bodies_of_an_abaqus_file_press_on_each_other_where_they_are_near(tmp_pa
     contacts = [ContactPair(Surface(b, f"near {a}"), Surface(a, f"near {b}"), Coulomb(0.5)) for a, b in pairs]
     loads = [Traction("tool", "pushed", (0.2, 0.0, -1.0))]
     scene = Scene(bodies_from(meshes, {"t*": STEEL}), [Support("table", "held")], loads, contacts)
-    state = solve_scene(scene, None, MPI.COMM_SELF, tolerance=1e-6)
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-6)
     np.testing.assert_allclose(state.contact.force.sum(axis=0), [-0.2, 0.0, 1.0], atol=1e-5)
 
 

@@ -49,7 +49,7 @@ def test_nothing_happens_at_once(
     parts = {name: graph_partition(body.mesh, 3) for name, body in scene.bodies.items()}
 
     for partition in (None, parts):
-        state = solve_scene(scene, partition, MPI.COMM_SELF)
+        state = solve_scene(scene, MPI.COMM_SELF, partitions=partition)
 
         assert state.solution.products == 0
         assert [step.method for step in state.solution.history] == ["start"]
@@ -61,7 +61,7 @@ def test_nothing_happens_at_once(
 def test_every_solver_takes_a_start_that_is_the_answer(solver: FaceNewton | Smalse) -> None:
     scene = stack(1, None, "mortar")
 
-    state = solve_scene(scene, None, MPI.COMM_SELF, solver=solver)
+    state = solve_scene(scene, MPI.COMM_SELF, solver=solver)
 
     assert (state.solution.products, state.solution.residuals.worst) == (0, 0.0)
 
@@ -70,8 +70,8 @@ def test_unloading_ends_without_any_force() -> None:
     loaded = stack(2, Coulomb(0.5), "node")
     pressed = Scene(loaded.bodies, loaded.supports, [Pressure("upper", "z1", 3.0)], loaded.contacts)
 
-    assert solve_scene(pressed, None, MPI.COMM_SELF).contact.normal_force.sum() > 1.0
-    assert not solve_scene(loaded, None, MPI.COMM_SELF).contact.normal_force.any()
+    assert solve_scene(pressed, MPI.COMM_SELF).contact.normal_force.sum() > 1.0
+    assert not solve_scene(loaded, MPI.COMM_SELF).contact.normal_force.any()
 
 
 def test_gaps_of_rounding_are_none_in_any_unit_and_anywhere() -> None:

@@ -59,7 +59,7 @@ def pressed(obstacle: RigidObstacle, dim: int, push: float = 0.02) -> State:
 
 def solved(scene: Scene, boxes: tuple[int, ...]) -> State:
     cut = {name: box_partition(body.mesh, boxes) for name, body in scene.bodies.items()}
-    return solve_scene(scene, cut, MPI.COMM_SELF, solver=FaceNewton(tolerance=TOLERANCE))
+    return solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=TOLERANCE))
 
 
 @pytest.mark.parametrize("with_gradient", [True, False])
@@ -133,7 +133,7 @@ def test_a_socket_holds_a_ball_that_rolls_off_a_floor() -> None:
     radius = 1.02
     scene = ball_on(RigidSphere((0.0, 0.0, radius), radius, hollow=True))
     cut = {"ball": bisection_partition(scene.bodies["ball"].mesh, 4)}
-    state = solve_scene(scene, cut, MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-8))
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=1e-8))
     contact = state.contact
     np.testing.assert_allclose(contact.force.sum(axis=0), (-0.4, -0.2, 1.0), atol=1e-6)
     closed = contact.normal_force > 1e-6
@@ -142,4 +142,4 @@ def test_a_socket_holds_a_ball_that_rolls_off_a_floor() -> None:
     assert lean[0] / lean[2] == pytest.approx(-0.4, rel=0.15), "walls, not friction, bear the push"
     floor = replace(scene, contacts=ball_on(BELOW["plane"]).contacts)
     with pytest.raises(InfeasibleError, match="body 'ball' can move away under the load"):
-        solve_scene(floor, cut, MPI.COMM_SELF)
+        solve_scene(floor, MPI.COMM_SELF, partitions=cut)

@@ -65,7 +65,7 @@ def scene() -> Scene:
 @cache
 def solved(count: int) -> State:
     cut = {body: graph_partition(each.mesh, count, body) for body, each in scene().bodies.items()}
-    return solve_scene(scene(), cut, MPI.COMM_SELF, solver=FaceNewton(tolerance=TOLERANCE))
+    return solve_scene(scene(), MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=TOLERANCE))
 
 
 def test_the_mesh_is_irregular_and_the_contact_mixed() -> None:

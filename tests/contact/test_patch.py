@@ -82,7 +82,7 @@ def worst_stress(scene: Scene, state: State) -> float:
 def solved(scene: Scene) -> State:
     whole = {name: np.zeros(body.mesh.n_cells, dtype=int) for name, body in scene.bodies.items()}
     solver = FaceNewton(tolerance=1e-12) if scene.contacts else ProjectedCG(tolerance=1e-12)
-    return solve_scene(scene, whole, MPI.COMM_SELF, solver=solver)
+    return solve_scene(scene, MPI.COMM_SELF, partitions=whole, solver=solver)
 
 
 CELLS = [

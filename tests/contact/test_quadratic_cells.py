@@ -49,7 +49,7 @@ def material(mesh: BodyMesh) -> IsotropicElasticity | PlaneStrain:
 
 def solved(scene: Scene, parts: int) -> State:
     cut = {name: bisection_partition(body.mesh, parts) for name, body in scene.bodies.items()}
-    return solve_scene(scene, cut, MPI.COMM_SELF, solver=SOLVER)
+    return solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=SOLVER)
 
 
 @pytest.mark.parametrize("cell", ["hexahedron27", "quadrilateral9", "triangle6"])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status, solve_scene, solve_steps
+from fenics_contact.contact import ContactProblem, State, Status, solve_scene, solve_steps
 from fenics_contact.geometry import block, box_partition
 from fenics_contact.scene import (
     Body,
@@ -57,7 +57,7 @@ def test_slip_is_the_relative_displacement_with_and_without_friction(
     friction: Coulomb | None, discretisation: Discretisation
 ) -> None:
     scene = pushed(friction, discretisation)
-    state = solve_scene(scene, cut(scene), MPI.COMM_SELF)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=cut(scene))
     contact, expected = state.contact, moved_along(state)
     size = np.abs(expected).max()
     assert size > 0.01
@@ -74,7 +74,10 @@ def test_slip_without_friction_counts_from_the_last_step() -> None:
     scene = pushed(None)
     base, way = scene.supports[0], [(0.02, 0.0), (0.05, 0.01), (0.01, -0.02)]
     steps = [LoadStep(f"{x}, {y}", supports=[base, Support("upper", "z1", (x, y, -0.04))]) for x, y in way]
-    states = solve_steps(replace(scene, supports=[base]), steps, cut(scene), MPI.COMM_SELF, tolerance=1e-8)
+    states = solve_steps(
+        ContactProblem(replace(scene, supports=[base]), MPI.COMM_SELF, partitions=cut(scene), tolerance=1e-8),
+        steps,
+    )
     before = np.zeros_like(states[0].contact.slip)
     for state in states:
         contact, total = state.contact, moved_along(state)

@@ -17,7 +17,9 @@ TOLERANCE = 1e-9
 
 
 def solved(scene) -> State:
-    state = solve_scene(scene, partitions(scene), MPI.COMM_SELF, solver=FaceNewton(tolerance=TOLERANCE))
+    state = solve_scene(
+        scene, MPI.COMM_SELF, partitions=partitions(scene), solver=FaceNewton(tolerance=TOLERANCE)
+    )
     assert_solved(state, TOLERANCE)
     return state
 
@@ -68,7 +70,7 @@ def test_statuses_say_what_forces_and_ways_say() -> None:
 
 def test_a_scene_without_contact_is_a_linear_solve() -> None:
     scene = uniaxial("hexahedron")
-    state = solve_scene(scene, partitions(scene), MPI.COMM_SELF, tolerance=1e-10)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=partitions(scene), tolerance=1e-10)
     assert_solved(state, TOLERANCE)
     assert state.contact.points.count == 0
     assert state.contact.force.shape == (0, 3)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import LoadSequence, State, Status, solve_scene, solve_steps
+from fenics_contact.contact import ContactProblem, LoadSequence, State, Status, solve_scene, solve_steps
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import block, box_partition
 from fenics_contact.qp import FaceNewton
@@ -47,7 +47,10 @@ def shears(path: tuple[float, ...]) -> list[LoadStep]:
 def solved(law: Coulomb | Tresca, path: tuple[float, ...] = PATH) -> tuple[State, ...]:
     scene = sheared_block(law)
     cut = {"block": box_partition(scene.bodies["block"].mesh, (2, 1, 1))}
-    return solve_steps(scene, shears(path), cut, MPI.COMM_SELF, solver=FaceNewton(tolerance=TOLERANCE))
+    return solve_steps(
+        ContactProblem(scene, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=TOLERANCE)),
+        shears(path),
+    )
 
 
 def shear_force(state: State) -> float:
@@ -113,7 +116,7 @@ def test_a_single_step_is_the_scene_at_once() -> None:
     (state,) = solved(Coulomb(FRICTION), (0.008,))
     scene = shears((0.008,))[0].applied_to(sheared_block(Coulomb(FRICTION)))
     cut = {"block": box_partition(scene.bodies["block"].mesh, (2, 1, 1))}
-    once = solve_scene(scene, cut, MPI.COMM_SELF, solver=FaceNewton(tolerance=TOLERANCE))
+    once = solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=TOLERANCE))
     np.testing.assert_allclose(state.contact.force, once.contact.force, atol=1e-12)
 
 
@@ -145,7 +148,9 @@ def test_loads_may_come_and_go() -> None:
     scene = replace(sheared_block(Coulomb(0.5)), supports=[])
     cut = {"block": box_partition(scene.bodies["block"].mesh, (2, 1, 1))}
     weight, push = Traction("block", "z1", (0.0, 0.0, -4.0)), Traction("block", "x0", (3.0, 0.0, 0.0))
-    sequence = LoadSequence(scene, cut, MPI.COMM_SELF, solver=FaceNewton(tolerance=TOLERANCE))
+    sequence = LoadSequence(
+        ContactProblem(scene, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=TOLERANCE))
+    )
     pressed = sequence.advance(LoadStep("press", loads=[weight]))
     pushed = sequence.advance(LoadStep("push", loads=[weight, push]))
     released = sequence.advance(LoadStep("release", loads=[weight]))
@@ -159,7 +164,7 @@ def test_loads_may_come_and_go() -> None:
 
 
 def test_steps_may_not_change_what_supports_hold() -> None:
-    sequence = LoadSequence(sheared_block(Coulomb(0.3)), None, MPI.COMM_SELF)
+    sequence = LoadSequence(ContactProblem(sheared_block(Coulomb(0.3)), MPI.COMM_SELF))
     sequence.advance(shears((0.0,))[0])
     freed = LoadStep("free", supports=[Support("block", "z1", (None, 0.0, -0.01))])
     with pytest.raises(InvalidInputError, match="may change their values, not what they hold"):

@@ -14,7 +14,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.contact import LoadSequence, Status, solve_steps
+from fenics_contact.contact import ContactProblem, LoadSequence, Status, solve_steps
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.geometry import block
 from fenics_contact.scene import Body, IsotropicElasticity, LoadStep, Scene, Support, Traction
@@ -83,7 +83,7 @@ def test_other_steps_are_refused(interrupted: Path) -> None:
 def test_another_scene_is_refused(interrupted: Path) -> None:
     other = replace(sequence(None, MPI.COMM_SELF).scene, contacts=[])
     with pytest.raises(InvalidInputError, match=r"scene.contacts.*more: give the same problem to go on"):
-        LoadSequence(other, None, MPI.COMM_SELF, checkpoint=Checkpoint(interrupted))
+        LoadSequence(ContactProblem(other, MPI.COMM_SELF), checkpoint=Checkpoint(interrupted))
 
 
 def test_a_history_written_less_often_ends_written(tmp_path: Path) -> None:
@@ -103,7 +103,10 @@ def test_a_body_without_contact_is_solved_again(tmp_path: Path) -> None:
     steps = [LoadStep(f"pull {pull}", loads=[Traction("bar", "x1", (pull, 0.0, 0.0))]) for pull in (1.0, 2.0)]
     cut = {"bar": np.zeros(mesh.n_cells, dtype=int)}
     checkpoint = Checkpoint(tmp_path / "steps.npz")
-    once, again = (solve_steps(scene, steps, cut, MPI.COMM_SELF, checkpoint=checkpoint) for _ in range(2))
+    once, again = (
+        solve_steps(ContactProblem(scene, MPI.COMM_SELF, partitions=cut), steps, checkpoint=checkpoint)
+        for _ in range(2)
+    )
     assert once[1].gather_displacement("bar").max() > 0.01
     for state, same in zip(once, again, strict=True):
         np.testing.assert_array_equal(state.gather_displacement("bar"), same.gather_displacement("bar"))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status, solve_scene, solve_steps
+from fenics_contact.contact import ContactProblem, State, Status, solve_scene, solve_steps
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
 from fenics_contact.geometry import block, box_partition
@@ -51,7 +51,7 @@ def stack(width: float, cells: int, discretisation: Discretisation = "node") -> 
 
 def solved(scene: Scene) -> State:
     cut = {name: box_partition(body.mesh, (2, 1, 1)) for name, body in scene.bodies.items()}
-    return solve_scene(scene, cut, MPI.COMM_SELF, solver=FaceNewton(tolerance=TOLERANCE))
+    return solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=TOLERANCE))
 
 
 @pytest.mark.parametrize("discretisation", ["node", "mortar"])
@@ -118,7 +118,9 @@ def test_load_steps_remember_where_supports_moved_the_slave() -> None:
         LoadStep(f"{s}", supports=[press, Support("block", "x0", (s, 0.0, None))]) for s in (0.01, 0.03, 0.02)
     ]
     cut = {"block": box_partition(mesh, (2, 1, 1))}
-    states = solve_steps(scene, steps, cut, MPI.COMM_SELF, solver=FaceNewton(tolerance=TOLERANCE))
+    states = solve_steps(
+        ContactProblem(scene, MPI.COMM_SELF, partitions=cut, solver=FaceNewton(tolerance=TOLERANCE)), steps
+    )
     driven = np.flatnonzero(mesh.points[states[0].contact.points.slave, 0] == 0.0)
     for state, step, total in zip(states, (0.01, 0.02, -0.01), (0.01, 0.03, 0.02), strict=True):
         contact = state.contact

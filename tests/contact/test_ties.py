@@ -48,10 +48,12 @@ def cuts(scene: Scene) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("discretisation", ["node", "mortar"])
 def test_tied_matching_meshes_are_one_mesh(discretisation: Discretisation) -> None:
     scene = tower(ties=[Tie(*FACES, discretisation=discretisation)])
-    tied = solve_scene(scene, cuts(scene), MPI.COMM_SELF, tolerance=1e-10)
+    tied = solve_scene(scene, MPI.COMM_SELF, partitions=cuts(scene), tolerance=1e-10)
     whole = block((0, 0, 0), (2, 1, 2), (4, 3, 4))
     one = Scene({"all": Body(whole, STEEL)}, [Support("all", "z0")], [Traction("all", "z1", PUSH)])
-    state = solve_scene(one, {"all": box_partition(whole, (2, 1, 1))}, MPI.COMM_SELF, tolerance=1e-10)
+    state = solve_scene(
+        one, MPI.COMM_SELF, partitions={"all": box_partition(whole, (2, 1, 1))}, tolerance=1e-10
+    )
     expected = state.gather_displacement("all")
     for name, body in scene.bodies.items():
         found = tied.gather_displacement(name)
@@ -61,24 +63,24 @@ def test_tied_matching_meshes_are_one_mesh(discretisation: Discretisation) -> No
 
 def test_a_tied_body_needs_no_other_hold_and_an_untied_one_is_refused() -> None:
     scene = tower((5, 4, 2), ties=[Tie(*FACES)])
-    state = solve_scene(scene, cuts(scene), MPI.COMM_SELF, tolerance=1e-10)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=cuts(scene), tolerance=1e-10)
     base = np.unique(scene.bodies["lower"].mesh.surfaces["z0"])
     assert state.counts["equality_multipliers"] > 0
     assert np.abs(state.gather_displacement("lower")[base]).max() < 1e-12
     with pytest.raises(InfeasibleError, match="body 'upper' can move away under the load"):
-        solve_scene(replace(scene, ties=[]), cuts(scene), MPI.COMM_SELF, tolerance=1e-10)
+        solve_scene(replace(scene, ties=[]), MPI.COMM_SELF, partitions=cuts(scene), tolerance=1e-10)
 
 
 def test_a_sliding_tie_holds_the_normal_direction_alone() -> None:
     glides = tower((5, 4, 2), ties=[Tie(*FACES, sliding=True)])
     with pytest.raises(InfeasibleError, match=r"body 'upper' can move away .* translation"):
-        solve_scene(glides, cuts(glides), MPI.COMM_SELF, tolerance=1e-10)
+        solve_scene(glides, MPI.COMM_SELF, partitions=cuts(glides), tolerance=1e-10)
     # Pulled apart, which contact would let go.
     guides = [Support("upper", "x0", (0.0, None, None)), Support("upper", "y0", (None, 0.0, None))]
     pulled = replace(
         glides, supports=[*glides.supports, *guides], loads=[Traction("upper", "z1", (0.0, 0.0, 1.0))]
     )
-    state = solve_scene(pulled, cuts(pulled), MPI.COMM_SELF, tolerance=1e-10)
+    state = solve_scene(pulled, MPI.COMM_SELF, partitions=cuts(pulled), tolerance=1e-10)
     low = np.unique(pulled.bodies["upper"].mesh.surfaces["z0"])
     high = np.unique(pulled.bodies["lower"].mesh.surfaces["z1"])
     above, below = state.gather_displacement("upper")[low], state.gather_displacement("lower")[high]
@@ -96,7 +98,7 @@ def test_only_a_tie_that_does_not_slide_drags_what_it_is_tied_to(
     moved = [Support("lower", "z0"), Support("upper", "z1", (0.1, 0.0, 0.0))]
     ties = [Tie(*FACES, sliding=sliding, discretisation=discretisation)]
     scene = tower((5, 3, 3), supports=moved, loads=[], ties=ties)
-    strain = solve_scene(scene, cuts(scene), MPI.COMM_SELF, tolerance=1e-10).energies.strain
+    strain = solve_scene(scene, MPI.COMM_SELF, partitions=cuts(scene), tolerance=1e-10).energies.strain
     assert strain < 1e-12 if sliding else strain > 1e-2
 
 
@@ -104,7 +106,7 @@ def test_a_tie_beside_contact_leaves_the_contact_law_alone() -> None:
     """A tied tower that stands on a floor with friction bears the whole push there."""
     floor = ContactPair(Surface("lower", "z0"), RigidPlane((0, 0, 0), (0, 0, 1)), Coulomb(0.5))
     scene = tower((5, 4, 2), supports=[], ties=[Tie(*FACES)], contacts=[floor])
-    state = solve_scene(scene, cuts(scene), MPI.COMM_SELF, tolerance=1e-10)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=cuts(scene), tolerance=1e-10)
     np.testing.assert_allclose(state.contact.force.sum(axis=0), -2.0 * np.array(PUSH), rtol=1e-6)
     assert state.torn.ties.count == 30
     assert state.torn.n_equality == state.torn.n_gluing + 90
@@ -113,7 +115,7 @@ def test_a_tie_beside_contact_leaves_the_contact_law_alone() -> None:
 def test_supported_components_of_tied_nodes_are_left_to_the_support() -> None:
     roller = [Support("lower", "z0"), Support("upper", "x0", (0.0, None, None))]
     scene = tower((5, 4, 2), ties=[Tie(*FACES)], supports=roller)
-    state = solve_scene(scene, cuts(scene), MPI.COMM_SELF, tolerance=1e-10)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=cuts(scene), tolerance=1e-10)
     held = np.unique(scene.bodies["upper"].mesh.surfaces["x0"])
     assert np.abs(state.gather_displacement("upper")[held, 0]).max() < 1e-12
     assert state.torn.n_equality == state.torn.n_gluing + 90 - 5
@@ -140,4 +142,4 @@ def test_tied_surfaces_that_do_not_meet_are_refused() -> None:
         "Tie 0 needs slave nodes that face the master, but none of the 20 movable nodes of 'z0' meets it"
     )
     with pytest.raises(InvalidInputError, match=message):
-        solve_scene(replace(away, ties=[Tie(*FACES)]), cuts(away), MPI.COMM_SELF, tolerance=1e-10)
+        solve_scene(replace(away, ties=[Tie(*FACES)]), MPI.COMM_SELF, partitions=cuts(away), tolerance=1e-10)

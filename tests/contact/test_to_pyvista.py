@@ -32,7 +32,7 @@ def pulled(cell: str) -> State:
     assert mesh.cell_type == cell
     hold = Support("bar", "x0", (0.0,) * mesh.dim)
     return solve_scene(
-        Scene({"bar": Body(mesh, material)}, [hold], [Traction("bar", "x1", load)]), None, MPI.COMM_SELF
+        Scene({"bar": Body(mesh, material)}, [hold], [Traction("bar", "x1", load)]), MPI.COMM_SELF
     )
 
 
@@ -92,7 +92,7 @@ RANKS = """
     from tests.contact.gallery import partitions, two_blocks
 
     scene = two_blocks(Coulomb(0.4))
-    state = solve_scene(scene, partitions(scene), MPI.COMM_WORLD, tolerance=1e-6)
+    state = solve_scene(scene, MPI.COMM_WORLD, partitions=partitions(scene), tolerance=1e-6)
     for name, block in zip(state.scene.bodies, state.to_pyvista()):
         numbers = [block.point_data["displacement"].sum(), block.cell_data["von_mises"].sum()]
         numbers = MPI.COMM_WORLD.gather([block.n_points, block.n_cells, *np.round(numbers, 4)])

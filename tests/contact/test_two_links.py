@@ -40,7 +40,7 @@ def state() -> State:
         [ContactPair(Surface("pulled", "contact"), Surface("held", "contact"), Coulomb(FRICTION))],
     )
     parts = {"held": box_partition(held, (4, 1, 2)), "pulled": box_partition(pulled, (4, 1, 2))}
-    return solve_scene(scene, parts, MPI.COMM_SELF, solver=FaceNewton(tolerance=TOLERANCE))
+    return solve_scene(scene, MPI.COMM_SELF, partitions=parts, solver=FaceNewton(tolerance=TOLERANCE))
 
 
 def own_rows(state: State) -> SimpleNamespace:

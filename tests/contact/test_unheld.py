@@ -69,7 +69,7 @@ def left_of(state: State, body: str, motion: np.ndarray) -> float:
 
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 6, 7, 9])
 def test_a_pressed_cube_stays_where_nothing_holds_it(n: int) -> None:
-    state = solve_scene(cube_on_floor(n), None, MPI.COMM_SELF)
+    state = solve_scene(cube_on_floor(n), MPI.COMM_SELF)
 
     assert state.solution.products <= 25
     np.testing.assert_allclose(state.contact.normal_force.sum(), 100.0 * 1e-3, rtol=1e-3)  # uniaxial stress
@@ -81,7 +81,7 @@ def test_a_pressed_cube_stays_where_nothing_holds_it(n: int) -> None:
 @pytest.mark.parametrize("parts", [1, 4])
 def test_partition_and_solver_do_not_move_it(parts: int, solver: FaceNewton | Smalse) -> None:
     scene = cube_on_floor(5)
-    state = solve_scene(scene, cut(scene, parts), MPI.COMM_SELF, solver=solver)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=cut(scene, parts), solver=solver)
 
     exact = 1e-3 * np.array([0.3, 0.3, -1.0]) * (scene.bodies["cube"].mesh.points - [0.0, 0.5, 0.0])
     np.testing.assert_allclose(state.gather_displacement("cube"), exact, atol=1e-8)
@@ -91,7 +91,7 @@ def test_partition_and_solver_do_not_move_it(parts: int, solver: FaceNewton | Sm
 @pytest.mark.parametrize("parts", [1, 3])
 def test_a_turned_block_without_friction_is_pressed_and_stays(discretisation: str, parts: int) -> None:
     scene = turned_stack(None, discretisation)
-    state = solve_scene(scene, cut(scene, parts), MPI.COMM_SELF)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=cut(scene, parts))
 
     force = state.contact.force.sum(axis=0)
     np.testing.assert_allclose(force, TURN @ [0.0, 0.0, 0.01 * 1.0 * 0.9], atol=1e-5)
@@ -106,7 +106,7 @@ def test_a_turned_block_without_friction_is_pressed_and_stays(discretisation: st
     [(Coulomb(0.3), None), (Coulomb(0.3), FixedPoint(FaceNewton())), (Tresca(0.01), None)],
 )
 def test_friction_holds_a_turned_block(friction: Coulomb | Tresca, solver: FixedPoint | None) -> None:
-    state = solve_scene(turned_stack(friction), None, MPI.COMM_SELF, solver=solver)
+    state = solve_scene(turned_stack(friction), MPI.COMM_SELF, solver=solver)
 
     assert state.unheld == ()
     np.testing.assert_allclose(state.contact.force.sum(axis=0), TURN @ [0.0, 0.0, 0.009], atol=1e-5)
@@ -117,7 +117,7 @@ def test_friction_elsewhere_keeps_its_steps_beside_an_unheld_body() -> None:
     rubbed = turned_stack(Coulomb(0.3))
     push = Traction("upper", "z1", tuple(TURN @ [0.002, 0.0, -0.01]))
     rubbed = replace(rubbed, loads=[push])
-    alone = solve_scene(rubbed, cut(rubbed, 2), MPI.COMM_SELF, tolerance=1e-8)
+    alone = solve_scene(rubbed, MPI.COMM_SELF, partitions=cut(rubbed, 2), tolerance=1e-8)
 
     other = cube_on_floor(3)
     beside = replace(
@@ -126,7 +126,7 @@ def test_friction_elsewhere_keeps_its_steps_beside_an_unheld_body() -> None:
         supports=[*rubbed.supports, *other.supports],
         contacts=[*rubbed.contacts, *other.contacts],
     )
-    both = solve_scene(beside, cut(beside, 2), MPI.COMM_SELF, tolerance=1e-8)
+    both = solve_scene(beside, MPI.COMM_SELF, partitions=cut(beside, 2), tolerance=1e-8)
 
     assert [str(motion) for motion in both.unheld] == ["'cube': translation (0, 1, 0)"]
     count = alone.contact.points.count
@@ -144,7 +144,7 @@ def test_bodies_tied_together_stay_together() -> None:
         contacts=[ContactPair(Surface("low", "y0"), floor)],
         ties=[Tie(Surface("top", "y0"), Surface("low", "y1"))],
     )
-    state = solve_scene(scene, None, MPI.COMM_SELF)
+    state = solve_scene(scene, MPI.COMM_SELF)
 
     (motion,) = state.unheld
     np.testing.assert_allclose([motion.bodies[name] for name in ("low", "top")], 2 * [[1.0, 0.0, 0.0]])
@@ -179,7 +179,7 @@ def test_unheld_motions_are_the_same_on_any_number_of_ranks(mpirun) -> None:
         from fenics_contact.geometry import graph_partition
         from tests.contact.test_unheld import cut, turned_stack
         scene = turned_stack()
-        state = solve_scene(scene, cut(scene, 4), MPI.COMM_WORLD, tolerance=1e-9)
+        state = solve_scene(scene, MPI.COMM_WORLD, partitions=cut(scene, 4), tolerance=1e-9)
         words, moved = [str(motion) for motion in state.unheld], state.gather_displacement("upper")
         if MPI.COMM_WORLD.rank == 0:
             print(len(words), np.linalg.norm(moved).round(10), *moved[7].round(10))

@@ -69,7 +69,7 @@ SCENES = {
 
 
 def solved(scene: Scene) -> State:
-    return solve_scene(scene, None, MPI.COMM_SELF)
+    return solve_scene(scene, MPI.COMM_SELF)
 
 
 @pytest.mark.parametrize("name", SCENES)

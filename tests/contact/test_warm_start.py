@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import FixedPoint, State, find_state
-from fenics_contact.feti import Decomposition, decompose
+from fenics_contact.contact import ContactProblem, FixedPoint, State
 from fenics_contact.qp import DualSolver, FaceNewton, Smalse
 from fenics_contact.scene import Coulomb, Scene, Traction, Tresca
 from tests.contact.checks import assert_solved
@@ -23,8 +22,8 @@ SOLVERS: dict[str, DualSolver] = {
 }
 
 
-def cut(scene: Scene) -> Decomposition:
-    return decompose(scene, partitions(scene), MPI.COMM_SELF)
+def posed(scene: Scene, solver: str) -> ContactProblem:
+    return ContactProblem(scene, MPI.COMM_SELF, partitions=partitions(scene), solver=SOLVERS[solver])
 
 
 def assert_same(one: State, two: State) -> None:
@@ -42,9 +41,8 @@ FEW = {"face Newton": 5, "SMALSE": 22, "fixed point": 22}
 @pytest.mark.parametrize("friction", [Coulomb(0.38), Tresca(1.0)])
 def test_solving_again_costs_at_most_a_few_products(friction: Coulomb | Tresca, solver: str) -> None:
     scene = two_blocks(friction)
-    decomposition = cut(scene)
-    first = find_state(scene, decomposition, solver=SOLVERS[solver])
-    again = find_state(scene, decomposition, solver=SOLVERS[solver], previous=first)
+    problem = posed(scene, solver)
+    first, again = problem.solve(), problem.solve()
     assert_solved(again, TOLERANCE)
     assert_same(again, first)
     assert first.counts["f_products"] > 20
@@ -57,11 +55,10 @@ def test_a_moved_scene_has_the_same_answer_from_a_warm_and_a_cold_start(
     friction: Coulomb | Tresca, solver: str
 ) -> None:
     scene = two_blocks(friction)
-    decomposition = cut(scene)
-    before = find_state(scene, decomposition, solver=SOLVERS[solver])
+    problem = posed(scene, solver)
+    before = problem.solve()
     moved = scene.moved({"upper": crowned(scene.bodies["upper"].mesh, 0.002).points})
-    cold = find_state(moved, decomposition, solver=SOLVERS[solver])
-    warm = find_state(moved, decomposition, solver=SOLVERS[solver], previous=before)
+    warm, cold = problem.solve(moved), problem.solve(moved, start=None)
     assert_solved(cold, TOLERANCE)
     assert_solved(warm, TOLERANCE)
     assert_same(warm, cold)
@@ -72,10 +69,9 @@ def test_a_moved_scene_has_the_same_answer_from_a_warm_and_a_cold_start(
 
 def test_another_load_has_the_same_answer_from_a_warm_and_a_cold_start() -> None:
     scene = block_on_plane(Coulomb(0.6))
-    decomposition = cut(scene)
-    before = find_state(scene, decomposition, solver=SOLVERS["face Newton"])
+    problem = posed(scene, "face Newton")
+    problem.solve()
     heavier = replace(scene, loads=[Traction("block", "z1", (1.05, 0.3, -2.1))])
-    warm = find_state(heavier, decomposition, solver=SOLVERS["face Newton"], previous=before)
-    cold = find_state(heavier, decomposition, solver=SOLVERS["face Newton"])
+    warm, cold = problem.solve(heavier), problem.solve(heavier, start=None)
     assert_same(warm, cold)
     assert warm.contact.force.sum(axis=0) == pytest.approx([-2.1, -0.6, 4.2], rel=1e-6)

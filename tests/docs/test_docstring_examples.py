@@ -148,5 +148,5 @@ def test_an_example_that_is_not_run_names_what_exists(example: doctest.DocTest) 
 
 
 def test_a_name_that_does_not_exist_is_found() -> None:
-    code = "state = solve_scene(scene, None, comm, tol=1)\nstate.presure\nplot(state)\n"
+    code = "state = solve_scene(scene, comm, tol=1)\nstate.presure\nplot(state)\n"
     assert unknown_names(code, public_names()) == ["plot", "solve_scene(tol=)", "state.presure"]

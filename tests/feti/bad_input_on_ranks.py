@@ -96,7 +96,8 @@ CASES: tuple[Callable[[], Cut], ...] = (
 def attempt(make: Callable[[], Cut], comm: MPI.Comm) -> tuple[str, str]:
     """Return class and message of what this rank raises."""
     try:
-        solve_scene(*make(), comm)
+        scene, partitions = make()
+        solve_scene(scene, comm, partitions=partitions)
     except Exception as error:
         return type(error).__name__, str(error)
     return "nothing", ""

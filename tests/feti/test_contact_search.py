@@ -95,7 +95,7 @@ def test_overlapping_bodies_are_refused() -> None:
 def test_overlap_that_faceting_explains_is_let_through_and_any_overlap_on_request() -> None:
     points = torn(on_floor(-0.01)).points
     assert (points.gap < 0).all()
-    deep = torn(on_floor(-0.2), start_geometry=False).points
+    deep = torn(on_floor(-0.2), overlap=True).points
     np.testing.assert_allclose(deep.gap, -0.2)
 
 

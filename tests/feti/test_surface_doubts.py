@@ -37,7 +37,7 @@ def told(caplog: pytest.LogCaptureFixture, *meshes: BodyMesh, **pair: Any) -> li
         contacts=[ContactPair(Surface(names[0], "contact"), master, **pair)],
     )
     with caplog.at_level(logging.WARNING):
-        build_torn_system(scene, decompose(scene, scene.partition(), MPI.COMM_SELF), start_geometry=False)
+        build_torn_system(scene, decompose(scene, scene.partition(), MPI.COMM_SELF), overlap=True)
     return [record.getMessage() for record in caplog.records]
 
 

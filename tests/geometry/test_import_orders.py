@@ -43,7 +43,7 @@ def solve_after(imports: str, mpirun: Callable[..., str]) -> None:
         body = Body(mesh, IsotropicElasticity(100.0, 0.25))
         held = {{"x0": (0.0, None, None), "y0": (None, 0.0, None), "z1": (None, None, -0.01)}}
         supports = [Support("block", side, value) for side, value in held.items()]
-        state = solve_scene(Scene({{"block": body}}, supports, (), [pair]), None, MPI.COMM_WORLD)
+        state = solve_scene(Scene({{"block": body}}, supports, (), [pair]), MPI.COMM_WORLD)
         sys.stdout.write(f"{{state.energies.strain}}\\n")
     """
     energy = 0.5 * 100.0 * (0.01 / 0.3) ** 2 * 0.7 * 0.5 * 0.3

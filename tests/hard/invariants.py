@@ -31,7 +31,7 @@ class Whole:
     def __init__(self, scene: Scene) -> None:
         one = {name: np.zeros(body.mesh.n_cells, dtype=np.int64) for name, body in scene.bodies.items()}
         decomposition = decompose(scene, one, MPI.COMM_SELF)
-        self.torn: TornSystem = build_torn_system(scene, decomposition, start_geometry=False)
+        self.torn: TornSystem = build_torn_system(scene, decomposition, overlap=True)
         tearing, dim = decomposition.tearing, self.torn.dim
         size = dim * tearing.n_nodes
         self.K = sp.csr_matrix((size, size))

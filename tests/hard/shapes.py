@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactResult
+from fenics_contact.contact import ContactProblem, ContactResult
 from fenics_contact.geometry import block
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import Body, BodyForce, ContactPair, Coulomb, Scene, Support, Surface
@@ -55,9 +55,13 @@ def on_a_ramp(
     design = SurfaceDesign("lower", side(lower, "z1"), (2, 1))
     # Near the limit of friction a state can cost any number of products: such designs are given up soon.
     return ShapeProblem(
-        scene, partitions(scene), design, ContactForces(misfit), MPI.COMM_SELF,
-        solver=FaceNewton(max_products=1500), tolerance=tolerance,
-    )  # fmt: skip
+        ContactProblem(
+            scene, MPI.COMM_SELF, partitions=partitions(scene), solver=FaceNewton(max_products=1500)
+        ),
+        design,
+        ContactForces(misfit),
+        tolerance=tolerance,
+    )
 
 
 def carved(tolerance: float | AdaptiveTolerance = 1e-8) -> ShapeProblem:
@@ -70,7 +74,10 @@ def carved(tolerance: float | AdaptiveTolerance = 1e-8) -> ShapeProblem:
     )
     judge = ContactForces(normal_forces)
     return ShapeProblem(
-        scene, partitions(scene), designs_of(scene), judge, MPI.COMM_SELF, tolerance=tolerance
+        ContactProblem(scene, MPI.COMM_SELF, partitions=partitions(scene)),
+        designs_of(scene),
+        judge,
+        tolerance=tolerance,
     )
 
 
@@ -129,5 +136,8 @@ def kink(switch: str) -> Kink:
 def _at_kink(scene: Scene, choice: WeakChoice) -> ShapeProblem:
     judge = ContactForces(normal_forces)
     return ShapeProblem(
-        scene, partitions(scene), designs_of(scene), judge, MPI.COMM_SELF, choice=choice, tolerance=1e-11
+        ContactProblem(scene, MPI.COMM_SELF, partitions=partitions(scene), tolerance=1e-11),
+        designs_of(scene),
+        judge,
+        choice=choice,
     )

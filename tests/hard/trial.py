@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status, solve_scene, solve_steps
+from fenics_contact.contact import ContactProblem, State, Status, solve_scene, solve_steps
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.geometry import bisection_partition, box_partition, graph_partition
 from fenics_contact.qp import DualSolver, FaceNewton, SolverStep
@@ -78,8 +78,10 @@ class Trial:
         """Find the state. Collective."""
         cut = self.cut if cut is None else cut
         if self.steps:
-            return solve_steps(self.scene, self.steps, cut, comm, solver=self.solver)[-1]
-        return solve_scene(self.scene, cut, comm, solver=self.solver)
+            return solve_steps(
+                ContactProblem(self.scene, comm, partitions=cut, solver=self.solver), self.steps
+            )[-1]
+        return solve_scene(self.scene, comm, partitions=cut, solver=self.solver)
 
     def in_units(self, length: float, force: float) -> Trial:
         """Return the trial in other units."""

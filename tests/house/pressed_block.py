@@ -23,4 +23,4 @@ def scene() -> Scene:
 
 def solve(comm: Any) -> State:
     """Solve the scene. Collective."""
-    return solve_scene(scene(), None, comm)
+    return solve_scene(scene(), comm)

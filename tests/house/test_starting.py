@@ -86,7 +86,7 @@ def test_processes_forked_after_a_solve_refuse_to_compute(mpirun: Callable[..., 
     import numpy as np
     from mpi4py import MPI
     from fenics_contact.accuracy import discretisation_error
-    from fenics_contact.contact import find_state
+    from fenics_contact.contact import ContactProblem
     from fenics_contact.scene import Tresca
     from tests.house.pressed_block import solve
     from tests.shape.blocks import block_on_block, problem
@@ -97,7 +97,7 @@ def test_processes_forked_after_a_solve_refuse_to_compute(mpirun: Callable[..., 
     design(alpha)
     for task in (
         lambda: solve(MPI.COMM_SELF),
-        lambda: find_state(state.scene, state.torn.decomposition, previous=state),
+        lambda: ContactProblem.following(state).solve(),
         lambda: design(alpha + 1e-3),
         lambda: state.von_mises,
         lambda: discretisation_error(state.torn, state.torn_displacement),

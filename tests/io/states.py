@@ -26,6 +26,6 @@ def blocks(cell: str = "hexahedron") -> Scene:
 def touching_blocks(cell: str = "hexahedron") -> State:
     """Open, sticking and slipping points are all there."""
     scene = blocks(cell)
-    state = solve_scene(scene, partitions(scene), MPI.COMM_SELF, tolerance=1e-6)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=partitions(scene), tolerance=1e-6)
     assert all(state.contact.count(status) > 0 for status in Status), "some status is missing"
     return state

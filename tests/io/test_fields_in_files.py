@@ -192,7 +192,7 @@ RANKS = """
 
     comm, folder = MPI.COMM_WORLD, Path(sys.argv[1])
     scene = blocks()
-    state = solve_scene(scene, partitions(scene), comm, tolerance=1e-6)
+    state = solve_scene(scene, comm, partitions=partitions(scene), tolerance=1e-6)
     write_vtu(state, folder)
     write_xdmf(state, folder / "state.xdmf")
     write_json(folder / "ranks.json", {"ranks": comm.size}, comm=comm)

@@ -82,7 +82,7 @@ def test_energies_residuals_and_contact_are_the_states(tmp_path: Path) -> None:
 def test_errors_are_told_where_they_are_known_or_asked_for(tmp_path: Path) -> None:
     scene = Scene({"block": Body(block((0, 0, 0), (2, 1, 1), (4, 2, 2)), IsotropicElasticity(1e3, 0.3))},
                   [Support("block", "x0")], [Pressure("block", "z1", 1.0)])  # fmt: skip
-    state = solve_scene(scene, None, MPI.COMM_SELF, tolerance=1e-8)
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-8)
     assert read_result(write_result(state, tmp_path))["errors"] is None
     asked = read_result(write_result(state, tmp_path, errors=True))["errors"]
     assert asked["discretisation"] == state.errors.discretisation > 0.0
@@ -91,7 +91,7 @@ def test_errors_are_told_where_they_are_known_or_asked_for(tmp_path: Path) -> No
     assert direct["solver"]["kind"] == "sparse factorisation of one body"
     assert direct["contact"] == []
     parts = {"block": np.arange(16) // 8}
-    balanced = solve_scene(scene, parts, MPI.COMM_SELF, tolerance=Balanced(share=0.05))
+    balanced = solve_scene(scene, MPI.COMM_SELF, partitions=parts, tolerance=Balanced(share=0.05))
     found = read_result(write_result(balanced, tmp_path))
     assert found["errors"]["by_body"]["block"] > 0.0
     assert found["solver"]["tolerance"]["share"] == 0.05
@@ -236,7 +236,7 @@ RANKS = """
     from tests.io.states import blocks
 
     comm, scene = MPI.COMM_WORLD, blocks()
-    state = solve_scene(scene, partitions(scene), comm, tolerance=1e-6)
+    state = solve_scene(scene, comm, partitions=partitions(scene), tolerance=1e-6)
     write_result(state, sys.argv[1], errors=True)
     try:
         write_result(state, sys.argv[1], name="nan", more={"a": float("nan")})

@@ -45,7 +45,9 @@ def potential(comm: MPI.Comm, limit: int, rows_per_rank: int) -> dict[str, Any]:
     """Solve two blocks in contact with the coarse problem kept as the limits say. Collective."""
     coarse.DENSE_LIMIT, shared_factor.ROWS_PER_RANK = limit, rows_per_rank
     scene = two_blocks(Coulomb(0.38))
-    state = solve_scene(scene, partitions(scene, (2, 1, 1)), comm, solver=FaceNewton(tolerance=1e-9))
+    state = solve_scene(
+        scene, comm, partitions=partitions(scene, (2, 1, 1)), solver=FaceNewton(tolerance=1e-9)
+    )
     return {
         "kind": type(state.system.problem.coarse.gram).__name__,
         "potential": state.energies.total_potential,

@@ -50,7 +50,7 @@ def blocks(comm: MPI.Comm) -> dict[str, Any]:
         expected = reference(scene, "block", comm)
         for subdomains in BOXES:
             if subdomains >= comm.size:
-                state = solve_scene(scene, cut(scene, subdomains), comm, tolerance=1e-10)
+                state = solve_scene(scene, comm, partitions=cut(scene, subdomains), tolerance=1e-10)
                 found[f"{cell} {subdomains}"] = {"error": error(state, "block", expected), **counted(state)}
     return found
 
@@ -64,8 +64,8 @@ def bodies(comm: MPI.Comm) -> dict[str, Any]:
     scene, partitions = two_materials()
     partitions["stiff"] = np.zeros_like(partitions["stiff"])
     state, alone = (
-        solve_scene(scene, partitions, comm, tolerance=1e-10),
-        solve_scene(scene, partitions, MPI.COMM_SELF, tolerance=1e-10),
+        solve_scene(scene, comm, partitions=partitions, tolerance=1e-10),
+        solve_scene(scene, MPI.COMM_SELF, partitions=partitions, tolerance=1e-10),
     )
     found: dict[str, Any] = counted(state)
     for name in scene.bodies:
@@ -87,7 +87,9 @@ def bar(comm: MPI.Comm) -> dict[str, Any]:
     mesh = block((0, 0, 0), (1, 1, 4), (2, 2, 4))
     supports, loads = [Support("bar", "z0")], [Traction("bar", "z1", (1.0, 0.0, 1.0))]
     scene = Scene({"bar": Body(mesh, STEEL)}, supports, loads)
-    state = solve_scene(scene, {"bar": box_partition(mesh, (1, 1, comm.size))}, comm, tolerance=1e-10)
+    state = solve_scene(
+        scene, comm, partitions={"bar": box_partition(mesh, (1, 1, comm.size))}, tolerance=1e-10
+    )
     owned = comm.allgather(len(state.system.torn.numbering.owned))
     return {"error": error(state, "bar", reference(scene, "bar", comm)), "owned": owned}
 

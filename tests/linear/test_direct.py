@@ -20,7 +20,7 @@ def cantilever(length: float, cells: int) -> Scene:
 
 
 def test_a_slender_beam_is_solved_to_what_double_precision_allows() -> None:
-    state = solve_scene(cantilever(100.0, 40), None, MPI.COMM_SELF)
+    state = solve_scene(cantilever(100.0, 40), MPI.COMM_SELF)
 
     assert isinstance(state.system, DirectSystem)
     (part,) = state.torn.subdomains
@@ -32,7 +32,7 @@ def test_a_slender_beam_is_solved_to_what_double_precision_allows() -> None:
 
 def test_an_answer_that_is_rounding_is_refused() -> None:
     with pytest.raises(ConvergenceError, match=r"error below 0.0001 in energy norm.*too slender"):
-        solve_scene(cantilever(3e4, 40), None, MPI.COMM_SELF)
+        solve_scene(cantilever(3e4, 40), MPI.COMM_SELF)
 
 
 def test_a_damaged_factor_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -50,4 +50,4 @@ def test_a_damaged_factor_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(DirectSystem, "__init__", damaged)
     with pytest.raises(ConvergenceError, match="needs an error below"):
-        solve_scene(cantilever(3.0, 5), None, MPI.COMM_SELF)
+        solve_scene(cantilever(3.0, 5), MPI.COMM_SELF)

@@ -33,7 +33,7 @@ def test_the_displacement_is_that_of_a_monolithic_solve(answer: dict[str, Any]) 
 def test_iterations_and_energy_do_not_depend_on_the_ranks(answer: dict[str, Any]) -> None:
     for cell in CELLS:
         scene = loaded_block(cell)
-        alone = solve_scene(scene, cut(scene, 8), MPI.COMM_SELF, tolerance=1e-10)
+        alone = solve_scene(scene, MPI.COMM_SELF, partitions=cut(scene, 8), tolerance=1e-10)
         case = answer["blocks"][f"{cell} 8"]
         assert abs(case["products"] - alone.solution.products) <= 1
         assert case["energy"] == pytest.approx(alone.energies.primal, rel=1e-10)

@@ -18,7 +18,7 @@ def test_iterations_are_bounded_as_subdomains_are_added(cell: str) -> None:
     counts = {}
     for n in (2, 3, 4):
         scene, partitions = clamped_block(cell, (n, n, n), LAYERS)
-        state = solve_scene(scene, partitions, MPI.COMM_SELF, tolerance=1e-10)
+        state = solve_scene(scene, MPI.COMM_SELF, partitions=partitions, tolerance=1e-10)
         assert state.solution.residuals.gluing < 1e-10
         counts[n**3] = state.solution.products
     sys.stdout.write(f"\n{cell}, H/h = {LAYERS}: iterations by number of subdomains {counts}\n")

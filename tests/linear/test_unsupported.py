@@ -22,7 +22,7 @@ def bars(*loads: Load, supports: tuple[Support, ...] = ()) -> State:
         loads,
     )
     cuts = {name: box_partition(mesh, (1, 1, 2)) for name, mesh in meshes.items()}
-    return solve_scene(scene, cuts, MPI.COMM_SELF, tolerance=1e-10)
+    return solve_scene(scene, MPI.COMM_SELF, partitions=cuts, tolerance=1e-10)
 
 
 def test_a_loaded_body_without_support_is_refused_by_name() -> None:
@@ -52,7 +52,9 @@ def test_a_scene_without_a_single_multiplier_is_solved() -> None:
     mesh = block((0, 0, 0), (1, 1, 4), (2, 2, 4), "tetrahedron")
     loads = [Traction("bar", "z1", (0.0, 0.0, 1.3)), Traction("bar", "z0", (0.0, 0.0, -1.3))]
     scene = Scene({"bar": Body(mesh, STEEL)}, loads=loads)
-    state = solve_scene(scene, {"bar": np.zeros(mesh.n_cells, dtype=int)}, MPI.COMM_SELF, tolerance=1e-10)
+    state = solve_scene(
+        scene, MPI.COMM_SELF, partitions={"bar": np.zeros(mesh.n_cells, dtype=int)}, tolerance=1e-10
+    )
     assert state.counts["equality_multipliers"] == 0
     np.testing.assert_allclose(state.von_mises["bar"].x.array, 1.3, rtol=1e-9)
 

@@ -55,7 +55,7 @@ def refused(comm: MPI.Comm) -> list[str]:
     scene = Scene({"good": Body(mesh, steel(3)), "bad": Body(mesh, Wrong(1.0, 0.3))})
     cut = {"good": box_partition(mesh, (4, 1, 1)), "bad": np.zeros(mesh.n_cells, dtype=int)}
     try:
-        solve_scene(scene, cut, comm)
+        solve_scene(scene, comm, partitions=cut)
     except InvalidInputError as error:
         return comm.allgather(str(error))
     return comm.allgather("")
@@ -68,7 +68,7 @@ def main() -> None:
         scene = scene_of(cell)
         boxes = {"heated": (2, 1, 1), "plain": (4, 1, 1)}
         cut = {n: box_partition(body.mesh, boxes[n][: scene.dim]) for n, body in scene.bodies.items()}
-        state = solve_scene(scene, cut, comm, tolerance=1e-10)
+        state = solve_scene(scene, comm, partitions=cut, tolerance=1e-10)
         for name in scene.bodies:
             field = state.gather_displacement(name), state.gather_von_mises(name)
             found[f"{cell} {name}"] = [part.ravel().tolist() for part in field]

@@ -42,7 +42,9 @@ def pulled(material: Material, cell: str) -> State:
         [Support("plate", "x0", (0.0, None)), Support("plate", "y0", (None, 0.0))],
         [Traction("plate", "x1", (TENSION, 0.0))],
     )
-    return solve_scene(scene, {"plate": box_partition(mesh, (2, 1))}, MPI.COMM_SELF, tolerance=1e-10)
+    return solve_scene(
+        scene, MPI.COMM_SELF, partitions={"plate": box_partition(mesh, (2, 1))}, tolerance=1e-10
+    )
 
 
 def strains(state: State) -> np.ndarray:

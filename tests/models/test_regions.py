@@ -84,7 +84,7 @@ def test_the_cut_into_subdomains_does_not_show(cell: str) -> None:
     found = []
     for boxes in ((1, 1, 1), (2, 1, 1), (4, 2, 1), (1, 2, 1)):
         state = solve_scene(
-            scene, {"body": box_partition(mesh, boxes[: mesh.dim])}, MPI.COMM_SELF, tolerance=1e-10
+            scene, MPI.COMM_SELF, partitions={"body": box_partition(mesh, boxes[: mesh.dim])}, tolerance=1e-10
         )
         found.append((state.gather_displacement("body"), state.gather_von_mises("body")))
     for displacement, stress in found[1:]:

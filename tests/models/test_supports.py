@@ -38,7 +38,7 @@ def test_a_linear_displacement_all_around_is_taken_on_inside(cell: str) -> None:
     components = tuple(lambda points, row=row: points @ row for row in A)
     supports = [Support("body", surface, components) for surface in mesh.surfaces]
     state = solve_scene(
-        Scene({"body": Body(mesh, steel(mesh.dim))}, supports), None, MPI.COMM_SELF, tolerance=1e-10
+        Scene({"body": Body(mesh, steel(mesh.dim))}, supports), MPI.COMM_SELF, tolerance=1e-10
     )
     inside = np.setdiff1d(
         np.arange(mesh.n_nodes), np.concatenate([f.ravel() for f in mesh.surfaces.values()])

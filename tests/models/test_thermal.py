@@ -48,7 +48,7 @@ def heated(material: Material, cell: str, change: Any, *held: str) -> State:
     partition = box_partition(mesh, (2, 1, 1)[: mesh.dim])
     loads = [ThermalStrain("body", change)]
     scene = Scene({"body": Body(mesh, material)}, rollers(mesh.dim, *held), loads)
-    return solve_scene(scene, {"body": partition}, MPI.COMM_SELF, tolerance=1e-10)
+    return solve_scene(scene, MPI.COMM_SELF, partitions={"body": partition}, tolerance=1e-10)
 
 
 @pytest.mark.parametrize("change", UNIFORM, ids=["number", "function", "UFL"])
@@ -71,7 +71,7 @@ def test_a_free_orthotropic_body_expands_along_its_axes(cell: str) -> None:
     strain = WARMER * axes.T @ np.diag(along) @ axes
     supports = [Support("body", name, _linear(strain)) for name in ("x0", "x1")]
     scene = Scene({"body": Body(mesh, wood)}, supports, [ThermalStrain("body", WARMER)])
-    state = solve_scene(scene, None, MPI.COMM_SELF, tolerance=1e-10)
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-10)
     np.testing.assert_allclose(state.gather_displacement("body"), mesh.points @ strain, atol=1e-9)
     assert state.gather_von_mises("body").max() < 1e-9
     assert abs(strain[0, 1]) > 0.01, "the axes are not turned: nothing was tested"
@@ -89,7 +89,7 @@ def test_a_free_orthotropic_plate_expands_along_its_axes(cell: str) -> None:
     mesh, strain = bent(box(cell)), WARMER * axes.T @ np.diag(along) @ axes
     supports = [Support("body", name, _linear(strain)) for name in ("x0", "x1")]
     scene = Scene({"body": Body(mesh, plate)}, supports, [ThermalStrain("body", WARMER)])
-    state = solve_scene(scene, None, MPI.COMM_SELF, tolerance=1e-10)
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-10)
     np.testing.assert_allclose(state.gather_displacement("body"), mesh.points @ strain, atol=1e-9)
     assert state.gather_von_mises("body").max() < 1e-7
     assert abs(strain[0, 1]) > 0.01, "the axes are not turned: nothing was tested"
@@ -136,7 +136,7 @@ def test_a_linear_temperature_bends_a_free_body_without_stress() -> None:
         loads = [ThermalStrain("body", lambda points: g * points[:, 1])]
         roller, pin = Support("body", "x0", (0.0, None)), Support("body", "y0", (None, _bent_down(g)))
         scene = Scene({"body": Body(mesh, material)}, [roller, pin], loads)
-        state = solve_scene(scene, None, MPI.COMM_SELF, tolerance=1e-10)
+        state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-10)
         found.append(state.gather_von_mises("body").mean() / (YOUNG * EXPANSION * g))
     assert found[1] < 0.6 * found[0] < 0.1
 
@@ -156,7 +156,9 @@ def test_two_materials_that_expand_differently_press_each_other() -> None:
     for boxes in ((2, 1, 1), (1, 1, 2)):  # each half a subdomain, and both halves in each subdomain
         body = Body(mesh, {"left": left, "right": right})
         scene = Scene({"body": body}, rollers(3, "x1"), [ThermalStrain("body", WARMER)])
-        state = solve_scene(scene, {"body": box_partition(mesh, boxes)}, MPI.COMM_SELF, tolerance=1e-10)
+        state = solve_scene(
+            scene, MPI.COMM_SELF, partitions={"body": box_partition(mesh, boxes)}, tolerance=1e-10
+        )
         np.testing.assert_allclose(state.gather_von_mises("body"), stress, rtol=1e-8)
 
 
@@ -164,6 +166,6 @@ def test_without_a_temperature_nothing_thermal_is_compiled() -> None:
     mesh = box("hexahedron")
     body = Body(mesh, IsotropicElasticity(YOUNG, POISSON, EXPANSION))
     supports = [Support("body", "x0"), Support("body", "x1", (0.01, None, None))]
-    state = solve_scene(Scene({"body": body}, supports), None, MPI.COMM_SELF, tolerance=1e-10)
+    state = solve_scene(Scene({"body": body}, supports), MPI.COMM_SELF, tolerance=1e-10)
     names = [name[0] for name in state.torn.decomposition.forms.compiled]
     assert names == ["stiffness"]

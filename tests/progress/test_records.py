@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import solve_steps
+from fenics_contact.contact import ContactProblem, solve_steps
 from fenics_contact.geometry import box_partition
 from fenics_contact.optimize import BundleTrust, Record, minimize
 from fenics_contact.progress import LOGGER_NAME, Event, Kind, Task
@@ -52,7 +52,9 @@ def sheared(steps: int, solver: FaceNewton | Smalse) -> int:
     """Shear a block; return the products."""
     scene = sheared_block()
     cut = {"block": box_partition(scene.bodies["block"].mesh, (2, 1, 1))}
-    states = solve_steps(scene, shears()[:steps], cut, MPI.COMM_SELF, solver=solver)
+    states = solve_steps(
+        ContactProblem(scene, MPI.COMM_SELF, partitions=cut, solver=solver), shears()[:steps]
+    )
     return sum(state.solution.products for state in states)
 
 

@@ -80,7 +80,7 @@ def judge(seed: int) -> Verdict:
 
 def _ended(made: Sample) -> tuple[Outcome, str, int]:
     try:
-        state = solve_scene(made.scene, made.cut, MPI.COMM_SELF, tolerance=made.tolerance)
+        state = solve_scene(made.scene, MPI.COMM_SELF, partitions=made.cut, tolerance=made.tolerance)
     except ConvergenceError as error:
         return Outcome.NOT_CONVERGED, str(error), error.history[-1].products if error.history else 0
     except FenicsContactError as error:

@@ -177,7 +177,7 @@ def _torn(made: Sample) -> TornSystem:
     """Return bodies in one piece with the contact points whose gaps supports leave open to change."""
     scene = made.scene
     one = {name: np.zeros(body.mesh.n_cells, dtype=np.int64) for name, body in scene.bodies.items()}
-    torn = build_torn_system(scene, decompose(scene, one, MPI.COMM_SELF), start_geometry=False)
+    torn = build_torn_system(scene, decompose(scene, one, MPI.COMM_SELF), overlap=True)
     points = torn.points
     kept = np.flatnonzero(moving(points, Whole(scene)))
     names = [field.name for field in fields(points)]

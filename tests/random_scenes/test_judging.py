@@ -48,7 +48,7 @@ def stacked(push: float = 0.001) -> Sample:
 @pytest.fixture(scope="module")
 def state() -> State:
     made = stacked()
-    return solve_scene(made.scene, made.cut, MPI.COMM_SELF, tolerance=made.tolerance)
+    return solve_scene(made.scene, MPI.COMM_SELF, partitions=made.cut, tolerance=made.tolerance)
 
 
 def test_a_right_answer_has_nothing_wrong(state: State) -> None:
@@ -119,7 +119,7 @@ def test_gaps_to_the_facets_of_a_round_master_are_noticed() -> None:
     for geometry, noticed in (("best", False), ("reconstructed", True), ("faceted", True)):
         pair = replace(scene.contacts[0], geometry=geometry)
         made = Sample(-1, "ball", replace(scene, contacts=[pair]), None, 1e-8)
-        found = complaints(solve_scene(made.scene, None, MPI.COMM_SELF, tolerance=1e-8), made)
+        found = complaints(solve_scene(made.scene, MPI.COMM_SELF, tolerance=1e-8), made)
         assert any("a gap apart along the normal" in words for words in found) == noticed, (geometry, found)
 
 

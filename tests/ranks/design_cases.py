@@ -8,7 +8,7 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactResult, State
+from fenics_contact.contact import ContactProblem, ContactResult, State
 from fenics_contact.optimize import BundleTrust, minimize
 from fenics_contact.scene import ContactPair, Scene, Support, Surface
 from fenics_contact.shape import (
@@ -28,7 +28,7 @@ from tests.shape.blocks import side
 def design(comm: MPI.Comm, objective: Any = TotalPotential(), given: Scene | None = None) -> ShapeProblem:
     """A block on a floor whose lower side moves."""
     moves = SurfaceDesign("block", side(MESH, "z0"), (2, 2))
-    return ShapeProblem(given or held(), CUT, moves, objective, comm)
+    return ShapeProblem(ContactProblem(given or held(), comm, partitions=CUT), moves, objective)
 
 
 def held(**parts: Any) -> Scene:

@@ -74,4 +74,4 @@ def scene(mesh: BodyMesh = MESH, **parts: Any) -> Scene:
 
 
 def solve(comm: MPI.Comm, given: Scene, **more: Any) -> State:
-    return solve_scene(given, more.pop("partitions", CUT), comm, **more)
+    return solve_scene(given, comm, partitions=more.pop("partitions", CUT), **more)

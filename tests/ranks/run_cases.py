@@ -14,7 +14,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.contact import State, solve_steps
+from fenics_contact.contact import ContactProblem, State, solve_steps
 from fenics_contact.io import write_vtu
 from fenics_contact.outer import SceneResponse, served
 from fenics_contact.scene import LoadStep, Scene, Traction
@@ -37,31 +37,35 @@ def folder(comm: MPI.Comm) -> Path:
 def checkpoint_cannot_be_written(comm: MPI.Comm) -> None:
     """By rank 0, which writes; the others could."""
     path = "/proc/none/here.npz" if comm.rank == 0 else folder(MPI.COMM_SELF) / "here.npz"
-    solve_steps(scene(), STEPS, CUT, comm, checkpoint=Checkpoint(path))
+    solve_steps(ContactProblem(scene(), comm, partitions=CUT), STEPS, checkpoint=Checkpoint(path))
 
 
 @case
 def checkpoint_on_one_rank_only(comm: MPI.Comm) -> None:
     kept = Checkpoint(folder(comm) / "run.npz")
-    solve_steps(scene(), STEPS, CUT, comm, checkpoint=kept if is_last(comm) else None)
+    solve_steps(
+        ContactProblem(scene(), comm, partitions=CUT), STEPS, checkpoint=kept if is_last(comm) else None
+    )
 
 
 @case
 def steps_differ(comm: MPI.Comm) -> None:
     other = replace(STEPS[1], loads=[Traction("block", "z1", (0.0, 0.0, -3.0))])
-    solve_steps(scene(), [STEPS[0], other if is_last(comm) else STEPS[1]], CUT, comm)
+    solve_steps(
+        ContactProblem(scene(), comm, partitions=CUT), [STEPS[0], other if is_last(comm) else STEPS[1]]
+    )
 
 
 @case
 def a_step_is_missing(comm: MPI.Comm) -> None:
-    solve_steps(scene(), STEPS[: 1 if is_last(comm) else 2], CUT, comm)
+    solve_steps(ContactProblem(scene(), comm, partitions=CUT), STEPS[: 1 if is_last(comm) else 2])
 
 
 @case
 def a_step_is_refused(comm: MPI.Comm) -> None:
     surface = "nowhere" if is_last(comm) else "z1"
     step = LoadStep("step", loads=[Traction("block", surface, (0.0, 0.0, -1.0))])
-    solve_steps(scene(), [step], CUT, comm)
+    solve_steps(ContactProblem(scene(), comm, partitions=CUT), [step])
 
 
 def response(comm: MPI.Comm, quantity: Callable[[State], Any], build: Any = pressed) -> Any:

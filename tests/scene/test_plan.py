@@ -59,7 +59,7 @@ def pair(friction: Friction = None) -> list[ContactPair]:
 
 
 def solved(scene: Scene) -> State:
-    return solve_scene(scene, cuts(scene), MPI.COMM_SELF, tolerance=1e-6)
+    return solve_scene(scene, MPI.COMM_SELF, partitions=cuts(scene), tolerance=1e-6)
 
 
 GUIDE = [
@@ -120,10 +120,13 @@ def test_one_body_in_one_piece_is_factored() -> None:
     whole = {"lower": np.zeros(64, dtype=int)}
     plan = scene.plan(whole)
     assert (plan.solver, plan.coarse_motions, sum(plan.multipliers.values())) == (SolverKind.DIRECT, 0, 0)
-    state = solve_scene(scene, whole, MPI.COMM_SELF, tolerance=1e-10)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=whole, tolerance=1e-10)
     assert isinstance(state.system, DirectSystem)
     torn = solve_scene(
-        scene, {"lower": box_partition(scene.bodies["lower"].mesh, (2, 2, 1))}, MPI.COMM_SELF, tolerance=1e-10
+        scene,
+        MPI.COMM_SELF,
+        partitions={"lower": box_partition(scene.bodies["lower"].mesh, (2, 2, 1))},
+        tolerance=1e-10,
     )
     assert isinstance(torn.system, DualSystem)
     size = np.abs(torn.gather_displacement("lower")).max()
@@ -140,7 +143,7 @@ def test_a_body_that_supports_do_not_hold_alone_is_not_factored() -> None:
     scene = Scene({"lower": stack().bodies["lower"]}, rollers, [Traction("lower", "z1", (0, 0, -1))])
     whole = {"lower": np.zeros(64, dtype=int)}
     assert scene.plan(whole).solver is SolverKind.PROJECTED_CG
-    state = solve_scene(scene, whole, MPI.COMM_SELF, tolerance=1e-10)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=whole, tolerance=1e-10)
     assert state.energies.primal == pytest.approx(-0.5 * 1.0**2 / 1000.0, rel=1e-9)
 
 
@@ -176,7 +179,7 @@ def test_a_plane_scene_has_one_tangential_multiplier_a_node_and_three_motions_a_
     plan = scene.plan(cut)
     assert plan.coarse_motions == 6
     assert plan.multipliers["normal"] == plan.multipliers["tangential"] == 9
-    state = solve_scene(scene, cut, MPI.COMM_SELF, tolerance=1e-6)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=cut, tolerance=1e-6)
     assert state.counts["torn_unknowns"] == plan.unknowns == 2 * 2 * 25
     assert state.counts["tangential_multipliers"] == 9
 

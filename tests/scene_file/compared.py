@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene, solve_steps
+from fenics_contact.contact import ContactProblem, State, solve_scene, solve_steps
 from fenics_contact.geometry import LinkShape, block, box_lattice, box_partition, hemisphere, two_links
 from fenics_contact.optimize import BundleTrust, LinearConstraints, minimize
 from fenics_contact.scene import (
@@ -41,7 +41,7 @@ def two_blocks(comm: MPI.Comm) -> Sequence[State]:
         loads=[Traction("upper", "z1", (20.0, 0.0, -100.0))],
         contacts=[ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), Coulomb(0.3))],
     )
-    return [solve_scene(scene, None, comm, tolerance=1e-6)]
+    return [solve_scene(scene, comm, tolerance=1e-6)]
 
 
 def sheared_block(comm: MPI.Comm) -> Sequence[State]:
@@ -53,7 +53,7 @@ def sheared_block(comm: MPI.Comm) -> Sequence[State]:
     )
     path = np.concatenate([np.linspace(0.0, 1.5, 7), np.linspace(1.5, -1.5, 13)[1:]])[:10]
     steps = [LoadStep(f"{x}", supports=[Support("block", "z1", (x, 0.0, -0.5))]) for x in path]
-    return solve_steps(scene, steps, None, comm, tolerance=1e-6)
+    return solve_steps(ContactProblem(scene, comm, tolerance=1e-6), steps)
 
 
 def hertz(comm: MPI.Comm) -> Sequence[State]:
@@ -70,7 +70,7 @@ def hertz(comm: MPI.Comm) -> Sequence[State]:
         loads=[TotalForce("ball", "top", (0.0, 0.0, -3750.0))],
         contacts=[ContactPair(Surface("block", "z1"), Surface("ball", "contact"), discretisation="mortar")],
     )
-    return [solve_scene(scene, None, comm, tolerance=1e-6)]
+    return [solve_scene(scene, comm, tolerance=1e-6)]
 
 
 def chain_scene(comm: MPI.Comm) -> tuple[Scene, SurfaceDesign]:
@@ -119,7 +119,7 @@ def compare_optimisation(comm: MPI.Comm) -> int:
     found = file.shape_task().minimize()
     scene, design = chain_scene(comm)
     partitions = {name: box_partition(body.mesh, (4, 1, 1)) for name, body in scene.bodies.items()}
-    problem = ShapeProblem(scene, partitions, design, TotalPotential(), comm)
+    problem = ShapeProblem(ContactProblem(scene, comm, partitions=partitions), design, TotalPotential())
     start = np.zeros(problem.size)
     _, gradient = problem.volume(start)
     wanted = minimize(

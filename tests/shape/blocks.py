@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from fenics_contact.contact import ContactProblem
 from fenics_contact.geometry import BodyMesh, DesignSurface, block
 from fenics_contact.scene import (
     Body,
@@ -71,6 +72,5 @@ def designs_of(scene: Scene) -> tuple[SurfaceDesign, ...]:
 
 
 def problem(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF, **more: Any) -> Remembering:
-    return Remembering(
-        scene, partitions(scene), designs_of(scene), TotalPotential(), comm, solver=SOLVER, **more
-    )
+    contact = ContactProblem(scene, comm, partitions=partitions(scene), solver=SOLVER)
+    return Remembering(contact, designs_of(scene), TotalPotential(), **more)

@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
+from fenics_contact.contact import ContactProblem
 from fenics_contact.geometry import (
     PULL_AXIS,
     LinkShape,
@@ -85,7 +86,8 @@ def chain_problem(
 ) -> Remembering:
     scene = chain(friction, geometry)
     partitions = {name: box_partition(body.mesh, BOXES) for name, body in scene.bodies.items()}
-    return Remembering(scene, partitions, chain_designs(), TotalPotential(), comm, solver=SOLVER, **more)
+    contact = ContactProblem(scene, comm, partitions=partitions, solver=SOLVER)
+    return Remembering(contact, chain_designs(), TotalPotential(), **more)
 
 
 #: Friction law and step of the difference quotients. Where every point slips, friction alone holds link 2 and

@@ -64,7 +64,7 @@ def motion_case(comm: MPI.Comm) -> dict[str, Any]:
     """The extension of one displacement into each block, and of one derivative back."""
     moving = PROBLEMS["blocks, tetrahedra"](comm)
     rng, found = np.random.default_rng(2), {}
-    bodies = {mesh.body for mesh in moving.decomposition.meshes}
+    bodies = {mesh.body for mesh in moving.contact.decomposition.meshes}
     motion: HarmonicExtension
     for design, motion in zip(moving.designs, moving._motions, strict=True):
         given = rng.standard_normal((len(motion.moving), 3))

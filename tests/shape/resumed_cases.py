@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from fenics_contact.contact import ContactProblem
 from fenics_contact.geometry import box_partition
 from fenics_contact.optimize import BundleTrust, Checkpoint, LinearConstraints, Result, minimize
 from fenics_contact.scene import Coulomb
@@ -29,10 +30,17 @@ def posed(name: str, comm: MPI.Comm, tolerance: float | AdaptiveTolerance | None
     if name == "block":
         scene = block_on_floor(Coulomb(0.3), load=(0.35, 0.1, -2.0))
         judge = ContactForces(normal_forces)
-        return ShapeProblem(scene, partitions(scene), designs_of(scene), judge, comm, tolerance=tolerance)
+        return ShapeProblem(
+            ContactProblem(scene, comm, partitions=partitions(scene)),
+            designs_of(scene),
+            judge,
+            tolerance=tolerance,
+        )
     scene = chain(Coulomb(0.3), pull=80e3)
     cut = {body: box_partition(scene.bodies[body].mesh, BOXES) for body in scene.bodies}
-    return ShapeProblem(scene, cut, chain_designs(), TotalPotential(), comm, tolerance=tolerance)
+    return ShapeProblem(
+        ContactProblem(scene, comm, partitions=cut), chain_designs(), TotalPotential(), tolerance=tolerance
+    )
 
 
 def minimised(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactResult
+from fenics_contact.contact import ContactProblem, ContactResult
 from fenics_contact.geometry import DesignSurface, block
 from fenics_contact.optimize import BundleTrust, Checkpoint, Result, minimize
 from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, Scene, Support, Surface
@@ -56,7 +56,9 @@ def posed(
         return float(sign @ contact.normal_force), sign, np.zeros((len(sign), 2))
 
     design = seesaw(scene, net)
-    return ShapeProblem(scene, partitions(scene), design, ContactForces(force), comm, **more)
+    return ShapeProblem(
+        ContactProblem(scene, comm, partitions=partitions(scene), **more), design, ContactForces(force)
+    )
 
 
 def minimised(problem: ShapeProblem, checkpoint: Checkpoint | None = None, **limits: Any) -> Result:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.optimize import Kind, Result
 from fenics_contact.shape import AdaptiveTolerance, DesignPoint, ShapeProblem, WeakChoice
@@ -146,9 +147,12 @@ def at_switch(switch: str, tolerance: float, choice: WeakChoice) -> DesignPoint:
     """The design at which one point lies on a switch of the contact law, by its stress."""
     exact = SWITCHES[switch]().problem()
     problem = ShapeProblem(
-        exact.scene, partitions(exact.scene), exact.designs, objectives("block")["stress"], MPI.COMM_SELF,
-        choice=choice, tolerance=tolerance,
-    )  # fmt: skip
+        ContactProblem(exact.scene, MPI.COMM_SELF, partitions=partitions(exact.scene)),
+        exact.designs,
+        objectives("block")["stress"],
+        choice=choice,
+        tolerance=tolerance,
+    )
     return problem.evaluate(DESIGN)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact.contact import ContactProblem
 from fenics_contact.optimize import BundleTrust, Kind, LinearConstraints, Result, minimize
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import Coulomb
@@ -27,7 +28,11 @@ def block() -> ShapeProblem:
     scene = block_on_floor(Coulomb(0.3), load=(0.35, 0.1, -2.0))
     judge = ContactForces(normal_forces)
     solver = FaceNewton(tolerance=1e-9)
-    return ShapeProblem(scene, partitions(scene), designs_of(scene), judge, MPI.COMM_SELF, solver=solver)
+    return ShapeProblem(
+        ContactProblem(scene, MPI.COMM_SELF, partitions=partitions(scene), solver=solver),
+        designs_of(scene),
+        judge,
+    )
 
 
 def chain() -> ShapeProblem:

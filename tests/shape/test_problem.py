@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactResult
+from fenics_contact.contact import ContactProblem, ContactResult
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
 from fenics_contact.geometry import rectangle
 from fenics_contact.scene import Body, Coulomb, PlaneStrain, Scene, Surface, Tie
@@ -33,7 +33,11 @@ def solved() -> Remembering:
 
 def fresh(**more: object) -> ShapeProblem:
     designs = designs_of(scene())
-    return ShapeProblem(scene(), partitions(scene()), designs, TotalPotential(), MPI.COMM_SELF, **more)
+    return ShapeProblem(
+        ContactProblem(scene(), MPI.COMM_SELF, partitions=partitions(scene()), **more),
+        designs,
+        TotalPotential(),
+    )
 
 
 DESIGN = 0.01 * np.random.default_rng(1).standard_normal(12)
@@ -49,7 +53,9 @@ def test_a_design_of_the_wrong_shape_is_refused(shape: tuple[int, ...]) -> None:
 def test_a_design_of_an_unknown_body_is_refused() -> None:
     design = SurfaceDesign("middle", side(scene().bodies["upper"].mesh, "z0"), (2, 2))
     with pytest.raises(InvalidInputError, match=r"names body 'middle', the scene has \['lower', 'upper'\]"):
-        ShapeProblem(scene(), partitions(scene()), design, TotalPotential(), MPI.COMM_SELF)
+        ShapeProblem(
+            ContactProblem(scene(), MPI.COMM_SELF, partitions=partitions(scene())), design, TotalPotential()
+        )
 
 
 @pytest.mark.parametrize(("body", "face"), [("lower", "z0"), ("upper", "z1")])
@@ -58,7 +64,9 @@ def test_a_surface_that_is_held_or_loaded_may_not_move(body: str, face: str) -> 
     with pytest.raises(
         InvalidInputError, match=f"keep away from supports and loads, but .* of body '{body}'"
     ):
-        ShapeProblem(scene(), partitions(scene()), design, TotalPotential(), MPI.COMM_SELF)
+        ShapeProblem(
+            ContactProblem(scene(), MPI.COMM_SELF, partitions=partitions(scene())), design, TotalPotential()
+        )
 
 
 def test_an_integral_over_an_unknown_body_is_refused() -> None:
@@ -108,7 +116,9 @@ def test_two_designs_of_one_body_add_up() -> None:
     free = replace(scene(), loads=[])
     mesh = free.bodies["upper"].mesh
     both = tuple(SurfaceDesign("upper", side(mesh, face), (2, 2), 0.1) for face in ("z0", "z1"))
-    blocks = ShapeProblem(free, partitions(free), both, TotalPotential(), MPI.COMM_SELF)
+    blocks = ShapeProblem(
+        ContactProblem(free, MPI.COMM_SELF, partitions=partitions(free)), both, TotalPotential()
+    )
     lower, upper = np.concatenate([np.full(4, 0.05), np.zeros(4)]), np.concatenate([np.zeros(4), np.ones(4)])
     moved = [blocks.points_of(alpha)["upper"] - mesh.points for alpha in (lower, upper, lower + upper)]
     assert np.abs(moved[0]).max() == pytest.approx(0.05)
@@ -152,7 +162,11 @@ def test_a_surface_of_mortar_contact_may_not_move_and_one_by_nodes_may() -> None
     by_mortar = replace(scene(), contacts=[replace(scene().contacts[0], discretisation="mortar")])
     message = r"mortar contact pair 0 lies on 'z0' of body 'upper', of which \d+ nodes move: use discr"
     with pytest.raises(InvalidInputError, match=message):
-        ShapeProblem(by_mortar, partitions(scene()), designs_of(scene()), TotalPotential(), MPI.COMM_SELF)
+        ShapeProblem(
+            ContactProblem(by_mortar, MPI.COMM_SELF, partitions=partitions(scene())),
+            designs_of(scene()),
+            TotalPotential(),
+        )
     assert fresh().size == 12
 
 
@@ -161,10 +175,18 @@ def test_a_tied_surface_may_not_move() -> None:
     with pytest.raises(
         InvalidInputError, match=r"tie 0 lies on 'z0' of body 'upper', of which \d+ nodes move"
     ):
-        ShapeProblem(tied, partitions(scene()), designs_of(scene()), TotalPotential(), MPI.COMM_SELF)
+        ShapeProblem(
+            ContactProblem(tied, MPI.COMM_SELF, partitions=partitions(scene())),
+            designs_of(scene()),
+            TotalPotential(),
+        )
 
 
 def test_a_plane_scene_is_refused() -> None:
     plate = Scene({"plate": Body(rectangle((0, 0), (1, 1), (2, 2)), PlaneStrain(1.0, 0.3))})
     with pytest.raises(InvalidInputError, match="shape problems are three-dimensional, the scene is plane"):
-        ShapeProblem(plate, {"plate": np.zeros(4, dtype=int)}, (), TotalPotential(), MPI.COMM_SELF)
+        ShapeProblem(
+            ContactProblem(plate, MPI.COMM_SELF, partitions={"plate": np.zeros(4, dtype=int)}),
+            (),
+            TotalPotential(),
+        )

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import Status
+from fenics_contact.contact import ContactProblem, Status
 from fenics_contact.geometry import block
 from fenics_contact.qp import DualSolver, FaceNewton, Smalse
 from fenics_contact.scene import Body, ContactPair, Coulomb, Scene, Support, Surface, Tresca
@@ -58,10 +58,10 @@ def problem(name: str, tolerance: float) -> Remembering:
     case = CASES[name]
     scene = case.build()
     solver = FaceNewton() if tolerance == EXACT else case.solver
-    designs, cut = designs_of(scene), partitions(scene)
-    return Remembering(
-        scene, cut, designs, TotalPotential(), MPI.COMM_SELF, solver=solver, tolerance=tolerance
+    contact = ContactProblem(
+        scene, MPI.COMM_SELF, partitions=partitions(scene), solver=solver, tolerance=tolerance
     )
+    return Remembering(contact, designs_of(scene), TotalPotential())
 
 
 @cache

@@ -10,10 +10,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactResult, Status, find_state, solve_scene
-from fenics_contact.feti import decompose
+from fenics_contact.contact import ContactProblem, ContactResult, Status, solve_scene
 from fenics_contact.geometry import BodyMesh, block
-from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import Body, ContactPair, Coulomb, IsotropicElasticity, Scene, Support, Surface
 from fenics_contact.shape import ContactForces, Objective, WeakChoice, linearise_face
 from tests.contact.gallery import partitions, two_blocks
@@ -69,9 +67,8 @@ def test_weak_points_are_counted_and_their_branch_is_named(switch: str, choice: 
 @pytest.mark.parametrize("switch", SWITCHES)
 def test_weak_points_are_recognised_at_the_accuracy_of_the_state(switch: str, tolerance: float) -> None:
     exact = lines(switch)[WeakChoice.HELD].problem
-    decomposition = decompose(exact.scene, partitions(exact.scene), MPI.COMM_SELF)
-    scene = exact.scene_of(DESIGN)
-    state = find_state(scene, decomposition, solver=FaceNewton(tolerance=tolerance), sensitivity=True)
+    problem = ContactProblem(exact.scene, MPI.COMM_SELF, partitions=partitions(exact.scene))
+    state = problem.solve(exact.scene_of(DESIGN), tolerance=tolerance, sensitivity=True)
     weak = linearise_face(state, WeakChoice.HELD).weak
     assert (weak.contacts > 0, weak.discs > 0) == tuple(count > 0 for count in COUNTS[switch])
     assert weak.count < 6, "a state tells most points apart"
@@ -169,7 +166,7 @@ def test_points_over_facet_edges_are_counted() -> None:
             contacts=[ContactPair(Surface("upper", "z0"), Surface("lower", "z1"))],
         )
         cuts = {name: np.zeros(body.mesh.n_cells, dtype=int) for name, body in bodies.items()}
-        state = solve_scene(scene, cuts, MPI.COMM_SELF, tolerance=1e-6)
+        state = solve_scene(scene, MPI.COMM_SELF, partitions=cuts, tolerance=1e-6)
         assert state.contact.count(Status.SLIP) > 0
         edges.append(linearise_face(state, WeakChoice.RELEASED).weak.edges)
     assert edges == [9, 0]
@@ -193,7 +190,8 @@ def test_points_on_edges_are_those_that_project_on_one(cell: str, discretisation
     """Nodes project upright on the level face below; points of mortar contact stand for a mean of facets."""
     scene = two_blocks(Coulomb(0.38), cell)
     scene = replace(scene, contacts=[replace(scene.contacts[0], discretisation=discretisation)])
-    state = find_state(scene, decompose(scene, partitions(scene), MPI.COMM_SELF), sensitivity=True)
+    problem = ContactProblem(scene, MPI.COMM_SELF, partitions=partitions(scene))
+    state = problem.solve(sensitivity=True)
     places = state.contact_places[state.contact.normal_force > 0]
     on_edges = int(np.count_nonzero(distance_to_edges(places, scene.bodies["lower"].mesh, "z1") < 1e-9))
     assert 3 < on_edges < len(places) - 3

@@ -43,7 +43,7 @@ def plane_block(cell: str = "quadrilateral", friction: float = 0.4) -> State:
         [Support("block", "y1", (0.006, -0.02))],
         contacts=[ContactPair(Surface("block", "y0"), FLOOR, Coulomb(friction))],
     )
-    state = solve_scene(scene, None, MPI.COMM_SELF, tolerance=1e-6)
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-6)
     if friction:
         assert all(state.contact.count(status) > 0 for status in Status), "some status is missing"
     return state
@@ -57,7 +57,7 @@ def hung_block() -> State:
         [Support("block", "y0", (0.0, 0.01))],
         contacts=[ContactPair(Surface("block", "y1"), RigidPlane((0.0, 1.0), (0.0, -1.0)), Coulomb(0.3))],
     )
-    return solve_scene(scene, None, MPI.COMM_SELF, tolerance=1e-6)
+    return solve_scene(scene, MPI.COMM_SELF, tolerance=1e-6)
 
 
 def ring(inner: float, outer: float, around: int = 24) -> BodyMesh:
@@ -87,7 +87,7 @@ def pin_in_ring() -> State:
         ],
         contacts=[ContactPair(Surface("ring", "inner"), Surface("pin", "outer"), Coulomb(0.2))],
     )
-    state = solve_scene(scene, None, MPI.COMM_SELF, tolerance=1e-6)
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-6)
     assert np.all(state.contact.normal_force > 0)
     return state
 
@@ -108,4 +108,4 @@ def caged_block() -> State:
         [Support("block", "z1", (0.0, 0.0, -0.02))],
         contacts=[ContactPair(Surface("block", side), obstacle) for side, obstacle in obstacles.items()],
     )
-    return solve_scene(scene, None, MPI.COMM_SELF, tolerance=1e-6)
+    return solve_scene(scene, MPI.COMM_SELF, tolerance=1e-6)

@@ -20,7 +20,7 @@ from tests.contact.gallery import partitions, two_blocks
 def touching_blocks(cell: str = "hexahedron") -> State:
     """Two blocks in frictional contact, with open, sticking and slipping points."""
     scene = two_blocks(Coulomb(0.4), cell)
-    state = solve_scene(scene, partitions(scene), MPI.COMM_SELF, tolerance=1e-6)
+    state = solve_scene(scene, MPI.COMM_SELF, partitions=partitions(scene), tolerance=1e-6)
     assert all(state.contact.count(status) > 0 for status in Status), "some status is missing"
     return state
 

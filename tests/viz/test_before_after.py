@@ -41,7 +41,7 @@ def raised(dim: int) -> State:
     points[:, -1] += (RISE if dim == 2 else -RISE) * weight * along
     bodies[name] = replace(bodies[name], mesh=mesh.moved(points))
     cut = partitions(scene) if dim == 3 else None
-    return solve_scene(replace(scene, bodies=bodies), cut, MPI.COMM_SELF, tolerance=1e-6)
+    return solve_scene(replace(scene, bodies=bodies), MPI.COMM_SELF, partitions=cut, tolerance=1e-6)
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -134,7 +134,7 @@ RANKS = """
 
     comm, folder = MPI.COMM_WORLD, Path(sys.argv[1])
     scene = two_blocks(Coulomb(0.4))
-    state = solve_scene(scene, partitions(scene), comm, tolerance=1e-6)
+    state = solve_scene(scene, comm, partitions=partitions(scene), tolerance=1e-6)
     shown = interactive(state, path=folder / "state.html")
     sys.modules["trame_vtk.modules.vtk.serializers"] = None
     fallen_back = interactive(state)

@@ -154,7 +154,7 @@ RANKS = """
     from tests.viz.plane_states import plane_block
 
     comm, folder = MPI.COMM_WORLD, Path(sys.argv[1])
-    state = solve_scene(plane_block().scene, None, comm, tolerance=1e-6)
+    state = solve_scene(plane_block().scene, comm, tolerance=1e-6)
     plot_stress(state, folder / "stress.png", width=640, clim=(0, 4))
     plot_contact_pressure(state, folder / "pressure.png", width=640)
 """

@@ -25,7 +25,9 @@ WIDTH = 600
 
 def fixed_point() -> tuple[SolverStep, ...]:
     scene = two_blocks(Coulomb(0.4))
-    state = solve_scene(scene, partitions(scene), MPI.COMM_SELF, solver=FixedPoint(Smalse(tolerance=1e-3)))
+    state = solve_scene(
+        scene, MPI.COMM_SELF, partitions=partitions(scene), solver=FixedPoint(Smalse(tolerance=1e-3))
+    )
     return state.dual_solution.history
 
 
@@ -41,7 +43,9 @@ def test_the_history_of_a_fixed_point_counts_its_tresca_problems() -> None:
 def test_the_history_of_a_balanced_solve_counts_its_rounds() -> None:
     scene = two_blocks(Coulomb(0.4))
     tight = Balanced(share=1e-4)
-    steps = solve_scene(scene, partitions(scene), MPI.COMM_SELF, tolerance=tight).dual_solution.history
+    steps = solve_scene(
+        scene, MPI.COMM_SELF, partitions=partitions(scene), tolerance=tight
+    ).dual_solution.history
     outer = [step.outer for step in steps]
     assert sorted(set(outer)) == list(range(outer[-1] + 1))
     assert outer[-1] >= 1, "one round was enough: nothing was tested"
@@ -68,7 +72,10 @@ def test_the_history_of_a_failure_is_drawn() -> None:
     scene = two_blocks(Coulomb(0.4))
     with pytest.raises(ConvergenceError) as failure:
         solve_scene(
-            scene, partitions(scene), MPI.COMM_SELF, solver=FaceNewton(tolerance=1e-10, max_products=8)
+            scene,
+            MPI.COMM_SELF,
+            partitions=partitions(scene),
+            solver=FaceNewton(tolerance=1e-10, max_products=8),
         )
     assert failure.value.history
     assert plot_residuals(failure.value.history, width=WIDTH).png is not None

@@ -163,7 +163,7 @@ RANKS = """
 
     comm, folder = MPI.COMM_WORLD, Path(sys.argv[1])
     scene = two_blocks(Coulomb(0.4))
-    state = solve_scene(scene, partitions(scene), comm, tolerance=1e-6)
+    state = solve_scene(scene, comm, partitions=partitions(scene), tolerance=1e-6)
     drawn = [
         plot_stress(state, folder / "stress.png", width=320, clim=(0, 4)),
         plot_contact_pressure(state, folder / "pressure.png", width=320, clim=(0, 8)),

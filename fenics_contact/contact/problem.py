@@ -1,0 +1,226 @@
+"""The front door: a scene in, its equilibrium out, and that of the next load, geometry or slip after it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+
+from fenics_contact._libraries import MPI, check_not_forked
+from fenics_contact.contact.equilibrium import (
+    default_solver,
+    direct_state,
+    dual_state,
+    known_system,
+    state_of,
+)
+from fenics_contact.contact.held import check_held
+from fenics_contact.contact.state import State
+from fenics_contact.contact.stored import Stored, restored_solution, with_stored_slip
+from fenics_contact.contact.tolerance import Tolerance, checked_tolerance
+from fenics_contact.errors import collectively, together
+from fenics_contact.feti import Decomposition, DualSystem, TornSystem, build_torn_system, decompose
+from fenics_contact.feti.same_input import check_same_input
+from fenics_contact.qp import DualSolver
+from fenics_contact.scene import Scene, SolverKind, choose_solver
+from fenics_contact.timing import PhaseTimer
+
+
+class ContactProblem:
+    """Equilibria of a scene, one after another; each starts from the one before.
+
+    What a change leaves alone (topology, numbering, matrices, factors, contact points) is not computed again,
+    and the solver starts from the last contact forces. `LoadSequence` and `ShapeProblem` are built on it.
+
+    Attributes:
+        scene: The scene as it was given.
+        comm: Communicator over which the subdomains are spread.
+        solver: Dual solver with its tolerance; None: the one that `Scene.plan` names.
+        tolerance: Largest relative residual of answers, see `solve_scene`.
+        timer: Seconds of this rank by phase, over all answers.
+        state: The last answer, None before the first.
+
+    Example:
+        >>> problem = ContactProblem(scene, MPI.COMM_WORLD)  # doctest: +SKIP
+        >>> state = problem.solve()  # doctest: +SKIP
+        >>> pushed = problem.solve(replace(scene, loads=[push]), slip_from=state)  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        comm: MPI.Comm,
+        *,
+        partitions: Mapping[str, np.ndarray] | None = None,
+        solver: DualSolver | None = None,
+        tolerance: Tolerance = None,
+    ) -> None:
+        """Prepare; nothing is computed yet. Arguments as for `solve_scene`."""
+        self.scene, self.comm = scene, comm
+        self.solver, self.tolerance = solver, tolerance
+        self.timer = PhaseTimer()
+        self.state = None
+        self._partitions, self._decomposition = partitions, None
+
+    state: State | None
+    _decomposition: Decomposition | None
+
+    @property
+    def partitions(self) -> Mapping[str, np.ndarray]:
+        """Body name -> subdomain of every cell, numbered from 0 within the body. Collective on first use."""
+        if self._partitions is None:
+            with together(self.comm):
+                self._partitions = self.scene.partition(self.comm.size)
+        return self._partitions
+
+    @property
+    def decomposition(self) -> Decomposition:
+        """The subdomains of the scene. Collective on first use."""
+        return self._decomposed(self.scene)
+
+    def _decomposed(self, scene: Scene) -> Decomposition:
+        """Return the subdomains; those of the first scene that is solved, whose supports hold some nodes."""
+        if self._decomposition is None:
+            with self.timer.phase("decompose"):
+                self._decomposition = decompose(scene, self.partitions, self.comm)
+        return self._decomposition
+
+    @classmethod
+    def following(
+        cls, state: State, *, solver: DualSolver | None = None, tolerance: Tolerance = None
+    ) -> ContactProblem:
+        """Return the problem whose last answer is a state, with its subdomains."""
+        decomposition = state.torn.decomposition
+        problem = cls(
+            state.scene, decomposition.comm,
+            partitions=decomposition.partitions, solver=solver, tolerance=tolerance,
+        )  # fmt: skip
+        problem._decomposition, problem.state = decomposition, state
+        return problem
+
+    @collectively("ContactProblem.solve", lambda self, *_, **__: self.comm)
+    def solve(
+        self,
+        scene: Scene | None = None,
+        *,
+        start: State | Literal["last"] | None = "last",
+        slip_from: State | None = None,
+        tolerance: Tolerance = None,
+        overlap: bool = False,
+        sensitivity: bool = False,
+    ) -> State:
+        """Find an equilibrium. Collective.
+
+        Args:
+            scene: The scene with other loads, values of supports or coordinates; None: as it was given.
+            start: State of a neighbouring geometry or load to start from, None for none.
+            slip_from: State from which slip is measured, that of the last load step; by default the
+                undeformed one.
+            tolerance: Another one than the problem's.
+            overlap: Whether bodies may overlap before they are loaded, as those of a design do.
+            sensitivity: Whether derivatives of the state are wanted, which live on the dual system, and for
+                which the default tolerance is a number.
+
+        Raises:
+            InvalidInputError: If scene or partition cannot be used, or supports hold other components than
+                those of the scene that was solved first.
+            InfeasibleError: If nothing holds some body against its load.
+            ConvergenceError: If the solver does not reach its tolerance; the last answer stays what it was.
+        """
+        check_not_forked()
+        scene = self.scene if scene is None else scene
+        wanted = self.tolerance if tolerance is None else tolerance
+        previous = self.state if start == "last" else start
+        decomposition = self._decomposed(scene)
+        check_same_input(self.comm, scene, solver=self.solver, tolerance=wanted)
+        with together(self.comm):
+            wanted = checked_tolerance(wanted)
+            kind = choose_solver(scene, decomposition.tearing.n_subdomains, sensitivity=sensitivity)
+        with self.timer.phase("assemble"):
+            torn = self._torn(scene, previous, overlap)
+            if slip_from is not None:
+                earlier, moved = slip_from.torn, slip_from.torn_displacement
+                torn = torn.with_slip_from(earlier.relative(moved), earlier.sliding(moved))
+            same = previous is not None and torn.points is previous.torn.points
+            if previous is None or not same or torn.scene.loads != previous.scene.loads:
+                check_held(torn)
+        if self.solver is None and kind is SolverKind.DIRECT:
+            self.state = direct_state(torn, previous, self.timer)
+            return self.state
+        solver = self.solver or default_solver(kind)
+        # Derivatives belong to the statuses of single points, which a balanced state leaves open.
+        if wanted is None and (self.solver is not None or sensitivity):
+            wanted = solver.tolerance
+        self.state = dual_state(torn, previous, solver, wanted, self.timer)
+        return self.state
+
+    @collectively("ContactProblem.restore", lambda self, *_, **__: self.comm)
+    def restore(self, stored: Stored, scene: Scene | None = None) -> State:
+        """Build a state from what `stored_state` returned: one product instead of a solve. Collective.
+
+        Args:
+            stored: The arrays, found with the same subdomains on any number of ranks.
+            scene: The scene with coordinates, loads and supports of the state; None: as it was given.
+
+        Returns:
+            The state; its multiplier is that of the stored one, its residuals are recomputed. The last answer
+            stays what it was: assign the state to `state` to go on from there.
+
+        Raises:
+            InvalidInputError: If the arrays are those of another system.
+        """
+        scene = self.scene if scene is None else scene
+        if not stored:
+            torn = self._torn(scene, self.state, overlap=True)
+            return direct_state(torn, self.state, self.timer)
+        with self.timer.phase("assemble"):
+            torn = with_stored_slip(self._torn(scene, self.state, overlap=True), stored)
+        system = DualSystem(torn, self.timer, previous=known_system(self.state))
+        with self.timer.phase("state"):
+            solution = restored_solution(system, stored)
+            displacement = system.displacement(solution.multiplier, solution.alpha)
+        return state_of(system, solution, displacement, self.timer)
+
+    def _torn(self, scene: Scene, previous: State | None, overlap: bool) -> TornSystem:
+        return build_torn_system(
+            scene,
+            self._decomposed(scene),
+            overlap=overlap,
+            previous=None if previous is None else previous.torn,
+        )
+
+
+@collectively("solve_scene", lambda scene, comm, **_: comm)
+def solve_scene(
+    scene: Scene,
+    comm: MPI.Comm,
+    *,
+    partitions: Mapping[str, np.ndarray] | None = None,
+    solver: DualSolver | None = None,
+    tolerance: Tolerance = None,
+) -> State:
+    """Find the equilibrium of a scene. Collective on ``comm``.
+
+    Args:
+        scene: Bodies, supports, loads and contact pairs, the same on every rank.
+        comm: Communicator over which the subdomains are spread.
+        partitions: Body name -> subdomain of every cell, numbered from 0 within the body; None lets
+            `Scene.partition` cut the bodies into subdomains of a good size.
+        solver: Dual solver with its tolerance; `Scene.plan` tells which one is chosen if it is None.
+        tolerance: Largest relative residual of the answer, or `fenics_contact.accuracy.Balanced`, which
+            solves as well as the mesh deserves. By default the solver's own, and without a solver `Balanced`.
+            Give a number, 1e-6 or less, where the status of single contact points matters, or small
+            differences between states.
+
+    Raises:
+        InvalidInputError: If scene or partition cannot be used.
+        InfeasibleError: If nothing holds some body against its load.
+        ConvergenceError: If the solver does not reach its tolerance.
+
+    Example:
+        >>> state = solve_scene(scene, MPI.COMM_WORLD)  # doctest: +SKIP
+        >>> parts = {"block": box_partition(mesh, (2, 1, 1))}  # doctest: +SKIP
+        >>> state = solve_scene(scene, MPI.COMM_SELF, partitions=parts)  # doctest: +SKIP
+    """
+    return ContactProblem(scene, comm, partitions=partitions, solver=solver, tolerance=tolerance).solve()
