@@ -42,9 +42,8 @@ class ContactProblem:
         state: The last answer, None before the first.
 
     Example:
-        >>> problem = ContactProblem(scene, MPI.COMM_WORLD)  # doctest: +SKIP
-        >>> state = problem.solve()  # doctest: +SKIP
-        >>> pushed = problem.solve(replace(scene, loads=[push]), slip_from=state)  # doctest: +SKIP
+        >>> equilibria = ContactProblem(scene, comm, tolerance=1e-6)  # doctest: +SKIP
+        >>> first, again = equilibria.solve(), equilibria.solve(scene)  # doctest: +SKIP
     """
 
     def __init__(

@@ -57,7 +57,7 @@ def posed(
 
     design = seesaw(scene, net)
     return ShapeProblem(
-        ContactProblem(scene, comm, partitions=partitions(scene), **more), design, ContactForces(force)
+        ContactProblem(scene, comm, partitions=partitions(scene)), design, ContactForces(force), **more
     )
 
 
