@@ -8,23 +8,26 @@ distributed over the ranks of the problem's communicator.
 from __future__ import annotations
 
 from fenics_contact.qp.coarse import CoarseSpace
-from fenics_contact.qp.coupled import CoupledSystem
 from fenics_contact.qp.equilibrium import Equilibrium, find_equilibrium, require_equilibrium
 from fenics_contact.qp.face import Face, classify
-from fenics_contact.qp.face_newton import FaceNewton
-from fenics_contact.qp.face_system import FaceSystem, FaceSystems
+from fenics_contact.qp.face_newton import FaceNewton, ProjectedCG
+from fenics_contact.qp.face_system import CoupledSystem, FaceSystem, FaceSystems
 from fenics_contact.qp.feasible import FeasibleSet
-from fenics_contact.qp.gmres import projected_gmres
 from fenics_contact.qp.iterate import apply_unless_zero
+from fenics_contact.qp.krylov import FaceStep, Stop, projected_cg, projected_gmres
 from fenics_contact.qp.layout import ContactLayout
-from fenics_contact.qp.linear import ProjectedCG
 from fenics_contact.qp.mpgp import Mpgp
-from fenics_contact.qp.pcg import FaceStep, Stop, projected_cg
 from fenics_contact.qp.problem import CountedOperator, DualProblem
-from fenics_contact.qp.residual import Residuals, contact_step, measure
 from fenics_contact.qp.slip_law import Coulomb, SlipLaw, Tresca
 from fenics_contact.qp.smalse import Smalse
-from fenics_contact.qp.solution import DualSolution, SmalseMemory, SolverStep
+from fenics_contact.qp.solution import (
+    DualSolution,
+    Residuals,
+    SmalseMemory,
+    SolverStep,
+    contact_step,
+    measure,
+)
 from fenics_contact.qp.solve import DualSolver, solve
 
 __all__ = [

@@ -11,9 +11,8 @@ import scipy.sparse as sp
 
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.qp.gram import GramInverse
+from fenics_contact.qp.gram import GramInverse, SparseGramInverse
 from fenics_contact.qp.reductions import Vector, global_sum
-from fenics_contact.qp.sparse_gram import SparseGramInverse
 
 #: Up to so many rigid motions the small matrices are dense, and every rank factors them.
 DENSE_LIMIT = 600

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from fenics_contact.errors import ConvergenceError, InfeasibleError
-from fenics_contact.qp.certify import Certificate, certify
-from fenics_contact.qp.iterate import Iterate, Start
+from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError
+from fenics_contact.qp.iterate import Certificate, Iterate, Start, certify
 from fenics_contact.qp.newton_steps import NewtonSteps
 from fenics_contact.qp.not_held import HARDLY_WEDGED, FrictionAlone, require_contact
 from fenics_contact.qp.problem import CountedOperator, DualProblem
+from fenics_contact.qp.reductions import global_sum
 from fenics_contact.qp.rescue import DIVERGED, rescue
 from fenics_contact.qp.slip_law import SlipLaw
 from fenics_contact.qp.smalse import Smalse
@@ -192,3 +192,45 @@ def _sound(problem: DualProblem, best: Iterate, first: Iterate) -> Iterate:
     """
     lost = problem.preconditioner is not None and best.residuals.coarse > UNBALANCED
     return first if lost else best
+
+
+@dataclass(frozen=True)
+class ProjectedCG:
+    """Projected preconditioned conjugate gradients for gluing and Dirichlet multipliers alone.
+
+    Attributes:
+        tolerance: Every residual of `Residuals` ends below it.
+        max_products: Give up after that many F-products.
+        max_restarts: Runs after which to give up; more than one is needed only where rounding makes the
+            carried residual differ from the recomputed one.
+    """
+
+    tolerance: float = 1e-9
+    max_products: int = 5000
+    max_restarts: int = 10
+
+    def with_tolerance(self, tolerance: float) -> ProjectedCG:
+        """Return the solver with another tolerance."""
+        return replace(self, tolerance=tolerance)
+
+    def run(self, problem: DualProblem, law: SlipLaw, start: Start) -> DualSolution:
+        """Solve from ``start``; called by `solve`. Collective.
+
+        Raises:
+            InvalidInputError: There are contacts.
+            ConvergenceError: Restarts or products were used up; carries the history.
+        """
+        contacts = round(float(global_sum(problem.comm, problem.layout.n_contact)[0]))
+        if contacts:
+            raise InvalidInputError(
+                f"projected CG needs a problem without contact, got {contacts} contacts: use FaceNewton or "
+                "Smalse"
+            )
+        newton = FaceNewton(
+            tolerance=self.tolerance,
+            max_products=self.max_products,
+            max_steps=self.max_restarts,
+            forcing=0.0,
+            patience=self.max_restarts,
+        )
+        return newton.run(problem, law, start)

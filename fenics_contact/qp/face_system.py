@@ -1,16 +1,18 @@
-"""The linear system of one face: operator, coarse space and preconditioner restricted to it."""
+"""The linear system of one face: operator, coarse space, preconditioner, and the growth of friction."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 
 from fenics_contact._libraries import MPI
 from fenics_contact.qp.coarse import CoarseSpace, gram_matrix
 from fenics_contact.qp.face import Face
 from fenics_contact.qp.problem import DualProblem, FacePreconditioner, Operator
-from fenics_contact.qp.reductions import Vector, global_sum
+from fenics_contact.qp.reductions import Vector, global_max, global_sum
+from fenics_contact.qp.square_inverse import SquareInverse, invert_square
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,3 +96,187 @@ class FaceSystems:
         if isinstance(preconditioner, FacePreconditioner):
             preconditioner = preconditioner.on_face(face.restriction)
         return FaceSystem(problem.comm, face, self._operator, restricted, preconditioner)
+
+
+#: Motions that only offsets resist are to be told from those that nothing resists.
+LEAST_DAMPING = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class ObliqueProjector:
+    """v ↦ v − G_sᵀ (G_u G_sᵀ)⁻¹ G_u v: removes rigid motions, lands where G_u vanishes.
+
+    Attributes:
+        tested: G_s, this rank's columns on the tested basis, shape (m, n_face).
+        moving: Coarse space of G_u on the moving basis.
+        inverse: (G_u G_sᵀ)⁻¹.
+    """
+
+    tested: sp.csr_matrix
+    moving: CoarseSpace
+    inverse: SquareInverse
+
+    @classmethod
+    def build(cls, tested: sp.csr_matrix, moving: CoarseSpace) -> ObliqueProjector | None:
+        """Factor G_u G_sᵀ; None if it is singular: then the face does not hold every body. Collective."""
+        diagonal = global_sum(moving.comm, moving.matrix.power(2).sum(axis=1))
+        scale = 1.0 / np.sqrt(np.maximum(diagonal, np.finfo(float).tiny))
+        inverse = invert_square(moving.comm, (moving.matrix @ tested.T).tocsr(), scale)
+        return None if inverse is None else cls(tested, moving, inverse)
+
+    def solve(self, resultant: Vector) -> Vector:
+        """Return (G_u G_sᵀ)⁻¹ times a replicated array of shape (m,). Collective."""
+        return self.inverse.solve(resultant)
+
+    def coefficients(self, v: Vector) -> Vector:
+        """Return (G_u G_sᵀ)⁻¹ G_u v, replicated. Collective."""
+        return self.solve(self.moving.apply(v))
+
+    def __call__(self, v: Vector) -> Vector:
+        """Project. Collective."""
+        return v - self.tested.T @ self.coefficients(v)
+
+
+@dataclass(frozen=True, eq=False)
+class DampedEquilibrium:
+    """Keeps G Z y with little motion of the offsets of slipping discs that κ holds in place.
+
+    Next to no normal force, κ is a million times the flexibility of other rows and more. Moved as far as all
+    others to keep equilibrium, such offsets would drown the rest of a residual in κ times as much.
+
+    Attributes:
+        damping: D, that of the face down to `LEAST_DAMPING`, shape (n_face,), owned.
+        coarse: G Z D.
+    """
+
+    damping: Vector
+    coarse: CoarseSpace
+
+    def project(self, v: Vector) -> Vector:
+        """Return v − D² ZᵀGᵀ (G Z D² ZᵀGᵀ)⁻¹ G Z v. Collective."""
+        return self.damping * self.coarse.project(v / self.damping)
+
+    def bearing(self, resultant: Vector) -> Vector:
+        """Return the shortest y in the norm of D⁻¹ with G Z y = resultant. Collective."""
+        return self.damping * self.coarse.transpose(self.coarse.solve(resultant))
+
+
+@dataclass(frozen=True, eq=False)
+class CoupledSystem:
+    """(Wᵀ F Z + κ) y = Wᵀ d + (G W)ᵀ α on {G Z y = load}, unsymmetric where discs slip.
+
+    Newton's step tests with the face's own basis W = Z_s and moves the multiplier along Z = Z_u = Z_s +
+    growth:
+    a column of a normal multiplier carries the friction μ ŵ that slips with it. The adjoint swaps the two.
+
+    Attributes:
+        system: The symmetric system of the face: F, κ and the preconditioner.
+        tested: W, shape (n_owned, n_face).
+        moving: Z, shape (n_owned, n_face).
+        oblique: Projector that keeps G Z y and ignores what rigid motions absorb.
+        damped: How equilibrium is kept where offsets are held in place; None where it is kept by all alike.
+    """
+
+    system: FaceSystem
+    tested: sp.csr_matrix
+    moving: sp.csr_matrix
+    oblique: ObliqueProjector
+    damped: DampedEquilibrium | None = None
+
+    @classmethod
+    def build(
+        cls,
+        system: FaceSystem,
+        coarse: CoarseSpace,
+        tested: sp.csr_matrix,
+        moving: sp.csr_matrix,
+        *,
+        damped: bool = False,
+    ) -> CoupledSystem | None:
+        """Join both bases; None where the face does not hold every body. Collective.
+
+        Args:
+            system: The symmetric system of the face.
+            coarse: Equilibrium of all multipliers.
+            tested: W, shape (n_owned, n_face).
+            moving: Z, shape (n_owned, n_face).
+            damped: Whether to spare offsets that κ holds in place: for systems that must be solved to the
+                last digits, beside switches of the contact law as well.
+        """
+        oblique = ObliqueProjector.build(sp.csr_matrix(coarse.matrix @ tested), coarse.restricted(moving))
+        if oblique is None or not damped:
+            return None if oblique is None else cls(system, tested, moving, oblique)
+        damping = np.maximum(system.face.damping, LEAST_DAMPING)
+        spared = coarse.restricted(sp.csr_matrix(moving @ sp.diags(damping)))
+        return cls(system, tested, moving, oblique, DampedEquilibrium(damping, spared))
+
+    def operate(self, z: Vector, full: Vector) -> Vector:
+        """Return (Wᵀ F Z + κ) z, shape (n_face,), where full = F Z z."""
+        return self.tested.T @ full + self.system.face.curvature * z
+
+    def image(self, z: Vector, full: Vector) -> Vector:
+        """Return the projected image of z, shape (n_face,), where full = F Z z. Collective."""
+        return self.oblique(self.operate(z, full))
+
+    def precondition(self, residual: Vector) -> Vector:
+        """Apply the symmetric preconditioner and return to equilibrium, G Z z = 0. Collective."""
+        equilibrium = self.damped or self.oblique.moving
+        return equilibrium.project(self.system.precondition(residual))
+
+    def balanced(self, y: Vector, load: Vector) -> Vector:
+        """Return y moved so that G Z y = load, shape (n_face,). Collective."""
+        missing = self.oblique.moving.apply(y) - load
+        if self.damped is not None:
+            return y - self.damped.bearing(missing)
+        return y - self.oblique.tested.T @ self.oblique.solve(missing)
+
+
+@dataclass(frozen=True, eq=False)
+class CoupledFace:
+    """A Newton step with growing friction: λ = fixed + Z_u y.
+
+    Attributes:
+        coupled: Its linear system.
+        coarse: Equilibrium of all multipliers, G λ = e.
+        fixed: The part of the multiplier that does not grow, owned.
+    """
+
+    coupled: CoupledSystem
+    coarse: CoarseSpace
+    fixed: Vector
+
+    def enter(self, multiplier: Vector) -> Vector:
+        """Return the multiplier on the face and in equilibrium that shares λ's coordinates. Collective."""
+        load = self.coarse.load - self.coarse.apply(self.fixed)
+        y = self.coupled.balanced(self.coupled.system.face.restrict(multiplier), load)
+        return self.fixed + self.coupled.moving @ y
+
+    def advance(self, step: Vector) -> Vector:
+        """Return how the multiplier moves, Z_u δ, owned, for a step δ in face coordinates."""
+        return self.coupled.moving @ step
+
+    def motions(self, gradient: Vector) -> Vector:
+        """Return α, the rigid motions of a gradient on the face, replicated. Collective."""
+        return self.coupled.oblique.coefficients(gradient)
+
+
+def couple(system: FaceSystem, coarse: CoarseSpace, growth: Vector, multiplier: Vector) -> CoupledFace | None:
+    """Add the growth of friction to a face system. Collective.
+
+    Args:
+        system: The symmetric system of the face.
+        coarse: Equilibrium of all multipliers.
+        growth: dΨ/dλ_N of each disc, shape (n_friction,), owned.
+        multiplier: λ at which the face was found, owned.
+
+    Returns:
+        The coupled face; None where no disc grows, or where the face does not hold every body.
+    """
+    face = system.face
+    if global_max(system.comm, float(np.any(growth[face.slip] > 0.0))) == 0.0:
+        return None
+    coupling = face.growth(growth)
+    coupled = CoupledSystem.build(system, coarse, face.restriction, (face.restriction + coupling).tocsr())
+    if coupled is None:
+        return None
+    return CoupledFace(coupled, coarse, face.fixed - coupling @ np.maximum(face.restrict(multiplier), 0.0))

@@ -1,12 +1,15 @@
-"""Inverse of a small symmetric positive semidefinite matrix, by Cholesky where it can be trusted."""
+"""Inverses of symmetric positive semidefinite matrices that survive a rank deficiency, dense or sparse."""
 
 from __future__ import annotations
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse as sp
 from scipy.linalg import lapack
 
-from fenics_contact.qp.reductions import Vector
+from fenics_contact._libraries import MPI
+from fenics_contact.linalg import SharedFactor
+from fenics_contact.qp.reductions import Vector, global_sum
 
 RANK_TOLERANCE = 1e-12
 
@@ -58,3 +61,57 @@ def _trusted_cholesky(matrix: Vector) -> Vector | None:
         return None
     reciprocal_condition, _ = lapack.dpocon(factor, np.abs(matrix).sum(axis=0).max(), uplo="L")
     return factor if reciprocal_condition > RANK_TOLERANCE else None
+
+
+#: Vectors of the first search for null vectors: a floating body gives six.
+FIRST_BLOCK = 8
+
+
+class SparseGramInverse:
+    """Generalised inverse of S = Σ S_rank that survives a rank deficiency; see `GramInverse`.
+
+    Null vectors are found by inverse iteration with a few vectors: of a matrix that is singular to
+    rounding they come out at once.
+
+    Attributes:
+        rank: Number of independent rows.
+        null_space: Columns z with S z = 0, shape (m, m - rank): motions that no multiplier resists.
+    """
+
+    def __init__(self, comm: MPI.Comm, share: sp.csr_matrix) -> None:
+        """Factor the sum of the ranks' shares, each of shape (m, m). Collective on ``comm``."""
+        diagonal = global_sum(comm, share.diagonal())
+        floor = RANK_TOLERANCE**2 * max(diagonal.max(initial=0.0), np.finfo(float).tiny)
+        scale = 1.0 / np.sqrt(np.where(diagonal > floor, diagonal, 1.0))
+        self._factor = SharedFactor(comm, share, scale)
+        self._scale = scale
+        self._null = self._null_vectors()
+        self.rank = len(diagonal) - self._null.shape[1]
+        self.null_space = scale[:, None] * self._null
+
+    def solve(self, right_side: Vector) -> Vector:
+        """Apply the generalised inverse to a replicated array of shape (m,). Collective."""
+        if self._null.shape[1] == 0:
+            return self._factor.solve(right_side)
+        scaled = self._scale * right_side
+        scaled = scaled - self._null @ (self._null.T @ scaled)
+        found = self._factor.solve(scaled / self._scale) / self._scale
+        return self._scale * (found - self._null @ (self._null.T @ found))
+
+    def _null_vectors(self) -> Vector:
+        """Return orthonormal null vectors of the scaled matrix. Collective."""
+        m = len(self._scale)
+        count = min(FIRST_BLOCK, m)
+        while True:
+            start = np.random.default_rng(0).standard_normal((m, count))
+            basis, _ = np.linalg.qr(self._invert_scaled(start))
+            inverse = basis.T @ self._invert_scaled(basis)
+            largest, turn = np.linalg.eigh(0.5 * (inverse + inverse.T))
+            null = largest > 1.0 / RANK_TOLERANCE
+            if not null.all() or count == m:
+                return np.asarray(basis @ turn[:, null])
+            count = min(2 * count, m)
+
+    def _invert_scaled(self, columns: Vector) -> Vector:
+        solved = [self._factor.solve(column / self._scale, refine=False) for column in columns.T]
+        return np.column_stack(solved) / self._scale[:, None]

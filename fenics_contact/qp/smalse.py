@@ -9,15 +9,13 @@ import numpy as np
 
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.qp.augmented import AugmentedLagrangian
-from fenics_contact.qp.certify import certify, count_status
 from fenics_contact.qp.feasible import FeasibleSet
-from fenics_contact.qp.iterate import Start
+from fenics_contact.qp.iterate import Start, certify, count_status
 from fenics_contact.qp.mpgp import Mpgp, minimise
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector
-from fenics_contact.qp.residual import Residuals, measure
 from fenics_contact.qp.slip_law import SlipLaw, Tresca
-from fenics_contact.qp.solution import DualSolution, SmalseMemory, SolverStep
+from fenics_contact.qp.solution import DualSolution, Residuals, SmalseMemory, SolverStep, measure
 
 #: A lack in the rise of the Lagrangian below this fraction of it says nothing about M.
 ROUNDING = 1e-13

@@ -2,11 +2,145 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from fenics_contact.qp.feasible import FeasibleSet
+from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.problem import DualProblem
-from fenics_contact.qp.reductions import Vector
-from fenics_contact.qp.residual import Residuals
+from fenics_contact.qp.reductions import Vector, global_max, global_sum
+
+FORCE_FLOOR = 1e-10
+#: Errors of contact forces below this fraction of the largest of all forces are rounding, and count as none.
+ROUNDING = 1e-14  # the same for jumps beside those that the loads alone would open
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Relative residuals of a multiplier λ with r = F λ − d − Gᵀα; all are zero at the solution.
+
+    Attributes:
+        natural: ‖λ − P_Λ(λ − ρ r)‖ over the contact rows, relative to ‖λ_N‖.
+        gluing: ‖r‖ over the equality rows, relative to the displacements that cancel there,
+            max(‖(F λ − d)_E‖, ‖d_E‖), or of an answer to the displacements themselves, if they are smaller.
+        coarse: Distance of λ from equilibrium, ‖Gᵀ(G Gᵀ)⁻¹(G λ − e)‖, relative to ‖λ‖.
+        violation: Largest violation of a bound or disc, relative to ‖λ_N‖.
+        force_scale: The force by which `natural` and `violation` were divided.
+        gluing_scale: The displacement by which `gluing` was divided.
+    """
+
+    natural: float
+    gluing: float
+    coarse: float
+    violation: float
+    force_scale: float
+    gluing_scale: float
+
+    @property
+    def worst(self) -> float:
+        """The largest residual, which steers the iteration: the natural one is at least the violation."""
+        return max(self.natural, self.gluing, self.coarse)
+
+    @property
+    def size(self) -> float:
+        """√(natural² + gluing²), the number that the solution of a face predicts."""
+        return float(np.hypot(self.natural, self.gluing))
+
+    def worst_beside(self, other: Residuals) -> float:
+        """The worst residual in the smaller scales of two: only such numbers tell which iterate is better.
+
+        A huge wrong force divided by itself is 1, and so is the missing part of one that is nearly right.
+        """
+        force = min(self.force_scale, other.force_scale) or max(self.force_scale, other.force_scale)
+        gluing = min(self.gluing_scale, other.gluing_scale) or max(self.gluing_scale, other.gluing_scale)
+        natural = _ratio(self.natural * self.force_scale, force)
+        return max(natural, _ratio(self.gluing * self.gluing_scale, gluing), self.coarse)
+
+    def beside(self, reach: float) -> Residuals:
+        """Return the residuals with the gluing residual relative to displacements that are smaller."""
+        if not 0.0 < reach < self.gluing_scale:
+            return self
+        return replace(self, gluing=self.gluing * self.gluing_scale / reach, gluing_scale=reach)
+
+    def within(self, tolerance: float) -> bool:
+        """Tell whether every residual is at most ``tolerance``; NaN is not."""
+        return all(value <= tolerance for value in (self.natural, self.gluing, self.coarse, self.violation))
+
+
+def contact_step(layout: ContactLayout, diagonal: Vector) -> Vector:
+    """Return ρ = 1/diag F on the contact rows, one value a disc, and 0 on equality rows, owned."""
+    step = np.zeros(layout.size)
+    step[layout.normal] = 1.0 / diagonal[layout.normal]
+    step[layout.tangential] = 1.0 / diagonal[layout.tangential].mean(axis=1, keepdims=True)
+    return step
+
+
+def measure(
+    problem: DualProblem, feasible: FeasibleSet, multiplier: Vector, product: Vector, residual: Vector
+) -> Residuals:
+    """Compute all residuals. Collective.
+
+    Contact forces below 1e-10 of ‖λ‖ count as none, so that a body that merely touches does not keep the
+    iteration alive, and so do forces below 1e-10 of those that would close the gaps, ρ‖d‖: rounding of r
+    gives rise to such. No force closes gaps between supports: rows that these determine alone have a ρ that
+    stands for no stiffness, and excuse no error but their own. Where no normal force acts at all, ‖λ‖ over
+    all contact rows stands in for ‖λ_N‖.
+
+    Args:
+        problem: The dual problem.
+        feasible: Λ(Ψ).
+        multiplier: λ, owned.
+        product: F λ, owned.
+        residual: r = F λ − d − Gᵀα, owned.
+    """
+    layout, equality, contact = problem.layout, problem.layout.equality, problem.layout.contact
+    step = contact_step(layout, problem.diagonal)
+    mapped = feasible.project(multiplier - step * residual)
+    free, error, needed = ~problem.between_supports, multiplier - mapped, step * problem.rhs
+    sums = global_sum(
+        problem.comm,
+        *(_square(x[layout.normal]) for x in (multiplier, mapped)),
+        *(_square(x[contact]) for x in (multiplier, mapped)),
+        *(_square(x[equality]) for x in (residual, product - problem.rhs, problem.rhs)),
+        _square(multiplier),
+        _square(problem.rhs),
+        *(_square(x[rows]) for x in (error, needed) for rows in (free, ~free)),
+        problem.coarse.local(multiplier),
+    )
+    normal, normal_mapped, force, force_mapped = np.sqrt(sums[:4])
+    jump, cancelled, load, everything, rhs = np.sqrt(sums[4:9])
+    distance, distance_held, closing, closing_held = np.sqrt(sums[9:13])
+    unbalanced = problem.coarse.norm(sums[13:] - problem.coarse.load)
+    force_scale = max(normal, normal_mapped)
+    if force_scale <= FORCE_FLOOR * max(force, force_mapped):
+        force_scale = max(force, force_mapped)
+    force_scale = max(force_scale, FORCE_FLOOR * max(everything, closing))
+    gluing_scale = max(cancelled, load) or rhs
+    rounding = ROUNDING * max(everything, closing)
+    distance = np.hypot(
+        distance if distance > rounding else 0.0,
+        distance_held if distance_held > max(rounding, ROUNDING * closing_held) else 0.0,
+    )
+    violation = global_max(problem.comm, feasible.violation(multiplier))
+    return Residuals(
+        natural=_ratio(distance, force_scale),
+        gluing=_ratio(jump if jump > ROUNDING * load else 0.0, gluing_scale),
+        coarse=_ratio(unbalanced, max(everything, problem.coarse.norm(problem.coarse.load))),
+        violation=_ratio(violation if violation > rounding else 0.0, force_scale),
+        force_scale=force_scale,
+        gluing_scale=gluing_scale,
+    )
+
+
+def _square(x: Vector) -> float:
+    return float(x @ x)
+
+
+def _ratio(value: float, scale: float) -> float:
+    if value == 0.0:
+        return 0.0
+    return float(value / scale) if scale > 0.0 else float(np.inf)
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,16 @@ import numpy as np
 
 from fenics_contact.errors import ConvergenceError, InvalidInputError, together
 from fenics_contact.progress import Task
-from fenics_contact.qp.certify import Certificate, count_status
 from fenics_contact.qp.equilibrium import require_equilibrium
-from fenics_contact.qp.iterate import Start, answer_at, apply_unless_zero, iterate_at, iterate_fitted
+from fenics_contact.qp.iterate import (
+    Certificate,
+    Start,
+    answer_at,
+    apply_unless_zero,
+    count_status,
+    iterate_at,
+    iterate_fitted,
+)
 from fenics_contact.qp.problem import CountedOperator, DualProblem
 from fenics_contact.qp.reductions import Vector
 from fenics_contact.qp.slip_law import Coulomb, SlipLaw, Tresca

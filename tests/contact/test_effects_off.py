@@ -14,7 +14,7 @@ from mpi4py import MPI
 from fenics_contact.contact import ContactProblem, LoadSequence, State, held, solve_scene
 from fenics_contact.feti import TornSystem, contact_search, dual, mortar, torn
 from fenics_contact.geometry import block, box_partition
-from fenics_contact.qp import coupled, face_newton, slip_law
+from fenics_contact.qp import face_newton, face_system, slip_law
 from fenics_contact.scene import (
     Body,
     BodyForce,
@@ -45,7 +45,7 @@ PARTS: dict[str, tuple[Any, str]] = {
     "mortar": (mortar, "mortar_coupling"),
     "balance of floating bodies": (held, "_check_balance"),
     "slip bounds that follow": (slip_law.Coulomb, "bound"),
-    "friction that grows in a step": (coupled.CoupledSystem, "__init__"),
+    "friction that grows in a step": (face_system.CoupledSystem, "__init__"),
     "slip of earlier steps": (TornSystem, "with_slip_from"),
 }
 LINEAR = {"multipliers", "coarse problem", "preconditioner", "faces"}

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from fenics_contact.contact import solve_scene
 from fenics_contact.linalg import SharedFactor, shared_factor
 from fenics_contact.qp import FaceNewton, coarse
-from fenics_contact.qp.sparse_gram import SparseGramInverse
+from fenics_contact.qp.gram import SparseGramInverse
 from fenics_contact.scene import Coulomb
 from tests.contact.gallery import partitions, two_blocks
 

@@ -154,7 +154,7 @@ MUTATIONS = (
     ),
     Mutation(
         "an answer need not be in balance",
-        "qp/residual.py",
+        "qp/solution.py",
         "for value in (self.natural, self.gluing, self.coarse, self.violation))",
         "for value in (self.natural, self.gluing, self.violation))",
         ("tests/qp/test_solve.py::test_one_large_residual_keeps_an_answer_from_being_within_a_tolerance",),

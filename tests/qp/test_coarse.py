@@ -8,8 +8,7 @@ from mpi4py import MPI
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.qp import CoarseSpace, ContactLayout, FaceSystem, classify
 from fenics_contact.qp import coarse as coarse_module
-from fenics_contact.qp.gram import GramInverse
-from fenics_contact.qp.sparse_gram import SparseGramInverse
+from fenics_contact.qp.gram import GramInverse, SparseGramInverse
 from fenics_contact.qp.square_inverse import invert_square
 
 

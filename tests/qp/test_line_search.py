@@ -9,9 +9,9 @@ import pytest
 
 from fenics_contact.qp import FaceNewton, Tresca, solve
 from fenics_contact.qp.iterate import Iterate, iterate_at
-from fenics_contact.qp.line_search import damp, descend
+from fenics_contact.qp.newton_steps import damp, descend
 from fenics_contact.qp.problem import CountedOperator
-from fenics_contact.qp.proximal import ProximalPoint
+from fenics_contact.qp.rescue import ProximalPoint
 from tests.qp.published_friction import CYCLING, published
 from tests.qp.random_problems import DenseProblem, random_problem
 

@@ -7,8 +7,8 @@ from mpi4py import MPI
 from scipy.optimize import nnls
 
 from fenics_contact.qp import ContactLayout, FeasibleSet, Mpgp
+from fenics_contact.qp.augmented import largest_eigenvalue
 from fenics_contact.qp.mpgp import BoundedQuadratic, minimise
-from fenics_contact.qp.norm_estimate import largest_eigenvalue
 from tests.qp.random_problems import conic_solution, count_statuses, random_problem
 
 

@@ -12,11 +12,9 @@ from fenics_contact.qp import FaceNewton, Tresca, contact_step, measure, solve
 from fenics_contact.qp.face_newton import slides
 from fenics_contact.qp.iterate import Start, iterate_at
 from fenics_contact.qp.problem import CountedOperator
-from fenics_contact.qp.proximal import ProximalPoint
-from fenics_contact.qp.rescue import rescue
-from fenics_contact.qp.residual import Residuals
+from fenics_contact.qp.rescue import ProximalPoint, rescue
 from fenics_contact.qp.slip_law import Coulomb
-from fenics_contact.qp.solution import SolverStep
+from fenics_contact.qp.solution import Residuals, SolverStep
 from tests.qp.test_coulomb import coulomb_violations
 from tests.qp.torn_bricks import Bricks, torn_problem
 
