@@ -14,7 +14,7 @@ from benchmarks.cases.chain import cold_state
 from benchmarks.cases.measuring import run_case, state_record
 from fenics_contact.contact import State
 from fenics_contact.qp import CountedOperator, FaceSystems, Stop, classify, contact_step, projected_cg
-from fenics_contact.qp.newton_steps import residual_weights
+from fenics_contact.qp.forcing import residual_weights
 
 MAX_ITERATIONS = 2000
 

@@ -51,17 +51,17 @@ class Statuses:
 
     @cached_property
     def coarse(self) -> CoarseSpace:
-        """Equilibrium by the free rows alone, in evened multipliers. Collective on first use."""
-        return self.problem.evened.coarse.restricted(self.free)
+        """Equilibrium by the free rows alone, in scaled multipliers. Collective on first use."""
+        return self.problem.scaled_problem.coarse.restricted(self.free)
 
     def spaces(self) -> Iterator[tuple[sp.csr_matrix, CoarseSpace]]:
         """Bases of rows with their equilibrium: of the free rows, of all contacts that press, of all."""
         yield self.free, self.coarse
-        layout, evened = self.problem.layout, self.problem.evened.coarse
+        layout, coarse = self.problem.layout, self.problem.scaled_problem.coarse
         nowhere = np.zeros_like(self.slip)
         pressing = basis(layout, self.closed, self.stick | self.slip, nowhere, self.directions)
-        yield pressing, evened.restricted(pressing)
-        yield sp.identity(layout.size, format="csr"), evened
+        yield pressing, coarse.restricted(pressing)
+        yield sp.identity(layout.size, format="csr"), coarse
 
     def settled(self, residual: Vector) -> Vector:
         """Return r without the rigid motions that fit it best on the free rows. Collective."""

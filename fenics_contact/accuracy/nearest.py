@@ -67,7 +67,7 @@ class _Search:
 
     def __init__(self, problem: DualProblem, feasible: FeasibleSet, start: Vector) -> None:
         self._problem, self._feasible, self._start = problem, feasible, start
-        self._coarse = problem.evened.coarse
+        self._coarse = problem.scaled_problem.coarse
         self._factor = evening(problem)
         self._size = problem.norm(start) or 1.0
 

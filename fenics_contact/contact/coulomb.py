@@ -13,7 +13,6 @@ from fenics_contact.qp import (
     DualProblem,
     DualSolution,
     DualSolver,
-    SlipLaw,
     SolverStep,
     find_equilibrium,
     measure,
@@ -63,17 +62,15 @@ class FixedPoint:
         """Return the fixed point around its solver with another tolerance."""
         return replace(self, solver=self.solver.with_tolerance(tolerance))
 
-    def run(self, problem: DualProblem, law: SlipLaw, start: Start) -> DualSolution:
+    def run(self, problem: DualProblem, start: Start) -> DualSolution:
         """Solve from ``start``; called by `fenics_contact.qp.solve`. Collective.
 
         Raises:
             InfeasibleError: If a Tresca problem on the way has no equilibrium.
             ConvergenceError: If the fixed point was not reached; carries the history of all steps.
         """
-        slip_bound, sequence = (
-            _first_slip_bound(problem, law, start),
-            SlipBoundSequence(problem.comm, self.damping),
-        )
+        slip_bound = _first_slip_bound(problem, start)
+        sequence = SlipBoundSequence(problem.comm, self.damping)
         earlier: DualSolution | np.ndarray | None = None if start.cold else start.iterate.multiplier
         history: list[SolverStep] = []
         products, reached = start.operator.products, np.inf
@@ -89,7 +86,7 @@ class FixedPoint:
                 ) from failure
             history = _continued(history, solution.history, products)
             products += solution.products
-            solution = _judged(solution, law)
+            solution = _under_own_bound(problem, solution)
             reached = solution.natural_residual
             slip_bound, note = sequence.advance(slip_bound, solution.slip_bound, reached)
             history[-1] = replace(history[-1], note=f"{history[-1].note}; {note}")
@@ -124,21 +121,20 @@ class FixedPoint:
         )
 
 
-def _first_slip_bound(problem: DualProblem, law: SlipLaw, start: Start) -> np.ndarray:
+def _first_slip_bound(problem: DualProblem, start: Start) -> np.ndarray:
     """Return slip bounds for which the first Tresca problem has an equilibrium. Collective.
 
     Without friction, the obvious choice, nothing may hold the bodies.
     """
     if not start.cold:
-        return law.bound(start.iterate.multiplier)
-    return FIRST_MARGIN * law.bound(find_equilibrium(problem, law).multiplier)
+        return problem.law.bound(start.iterate.multiplier)
+    return FIRST_MARGIN * problem.law.bound(find_equilibrium(problem).multiplier)
 
 
-def _judged(solution: DualSolution, law: SlipLaw) -> DualSolution:
+def _under_own_bound(problem: DualProblem, solution: DualSolution) -> DualSolution:
     """Return a Tresca solution with slip bound and residuals of its own normal forces. Collective."""
-    feasible = law.feasible(solution.multiplier)
-    residuals = measure(solution.problem, feasible, solution.multiplier, solution.product, solution.residual)
-    return replace(solution, slip_bound=feasible.slip_bound, residuals=residuals)
+    residuals = measure(problem, solution.multiplier, solution.product, solution.residual)
+    return replace(solution, slip_bound=problem.law.bound(solution.multiplier), residuals=residuals)
 
 
 def _continued(history: Sequence[SolverStep], steps: Sequence[SolverStep], products: int) -> list[SolverStep]:

@@ -54,7 +54,7 @@ def restored_solution(system: DualSystem, stored: Stored) -> DualSolution:
     problem, law = system.problem, _law(system)
     multiplier, motion = stored["multiplier"][system.torn.numbering.owned], stored["motion"]
     operator = CountedOperator(problem.operator)
-    iterate = iterate_at(problem, law, multiplier, operator(multiplier), motion)
+    iterate = iterate_at(problem.with_law(law), multiplier, operator(multiplier), motion)
     return DualSolution(
         problem=problem,
         multiplier=multiplier,

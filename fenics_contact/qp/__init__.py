@@ -17,7 +17,7 @@ from fenics_contact.qp.iterate import apply_unless_zero
 from fenics_contact.qp.krylov import FaceStep, Stop, projected_cg, projected_gmres
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.mpgp import Mpgp
-from fenics_contact.qp.problem import CountedOperator, DualProblem
+from fenics_contact.qp.problem import CountedOperator, DualProblem, Scaling
 from fenics_contact.qp.slip_law import Coulomb, SlipLaw, Tresca
 from fenics_contact.qp.smalse import Smalse
 from fenics_contact.qp.solution import (
@@ -49,6 +49,7 @@ __all__ = [
     "Mpgp",
     "ProjectedCG",
     "Residuals",
+    "Scaling",
     "SlipLaw",
     "Smalse",
     "SmalseMemory",

@@ -9,7 +9,6 @@ import numpy as np
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_sum
-from fenics_contact.qp.slip_law import SlipLaw
 
 #: A thin plate clamped at one edge needs as large a force as its length is thicknesses.
 LARGEST_FORCE = 1e7
@@ -32,7 +31,7 @@ class Equilibrium:
 
 
 def find_equilibrium(
-    problem: DualProblem, law: SlipLaw, *, tolerance: float = 1e-4, max_iterations: int = 2000
+    problem: DualProblem, *, tolerance: float = 1e-4, max_iterations: int = 2000
 ) -> Equilibrium:
     """Look for an admissible multiplier that balances the load, without a single F-product. Collective.
 
@@ -41,12 +40,11 @@ def find_equilibrium(
     ‖g‖² ≤ ‖s‖(‖y − z‖ + ‖g‖). Once that would take a force 10⁷ times the load's, none exists.
 
     Args:
-        problem: Coarse space and layout are used.
-        law: Tresca's bounds or Coulomb's cones.
+        problem: Coarse space, layout and law are used: Tresca's bounds or Coulomb's cones.
         tolerance: Relative error of equilibrium at which a multiplier counts as found.
         max_iterations: Give up undecided after that many cheap iterations.
     """
-    coarse = problem.coarse
+    coarse, law = problem.coarse, problem.law
     target = coarse.particular()
     size = coarse.norm(coarse.load)
     z = law.admit(target)
@@ -69,13 +67,13 @@ def find_equilibrium(
     return Equilibrium(z, float(np.sqrt(distance)) / size, None)
 
 
-def require_equilibrium(problem: DualProblem, law: SlipLaw) -> Equilibrium:
+def require_equilibrium(problem: DualProblem) -> Equilibrium:
     """Return an admissible multiplier near equilibrium, or refuse the problem. Collective.
 
     Raises:
         InfeasibleError: It is proven that none exists.
     """
-    found = find_equilibrium(problem, law)
+    found = find_equilibrium(problem)
     if found.motion is not None:
         size = np.abs(found.motion)
         rows = np.flatnonzero(size > 0.1 * size.max())

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import NoReturn
 
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInputError
+from fenics_contact.qp.forcing import Forcing
 from fenics_contact.qp.iterate import Certificate, Iterate, Start, certify
-from fenics_contact.qp.newton_steps import NewtonSteps
+from fenics_contact.qp.newton_steps import NewtonState, NewtonSteps
 from fenics_contact.qp.not_held import HARDLY_WEDGED, FrictionAlone, require_contact
-from fenics_contact.qp.problem import CountedOperator, DualProblem
+from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import global_sum
-from fenics_contact.qp.rescue import DIVERGED, rescue
-from fenics_contact.qp.slip_law import SlipLaw
+from fenics_contact.qp.rescue import DIVERGED, Rescue, Rescued
 from fenics_contact.qp.smalse import Smalse
-from fenics_contact.qp.solution import DualSolution, SolverStep
+from fenics_contact.qp.solution import DualSolution, SmalseMemory, SolverStep
 
 #: Distance from equilibrium of an iterate that proximal points could not repair.
 UNBALANCED = 1e-6
@@ -40,14 +41,14 @@ class FaceNewton:
     Coulomb's law the slip bound is refreshed in every step, and the friction of slipping discs grows with
     the normal force already within the step: one loop for all.
 
-    Floating bodies are settled after every step (`Settling`): their motions balance the load with the forces
-    of the next guess. Three more things keep the active set from cycling. A disc whose friction force would
-    turn by more than a right angle has a ρ too large for it; its ρ is reduced until the force stays or the
-    disc sticks. A step that is worse than the last two iterates is cut short, at no cost in products. Steps
-    without progress are followed by a rescue from the best iterate so far, by proximal points, whose convex
-    potential a line search descends (`qp.proximal`), or without a preconditioner by SMALSE; the history says
-    whether the active set cycled or the residual stood still. And nothing is accepted before its residuals
-    were recomputed.
+    Floating bodies come to rest after every step (`RigidMotionCorrection`): their motions balance the load
+    with the forces of the next guess. Three more things keep the active set from cycling. A disc whose
+    friction force would turn by more than a right angle has a ρ too large for it; its ρ is reduced until the
+    force stays or the disc sticks. A step that is worse than the last two iterates is cut short, at no cost
+    in products. Steps without progress are followed by a rescue from the best iterate so far, by proximal
+    points, whose convex potential a line search descends (`qp.rescue`), or without a preconditioner by
+    SMALSE; the history says whether the active set cycled or the residual stood still. And nothing is
+    accepted before its residuals were recomputed.
 
     Attributes:
         tolerance: Every residual of `Residuals` ends below it.
@@ -78,7 +79,7 @@ class FaceNewton:
         """Return the solver with another tolerance."""
         return replace(self, tolerance=tolerance)
 
-    def run(self, problem: DualProblem, law: SlipLaw, start: Start) -> DualSolution:
+    def run(self, problem: DualProblem, start: Start) -> DualSolution:
         """Solve from ``start``; called by `solve`. Collective.
 
         Raises:
@@ -86,82 +87,212 @@ class FaceNewton:
                 where all was tried before that was found, its cause carries the history.
             ConvergenceError: Steps or products were used up; carries the history.
         """
-        operator, memory = start.operator, start.memory
-        newton = NewtonSteps(problem, law, operator, self)
-        rough = replace(self, tolerance=ROUGH, max_products=10 * self.rescue_products)
-        alone = FrictionAlone(problem, law, rough)
-        history: list[SolverStep] = []
-        first = start.iterate if start.cold else newton.settled(start.iterate)
-        iterate = best = first
-        since_best, budget, care, rescues, vain = 0, self.rescue_products, 1.0, 0, 0
-        rescued: Iterate | None = None
-        origin: Iterate | None = None
-        while len(history) < self.max_steps and operator.products < self.max_products and vain < VAIN:
-            iterate, line = newton.step(iterate, len(history), care)
-            history.append(line)
-            start.reached(line)
-            iterate, answer = self._checked(problem, law, operator, iterate)
-            if answer is not None:
-                return answer.solution(problem, history, operator.products, memory)
-            require_contact(history, self.patience)
-            before, after = best.residuals, iterate.residuals
-            progress = after.worst_beside(before) < 0.5 * before.worst_beside(after)
-            best, since_best = (iterate, 0) if progress else (best, since_best + 1)
-            care = 1.0 if progress else care * CARE if since_best > CARELESS else care
-            if since_best < self.patience and after.worst_beside(before) < DIVERGED:
-                continue
-            rescues += 1
-            if rescues == DOUBT:
-                alone.require_enough()
-            # Where Newton could do nothing with the last rescue, the next one must go further.
-            origin, last = _sound(problem, best, first), origin
-            budget = 2 * budget if best is rescued or origin is last else self.rescue_products
-            found, memory = rescue(
-                problem,
-                law,
-                Start(origin, operator, memory, cold=False),
-                self,
-                budget=min(budget, max(self.max_products - operator.products, 1)),
-                further=origin is last,
-                reason=newton.stall(),
-                history=history,
-            )
-            start.reached(history[-1])
-            iterate, answer = self._checked(problem, law, operator, found)
-            if answer is not None:
-                return answer.solution(problem, history, operator.products, memory)
-            vain = vain + 1 if origin is last and _same(rescued, iterate) else 0
-            rescued, best, since_best = iterate, iterate, 0
-        failure = ConvergenceError(self._failure(newton, operator, history, best), history)
-        if rescues >= DOUBT:
+        run = _Run.build(self, problem, start)
+        state = run.init()
+        while not run.exhausted(state):
+            state = run.step(state)
+            if state.answer is None and state.stuck:
+                state = run.rescued(state)
+            if state.answer is not None:
+                return state.answer.solution(problem, state.history, start.operator.products, state.memory)
+        run.fail(state)
+
+
+@dataclass(frozen=True, eq=False)
+class _LastRescue:
+    """What the next rescue must know of the last one.
+
+    Attributes:
+        origin: Where it began.
+        found: Where it led to.
+        budget: Products that it might have spent.
+        vain: Rescues in turn, up to it, that led to one and the same iterate.
+    """
+
+    origin: Iterate
+    found: Iterate
+    budget: int
+    vain: int
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """Where a solve by face Newton is.
+
+    Attributes:
+        newton: The present iterate, with faces and ρ.
+        best: The last iterate that halved the residual, or the outcome of a later rescue.
+        memory: What SMALSE learned.
+        history: One line a step or rescue.
+        since_best: Newton steps since the best iterate.
+        care: Factor on the tolerance of the next face.
+        stuck: Whether the last steps call for a rescue.
+        rescues: Rescues so far.
+        last_rescue: The last of them.
+        answer: The certified answer, once the iterate is one.
+    """
+
+    newton: NewtonState
+    best: Iterate
+    memory: SmalseMemory | None
+    history: tuple[SolverStep, ...] = ()
+    since_best: int = 0
+    care: float = 1.0
+    stuck: bool = False
+    rescues: int = 0
+    last_rescue: _LastRescue | None = None
+    answer: Certificate | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """One solve by face Newton: what stays the same in all its steps.
+
+    Attributes:
+        parameters: Those of the method.
+        problem: The dual problem.
+        start: Where it begins.
+        steps: Newton's method.
+        rescue: What helps where that stands still.
+        friction_alone: The question whether friction can suffice.
+    """
+
+    parameters: FaceNewton
+    problem: DualProblem
+    start: Start
+    steps: NewtonSteps
+    rescue: Rescue
+    friction_alone: FrictionAlone
+
+    @classmethod
+    def build(cls, parameters: FaceNewton, problem: DualProblem, start: Start) -> _Run:
+        """Prepare a solve. Collective."""
+        most = parameters.max_products
+        forcing = Forcing(parameters.forcing, parameters.loosest, parameters.tolerance)
+        steps = NewtonSteps.build(problem, start.operator, forcing, most)
+        rough = replace(parameters, tolerance=ROUGH, max_products=10 * parameters.rescue_products)
+        rescue = Rescue(problem, forcing, most, parameters.rescue)
+        if not start.cold:
+            start = replace(start, iterate=steps.at_rest(start.iterate))
+        return cls(parameters, problem, start, steps, rescue, FrictionAlone(problem, rough.run))
+
+    def init(self) -> _State:
+        """Return the state before the first step."""
+        first = self.start.iterate
+        return _State(self.steps.init(first), first, self.start.memory)
+
+    def exhausted(self, state: _State) -> bool:
+        """Tell whether steps or products are used up, or rescues in vain."""
+        parameters, products = self.parameters, self.start.operator.products
+        in_vain = state.last_rescue is not None and state.last_rescue.vain >= VAIN
+        return in_vain or len(state.history) >= parameters.max_steps or products >= parameters.max_products
+
+    def step(self, state: _State) -> _State:
+        """Take a Newton step and judge it. Collective.
+
+        Raises:
+            InfeasibleError: All contacts stay open, and something moves that only they could hold.
+        """
+        newton, line = self.steps.step(state.newton, len(state.history), state.care)
+        history = (*state.history, line)
+        self.start.reached(line)
+        iterate, answer = self._checked(newton.iterate)
+        newton = replace(newton, iterate=iterate)
+        if answer is not None:
+            return replace(state, newton=newton, history=history, answer=answer)
+        require_contact(history, self.parameters.patience)
+        before, after = state.best.residuals, iterate.residuals
+        progress = after.worst_beside(before) < 0.5 * before.worst_beside(after)
+        since_best = 0 if progress else state.since_best + 1
+        return replace(
+            state,
+            newton=newton,
+            history=history,
+            best=iterate if progress else state.best,
+            since_best=since_best,
+            care=1.0 if progress else state.care * CARE if since_best > CARELESS else state.care,
+            stuck=since_best >= self.parameters.patience or not after.worst_beside(before) < DIVERGED,
+        )
+
+    def rescued(self, state: _State) -> _State:
+        """Go on from what a rescue makes of the best iterate. Collective.
+
+        Raises:
+            InfeasibleError: Friction is far from enough.
+        """
+        if state.rescues + 1 == DOUBT:
+            self.friction_alone.require_enough()
+        operator, last = self.start.operator, state.last_rescue
+        origin = self._rescue_start(state.best)
+        # Where Newton could do nothing with the last rescue, the next one must go further.
+        again = last is not None and origin is last.origin
+        budget = self.parameters.rescue_products
+        if last is not None and (again or state.best is last.found):
+            budget = 2 * last.budget
+        left = max(self.parameters.max_products - operator.products, 1)
+        begin = Start(origin, operator, state.memory, cold=False)
+        outcome = self.rescue(begin, min(budget, left), further=again)
+        line = self._line(state, origin, outcome)
+        self.start.reached(line)
+        iterate, answer = self._checked(outcome.iterate)
+        vain = last.vain + 1 if last is not None and again and _same(last.found, iterate) else 0
+        return replace(
+            state,
+            newton=replace(state.newton, iterate=iterate),
+            best=iterate,
+            memory=outcome.memory,
+            history=(*state.history, line),
+            since_best=0,
+            rescues=state.rescues + 1,
+            last_rescue=_LastRescue(origin, iterate, budget, vain),
+            answer=answer,
+        )
+
+    def fail(self, state: _State) -> NoReturn:
+        """Raise the error of a solve that is exhausted. Collective."""
+        failure = ConvergenceError(self._failed(state), state.history)
+        if state.rescues >= DOUBT:
             try:
-                alone.require_enough(HARDLY_WEDGED)
+                self.friction_alone.require_enough(HARDLY_WEDGED)
             except InfeasibleError as reason:
                 raise reason from failure
         raise failure
 
-    def _checked(
-        self, problem: DualProblem, law: SlipLaw, operator: CountedOperator, iterate: Iterate
-    ) -> tuple[Iterate, Certificate | None]:
-        """Recompute an iterate that claims to be the solution; certify it if it is. Collective."""
-        if not iterate.residuals.within(self.tolerance):
-            return iterate, None
-        answer = certify(problem, operator, law, iterate.multiplier, iterate.residual)
-        return answer.iterate, answer if answer.iterate.residuals.within(self.tolerance) else None
+    def _rescue_start(self, best: Iterate) -> Iterate:
+        """Return where a rescue starts: the first iterate where the best one is far from equilibrium.
 
-    def _failure(
-        self, newton: NewtonSteps, operator: CountedOperator, history: list[SolverStep], best: Iterate
-    ) -> str:
+        SMALSE finds back to equilibrium, proximal points keep what they are given.
+        """
+        lost = self.problem.preconditioner is not None and best.residuals.coarse > UNBALANCED
+        return self.start.iterate if lost else best
+
+    def _line(self, state: _State, origin: Iterate, outcome: Rescued) -> SolverStep:
+        """Return the line of history of a rescue, with its reason. Collective."""
+        reached = "met its target" if outcome.reached else "used its budget"
+        reason = state.newton.stall(self.problem.comm)
+        note = f"rescue from {origin.residuals.worst:.1e} because {reason}: {reached}"
+        return replace(outcome.line, iteration=len(state.history), note=note)
+
+    def _checked(self, iterate: Iterate) -> tuple[Iterate, Certificate | None]:
+        """Recompute an iterate that claims to be the solution; certify it if it is. Collective."""
+        tolerance = self.parameters.tolerance
+        if not iterate.residuals.within(tolerance):
+            return iterate, None
+        answer = certify(self.problem, self.start.operator, iterate.multiplier, iterate.residual)
+        return answer.iterate, answer if answer.iterate.residuals.within(tolerance) else None
+
+    def _failed(self, state: _State) -> str:
         """Say what was reached, why it went no further and what to try. Collective."""
-        up = [operator.products >= self.max_products, len(history) >= self.max_steps]
+        parameters, products, history = self.parameters, self.start.operator.products, state.history
+        up = [products >= parameters.max_products, len(history) >= parameters.max_steps]
         more = [f"raise {name}" for name, used in zip(("max_products", "max_steps"), up, strict=True) if used]
-        last, rescues = history[-1], sum("rescue" in step.method for step in history)
+        last, best = history[-1], state.best.residuals.worst
         reached = (
-            f"face Newton needs residuals below {self.tolerance:.1e}, got after {operator.products} products "
-            f"and {len(history)} steps: {last}; the best was {best.residuals.worst:.1e}, {newton.stall()}, "
-            f"and {rescues} rescues did not help"
+            f"face Newton needs residuals below {parameters.tolerance:.1e}, got after {products} products "
+            f"and {len(history)} steps: {last}; the best was {best:.1e}, "
+            f"{state.newton.stall(self.problem.comm)}, and {state.rescues} rescues did not help"
         )
-        if slides(history) and best.residuals.worst > HARDLY:
+        if slides(history) and best > HARDLY:
             ways = ["raise the friction", "lower the load", "add a support", *more]
             why = f"all {last.slip} discs slip, and friction may not suffice for any equilibrium; "
         else:
@@ -171,10 +302,8 @@ class FaceNewton:
         return f"{reached}: {why}{', '.join(ways[:-1])}, or {ways[-1]}"
 
 
-def _same(before: Iterate | None, after: Iterate) -> bool:
+def _same(before: Iterate, after: Iterate) -> bool:
     """Tell whether two rescues led to one and the same iterate."""
-    if before is None:
-        return False
     worst = after.residuals.worst
     return abs(worst - before.residuals.worst) <= SAME * worst
 
@@ -183,15 +312,6 @@ def slides(history: Sequence[SolverStep]) -> bool:
     """Tell whether all discs slip, and have done so for a while."""
     late = history[-max(SLIDING, len(history) // 4) :]
     return bool(late) and all(step.slip > 0 and step.stick == 0 for step in late)
-
-
-def _sound(problem: DualProblem, best: Iterate, first: Iterate) -> Iterate:
-    """Return where a rescue starts: the first iterate where the best one is far from equilibrium.
-
-    SMALSE finds back to equilibrium, proximal points keep what they are given.
-    """
-    lost = problem.preconditioner is not None and best.residuals.coarse > UNBALANCED
-    return first if lost else best
 
 
 @dataclass(frozen=True)
@@ -213,7 +333,7 @@ class ProjectedCG:
         """Return the solver with another tolerance."""
         return replace(self, tolerance=tolerance)
 
-    def run(self, problem: DualProblem, law: SlipLaw, start: Start) -> DualSolution:
+    def run(self, problem: DualProblem, start: Start) -> DualSolution:
         """Solve from ``start``; called by `solve`. Collective.
 
         Raises:
@@ -233,4 +353,4 @@ class ProjectedCG:
             forcing=0.0,
             patience=self.max_restarts,
         )
-        return newton.run(problem, law, start)
+        return newton.run(problem, start)

@@ -7,11 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact.progress import Task
 from fenics_contact.qp.face import classify
 from fenics_contact.qp.problem import CountedOperator, DualProblem, Operator
 from fenics_contact.qp.reductions import Vector, global_sum
-from fenics_contact.qp.slip_law import SlipLaw
 from fenics_contact.qp.solution import (
     DualSolution,
     Residuals,
@@ -20,6 +18,9 @@ from fenics_contact.qp.solution import (
     contact_step,
     measure,
 )
+
+#: Discs this far inside their slip bound, relatively, count as sticking where only λ is known.
+SLIP_MARGIN = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +39,10 @@ class Iterate:
     residual: Vector
     residuals: Residuals
 
+    def motions(self, problem: DualProblem) -> Vector:
+        """Return α, shape (m,), replicated, of which r = F λ − d − Gᵀα was made. Collective."""
+        return problem.coarse.coefficients(self.product - problem.rhs - self.residual)
+
 
 @dataclass(frozen=True, eq=False)
 class Start:
@@ -48,44 +53,50 @@ class Start:
         operator: F with its counter, to be used for the whole solve.
         memory: What SMALSE learned before, None if nothing.
         cold: Whether λ is the shortest multiplier in equilibrium, Gᵀ(G Gᵀ)⁻¹e.
-        task: The solve, which tells how far it is; None within another.
     """
 
     iterate: Iterate
     operator: CountedOperator
     memory: SmalseMemory | None = None
     cold: bool = True
-    task: Task | None = None
 
     def reached(self, step: SolverStep) -> None:
         """Tell whoever listens what a step of the solver has reached."""
-        if self.task is not None:
-            self.task.step(step.products, measure=step.residuals.worst)
+        self.operator.report(step.products, step.residuals.worst)
 
 
-def iterate_at(
-    problem: DualProblem, law: SlipLaw, multiplier: Vector, product: Vector, alpha: Vector
-) -> Iterate:
+def iterate_at(problem: DualProblem, multiplier: Vector, product: Vector, alpha: Vector) -> Iterate:
     """Return the iterate of a multiplier with known product F λ and rigid motions α. Collective."""
     residual = product - problem.rhs - problem.coarse.transpose(alpha)
-    residuals = measure(problem, law.feasible(multiplier), multiplier, product, residual)
+    residuals = measure(problem, multiplier, product, residual)
     return Iterate(multiplier, product, residual, residuals)
 
 
-def iterate_fitted(problem: DualProblem, law: SlipLaw, multiplier: Vector, product: Vector) -> Iterate:
+def iterate_fitted(problem: DualProblem, multiplier: Vector, product: Vector) -> Iterate:
     """Return the iterate with the rigid motions that fit best, see `fit_rigid_motions`. Collective."""
-    return iterate_at(problem, law, multiplier, product, fit_rigid_motions(problem, law, multiplier, product))
+    return iterate_at(problem, multiplier, product, fit_rigid_motions(problem, multiplier, product))
 
 
-def answer_at(
-    problem: DualProblem, law: SlipLaw, multiplier: Vector, product: Vector, alpha: Vector
-) -> Iterate:
+def iterate_between(problem: DualProblem, before: Iterate, after: Iterate, part: float) -> Iterate:
+    """Return the iterate at a part of the way from one to another, without a product. Collective."""
+    multiplier, product, residual = (
+        np.asarray((1.0 - part) * old + part * new, dtype=np.float64)
+        for old, new in (
+            (before.multiplier, after.multiplier),
+            (before.product, after.product),
+            (before.residual, after.residual),
+        )
+    )
+    return Iterate(multiplier, product, residual, measure(problem, multiplier, product, residual))
+
+
+def answer_at(problem: DualProblem, multiplier: Vector, product: Vector, alpha: Vector) -> Iterate:
     """Return the iterate with its jumps judged beside the displacements where those are known. Collective.
 
     On the way to an answer jumps are compared with B K⁺(Bᵀλ − f), which costs nothing more. That says little
     where loads go straight into supports or press thin pieces that are held: alone they would move far.
     """
-    iterate = iterate_at(problem, law, multiplier, product, alpha)
+    iterate = iterate_at(problem, multiplier, product, alpha)
     if problem.reach is None:
         return iterate
     # Over all rows: those of supports may not move at all.
@@ -98,10 +109,7 @@ def apply_unless_zero(problem: DualProblem, operator: Operator, x: Vector) -> Ve
     return operator(x) if problem.norm(x) > 0.0 else np.zeros_like(x)
 
 
-SLIP_MARGIN = 1e-4
-
-
-def fit_rigid_motions(problem: DualProblem, law: SlipLaw, multiplier: Vector, product: Vector) -> Vector:
+def fit_rigid_motions(problem: DualProblem, multiplier: Vector, product: Vector) -> Vector:
     """Return α = (G_F G_Fᵀ)⁻¹ G_F (F λ − d)_F over the rows that λ says are free. Collective.
 
     Free are the gluing rows, contacts with λ_N > 0, discs well inside their bound, and the tangents of the
@@ -110,11 +118,10 @@ def fit_rigid_motions(problem: DualProblem, law: SlipLaw, multiplier: Vector, pr
 
     Args:
         problem: The dual problem.
-        law: Where the slip bound comes from.
         multiplier: λ, owned.
         product: F λ, owned.
     """
-    bound = (1.0 - SLIP_MARGIN) * law.bound(multiplier)
+    bound = (1.0 - SLIP_MARGIN) * problem.law.bound(multiplier)
     step = contact_step(problem.layout, problem.diagonal)
     face = classify(problem.layout, bound, multiplier, np.zeros_like(multiplier), step)
     return problem.coarse.restricted(face.restriction).coefficients(face.restrict(product - problem.rhs))
@@ -158,22 +165,19 @@ class Certificate:
         )
 
 
-def certify(
-    problem: DualProblem, operator: Operator, law: SlipLaw, multiplier: Vector, residual: Vector
-) -> Certificate:
+def certify(problem: DualProblem, operator: Operator, multiplier: Vector, residual: Vector) -> Certificate:
     """Recompute everything that can be said about a multiplier. Collective; one product.
 
     Args:
         problem: The dual problem.
         operator: F, counted.
-        law: Where the slip bound comes from.
         multiplier: λ, owned.
         residual: A solver's own r, owned; of it only the choice of α is kept.
     """
     product = operator(multiplier)
     alpha = problem.coarse.coefficients(product - problem.rhs - residual)
-    iterate = answer_at(problem, law, multiplier, product, alpha)
-    return Certificate(iterate, alpha, law.bound(multiplier))
+    iterate = answer_at(problem, multiplier, product, alpha)
+    return Certificate(iterate, alpha, problem.law.bound(multiplier))
 
 
 def count_status(problem: DualProblem, multiplier: Vector, slip_bound: Vector) -> tuple[int, int, int]:

@@ -3,49 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fenics_contact._libraries import MPI
 from fenics_contact.qp.face import Face, classify
 from fenics_contact.qp.face_system import CoupledFace, FaceSystem, FaceSystems, couple
-from fenics_contact.qp.iterate import Iterate, apply_unless_zero, iterate_at
+from fenics_contact.qp.forcing import Forcing, residual_weights
+from fenics_contact.qp.iterate import Iterate, apply_unless_zero, iterate_at, iterate_between
 from fenics_contact.qp.krylov import FaceStep, Stop, projected_cg, projected_gmres
 from fenics_contact.qp.problem import CountedOperator, DualProblem, ShiftedOperator
 from fenics_contact.qp.reductions import Vector, global_sum
-from fenics_contact.qp.settling import Settling, keep_unheld
-from fenics_contact.qp.slip_law import SlipLaw
-from fenics_contact.qp.solution import Residuals, SolverStep, contact_step, measure
+from fenics_contact.qp.rigid_motions import RigidMotionCorrection, keep_free_motions
+from fenics_contact.qp.solution import Residuals, SolverStep, contact_step
 
-if TYPE_CHECKING:
-    from fenics_contact.qp.face_newton import FaceNewton
-
-
+#: The longest cycle of active sets that is recognised.
+LONGEST_CYCLE = 6
+#: Factor on ρ of a disc whose friction force would turn back.
+TURNED = 0.3
+#: Parts of a step that are tried where the whole one made things worse.
 FRACTIONS = (0.5, 0.25, 0.1)
 #: Taken only near a solution: far from one, a step as short as this stays where nothing is known yet.
 SHORTEST = 0.01
 #: The largest relative residual that counts as near.
 NEAR = 0.5
-#: The whole step is taken where the potential rises at its end by less than this fraction of its first fall.
-STEEP = 0.3
-#: The slope at which a minimum of the potential counts as found, relative to the first one.
-LEVEL = 0.1
-#: Gluing residual from which on bodies are in pieces, and their potential says nothing.
-TORN = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class Damped:
-    """The iterate that was kept and the fraction of the step that led to it."""
+    """The iterate that is taken and the fraction of the step that led to it."""
 
     iterate: Iterate
     fraction: float
 
 
-def damp(
-    problem: DualProblem, law: SlipLaw, before: Iterate, after: Iterate, earlier: Residuals | None = None
-) -> Damped:
+def damp(problem: DualProblem, before: Iterate, after: Iterate, earlier: Residuals | None = None) -> Damped:
     """Return the best of a few points between two iterates if the second is worse than the first. Collective.
 
     F λ and r are linear in λ and α, so no product is spent; the natural residual is not, and often has its
@@ -54,7 +47,6 @@ def damp(
 
     Args:
         problem: The dual problem.
-        law: Where the slip bound comes from.
         before: Where the step began.
         after: Where it ended.
         earlier: Residuals of the iterate before that, if there was one.
@@ -64,159 +56,55 @@ def damp(
             return Damped(after, 1.0)
     candidates = [Damped(after, 1.0)]
     fractions = (*FRACTIONS, SHORTEST) if before.residuals.worst < NEAR else FRACTIONS
-    candidates += [Damped(_between(problem, law, before, after, part), part) for part in fractions]
+    candidates += [Damped(iterate_between(problem, before, after, part), part) for part in fractions]
     return min(candidates, key=lambda candidate: candidate.iterate.residuals.worst_beside(after.residuals))
-
-
-def descend(problem: DualProblem, law: SlipLaw, before: Iterate, after: Iterate) -> Damped:
-    """Return the minimum between two iterates of the potential that a proximal point minimises. Collective.
-
-    The potential energy of displacements u(λ, α) together with that of springs ρ in all contacts and discs is
-    convex; its derivative along a step is that of r, against the force λ that deforms the bodies less the
-    force P_Λ(λ − ρ r) of the springs. Bodies in pieces come together first, whatever the potential.
-
-    Args:
-        problem: Problem of a proximal point, F + D with ρ = 1/D.
-        law: Tresca's law.
-        before: Where the step began.
-        after: Where it ended.
-    """
-    slope = _slope(problem, law, before, after)
-    first, last = slope(0.0), slope(1.0)
-    if first >= 0.0 or last <= -STEEP * first or before.residuals.gluing > TORN:
-        return Damped(after, 1.0)
-    left, right, low, high = 0.0, 1.0, first, last
-    for _ in range(30):
-        part = left + (right - left) * min(max(-low / (high - low), 0.1), 0.9)
-        value = slope(part)
-        if abs(value) <= -LEVEL * first:
-            break
-        if value < 0.0:
-            left, low = part, value
-        else:
-            right, high = part, value
-    return Damped(_between(problem, law, before, after, part), part)
 
 
 def _worse(one: Residuals, other: Residuals) -> bool:
     return one.worst > other.worst and one.worst_beside(other) > other.worst_beside(one)
 
 
-def _slope(problem: DualProblem, law: SlipLaw, before: Iterate, after: Iterate) -> Callable[[float], float]:
-    """Return the derivative of the potential as a function of the fraction of a step. Collective to call."""
-    layout, step = problem.layout, contact_step(problem.layout, problem.diagonal)
-    moved, turned = after.multiplier - before.multiplier, after.residual - before.residual
-    opened = turned.copy()
-    opened[layout.contact] -= moved[layout.contact] / step[layout.contact]
+@dataclass(frozen=True)
+class Safeguards:
+    """What keeps Newton's method from running in circles.
 
-    def slope(part: float) -> float:
-        multiplier = before.multiplier + part * moved
-        trial = multiplier - step * (before.residual + part * turned)
-        missing = multiplier - law.feasible(multiplier).project(trial)
-        missing[layout.equality] = (part - 1.0) * moved[layout.equality]
-        return float(global_sum(problem.comm, opened @ missing)[0])
+    Attributes:
+        shorten: Chooses a point of a step, given where it begins and ends and the residuals before that.
+        adapts_step: Whether a disc whose friction force would turn by more than a right angle gets a smaller
+            ρ: it was too large, unless springs prescribe it.
+        moves_held: Whether floating bodies are moved to their rest also where the face holds them all.
+    """
 
-    return slope
-
-
-def _between(problem: DualProblem, law: SlipLaw, before: Iterate, after: Iterate, fraction: float) -> Iterate:
-    multiplier, product, residual = (
-        np.asarray((1.0 - fraction) * old + fraction * new, dtype=np.float64)
-        for old, new in (
-            (before.multiplier, after.multiplier),
-            (before.product, after.product),
-            (before.residual, after.residual),
-        )
-    )
-    residuals = measure(problem, law.feasible(multiplier), multiplier, product, residual)
-    return Iterate(multiplier, product, residual, residuals)
+    shorten: Callable[[DualProblem, Iterate, Iterate, Residuals | None], Damped] = damp
+    adapts_step: bool = True
+    moves_held: bool = True
 
 
-#: The longest cycle of active sets that is recognised.
-LONGEST_CYCLE = 6
+@dataclass(frozen=True, eq=False)
+class NewtonState:
+    """All that one Newton step leaves to the next.
 
+    Attributes:
+        iterate: Where the next step begins.
+        step: ρ of the natural map, 0 on equality rows, owned.
+        faces: The last faces, latest first.
+        mismatch: How far the last residual was from the one that its face predicted, relative to the
+            residual before it.
+        before: Residuals before the last step, None before the first.
+    """
 
-class NewtonSteps:
-    """Takes Newton steps of one solve and remembers the last faces, residuals and each disc's ρ."""
+    iterate: Iterate
+    step: Vector
+    faces: tuple[Face, ...] = ()
+    mismatch: float = 1.0
+    before: Residuals | None = None
 
-    def __init__(
-        self,
-        problem: DualProblem,
-        law: SlipLaw,
-        operator: CountedOperator | ShiftedOperator,
-        parameters: FaceNewton,
-        *,
-        springs: bool = False,
-    ) -> None:
-        """Prepare the coarse spaces of all faces. Collective.
-
-        Args:
-            problem: The dual problem, or that of a proximal point.
-            law: Where the slip bound comes from.
-            operator: Its operator, counted.
-            parameters: Forcing terms and limits.
-            springs: The problem is that of a proximal point: ρ is given, a potential says how far to go.
-        """
-        self._problem, self._law, self._parameters = problem, law, parameters
-        self._operator, self._springs = operator, springs
-        self._systems = FaceSystems(problem, operator)
-        self._natural_step = contact_step(problem.layout, problem.diagonal)
-        self._rho = self._natural_step.copy()
-        self._face: Face | None = None
-        self._earlier: list[Face] = []
-        self._mismatch = 1.0
-        self._settling = Settling(problem, law)
-        self._before: Residuals | None = None
-
-    def move(self, problem: DualProblem, law: SlipLaw) -> None:
-        """Go on with another right side and another law."""
-        self._problem, self._law = problem, law
-        self._settling = self._settling.with_law(law)
-
-    def settled(self, iterate: Iterate) -> Iterate:
-        """Return an iterate of another load or position with its floating bodies at rest. Collective."""
-        problem = self._problem
-        alpha = problem.coarse.coefficients(iterate.product - problem.rhs - iterate.residual)
-        alpha = alpha + self._settling(iterate.multiplier, iterate.residual, self._rho)
-        return iterate_at(problem, self._law, iterate.multiplier, iterate.product, alpha)
-
-    def step(self, iterate: Iterate, number: int, care: float = 1.0) -> tuple[Iterate, SolverStep]:
-        """Classify, solve the face, and return the new iterate with its line of history. Collective.
-
-        Args:
-            iterate: Where to start.
-            number: Number of the step in the history.
-            care: Factor on the inner tolerance, at most one.
-        """
-        face = self._next_face(iterate)
-        self._earlier = [self._face, *self._earlier[: LONGEST_CYCLE - 1]] if self._face else []
-        changes = 0 if self._face is None else face.changes(self._face)
-        self._face = face
-        system = self._systems.build(face)
-        coupled = couple(system, self._problem.coarse, self._law.growth, iterate.multiplier)
-        linear = coupled or system
-        entered = linear.enter(iterate.multiplier)
-        moved = apply_unless_zero(self._problem, self._operator, entered - iterate.multiplier)
-        product = iterate.product + moved
-        forcing = care * self._forcing(changes)
-        solved = self._solve(system, coupled, entered, product, iterate.residuals, forcing)
-        multiplier, product = entered + linear.advance(solved.step), product + solved.product
-        alpha = self._motions(system, linear, iterate, multiplier, product)
-        after = iterate_at(self._problem, self._law, multiplier, product, alpha)
-        self._mismatch = abs(after.residuals.size - solved.measure) / (iterate.residuals.size or 1.0)
-        if self._springs:
-            damped = descend(self._problem, self._law, iterate, after)
-        else:
-            damped = damp(self._problem, self._law, iterate, after, self._before)
-        self._before = iterate.residuals
-        return damped.iterate, self._record(number, damped, system, solved, changes)
-
-    def stall(self) -> str:
+    def stall(self, comm: MPI.Comm) -> str:
         """Say why the last steps led nowhere: whether the active set cycles or stands still. Collective."""
-        if self._face is None or not self._earlier:
+        if len(self.faces) < 2:
             return "the residual stands still"
-        changes = [self._face.changes(face) for face in self._earlier]
-        changed = global_sum(self._problem.comm, *changes)
+        last, *earlier = self.faces
+        changed = global_sum(comm, *[last.changes(face) for face in earlier])
         flickering = f"{round(float(changed[0]))} statuses changed in the last step"
         if changed[0] == 0.0:
             return "the residual stands still on one face"
@@ -224,15 +112,126 @@ class NewtonSteps:
             return f"the active set cycles with period {int(np.argmin(changed)) + 1}, {flickering}"
         return f"the active set does not settle, {flickering}"
 
-    def _next_face(self, iterate: Iterate) -> Face:
+
+@dataclass(frozen=True, eq=False)
+class NewtonSteps:
+    """Newton's method on the faces of one problem: `init` makes the first state, `step` the following ones.
+
+    Attributes:
+        problem: The dual problem, or that of a proximal point.
+        operator: Its operator, counted.
+        forcing: How accurately faces are solved.
+        max_products: No face is solved beyond that many F-products of the whole solve.
+        safeguards: What keeps the method from running in circles.
+        natural_step: ρ = 1/diag F, 0 on equality rows, owned.
+        systems: The linear systems of faces.
+        correction: Moves floating bodies to their rest.
+    """
+
+    problem: DualProblem
+    operator: CountedOperator | ShiftedOperator
+    forcing: Forcing
+    max_products: int
+    safeguards: Safeguards
+    natural_step: Vector
+    systems: FaceSystems
+    correction: RigidMotionCorrection
+
+    @classmethod
+    def build(
+        cls,
+        problem: DualProblem,
+        operator: CountedOperator | ShiftedOperator,
+        forcing: Forcing,
+        max_products: int,
+        safeguards: Safeguards | None = None,
+    ) -> NewtonSteps:
+        """Prepare the coarse spaces of all faces. Collective."""
+        return cls(
+            problem,
+            operator,
+            forcing,
+            max_products,
+            safeguards or Safeguards(),
+            contact_step(problem.layout, problem.diagonal),
+            FaceSystems(problem, operator),
+            RigidMotionCorrection.build(problem),
+        )
+
+    def moved(self, problem: DualProblem) -> NewtonSteps:
+        """Return the same for a problem that differs by its right side or its law."""
+        return replace(self, problem=problem, correction=replace(self.correction, problem=problem))
+
+    def init(self, iterate: Iterate) -> NewtonState:
+        """Return the state before the first step."""
+        return NewtonState(iterate, self.natural_step)
+
+    def at_rest(self, iterate: Iterate) -> Iterate:
+        """Return an iterate of another load or position with its floating bodies at rest. Collective."""
+        problem = self.problem
+        alpha = iterate.motions(problem)
+        alpha = alpha + self.correction(iterate.multiplier, iterate.residual, self.natural_step)
+        return iterate_at(problem, iterate.multiplier, iterate.product, alpha)
+
+    def step(self, state: NewtonState, number: int, care: float = 1.0) -> tuple[NewtonState, SolverStep]:
+        """Take one step and return the state after it with its line of history. Collective.
+
+        Args:
+            state: The state before.
+            number: Number of the step in the history.
+            care: Factor on the tolerance of the face, at most one.
+        """
+        problem, before = self.problem, state.iterate
+        # 1. The face that the natural map chooses, and how many statuses differ from those of the last one.
+        step, face = self._next_face(state)
+        count = face.changes(state.faces[0]) if state.faces else 0
+        changed = round(float(global_sum(problem.comm, count)[0]))
+        # 2. Its linear system, in which slipping forces grow with their normal forces.
+        system = self.systems.build(face)
+        linear = couple(system, problem.coarse, problem.law.growth, before.multiplier) or system
+        # 3. Onto the face and into equilibrium; the Krylov method keeps both.
+        entered = linear.enter(before.multiplier)
+        product = before.product + apply_unless_zero(problem, self.operator, entered - before.multiplier)
+        known = None if changed else state.mismatch
+        tolerance = self.forcing.tolerance_of_face(before.residuals, known, care)
+        solved = self._solve(system, linear, entered, product, before.residuals, tolerance)
+        multiplier, product = entered + linear.advance(solved.step), product + solved.product
+        # 4. Rigid motions, then as much of the step as pays.
+        alpha = self._motions(system, linear, before, multiplier, product, step)
+        after = iterate_at(problem, multiplier, product, alpha)
+        mismatch = abs(after.residuals.size - solved.measure) / (before.residuals.size or 1.0)
+        taken = self.safeguards.shorten(problem, before, after, state.before)
+        faces = (face, *state.faces[:LONGEST_CYCLE])
+        following = NewtonState(taken.iterate, step, faces, mismatch, before.residuals)
+        return following, self._record(number, taken, system, solved, changed)
+
+    def _next_face(self, state: NewtonState) -> tuple[Vector, Face]:
         """Classify, with a smaller ρ for discs whose force would otherwise turn back."""
-        layout, slip_bound = self._problem.layout, self._law.bound(iterate.multiplier)
-        face = classify(layout, slip_bound, iterate.multiplier, iterate.residual, self._rho)
-        if self._face is None or self._springs:
-            return face
-        turned = np.einsum("ia,ia->i", face.direction, self._face.direction) < 0.0
-        self._rho[layout.tangential[turned]] *= 0.3
-        return classify(layout, slip_bound, iterate.multiplier, iterate.residual, self._rho)
+        layout, iterate = self.problem.layout, state.iterate
+        bound = self.problem.law.bound(iterate.multiplier)
+        face = classify(layout, bound, iterate.multiplier, iterate.residual, state.step)
+        if not state.faces or not self.safeguards.adapts_step:
+            return state.step, face
+        turned = np.einsum("ia,ia->i", face.direction, state.faces[0].direction) < 0.0
+        step = state.step.copy()
+        step[layout.tangential[turned]] *= TURNED
+        return step, classify(layout, bound, iterate.multiplier, iterate.residual, step)
+
+    def _solve(
+        self,
+        system: FaceSystem,
+        linear: FaceSystem | CoupledFace,
+        multiplier: Vector,
+        product: Vector,
+        residuals: Residuals,
+        tolerance: float,
+    ) -> FaceStep:
+        gradient = system.gradient(multiplier, product - self.problem.rhs)
+        weights = residual_weights(system.face, residuals, self.natural_step)
+        limit = max(self.max_products - self.operator.products, 1)
+        if isinstance(linear, CoupledFace):
+            return projected_gmres(linear.coupled, gradient, weights, tolerance, limit)
+        return projected_cg(system, gradient, weights, tolerance, limit)
 
     def _motions(
         self,
@@ -241,81 +240,34 @@ class NewtonSteps:
         before: Iterate,
         multiplier: Vector,
         product: Vector,
+        step: Vector,
     ) -> Vector:
-        """Return α after a step: from the rows of the face, then settled. Collective."""
-        problem, coarse = self._problem, self._problem.coarse
-        earlier = coarse.coefficients(before.product - problem.rhs - before.residual)
+        """Return α after a step: from the rows of the face, then at rest. Collective."""
+        problem = self.problem
         alpha = linear.motions(system.gradient(multiplier, product - problem.rhs))
-        alpha = keep_unheld(system.coarse, earlier, alpha)
-        if self._springs and system.coarse.gram.rank == coarse.m:
-            # The face moves the bodies already; moving them in turns with the rest would creep.
+        alpha = keep_free_motions(system.coarse, before.motions(problem), alpha)
+        if not self.safeguards.moves_held and system.coarse.gram.rank == problem.coarse.m:
             return alpha
-        residual = product - problem.rhs - coarse.transpose(alpha)
-        return np.asarray(alpha + self._settling(multiplier, residual, self._rho), dtype=np.float64)
-
-    def _forcing(self, changes: int) -> float:
-        """Return the inner tolerance relative to the residual. Collective."""
-        changed = global_sum(self._problem.comm, changes)[0] > 0.0
-        return self._parameters.forcing if changed else min(self._parameters.forcing, self._mismatch)
-
-    def _solve(
-        self,
-        system: FaceSystem,
-        coupled: CoupledFace | None,
-        multiplier: Vector,
-        product: Vector,
-        residuals: Residuals,
-        forcing: float,
-    ) -> FaceStep:
-        wanted = min(self._parameters.loosest, forcing * residuals.worst)
-        tolerance = max(wanted, 0.3 * self._parameters.tolerance)
-        gradient = system.gradient(multiplier, product - self._problem.rhs)
-        weights = residual_weights(system.face, residuals, self._natural_step)
-        limit = max(self._parameters.max_products - self._operator.products, 1)
-        if coupled is None:
-            return projected_cg(system, gradient, weights, tolerance, limit)
-        return projected_gmres(coupled.coupled, gradient, weights, tolerance, limit)
+        residual = product - problem.rhs - problem.coarse.transpose(alpha)
+        return np.asarray(alpha + self.correction(multiplier, residual, step), dtype=np.float64)
 
     def _record(
-        self, number: int, damped: Damped, system: FaceSystem, solved: FaceStep, changes: int
+        self, number: int, taken: Damped, system: FaceSystem, solved: FaceStep, changed: int
     ) -> SolverStep:
         face, coarse = system.face, system.coarse
         counts = global_sum(
-            self._problem.comm,
+            self.problem.comm,
             np.count_nonzero(face.closed),
             np.count_nonzero(face.stick),
             np.count_nonzero(face.slip),
-            changes,
         )
-        closed, stick, slip, changed = (round(float(count)) for count in counts)
+        closed, stick, slip = (round(float(count)) for count in counts)
         note = f"{solved.iterations} CG steps, {changed} status changes"
-        if damped.fraction < 1.0:
-            note += f", cut to {damped.fraction:g} of the step"
+        if taken.fraction < 1.0:
+            note += f", cut to {taken.fraction:g} of the step"
         if solved.stop is not Stop.CONVERGED:
             note += f", {solved.stop.value}"
         if coarse.gram.rank < coarse.m:
             note += f", {coarse.m - coarse.gram.rank} rigid motions not held by the face"
-        return SolverStep(
-            "face Newton",
-            number,
-            self._operator.products,
-            damped.iterate.residuals,
-            closed,
-            stick,
-            slip,
-            note,
-        )
-
-
-def residual_weights(face: Face, residuals: Residuals, step: Vector) -> Vector:
-    """Return the weights that turn a residual on a face into the natural and the gluing residual.
-
-    Args:
-        face: The face.
-        residuals: The last residuals, for their scales.
-        step: ρ of the natural map, 0 on equality rows, owned.
-    """
-    gluing = residuals.gluing_scale or 1.0
-    weights = np.sqrt(face.restriction.power(2).T @ step**2) * face.damping**2
-    weights /= residuals.force_scale or np.inf
-    return np.where(weights > 0.0, weights, 1.0 / gluing)
+        residuals, products = taken.iterate.residuals, self.operator.products
+        return SolverStep("face Newton", number, products, residuals, closed, stick, slip, note)

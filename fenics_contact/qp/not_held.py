@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,11 +14,8 @@ from fenics_contact.qp.equilibrium import find_equilibrium
 from fenics_contact.qp.iterate import Start, apply_unless_zero, iterate_fitted
 from fenics_contact.qp.problem import CountedOperator, DualProblem
 from fenics_contact.qp.reductions import Vector, global_max
-from fenics_contact.qp.slip_law import SlipLaw, Tresca
-from fenics_contact.qp.solution import SolverStep
-
-if TYPE_CHECKING:
-    from fenics_contact.qp.face_newton import FaceNewton
+from fenics_contact.qp.slip_law import Tresca
+from fenics_contact.qp.solution import DualSolution, SolverStep
 
 #: Friction may press surfaces together itself, where they wedge: at most so many times what else does, and so
 #: many times where a solver has tried all it can.
@@ -58,13 +54,11 @@ class FrictionAlone:
 
     Attributes:
         problem: The problem that is not solved.
-        law: Its law.
-        solver: Solves it without friction.
+        solve: Solves it without friction.
     """
 
     problem: DualProblem
-    law: SlipLaw
-    solver: FaceNewton
+    solve: Callable[[DualProblem, Start], DualSolution]
 
     def require_enough(self, wedged: float = WEDGED) -> None:
         """Refuse a problem whose friction is far from enough. Collective.
@@ -80,8 +74,8 @@ class FrictionAlone:
         """
         if self._forces is None:
             return
-        bound = wedged * self.law.bound(self._forces)
-        found = find_equilibrium(self.problem, Tresca(self.problem.layout, bound))
+        bound = wedged * self.problem.law.bound(self._forces)
+        found = find_equilibrium(self.problem.with_law(Tresca(self.problem.layout, bound)))
         if found.motion is not None:
             raise InfeasibleError(
                 "friction needs surfaces that are pressed together, but without it they are pressed so "
@@ -96,19 +90,20 @@ class FrictionAlone:
 
         The bodies are held in all motions that only friction resists. Collective on first use.
         """
-        problem, law, layout, coarse = self.problem, self.law, self.problem.layout, self.problem.coarse
-        if global_max(problem.comm, float(law.growth.max(initial=0.0))) == 0.0:
+        problem, layout, coarse = self.problem, self.problem.layout, self.problem.coarse
+        if global_max(problem.comm, float(problem.law.growth.max(initial=0.0))) == 0.0:
             return None
         rows = np.concatenate([layout.equality, layout.normal])
         entries = (np.ones(len(rows)), (rows, np.arange(len(rows))))
         pressing = coarse.restricted(sp.csr_matrix(entries, shape=(layout.size, len(rows))))
         unheld, _ = np.linalg.qr(pressing.gram.null_space)
-        held = replace(problem, coarse=coarse.with_load(coarse.load - unheld @ (unheld.T @ coarse.load)))
-        without = Tresca(layout, law.bound(np.zeros(layout.size)))
+        loaded = coarse.with_load(coarse.load - unheld @ (unheld.T @ coarse.load))
+        given = Tresca(layout, problem.law.bound(np.zeros(layout.size)))
+        held = replace(problem, coarse=loaded, friction=given)
         multiplier, operator = held.coarse.particular(), CountedOperator(problem.operator)
         product = apply_unless_zero(held, operator, multiplier)
-        start = Start(iterate_fitted(held, without, multiplier, product), operator)
+        start = Start(iterate_fitted(held, multiplier, product), operator)
         try:
-            return self.solver.run(held, without, start).multiplier
+            return self.solve(held, start).multiplier
         except (ConvergenceError, InfeasibleError):
             return None

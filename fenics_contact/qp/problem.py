@@ -1,27 +1,29 @@
-"""The dual problem: min ½ λᵀF λ − dᵀλ subject to G λ = e and λ in a cone, given by its operators."""
+"""The dual problem: min ½ λᵀF λ − dᵀλ subject to G λ = e and λ in a cone, by its operators and its law."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import InfeasibleError, InvalidInputError, together
-from fenics_contact.progress import Task
 from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.face import Marks
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector, global_sum
-
-if TYPE_CHECKING:
-    from fenics_contact.qp.scaling import Scaling
+from fenics_contact.qp.slip_law import SlipLaw, Tresca
 
 Operator = Callable[[Vector], Vector]
+#: What is called with the number of F-products so far and, after a step of a solver, with its residual.
+Report = Callable[[int, float | None], None]
+
+#: Factors that differ by less than this, relatively, are not worth scaling with.
+EVEN = 1e-6
 
 
 @runtime_checkable
@@ -55,6 +57,7 @@ class DualProblem:
             collective; what the jumps of an answer are compared with. None where displacements are not known.
         supported: Marks of contact rows that supports determine alone, owned, shape (size,): no multiplier
             moves them, and their diagonal stands for no flexibility. None where there are no such rows.
+        friction: The law that slip bounds follow; None where no disc bears a force.
     """
 
     comm: MPI.Comm
@@ -67,6 +70,7 @@ class DualProblem:
     scaling: Scaling | None = None
     reach: Callable[[Vector, Vector], Vector] | None = None
     supported: Marks | None = None
+    friction: SlipLaw | None = None
 
     @cached_property
     def between_supports(self) -> Marks:
@@ -74,7 +78,16 @@ class DualProblem:
         return np.zeros(self.layout.size, dtype=bool) if self.supported is None else self.supported
 
     @cached_property
-    def evened(self) -> DualProblem:
+    def law(self) -> SlipLaw:
+        """The law of `friction`; without one all slip bounds are zero."""
+        return self.friction or Tresca(self.layout, np.zeros(self.layout.n_friction))
+
+    def with_law(self, law: SlipLaw) -> DualProblem:
+        """Return the same problem under another law of friction."""
+        return replace(self, friction=law)
+
+    @cached_property
+    def scaled_problem(self) -> DualProblem:
         """The problem in multipliers scaled by `scaling`, itself where there is none."""
         return self if self.scaling is None else self.scaling.applied_to(self)
 
@@ -117,6 +130,74 @@ class DualProblem:
             )
 
 
+@dataclass(frozen=True, eq=False)
+class Scaling:
+    """Factors s of the multipliers, λ = s μ, that make them evenly stiff, and the coarse space of μ.
+
+    The projector of the problem for μ is that of λ with P_Q = I − Q Gᵀ(G Q Gᵀ)⁻¹G, Q = diag(s²). Where the
+    coefficients jump, preconditioned projected conjugate gradients need such a Q to converge independently
+    of the jumps.
+
+    Attributes:
+        factor: s > 0, the same for all multipliers of one contact, owned, shape (size,).
+        coarse: G diag(s) with the right side e.
+
+    References:
+        A. Klawonn, O. B. Widlund, FETI and Neumann-Neumann iterative substructuring methods: connections and
+        new results, Comm. Pure Appl. Math. 54 (2001) 57-90.
+    """
+
+    factor: Vector
+    coarse: CoarseSpace
+
+    @classmethod
+    def build(cls, factor: Vector, coarse: CoarseSpace) -> Scaling:
+        """Scale a coarse space; its matrix is factored when it is first needed."""
+        return cls(factor, CoarseSpace(coarse.comm, coarse.matrix @ sp.diags(factor), coarse.load))
+
+    def with_load(self, load: Vector) -> Scaling:
+        """Return the scaling of a problem with another right side e; what is factored is shared."""
+        return replace(self, coarse=self.coarse.with_load(load))
+
+    def applied_to(self, problem: DualProblem) -> DualProblem:
+        """Return the problem for μ, see `DualProblem.scaled_problem`."""
+        s, precondition, reach = self.factor, problem.preconditioner, problem.reach
+        discs, friction = s[problem.layout.tangential[:, 0]], problem.friction
+        return replace(
+            problem,
+            operator=lambda x: s * problem.operator(s * x),
+            rhs=s * problem.rhs,
+            coarse=self.coarse,
+            diagonal=s**2 * problem.diagonal,
+            preconditioner=None if precondition is None else _scaled(precondition, s),
+            scaling=None,
+            reach=None if reach is None else lambda x, alpha: s * reach(s * x, alpha),
+            friction=None if friction is None else friction.scaled(discs),
+        )
+
+
+def _scaled(precondition: Operator, s: Vector) -> Operator:
+    """Return x -> M(x / s) / s."""
+    if isinstance(precondition, FacePreconditioner):
+        return _ScaledPreconditioner(precondition, s)
+    return lambda x: precondition(x / s) / s
+
+
+@dataclass(frozen=True, eq=False)
+class _ScaledPreconditioner:
+    """x -> M(x / s) / s, on faces as well: s is even within a contact, so that Z is that of λ."""
+
+    inner: FacePreconditioner
+    factor: Vector
+
+    def __call__(self, residual: Vector) -> Vector:
+        return self.inner(residual / self.factor) / self.factor
+
+    def on_face(self, restriction: sp.csr_matrix) -> Operator:
+        precondition, s = self.inner.on_face(restriction), self.factor
+        return lambda x: precondition(x / s) / s
+
+
 class CountedOperator:
     """The dual operator together with the number of times it was applied.
 
@@ -124,23 +205,27 @@ class CountedOperator:
         products: Applications of F so far.
     """
 
-    def __init__(self, operator: Operator, task: Task | None = None) -> None:
+    def __init__(self, operator: Operator, report: Report | None = None) -> None:
         """Wrap ``operator``.
 
         Args:
             operator: F.
-            task: Work of which a product is a step.
+            report: Called with the number of products after each of them.
         """
-        self._operator, self._task = operator, task
+        self._operator, self._report = operator, report
         self.products = 0
 
     def __call__(self, x: Vector) -> Vector:
         """Apply F to an owned vector and count. Collective."""
-        found = self._operator(x)
+        product = self._operator(x)
         self.products += 1
-        if self._task is not None:
-            self._task.step(self.products)
-        return found
+        self.report(self.products, None)
+        return product
+
+    def report(self, products: int, residual: float | None) -> None:
+        """Tell whoever listens how many products there were and what residual they led to."""
+        if self._report is not None:
+            self._report(products, residual)
 
 
 class ShiftedOperator:

@@ -2,99 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fenics_contact.qp.iterate import Iterate, Start, certify, iterate_at
-from fenics_contact.qp.newton_steps import NewtonSteps
+from fenics_contact.qp.forcing import Forcing
+from fenics_contact.qp.iterate import Iterate, Start, certify, iterate_at, iterate_between
+from fenics_contact.qp.newton_steps import Damped, NewtonState, NewtonSteps, Safeguards
 from fenics_contact.qp.problem import CountedOperator, DualProblem, ShiftedOperator
-from fenics_contact.qp.reductions import Vector
-from fenics_contact.qp.slip_law import SlipLaw, Tresca
-from fenics_contact.qp.smalse import outer_iterations
+from fenics_contact.qp.reductions import Vector, global_sum
+from fenics_contact.qp.slip_law import Tresca
+from fenics_contact.qp.smalse import Smalse, outer_iterations
 from fenics_contact.qp.solution import Residuals, SmalseMemory, SolverStep, contact_step
-
-if TYPE_CHECKING:
-    from fenics_contact.qp.face_newton import FaceNewton
-
-
-@dataclass(frozen=True, eq=False)
-class ProximalPoint:
-    """min ½ λᵀF λ − dᵀλ + ½ ‖λ − λ̄‖²_D over G λ = e and Λ(Ψ): contacts and friction on springs 1/D.
-
-    In displacements that is to minimise a convex function with a continuous derivative, the potential energy
-    with augmented Lagrangians of contact and friction, so that Newton's method with a line search gets there
-    from anywhere, and without cycles. Its face is Newton's of the problem with F + D, d + D λ̄ and ρ = 1/D;
-    the centre λ̄ then moves to the force of the springs.
-
-    Attributes:
-        original: The problem without springs.
-        law: Its law.
-        problem: The problem with springs: F + D, d + D λ̄, and D in place of the diagonal of F.
-        operator: F + D, counted.
-        frozen: Tresca's law with the slip bound of the centre.
-        shift: D, 0 on equality rows, owned.
-
-    References:
-        R. T. Rockafellar, Augmented Lagrangians and applications of the proximal point algorithm in convex
-        programming, Math. Oper. Res. 1 (1976).
-    """
-
-    original: DualProblem
-    law: SlipLaw
-    problem: DualProblem
-    operator: ShiftedOperator
-    frozen: Tresca
-    shift: Vector
-
-    @classmethod
-    def build(
-        cls, problem: DualProblem, law: SlipLaw, operator: CountedOperator, stiffness: float
-    ) -> ProximalPoint:
-        """Put springs of stiffness ``stiffness`` / diag F in all contacts and discs, without a centre yet.
-
-        Args:
-            problem: The dual problem.
-            law: Where the slip bound comes from.
-            operator: F, counted.
-            stiffness: 1/D in units of 1/diag F: the larger, the nearer to the problem without springs.
-        """
-        layout = problem.layout
-        shift = np.zeros(layout.size)
-        shift[layout.contact] = 1.0 / (stiffness * contact_step(layout, problem.diagonal)[layout.contact])
-        diagonal = np.where(shift > 0.0, shift, problem.diagonal)
-        springs = ShiftedOperator(operator, shift)
-        shifted = replace(problem, operator=springs, diagonal=diagonal)
-        return cls(problem, law, shifted, springs, Tresca(layout, np.zeros(layout.n_friction)), shift)
-
-    def centred(self, force: Vector) -> ProximalPoint:
-        """Return the point with the centre and the slip bound of a force, owned."""
-        bound = self.law.bound(force)
-        frozen = Tresca(self.original.layout, bound)
-        centre = self.shift * frozen.feasible(force).project(force)
-        return replace(self, problem=replace(self.problem, rhs=self.original.rhs + centre), frozen=frozen)
-
-    def enter(self, iterate: Iterate) -> Iterate:
-        """Return an iterate of the original problem as one of that with springs. Collective."""
-        original = self.original
-        alpha = original.coarse.coefficients(iterate.product - original.rhs - iterate.residual)
-        product = iterate.product + self.shift * iterate.multiplier
-        return iterate_at(self.problem, self.frozen, iterate.multiplier, product, alpha)
-
-    def leave(self, iterate: Iterate) -> Iterate:
-        """Return an iterate of the problem with springs as one of the original one. Collective."""
-        problem = self.problem
-        alpha = problem.coarse.coefficients(iterate.product - problem.rhs - iterate.residual)
-        product = iterate.product - self.shift * iterate.multiplier
-        return iterate_at(self.original, self.law, iterate.multiplier, product, alpha)
-
-    def force(self, iterate: Iterate) -> Vector:
-        """Return the force of the springs at an iterate, P_Λ(λ̄ − D⁻¹ r), owned."""
-        step = contact_step(self.original.layout, self.problem.diagonal)
-        trial = iterate.multiplier - step * iterate.residual
-        return self.frozen.feasible(trial).project(trial)
-
 
 #: A rescue aims at a residual smaller by this factor.
 REDUCTION = 0.1
@@ -111,105 +31,268 @@ CENTRED, AHEAD = 0.03, 0.3
 DIVERGED = 1e12
 #: Largest inner tolerances, relative to the residual and of all.
 FORCING, LOOSEST = 0.25, 0.1
+#: The whole step is taken where the potential rises at its end by less than this fraction of its first fall.
+STEEP = 0.3
+#: The slope at which a minimum of the potential counts as found, relative to the first one.
+LEVEL = 0.1
+#: Gluing residual from which on bodies are in pieces, and their potential says nothing.
+TORN = 0.1
 
 
-def rescue(
-    problem: DualProblem,
-    law: SlipLaw,
-    start: Start,
-    parameters: FaceNewton,
-    *,
-    budget: int,
-    further: bool = False,
-    reason: str,
-    history: list[SolverStep],
-) -> tuple[Iterate, SmalseMemory | None]:
-    """Improve an iterate that Newton's method cannot, with its slip bound held for a while. Collective.
+@dataclass(frozen=True, eq=False)
+class ProximalPoint:
+    """min ½ λᵀF λ − dᵀλ + ½ ‖λ − λ̄‖²_D over G λ = e and Λ(Ψ): contacts and friction on springs 1/D.
+
+    In displacements that is to minimise a convex function with a continuous derivative, the potential energy
+    with augmented Lagrangians of contact and friction, so that Newton's method with a line search gets there
+    from anywhere, and without cycles. Its face is Newton's of the problem with F + D, d + D λ̄ and ρ = 1/D;
+    the centre λ̄ then moves to the force of the springs.
+
+    Attributes:
+        original: The problem without springs.
+        problem: The problem with springs: F + D, d + D λ̄, D in place of the diagonal of F, and Tresca's law
+            with the slip bound of the centre.
+        operator: F + D, counted.
+        stiffness: 1/D in units of 1/diag F: the larger, the nearer to the problem without springs.
+        shift: D, 0 on equality rows, owned.
+
+    References:
+        R. T. Rockafellar, Augmented Lagrangians and applications of the proximal point algorithm in convex
+        programming, Math. Oper. Res. 1 (1976).
+    """
+
+    original: DualProblem
+    problem: DualProblem
+    operator: ShiftedOperator
+    stiffness: float
+    shift: Vector
+
+    @classmethod
+    def build(cls, problem: DualProblem, operator: CountedOperator, stiffness: float) -> ProximalPoint:
+        """Put springs of stiffness ``stiffness`` / diag F in all contacts and discs, without a centre yet.
+
+        Args:
+            problem: The dual problem.
+            operator: F, counted.
+            stiffness: 1/D in units of 1/diag F.
+        """
+        layout = problem.layout
+        shift = np.zeros(layout.size)
+        shift[layout.contact] = 1.0 / (stiffness * contact_step(layout, problem.diagonal)[layout.contact])
+        diagonal = np.where(shift > 0.0, shift, problem.diagonal)
+        springs = ShiftedOperator(operator, shift)
+        shifted = replace(problem, operator=springs, diagonal=diagonal, friction=None)
+        return cls(problem, shifted, springs, stiffness, shift)
+
+    def centred(self, force: Vector) -> ProximalPoint:
+        """Return the point with the centre and the slip bound of a force, owned."""
+        original = self.original
+        frozen = Tresca(original.layout, original.law.bound(force))
+        rhs = original.rhs + self.shift * frozen.admit(force)
+        return replace(self, problem=replace(self.problem, rhs=rhs, friction=frozen))
+
+    def enter(self, iterate: Iterate) -> Iterate:
+        """Return an iterate of the original problem as one of that with springs. Collective."""
+        alpha = iterate.motions(self.original)
+        product = iterate.product + self.shift * iterate.multiplier
+        return iterate_at(self.problem, iterate.multiplier, product, alpha)
+
+    def leave(self, iterate: Iterate) -> Iterate:
+        """Return an iterate of the problem with springs as one of the original one. Collective."""
+        alpha = iterate.motions(self.problem)
+        product = iterate.product - self.shift * iterate.multiplier
+        return iterate_at(self.original, iterate.multiplier, product, alpha)
+
+    def force(self, iterate: Iterate) -> Vector:
+        """Return the force of the springs at an iterate, P_Λ(λ̄ − D⁻¹ r), owned."""
+        step = contact_step(self.original.layout, self.problem.diagonal)
+        return self.problem.law.admit(iterate.multiplier - step * iterate.residual)
+
+
+def descend(
+    problem: DualProblem, before: Iterate, after: Iterate, earlier: Residuals | None = None
+) -> Damped:
+    """Return the minimum between two iterates of the potential that a proximal point minimises. Collective.
+
+    The potential energy of displacements u(λ, α) together with that of springs ρ in all contacts and discs is
+    convex; its derivative along a step is that of r, against the force λ that deforms the bodies less the
+    force P_Λ(λ − ρ r) of the springs. Bodies in pieces come together first, whatever the potential.
+
+    Args:
+        problem: Problem of a proximal point, F + D with ρ = 1/D.
+        before: Where the step began.
+        after: Where it ended.
+        earlier: Residuals before that, which say nothing of the potential.
+    """
+    slope = _slope(problem, before, after)
+    first, last = slope(0.0), slope(1.0)
+    if first >= 0.0 or last <= -STEEP * first or before.residuals.gluing > TORN:
+        return Damped(after, 1.0)
+    left, right, low, high = 0.0, 1.0, first, last
+    for _ in range(30):
+        part = left + (right - left) * min(max(-low / (high - low), 0.1), 0.9)
+        value = slope(part)
+        if abs(value) <= -LEVEL * first:
+            break
+        if value < 0.0:
+            left, low = part, value
+        else:
+            right, high = part, value
+    return Damped(iterate_between(problem, before, after, part), part)
+
+
+def _slope(problem: DualProblem, before: Iterate, after: Iterate) -> Callable[[float], float]:
+    """Return the derivative of the potential as a function of the fraction of a step. Collective to call."""
+    layout, step = problem.layout, contact_step(problem.layout, problem.diagonal)
+    moved, turned = after.multiplier - before.multiplier, after.residual - before.residual
+    opened = turned.copy()
+    opened[layout.contact] -= moved[layout.contact] / step[layout.contact]
+
+    def slope(part: float) -> float:
+        multiplier = before.multiplier + part * moved
+        trial = multiplier - step * (before.residual + part * turned)
+        missing = multiplier - problem.law.feasible(multiplier).project(trial)
+        missing[layout.equality] = (part - 1.0) * moved[layout.equality]
+        return float(global_sum(problem.comm, opened @ missing)[0])
+
+    return slope
+
+
+#: Springs prescribe ρ, a potential says how far to go, and a face that holds all bodies moves them already:
+#: moving them in turns with the rest would creep.
+WITH_SPRINGS = Safeguards(shorten=descend, adapts_step=False, moves_held=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Rescued:
+    """What a rescue led to.
+
+    Attributes:
+        iterate: The improved iterate, with its residuals under the law of the problem.
+        line: Its line of history, without number and reason.
+        memory: What SMALSE learned.
+        reached: Whether the residual is as small as was aimed at.
+    """
+
+    iterate: Iterate
+    line: SolverStep
+    memory: SmalseMemory | None
+    reached: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Rescue:
+    """Improves iterates that Newton's method cannot, with their slip bound held for a while.
 
     By proximal points where a preconditioner makes faces cheap; by SMALSE, which solves no face, elsewhere.
 
-    Args:
+    Attributes:
         problem: The dual problem.
-        law: Where the slip bound comes from.
-        start: The iterate that Newton could not improve.
-        parameters: Those of Newton's method.
-        budget: Largest number of products to spend.
-        further: Whether an earlier rescue from the same iterate was of no use.
-        reason: Why Newton's method needs it, in words.
-        history: Gets one record.
-
-    Returns:
-        The improved iterate with its residuals for ``law``, and what SMALSE learned.
+        forcing: How accurately Newton's method solves its faces, and the tolerance of the solve.
+        max_products: Largest number of F-products of the whole solve.
+        smalse: Parameters where there is no preconditioner.
     """
-    limit = start.operator.products + budget
-    memory: SmalseMemory | None = start.memory
-    if problem.preconditioner is None:
-        found, line, memory = _by_smalse(problem, law, start, parameters, limit)
-    else:
-        found, line = _by_proximal_points(problem, law, start, parameters, limit, further)
-    before = start.iterate.residuals
-    reached = "met its target" if _improved(found.residuals, before, further) else "used its budget"
-    note = f"rescue from {before.worst:.1e} because {reason}: {reached}"
-    products = start.operator.products
-    history.append(
-        replace(line, iteration=len(history), products=products, residuals=found.residuals, note=note)
-    )
-    return found, memory
+
+    problem: DualProblem
+    forcing: Forcing
+    max_products: int
+    smalse: Smalse
+
+    def __call__(self, start: Start, budget: int, *, further: bool = False) -> Rescued:
+        """Improve an iterate. Collective.
+
+        Args:
+            start: The iterate that Newton could not improve.
+            budget: Largest number of products to spend.
+            further: Whether an earlier rescue from the same iterate was of no use.
+        """
+        limit, memory = start.operator.products + budget, start.memory
+        if self.problem.preconditioner is None:
+            iterate, line, memory = self._by_smalse(start, limit)
+        else:
+            iterate, line = self._by_proximal_points(start, limit, further)
+        reached = _improved(iterate.residuals, start.iterate.residuals, further)
+        line = replace(line, products=start.operator.products, residuals=iterate.residuals)
+        return Rescued(iterate, line, memory, reached)
+
+    def _by_proximal_points(self, start: Start, limit: int, further: bool) -> tuple[Iterate, SolverStep]:
+        """Take Newton steps with springs, and move their centre whenever they come to rest. Collective."""
+        path = self._first_centre(start)
+        for number in range(PROXIMAL_STEPS):
+            newton, line = path.steps.step(path.newton, number)
+            found = path.point.leave(newton.iterate)
+            if not found.residuals.worst < DIVERGED:
+                found = start.iterate
+                break
+            improved = _improved(found.residuals, start.iterate.residuals, further)
+            if improved or start.operator.products >= limit or found.residuals.within(self.forcing.tolerance):
+                break
+            path = replace(path, newton=newton, since=path.since + 1)
+            if newton.iterate.residuals.worst < max(CENTRED, AHEAD * found.residuals.worst):
+                path = self._next_centre(path, start.operator, found)
+        return found, replace(line, method="proximal rescue")
+
+    def _first_centre(self, start: Start) -> _ProximalPath:
+        """Put soft springs between the bodies and their forces at the start. Collective."""
+        point = ProximalPoint.build(self.problem, start.operator, SPRINGS)
+        point = point.centred(start.iterate.multiplier)
+        steps = self._steps(point)
+        return _ProximalPath(point, steps, steps.init(steps.at_rest(point.enter(start.iterate))))
+
+    def _next_centre(self, path: _ProximalPath, operator: CountedOperator, found: Iterate) -> _ProximalPath:
+        """Move the centre to the force of the springs, and make them stiffer if it came quickly. Collective.
+
+        Args:
+            path: Where the steps came to rest.
+            operator: F, counted.
+            found: The iterate there without springs.
+        """
+        force = path.point.force(path.newton.iterate)
+        if path.since <= FEW:
+            point = ProximalPoint.build(self.problem, operator, STIFFER * path.point.stiffness).centred(force)
+            steps = self._steps(point)
+            return _ProximalPath(point, steps, steps.init(point.enter(found)))
+        point = path.point.centred(force)
+        newton = replace(path.newton, iterate=point.enter(found))
+        return _ProximalPath(point, path.steps.moved(point.problem), newton)
+
+    def _steps(self, point: ProximalPoint) -> NewtonSteps:
+        """Prepare Newton's method for a proximal point. Collective."""
+        forcing = self.forcing.at_most(FORCING, LOOSEST)
+        return NewtonSteps.build(point.problem, point.operator, forcing, self.max_products, WITH_SPRINGS)
+
+    def _by_smalse(self, start: Start, limit: int) -> tuple[Iterate, SolverStep, SmalseMemory]:
+        """Take SMALSE steps. Collective."""
+        problem = self.problem
+        frozen = problem.with_law(Tresca(problem.layout, problem.law.bound(start.iterate.multiplier)))
+        target = REDUCTION * start.iterate.residuals.worst
+        settings = replace(self.smalse, tolerance=target, max_products=limit)
+        for state in outer_iterations(frozen, start, settings):
+            if state.residuals.within(target) or start.operator.products >= limit:
+                break
+        improved = certify(problem, start.operator, state.multiplier, state.residual).iterate
+        line = state.record(0, problem, start.operator.products)
+        return improved, replace(line, method="SMALSE rescue"), state.memory
+
+
+@dataclass(frozen=True, eq=False)
+class _ProximalPath:
+    """Where a rescue by proximal points is.
+
+    Attributes:
+        point: Springs and their centre.
+        steps: Newton's method with these springs.
+        newton: Its state.
+        since: Steps since the centre moved.
+    """
+
+    point: ProximalPoint
+    steps: NewtonSteps
+    newton: NewtonState
+    since: int = 0
 
 
 def _improved(after: Residuals, before: Residuals, further: bool) -> bool:
     better = after.worst_beside(before) <= REDUCTION * before.worst_beside(after)
     # From a very bad iterate any other is better by far, but not always one from which Newton gets anywhere.
     return better and (not further or after.worst <= REDUCTION)
-
-
-def _by_proximal_points(
-    problem: DualProblem, law: SlipLaw, start: Start, parameters: FaceNewton, limit: int, further: bool
-) -> tuple[Iterate, SolverStep]:
-    """Take Newton steps with springs, and move their centre whenever they come to rest. Collective."""
-    stiffness, since = SPRINGS, 0
-    point = ProximalPoint.build(problem, law, start.operator, stiffness).centred(start.iterate.multiplier)
-    careful = replace(
-        parameters, forcing=min(parameters.forcing, FORCING), loosest=min(parameters.loosest, LOOSEST)
-    )
-    steps = NewtonSteps(point.problem, point.frozen, point.operator, careful, springs=True)
-    current = steps.settled(point.enter(start.iterate))
-    for number in range(PROXIMAL_STEPS):
-        current, line = steps.step(current, number)
-        found = point.leave(current)
-        if not found.residuals.worst < DIVERGED:
-            found = start.iterate
-            break
-        if _improved(found.residuals, start.iterate.residuals, further) or start.operator.products >= limit:
-            break
-        if found.residuals.within(parameters.tolerance):
-            break
-        since += 1
-        if current.residuals.worst < max(CENTRED, AHEAD * found.residuals.worst):
-            force = point.force(current)
-            if since <= FEW:
-                stiffness, since = STIFFER * stiffness, 0
-                point = ProximalPoint.build(problem, law, start.operator, stiffness).centred(force)
-                steps = NewtonSteps(point.problem, point.frozen, point.operator, careful, springs=True)
-            else:
-                since = 0
-                point = point.centred(force)
-                steps.move(point.problem, point.frozen)
-            current = point.enter(found)
-    return found, replace(line, method="proximal rescue")
-
-
-def _by_smalse(
-    problem: DualProblem, law: SlipLaw, start: Start, parameters: FaceNewton, limit: int
-) -> tuple[Iterate, SolverStep, SmalseMemory]:
-    """Take SMALSE steps. Collective."""
-    frozen = Tresca(problem.layout, law.bound(start.iterate.multiplier))
-    feasible = frozen.feasible(start.iterate.multiplier)
-    target = REDUCTION * start.iterate.residuals.worst
-    settings = replace(parameters.rescue, tolerance=target, max_products=limit)
-    for state in outer_iterations(problem, feasible, start, settings):
-        if state.residuals.within(target) or start.operator.products >= limit:
-            break
-    improved = certify(problem, start.operator, law, state.multiplier, state.residual).iterate
-    line = state.record(0, problem, start.operator.products)
-    return improved, replace(line, method="SMALSE rescue"), state.memory

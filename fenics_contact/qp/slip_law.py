@@ -29,6 +29,9 @@ class SlipLaw(Protocol):
     def admit(self, multiplier: Vector) -> Vector:
         """Return the nearest multiplier that the law admits with the slip bound of its own normal force."""
 
+    def scaled(self, factor: Vector) -> SlipLaw:
+        """Return the law for μ where λ = s μ, with the factor s of each disc, shape (n_friction,), owned."""
+
 
 @dataclass(frozen=True, eq=False)
 class Tresca:
@@ -58,6 +61,10 @@ class Tresca:
     def admit(self, multiplier: Vector) -> Vector:
         """Return the projection on Λ(Ψ)."""
         return self.feasible(multiplier).project(multiplier)
+
+    def scaled(self, factor: Vector) -> Tresca:
+        """Return the law with the bounds Ψ / s."""
+        return Tresca(self.layout, self.slip_bound / factor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,3 +132,7 @@ class Coulomb:
         admitted[layout.tangential_frictional[outside]] = peak[outside]
         admitted[layout.tangential] = np.minimum(shrink, 1.0)[:, None] * tau
         return admitted
+
+    def scaled(self, factor: Vector) -> Coulomb:
+        """Return the law with the given part Ψ₀ / s; μ is the same, as s is that of the whole contact."""
+        return Coulomb(self.layout, self.friction_coefficient, self.given / factor)

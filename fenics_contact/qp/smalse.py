@@ -9,12 +9,11 @@ import numpy as np
 
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.qp.augmented import AugmentedLagrangian
-from fenics_contact.qp.feasible import FeasibleSet
 from fenics_contact.qp.iterate import Start, certify, count_status
 from fenics_contact.qp.mpgp import Mpgp, minimise
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector
-from fenics_contact.qp.slip_law import SlipLaw, Tresca
+from fenics_contact.qp.slip_law import Tresca
 from fenics_contact.qp.solution import DualSolution, Residuals, SmalseMemory, SolverStep, measure
 
 #: A lack in the rise of the Lagrangian below this fraction of it says nothing about M.
@@ -52,24 +51,24 @@ class Smalse:
         """Return the solver with another tolerance."""
         return replace(self, tolerance=tolerance)
 
-    def run(self, problem: DualProblem, law: SlipLaw, start: Start) -> DualSolution:
+    def run(self, problem: DualProblem, start: Start) -> DualSolution:
         """Solve from ``start``; called by `solve`. Collective.
 
         Raises:
             InvalidInputError: The slip bound follows the multiplier.
             ConvergenceError: The product budget was used up; carries the history.
         """
-        if not isinstance(law, Tresca):
+        if not isinstance(problem.law, Tresca):
             raise InvalidInputError(
-                f"SMALSE needs a given slip bound, got {type(law).__name__}'s law: iterate on the bound "
-                "around it, or use FaceNewton"
+                f"SMALSE needs a given slip bound, got {type(problem.law).__name__}'s law: iterate on the "
+                "bound around it, or use FaceNewton"
             )
         operator, history = start.operator, list[SolverStep]()
-        for state in outer_iterations(problem, law.feasible(start.iterate.multiplier), start, self):
+        for state in outer_iterations(problem, start, self):
             history.append(state.record(len(history), problem, operator.products))
             start.reached(history[-1])
             if state.residuals.within(0.5 * self.tolerance):
-                answer = certify(problem, operator, law, state.multiplier, state.residual)
+                answer = certify(problem, operator, state.multiplier, state.residual)
                 if answer.iterate.residuals.within(self.tolerance):
                     return answer.solution(problem, history, operator.products, state.memory)
             if operator.products >= self.max_products:
@@ -109,14 +108,13 @@ class SmalseState:
         return SolverStep("SMALSE", iteration, products, self.residuals, closed, stick, slip, note)
 
 
-def outer_iterations(
-    problem: DualProblem, feasible: FeasibleSet, start: Start, parameters: Smalse
-) -> Iterator[SmalseState]:
-    """Yield the state after every outer iteration, without end. Collective.
+def outer_iterations(problem: DualProblem, start: Start, parameters: Smalse) -> Iterator[SmalseState]:
+    """Yield the state after every outer iteration, without end, for given slip bounds. Collective.
 
     The multiplier of G λ = e is kept as the vector v = G̃ᵀμ in range(Gᵀ) and updated by v ← v + Q λ − λ₀.
     """
     lagrangian = AugmentedLagrangian(problem, start)
+    feasible = problem.law.feasible(start.iterate.multiplier)
     x, v = feasible.project(start.iterate.multiplier), lagrangian.first_multiplier(start.iterate.residual)
     balance = parameters.balance if start.memory is None else start.memory.balance
     rigid = start.iterate.product - start.iterate.residual  # d + Gᵀα at the start: sets a scale only
@@ -137,7 +135,7 @@ def outer_iterations(
             balance *= parameters.balance_reduction
         previous = value
         v = v + lagrangian.drift(x)
-        residuals = measure(problem, feasible, x, residual + rigid, residual)
+        residuals = measure(problem, x, residual + rigid, residual)
         memory = SmalseMemory(lagrangian.norm, balance)
         yield SmalseState(x, residual, residuals, memory, minimum.iterations, feasible.slip_bound)
         caution *= 0.3 if minimum.iterations == 0 else 1.0

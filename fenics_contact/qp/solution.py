@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact.qp.feasible import FeasibleSet
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
@@ -76,10 +75,8 @@ def contact_step(layout: ContactLayout, diagonal: Vector) -> Vector:
     return step
 
 
-def measure(
-    problem: DualProblem, feasible: FeasibleSet, multiplier: Vector, product: Vector, residual: Vector
-) -> Residuals:
-    """Compute all residuals. Collective.
+def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual: Vector) -> Residuals:
+    """Compute all residuals with the slip bound that belongs to the multiplier. Collective.
 
     Contact forces below 1e-10 of ‖λ‖ count as none, so that a body that merely touches does not keep the
     iteration alive, and so do forces below 1e-10 of those that would close the gaps, ρ‖d‖: rounding of r
@@ -89,13 +86,13 @@ def measure(
 
     Args:
         problem: The dual problem.
-        feasible: Λ(Ψ).
         multiplier: λ, owned.
         product: F λ, owned.
         residual: r = F λ − d − Gᵀα, owned.
     """
     layout, equality, contact = problem.layout, problem.layout.equality, problem.layout.contact
     step = contact_step(layout, problem.diagonal)
+    feasible = problem.law.feasible(multiplier)
     mapped = feasible.project(multiplier - step * residual)
     free, error, needed = ~problem.between_supports, multiplier - mapped, step * problem.rhs
     sums = global_sum(

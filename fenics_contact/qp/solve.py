@@ -38,8 +38,8 @@ class DualSolver(Protocol):
     def with_tolerance(self, tolerance: float) -> DualSolver:
         """Return the solver with another tolerance."""
 
-    def run(self, problem: DualProblem, law: SlipLaw, start: Start) -> DualSolution:
-        """Solve from ``start``. Collective.
+    def run(self, problem: DualProblem, start: Start) -> DualSolution:
+        """Solve from ``start`` under the law of the problem. Collective.
 
         Raises:
             InfeasibleError: If the problem has no equilibrium.
@@ -77,17 +77,27 @@ def solve(
     """
     problem.check()
     with together(problem.comm):
-        law = _slip_law(problem, slip_bound, friction_coefficient)
-    if problem.scaling is not None:
-        return _solve_scaled(problem, law, slip_bound, solver, start, friction_coefficient)
+        under_law = problem.with_law(_slip_law(problem, slip_bound, friction_coefficient))
+    same = isinstance(start, DualSolution) and start.problem is problem
+    find = _solve_scaled if problem.scaling is not None else _solve_as_given
+    return replace(find(under_law, solver, start, same), problem=problem)
+
+
+def _solve_as_given(
+    problem: DualProblem, solver: DualSolver, start: DualSolution | Vector | None, same: bool
+) -> DualSolution:
+    """Solve a problem with its law; ``same`` tells whether the start is a solution of it. Collective."""
     with Task("solve", unit="products", target=solver.tolerance) as task:
         if start is None:
-            require_equilibrium(problem, law)
-        begin = _begin(problem, law, start, task)
-        known = _as_it_is(problem, law, begin, solver.tolerance)
+            require_equilibrium(problem)
+        operator = CountedOperator(
+            problem.operator, lambda products, residual: task.step(products, measure=residual)
+        )
+        begin = _begin(problem, operator, start, same)
+        known = _as_it_is(problem, begin, solver.tolerance)
         if known is not None:
             return known
-        solution = solver.run(problem, law, begin)
+        solution = solver.run(problem, begin)
     if not solution.residuals.within(solver.tolerance):
         raise ConvergenceError(
             f"a solution needs residuals below {solver.tolerance:.1e}, got {solution.residuals}: "
@@ -98,24 +108,18 @@ def solve(
 
 
 def _solve_scaled(
-    problem: DualProblem,
-    law: SlipLaw,
-    slip_bound: Vector | None,
-    solver: DualSolver,
-    start: DualSolution | Vector | None,
-    friction_coefficient: Vector | None,
+    problem: DualProblem, solver: DualSolver, start: DualSolution | Vector | None, same: bool
 ) -> DualSolution:
     """Solve in scaled multipliers until the residuals of the unscaled ones are small, too. Collective."""
-    scaling = problem.scaling
-    assert scaling is not None
-    bound, begin = scaling.bound(problem, slip_bound), scaling.start(problem, start)
+    scaled = problem.scaled_problem
+    scaled.check()
+    begin = _scaled_start(problem, start)
     tolerance, products = solver.tolerance, 0
     history: tuple[SolverStep, ...] = ()
-    for _ in range(SCALED_ATTEMPTS):
-        stricter = solver.with_tolerance(tolerance)
-        begin = solve(problem.evened, bound, stricter, begin, friction_coefficient=friction_coefficient)
+    for attempt in range(SCALED_ATTEMPTS):
+        begin = _solve_as_given(scaled, solver.with_tolerance(tolerance), begin, same or attempt > 0)
         products, history = products + begin.products, (*history, *begin.history)
-        solution = scaling.solution(problem, law, begin)
+        solution = _unscaled(problem, begin)
         if solution.residuals.within(solver.tolerance):
             return replace(solution, products=products, iterations=len(history), history=history)
         tolerance *= 0.3 * solver.tolerance / solution.residuals.worst
@@ -123,6 +127,32 @@ def _solve_scaled(
         f"a solution needs residuals below {solver.tolerance:.1e}, got {solution.residuals} after "
         f"{SCALED_ATTEMPTS} attempts with ever stricter scaled ones: loosen the tolerance",
         history,
+    )
+
+
+def _scaled_start(problem: DualProblem, start: DualSolution | Vector | None) -> DualSolution | Vector | None:
+    """Return where to start for μ, λ = s μ, see `Scaling`."""
+    assert problem.scaling is not None
+    s = problem.scaling.factor
+    if not isinstance(start, DualSolution):
+        return None if start is None else np.asarray(start / s, dtype=np.float64)
+    multiplier, product, residual = start.multiplier / s, start.product * s, start.residual * s
+    return replace(start, multiplier=multiplier, product=product, residual=residual)
+
+
+def _unscaled(problem: DualProblem, solution: DualSolution) -> DualSolution:
+    """Return the solution for λ of one for μ, with its residuals. Collective."""
+    assert problem.scaling is not None
+    s = problem.scaling.factor
+    multiplier, product = s * solution.multiplier, solution.product / s
+    answer = answer_at(problem, multiplier, product, solution.alpha)
+    return replace(
+        solution,
+        multiplier=multiplier,
+        product=product,
+        residual=answer.residual,
+        slip_bound=problem.law.bound(multiplier),
+        residuals=answer.residuals,
     )
 
 
@@ -144,11 +174,13 @@ def _slip_law(
     return law
 
 
-def _begin(problem: DualProblem, law: SlipLaw, start: DualSolution | Vector | None, task: Task) -> Start:
+def _begin(
+    problem: DualProblem, operator: CountedOperator, start: DualSolution | Vector | None, same: bool
+) -> Start:
     """Compute product and residual of the starting multiplier. Collective; at most one product."""
-    coarse, operator = problem.coarse, CountedOperator(problem.operator, task)
+    coarse = problem.coarse
     earlier = start if isinstance(start, DualSolution) else None
-    if earlier is not None and earlier.problem is problem:
+    if earlier is not None and same:
         multiplier, product = earlier.multiplier, earlier.product
     else:
         given = start if earlier is None else earlier.multiplier
@@ -157,29 +189,29 @@ def _begin(problem: DualProblem, law: SlipLaw, start: DualSolution | Vector | No
             _require_size(multiplier, problem.layout.size)
         product = apply_unless_zero(problem, operator, multiplier)
     if earlier is not None and earlier.alpha.shape == (coarse.m,):
-        iterate = iterate_at(problem, law, multiplier, product, earlier.alpha)
+        iterate = iterate_at(problem, multiplier, product, earlier.alpha)
     else:
-        iterate = iterate_fitted(problem, law, multiplier, product)
+        iterate = iterate_fitted(problem, multiplier, product)
     memory = None if earlier is None else earlier.memory
     if start is not None and problem.norm(coarse.particular()) == 0.0:
         # No body is pushed: no force at all may be nearer than those of another load, and is known for free.
         nothing = np.zeros_like(multiplier)
-        rest = iterate_fitted(problem, law, nothing, nothing)
+        rest = iterate_fitted(problem, nothing, nothing)
         if rest.residuals.worst <= iterate.residuals.worst:
-            return Start(rest, operator, memory, cold=True, task=task)
-    return Start(iterate, operator, memory, cold=start is None, task=task)
+            return Start(rest, operator, memory, cold=True)
+    return Start(iterate, operator, memory, cold=start is None)
 
 
-def _as_it_is(problem: DualProblem, law: SlipLaw, start: Start, tolerance: float) -> DualSolution | None:
+def _as_it_is(problem: DualProblem, start: Start, tolerance: float) -> DualSolution | None:
     """Return a start that is the answer already: nothing is loaded, or nothing has changed. Collective."""
     iterate = start.iterate
     if not iterate.residuals.within(tolerance):
         return None
-    alpha = problem.coarse.coefficients(iterate.product - problem.rhs - iterate.residual)
-    iterate = answer_at(problem, law, iterate.multiplier, iterate.product, alpha)
+    alpha = iterate.motions(problem)
+    iterate = answer_at(problem, iterate.multiplier, iterate.product, alpha)
     if not iterate.residuals.within(tolerance):
         return None
-    answer = Certificate(iterate, alpha, law.bound(iterate.multiplier))
+    answer = Certificate(iterate, alpha, problem.law.bound(iterate.multiplier))
     closed, stick, slip = count_status(problem, iterate.multiplier, answer.slip_bound)
     products, note = start.operator.products, "the answer already"
     line = SolverStep("start", 0, products, iterate.residuals, closed, stick, slip, note)

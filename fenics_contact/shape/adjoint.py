@@ -80,9 +80,9 @@ def solve_adjoint(
     """
     system = state.dual
     _require_held(system, partials.by_displacement)
-    problem, face, factor = _evened_out(system.problem, linearised.face)
+    problem, face, factor = _scaled(system.problem, linearised.face)
     task = Task("adjoint", unit="products")
-    operator = CountedOperator(problem.operator, task)
+    operator = CountedOperator(problem.operator, lambda products, _: task.step(products))
     face_system = FaceSystems(problem, operator).build(face)
     transposed = CoupledSystem.build(
         face_system, problem.coarse, linearised.moving, linearised.tested, damped=True
@@ -169,7 +169,7 @@ def _require_held(system: DualSystem, by_displacement: np.ndarray) -> None:
         )
 
 
-def _evened_out(problem: DualProblem, face: Face) -> tuple[DualProblem, Face, np.ndarray | float]:
+def _scaled(problem: DualProblem, face: Face) -> tuple[DualProblem, Face, np.ndarray | float]:
     """Return problem and face in multipliers scaled by stiffness, and the factors, see `Scaling`.
 
     The factors are even within a contact, so that both bases of a face stay what they are.
@@ -178,4 +178,4 @@ def _evened_out(problem: DualProblem, face: Face) -> tuple[DualProblem, Face, np
         return problem, face, 1.0
     factor = problem.scaling.factor
     flexibility = face.flexibility * factor[problem.layout.tangential[:, 0]] ** 2
-    return problem.evened, replace(face, flexibility=flexibility), factor
+    return problem.scaled_problem, replace(face, flexibility=flexibility), factor

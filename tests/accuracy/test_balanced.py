@@ -12,7 +12,7 @@ from fenics_contact.accuracy import Balanced, SolverErrors
 from fenics_contact.contact import ContactProblem, State, solve_scene, solve_steps
 from fenics_contact.errors import ConvergenceError, InvalidInputError
 from fenics_contact.geometry import block, box_partition
-from fenics_contact.qp import DualProblem, DualSolution, FaceNewton, SlipLaw
+from fenics_contact.qp import DualProblem, DualSolution, FaceNewton
 from fenics_contact.qp.iterate import Start
 from fenics_contact.scene import Body, Coulomb, Scene, Support, Traction
 from tests.accuracy.algebraic import CASES, measured
@@ -158,10 +158,10 @@ class Limited:
     def with_tolerance(self, tolerance: float) -> Limited:
         return replace(self, tolerance=tolerance)
 
-    def run(self, problem: DualProblem, law: SlipLaw, start: Start) -> DualSolution:
+    def run(self, problem: DualProblem, start: Start) -> DualSolution:
         if self.tolerance < self.limit:
             raise ConvergenceError(f"needs {self.tolerance:.1e}", ["the step that failed"])
-        return FaceNewton(tolerance=self.tolerance).run(problem, law, start)
+        return FaceNewton(tolerance=self.tolerance).run(problem, start)
 
 
 def test_a_solver_that_fails_on_the_way_tells_all_steps() -> None:

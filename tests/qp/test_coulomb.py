@@ -66,7 +66,7 @@ def test_one_loop_equals_the_fixed_point_of_tresca_problems():
     law = Coulomb(dual.layout, mu_f)
     one_loop = solve(dual, None, FaceNewton(tolerance=1e-10), friction_coefficient=mu_f)
     step, products = None, 0
-    first = find_equilibrium(dual, law).multiplier
+    first = find_equilibrium(dual.with_law(law)).multiplier
     for _ in range(60):
         bound = law.bound(first if step is None else step.multiplier)
         step = solve(dual, bound, Smalse(tolerance=1e-10), step)

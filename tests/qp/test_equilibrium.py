@@ -33,7 +33,7 @@ def test_admissible_multiplier_is_found_without_a_product():
     problem = random_problem(5)
     dual = replace(problem.dual, operator=no_product)
     law = Tresca(problem.layout, problem.slip_bound)
-    found = find_equilibrium(dual, law)
+    found = find_equilibrium(dual.with_law(law))
     assert found.motion is None
     assert found.error <= 1e-4
     distance = dual.coarse.norm(dual.coarse.residual(found.multiplier))
@@ -44,13 +44,14 @@ def test_admissible_multiplier_is_found_without_a_product():
 def test_sliding_limit_of_a_pulled_brick_is_found(friction_coefficient, held):
     dual, _ = torn_problem(Bricks(n=3, cubes=(2, 2), press=0.01, shear=0.002))
     mu_f = np.full(dual.layout.n_friction, friction_coefficient)
-    found = find_equilibrium(dual, Coulomb(dual.layout, mu_f))
+    found = find_equilibrium(dual.with_law(Coulomb(dual.layout, mu_f)))
     assert (found.motion is None) == held
 
 
 def test_unheld_motion_is_the_sliding_of_the_upper_brick():
     dual, torn = torn_problem(Bricks(n=3, shear=0.003))
-    found = find_equilibrium(dual, Coulomb(dual.layout, np.full(dual.layout.n_friction, 0.2)))
+    mu_f = np.full(dual.layout.n_friction, 0.2)
+    found = find_equilibrium(dual.with_law(Coulomb(dual.layout, mu_f)))
     motions = np.einsum("ij,sj->si", torn.kernel, found.motion.reshape(-1, 6))
     translation = motions.reshape(len(torn.places), -1, 3).mean(axis=1)
     upper = np.linalg.norm(translation[torn.body == 1], axis=1).min()
@@ -100,4 +101,5 @@ def test_loaded_motion_without_any_row_is_refused():
 
 def test_problem_without_floating_bodies_is_always_held():
     problem = random_problem(5, m=0)
-    assert find_equilibrium(problem.dual, Tresca(problem.layout, problem.slip_bound)).motion is None
+    law = Tresca(problem.layout, problem.slip_bound)
+    assert find_equilibrium(problem.dual.with_law(law)).motion is None

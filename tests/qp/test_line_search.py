@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fenics_contact.qp import FaceNewton, Tresca, solve
+from fenics_contact.qp import DualProblem, FaceNewton, Tresca, solve
 from fenics_contact.qp.iterate import Iterate, iterate_at
-from fenics_contact.qp.newton_steps import damp, descend
+from fenics_contact.qp.newton_steps import damp
 from fenics_contact.qp.problem import CountedOperator
-from fenics_contact.qp.rescue import ProximalPoint
+from fenics_contact.qp.rescue import ProximalPoint, descend
 from tests.qp.published_friction import CYCLING, published
 from tests.qp.random_problems import DenseProblem, random_problem
 
@@ -20,19 +20,22 @@ def no_product(x):
     raise AssertionError("all products on a segment are known")
 
 
+def with_bounds(problem: DenseProblem) -> DualProblem:
+    return problem.dual.with_law(Tresca(problem.layout, problem.slip_bound))
+
+
 def iterate(problem: DenseProblem, multiplier: np.ndarray, alpha: np.ndarray) -> Iterate:
-    law = Tresca(problem.layout, problem.slip_bound)
-    return iterate_at(problem.dual, law, multiplier, problem.F @ multiplier, alpha)
+    return iterate_at(with_bounds(problem), multiplier, problem.F @ multiplier, alpha)
 
 
 def test_solution_between_two_iterates_is_found():
     problem = random_problem(3)
-    dual, law = replace(problem.dual, operator=no_product), Tresca(problem.layout, problem.slip_bound)
+    dual = replace(with_bounds(problem), operator=no_product)
     solution = solve(problem.dual, problem.slip_bound, FaceNewton(tolerance=1e-10))
     offset = np.random.default_rng(0).standard_normal(len(problem.d))
     before = iterate(problem, solution.multiplier - 0.1 * offset, solution.alpha - 0.1)
     after = iterate(problem, solution.multiplier + 0.3 * offset, solution.alpha + 0.3)
-    damped = damp(dual, law, before, after)
+    damped = damp(dual, before, after)
     assert damped.fraction == 0.25
     assert damped.iterate.residuals.size < 1e-8 < before.residuals.size < after.residuals.size
     np.testing.assert_allclose(damped.iterate.multiplier, solution.multiplier, atol=1e-8)
@@ -41,11 +44,10 @@ def test_solution_between_two_iterates_is_found():
 
 def test_step_that_improves_is_kept_whole():
     problem = random_problem(3)
-    law = Tresca(problem.layout, problem.slip_bound)
     solution = solve(problem.dual, problem.slip_bound, FaceNewton(tolerance=1e-10))
     worse = iterate(problem, 1.1 * solution.multiplier, solution.alpha)
     better = iterate(problem, 1.01 * solution.multiplier, solution.alpha)
-    damped = damp(problem.dual, law, worse, better)
+    damped = damp(with_bounds(problem), worse, better)
     assert damped.fraction == 1.0
     assert damped.iterate is better
 
@@ -53,50 +55,47 @@ def test_step_that_improves_is_kept_whole():
 def test_a_huge_wrong_force_is_worse_than_one_that_is_nearly_right():
     """Relative to itself each is wrong by about one: only a common scale tells them apart."""
     problem = random_problem(3)
-    law = Tresca(problem.layout, problem.slip_bound)
     solution = solve(problem.dual, problem.slip_bound, FaceNewton(tolerance=1e-10))
     huge = iterate(problem, -1e4 * np.abs(solution.multiplier), solution.alpha)
     small = iterate(problem, np.zeros_like(solution.multiplier), solution.alpha)
     assert small.residuals.worst > 0.5 * huge.residuals.worst
     assert huge.residuals.worst_beside(small.residuals) > 100 * small.residuals.worst_beside(huge.residuals)
-    assert damp(problem.dual, law, huge, small).iterate is small
+    assert damp(with_bounds(problem), huge, small).iterate is small
 
 
 def test_a_step_may_be_worse_than_the_last_iterate_if_it_is_better_than_the_one_before():
     problem = random_problem(3)
-    law = Tresca(problem.layout, problem.slip_bound)
     solution = solve(problem.dual, problem.slip_bound, FaceNewton(tolerance=1e-10))
     good, fair, bad = (
         iterate(problem, part * solution.multiplier, solution.alpha) for part in (1.01, 1.1, 2.0)
     )
-    assert damp(problem.dual, law, good, fair).iterate is not fair
-    assert damp(problem.dual, law, good, fair, bad.residuals).iterate is fair
+    assert damp(with_bounds(problem), good, fair).iterate is not fair
+    assert damp(with_bounds(problem), good, fair, bad.residuals).iterate is fair
 
 
 @pytest.mark.parametrize(("size", "fraction"), [(1.0, 0.01), (100.0, 0.1)], ids=["near", "far"])
 def test_the_shortest_step_is_taken_near_a_solution_only(size, fraction):
     """Far from one the residual is made of contacts that are still to close, and falls little by little."""
     problem = random_problem(3)
-    law = Tresca(problem.layout, problem.slip_bound)
     solution = solve(problem.dual, problem.slip_bound, FaceNewton(tolerance=1e-10))
     before, after = (
         iterate(problem, solution.multiplier, solution.alpha + size * part) for part in (-0.01, 0.99)
     )
-    assert damp(problem.dual, law, before, after).fraction == fraction
+    assert damp(with_bounds(problem), before, after).fraction == fraction
 
 
 def test_the_minimum_of_the_potential_on_a_segment_is_found():
     problem = random_problem(3)
-    dual, law = problem.dual, Tresca(problem.layout, problem.slip_bound)
+    dual = with_bounds(problem)
     solution = solve(dual, problem.slip_bound, FaceNewton(tolerance=1e-11))
-    point = ProximalPoint.build(dual, law, CountedOperator(dual.operator), 10.0).centred(solution.multiplier)
+    point = ProximalPoint.build(dual, CountedOperator(dual.operator), 10.0).centred(solution.multiplier)
     begin = point.enter(iterate(problem, solution.multiplier, solution.alpha))
     offset = np.random.default_rng(0).standard_normal(len(solution.alpha))
     ends = [iterate(problem, solution.multiplier, solution.alpha + part * offset) for part in (-1e-3, 4e-3)]
-    found = descend(point.problem, point.frozen, *(point.enter(end) for end in ends))
+    found = descend(point.problem, *(point.enter(end) for end in ends))
     assert found.fraction == pytest.approx(0.2, abs=0.03)
     assert found.iterate.residuals.natural < 0.2 * point.enter(ends[0]).residuals.natural
-    assert descend(point.problem, point.frozen, point.enter(ends[0]), begin).fraction == 1.0
+    assert descend(point.problem, point.enter(ends[0]), begin).fraction == 1.0
 
 
 def test_a_step_that_was_cut_is_told():

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fenics_contact.errors import ConvergenceError
-from fenics_contact.qp import FaceNewton, Tresca, contact_step, measure, solve
+from fenics_contact.qp import FaceNewton, Smalse, Tresca, contact_step, measure, solve
 from fenics_contact.qp.face_newton import slides
+from fenics_contact.qp.forcing import Forcing
 from fenics_contact.qp.iterate import Start, iterate_at
 from fenics_contact.qp.problem import CountedOperator
-from fenics_contact.qp.rescue import ProximalPoint, rescue
+from fenics_contact.qp.rescue import ProximalPoint, Rescue
 from fenics_contact.qp.slip_law import Coulomb
 from fenics_contact.qp.solution import Residuals, SolverStep
 from tests.qp.test_coulomb import coulomb_violations
@@ -33,26 +35,35 @@ def test_an_almost_unloaded_brick_on_a_round_one_is_solved(load: float) -> None:
 @pytest.mark.parametrize("preconditioned", [True, False])
 def test_a_rescue_comes_nearer_from_anywhere(preconditioned: bool) -> None:
     dual, _ = torn_problem(Bricks(crown=0.1, tilt=0.5, preconditioned=preconditioned))
-    law, operator = Coulomb(dual.layout, np.full(dual.layout.n_friction, 0.3)), CountedOperator(dual.operator)
-    far = dual.coarse.particular()
-    begin = iterate_at(dual, law, far, dual.operator(far), np.zeros(dual.coarse.m))
-    history = []
-    start = Start(begin, operator, None, cold=False)
-    found, memory = rescue(dual, law, start, FaceNewton(), budget=400, reason="of a test", history=history)
-    assert found.residuals.worst_beside(begin.residuals) < 0.3 * begin.residuals.worst_beside(found.residuals)
-    assert [step.method for step in history] == ["proximal rescue" if preconditioned else "SMALSE rescue"]
-    assert "because of a test" in history[0].note
-    assert history[0].products == operator.products < 400
-    assert (memory is None) == preconditioned
+    dual = dual.with_law(Coulomb(dual.layout, np.full(dual.layout.n_friction, 0.3)))
+    far, operator = dual.coarse.particular(), CountedOperator(dual.operator)
+    begin = iterate_at(dual, far, dual.operator(far), np.zeros(dual.coarse.m))
+    rescue = Rescue(dual, Forcing(0.25, 0.1, 1e-6), 20_000, Smalse())
+    rescued = rescue(Start(begin, operator, None, cold=False), 400)
+    before, after = begin.residuals, rescued.iterate.residuals
+    assert after.worst_beside(before) < 0.3 * before.worst_beside(after)
+    assert rescued.line.method == ("proximal rescue" if preconditioned else "SMALSE rescue")
+    assert rescued.line.residuals == after
+    assert rescued.line.products == operator.products < 400
+    assert (rescued.memory is None) == preconditioned
+
+
+def test_the_history_says_why_a_rescue_was_called_and_what_it_reached() -> None:
+    dual, _ = torn_problem(Bricks(cubes=(2, 2), crown=0.2, tilt=0.5))
+    hasty = FaceNewton(tolerance=1e-10, patience=1, forcing=0.9, loosest=0.5)
+    found = solve(dual, None, hasty, friction_coefficient=np.full(dual.layout.n_friction, 0.3))
+    (line,) = (step for step in found.history if "rescue" in step.method)
+    assert re.fullmatch(r"rescue from \S+ because the .+: (met its target|used its budget)", line.note)
+    assert [step.iteration for step in found.history] == list(range(found.iterations))
 
 
 def test_at_the_solution_springs_at_rest_change_nothing() -> None:
     dual, _ = torn_problem(Bricks(crown=0.1, tilt=0.5))
     bound = np.full(dual.layout.n_friction, 1e-3)
     solution = solve(dual, bound, FaceNewton(tolerance=1e-10))
-    law, operator = Tresca(dual.layout, bound), CountedOperator(dual.operator)
-    point = ProximalPoint.build(dual, law, operator, 10.0).centred(solution.multiplier)
-    there = iterate_at(dual, law, solution.multiplier, solution.product, solution.alpha)
+    dual, operator = dual.with_law(Tresca(dual.layout, bound)), CountedOperator(dual.operator)
+    point = ProximalPoint.build(dual, operator, 10.0).centred(solution.multiplier)
+    there = iterate_at(dual, solution.multiplier, solution.product, solution.alpha)
     inside = point.enter(there)
     assert inside.residuals.worst < 1e-8
     np.testing.assert_allclose(
@@ -69,14 +80,14 @@ def test_at_the_solution_springs_at_rest_change_nothing() -> None:
 
 def test_forces_that_are_rounding_are_none() -> None:
     dual, _ = torn_problem(Bricks(crown=0.1))
-    law = Tresca(dual.layout, np.full(dual.layout.n_friction, 1e-3))
+    dual = dual.with_law(Tresca(dual.layout, np.full(dual.layout.n_friction, 1e-3)))
     rng, size = np.random.default_rng(0), dual.layout.size
     multiplier = np.where(np.isin(np.arange(size), dual.layout.equality), 1.0, 0.0)
     noise = np.zeros(size)
     noise[dual.layout.contact] = rng.standard_normal(len(dual.layout.contact))
     zero = np.zeros(size)
     for scale, counts in ((1e-17, False), (1e-8, True)):
-        found = measure(dual, law.feasible(zero), multiplier + scale * noise, zero, zero)
+        found = measure(dual, multiplier + scale * noise, zero, zero)
         assert (found.natural > 0.0) == counts
         assert (found.violation > 0.0) == counts
 

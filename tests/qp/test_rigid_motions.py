@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.qp import Coulomb, DualProblem, FaceNewton, Smalse, Tresca, contact_step, solve
-from fenics_contact.qp.settling import Settling
+from fenics_contact.qp.rigid_motions import RigidMotionCorrection
 from tests.qp.test_coulomb import coulomb_violations
 from tests.qp.torn_bricks import Bricks, torn_problem
 
@@ -16,7 +16,7 @@ from tests.qp.torn_bricks import Bricks, torn_problem
 def settled(problem: DualProblem, law, multiplier, residual):
     """Return δα, and the trial force after it."""
     step = contact_step(problem.layout, problem.diagonal)
-    motion = Settling(problem, law)(multiplier, residual, step)
+    motion = RigidMotionCorrection.build(problem.with_law(law))(multiplier, residual, step)
     trial = multiplier - step * (residual - problem.coarse.transpose(motion))
     return motion, law.feasible(trial).project(trial)
 
@@ -34,7 +34,7 @@ def test_trial_forces_balance_the_load_of_the_floating_brick(kind: str):
     dual, multiplier, residual = gallery()
     ones = np.ones(dual.layout.n_friction)
     law = Tresca(dual.layout, 1e-3 * ones) if kind == "Tresca" else Coulomb(dual.layout, 0.4 * ones)
-    motions = Settling(dual, law).motions
+    motions = RigidMotionCorrection.build(dual).motions
     assert motions.shape[1] == 6
     missing = []
     for given in (residual, residual + 1.0 * dual.coarse.transpose(motions.sum(axis=1))):
@@ -61,7 +61,7 @@ def test_the_motion_strains_no_glue_and_costs_no_product():
 def test_without_a_floating_body_nothing_moves():
     dual, _ = torn_problem(Bricks(n=3, contact=False))
     law = Tresca(dual.layout, np.zeros(0))
-    assert Settling(dual, law).motions.shape[1] == 0
+    assert RigidMotionCorrection.build(dual).motions.shape[1] == 0
     motion, _ = settled(dual, law, dual.coarse.particular(), -dual.rhs)
     assert not motion.any()
 

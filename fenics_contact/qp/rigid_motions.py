@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +11,6 @@ from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.feasible import FeasibleSet
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
-from fenics_contact.qp.slip_law import SlipLaw
 
 #: Imbalance relative to the sum of all forces at which bodies count as settled.
 BALANCED = 1e-11
@@ -28,12 +26,13 @@ UNRESISTED = 1e-10
 UNFELT = 1e-13
 
 
-class Settling:
+@dataclass(frozen=True, eq=False)
+class RigidMotionCorrection:
     """Chooses the rigid motions of floating bodies without a single F-product.
 
     A body that nothing but contact holds moves by N β, Gᵀ N = 0 on the gluing rows. At a multiplier λ with
     r = F λ − d − Gᵀα, each contact answers such a motion by the trial force P_Λ(λ − ρ(r − Gᵀ N β)): a spring
-    that opens, sticks or slips. `Settling` solves
+    that opens, sticks or slips. The correction solves
 
         Nᵀ G P_Λ(λ − ρ (r − Gᵀ N β)) = Nᵀ e,
 
@@ -46,23 +45,24 @@ class Settling:
     the load under these bounds, bodies move on as linear springs would.
 
     Attributes:
+        problem: The dual problem, whose law is that of the trial forces.
         motions: N, orthonormal motions of bodies that no equality row holds, shape (m, k), replicated.
+        rows: Gᵀ N without rounding, shape (n_owned, k).
     """
 
-    def __init__(self, problem: DualProblem, law: SlipLaw) -> None:
+    problem: DualProblem
+    motions: Vector
+    rows: Vector
+
+    @classmethod
+    def build(cls, problem: DualProblem) -> RigidMotionCorrection:
         """Find the floating bodies. Collective."""
-        self._problem, self._law = problem, law
-        self.motions = _floating_motions(problem)
-        self._rows = np.asarray(problem.coarse.matrix.T @ self.motions)
+        motions = _floating_motions(problem)
+        rows = np.asarray(problem.coarse.matrix.T @ motions)
         # Against forces of rounding a body would have to move as far as their rows are rounding.
         felt = np.sqrt(problem.coarse.matrix.power(2).sum(axis=0)).reshape(-1, 1)
-        self._rows[np.abs(self._rows) <= UNFELT * np.asarray(felt)] = 0.0
-
-    def with_law(self, law: SlipLaw) -> Settling:
-        """Return the same bodies under another law."""
-        other = copy(self)
-        other._law = law
-        return other
+        rows[np.abs(rows) <= UNFELT * np.asarray(felt)] = 0.0
+        return cls(problem, motions, rows)
 
     def __call__(self, multiplier: Vector, residual: Vector, step: Vector) -> Vector:
         """Return δα = N β, shape (m,), replicated. Collective.
@@ -74,25 +74,24 @@ class Settling:
         """
         if self.motions.shape[1] == 0:
             return np.zeros(len(self.motions))
-        stiffness = self._problem.comm.allreduce(self._rows.T @ (step[:, None] * self._rows))
+        problem = self.problem
+        stiffness = problem.comm.allreduce(self.rows.T @ (step[:, None] * self.rows))
         values, vectors = np.linalg.eigh(stiffness)
         resisted = values > UNRESISTED * values.max(initial=0.0)
         units = vectors[:, resisted] / np.sqrt(values[resisted])
         springs = _Springs(
-            self._problem,
-            self._law,
+            problem,
             start=multiplier - step * residual,
             step=step,
-            rows=self._rows @ units,
-            load=units.T @ (self.motions.T @ self._problem.coarse.load),
-            forces=self._problem.norm(multiplier),
+            rows=self.rows @ units,
+            load=units.T @ (self.motions.T @ problem.coarse.load),
+            forces=problem.norm(multiplier),
         )
-        return np.asarray(
-            self.motions @ (units @ _rest(springs, self._law.bound(multiplier))), dtype=np.float64
-        )
+        motion = _equilibrium_motion(springs, problem.law.bound(multiplier))
+        return np.asarray(self.motions @ (units @ motion), dtype=np.float64)
 
 
-def keep_unheld(face: CoarseSpace, earlier: Vector, alpha: Vector) -> Vector:
+def keep_free_motions(face: CoarseSpace, earlier: Vector, alpha: Vector) -> Vector:
     """Return α with the motions that a face says nothing about as they were.
 
     Args:
@@ -141,7 +140,6 @@ class _Springs:
 
     Attributes:
         problem: The dual problem.
-        law: Where the bound comes from.
         start: w = λ − ρ r at z = 0, owned.
         step: ρ, the stiffness of the springs, owned.
         rows: Gᵀ N in the coordinates z, shape (n_owned, k).
@@ -150,7 +148,6 @@ class _Springs:
     """
 
     problem: DualProblem
-    law: SlipLaw
     start: Vector
     step: Vector
     rows: Vector
@@ -162,7 +159,7 @@ class _Springs:
         layout = self.problem.layout
         contact = layout.contact
         trial = self.start + self.step * (self.rows @ z)
-        bound = self.law.bound(trial) if bound is None else bound
+        bound = self.problem.law.bound(trial) if bound is None else bound
         force = FeasibleSet(layout, bound).project(trial)
         w, p = trial[contact], force[contact]
         # ½‖w‖² − ½‖w − p‖² without its cancellation; its derivative is p.
@@ -216,7 +213,7 @@ class _Springs:
         return np.asarray(change, dtype=np.float64)
 
 
-def _rest(springs: _Springs, bound: Vector) -> Vector:
+def _equilibrium_motion(springs: _Springs, bound: Vector) -> Vector:
     """Return the motion that balances the load, or that of linear springs where none does. Collective.
 
     Args:
@@ -246,7 +243,8 @@ def _coupled(springs: _Springs, balance: _Balance, target: float) -> _Balance:
     for _ in range(COUPLED_STEPS):
         if balance.size <= target:
             break
-        step = np.linalg.lstsq(springs.slope(balance, springs.law.growth), balance.imbalance, rcond=None)[0]
+        slope = springs.slope(balance, springs.problem.law.growth)
+        step = np.linalg.lstsq(slope, balance.imbalance, rcond=None)[0]
         following = springs.at(balance.motion - step)
         if not following.size < 0.5 * balance.size:
             break
