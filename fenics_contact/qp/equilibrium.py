@@ -73,13 +73,13 @@ def require_equilibrium(problem: DualProblem) -> Equilibrium:
     Raises:
         InfeasibleError: It is proven that none exists.
     """
-    found = find_equilibrium(problem)
-    if found.motion is not None:
-        size = np.abs(found.motion)
+    equilibrium = find_equilibrium(problem)
+    if equilibrium.motion is not None:
+        size = np.abs(equilibrium.motion)
         rows = np.flatnonzero(size > 0.1 * size.max())
         raise InfeasibleError(
             "contact and friction need to balance the load, but no admissible multiplier comes closer than "
-            f"{100 * found.error:.3g} % of it: the rigid motions in rows {rows.tolist()} of e are not held; "
-            "add a support, turn the load into the contact or raise the friction"
+            f"{100 * equilibrium.error:.3g} % of it: the rigid motions in rows {rows.tolist()} of e are not "
+            "held; add a support, turn the load into the contact or raise the friction"
         )
-    return found
+    return equilibrium

@@ -94,7 +94,7 @@ class FaceNewton:
             if state.answer is None and state.stuck:
                 state = run.rescued(state)
             if state.answer is not None:
-                return state.answer.solution(problem, state.history, start.operator.products, state.memory)
+                return state.answer.solution(state.history, start.operator.products, state.memory)
         run.fail(state)
 
 
@@ -104,13 +104,13 @@ class _LastRescue:
 
     Attributes:
         origin: Where it began.
-        found: Where it led to.
+        result: Where it led to.
         budget: Products that it might have spent.
         vain: Rescues in turn, up to it, that led to one and the same iterate.
     """
 
     origin: Iterate
-    found: Iterate
+    result: Iterate
     budget: int
     vain: int
 
@@ -188,7 +188,7 @@ class _Run:
         return in_vain or len(state.history) >= parameters.max_steps or products >= parameters.max_products
 
     def step(self, state: _State) -> _State:
-        """Take a Newton step and judge it. Collective.
+        """Take a Newton step and see whether it made progress. Collective.
 
         Raises:
             InfeasibleError: All contacts stay open, and something moves that only they could hold.
@@ -227,7 +227,7 @@ class _Run:
         # Where Newton could do nothing with the last rescue, the next one must go further.
         again = last is not None and origin is last.origin
         budget = self.parameters.rescue_products
-        if last is not None and (again or state.best is last.found):
+        if last is not None and (again or state.best is last.result):
             budget = 2 * last.budget
         left = max(self.parameters.max_products - operator.products, 1)
         begin = Start(origin, operator, state.memory, cold=False)
@@ -235,7 +235,7 @@ class _Run:
         line = self._line(state, origin, outcome)
         self.start.reached(line)
         iterate, answer = self._checked(outcome.iterate)
-        vain = last.vain + 1 if last is not None and again and _same(last.found, iterate) else 0
+        vain = last.vain + 1 if last is not None and again and _same(last.result, iterate) else 0
         return replace(
             state,
             newton=replace(state.newton, iterate=iterate),
@@ -278,7 +278,8 @@ class _Run:
         tolerance = self.parameters.tolerance
         if not iterate.residuals.within(tolerance):
             return iterate, None
-        answer = certify(self.problem, self.start.operator, iterate.multiplier, iterate.residual)
+        product = self.start.operator(iterate.multiplier)
+        answer = certify(self.problem, iterate.multiplier, product, iterate.residual)
         return answer.iterate, answer if answer.iterate.residuals.within(tolerance) else None
 
     def _failed(self, state: _State) -> str:

@@ -95,8 +95,8 @@ class SparseGramInverse:
             return self._factor.solve(right_side)
         scaled = self._scale * right_side
         scaled = scaled - self._null @ (self._null.T @ scaled)
-        found = self._factor.solve(scaled / self._scale) / self._scale
-        return self._scale * (found - self._null @ (self._null.T @ found))
+        solved = self._factor.solve(scaled / self._scale) / self._scale
+        return self._scale * (solved - self._null @ (self._null.T @ solved))
 
     def _null_vectors(self) -> Vector:
         """Return orthonormal null vectors of the scaled matrix. Collective."""

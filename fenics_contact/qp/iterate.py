@@ -73,8 +73,18 @@ def iterate_at(problem: DualProblem, multiplier: Vector, product: Vector, alpha:
 
 
 def iterate_fitted(problem: DualProblem, multiplier: Vector, product: Vector) -> Iterate:
-    """Return the iterate with the rigid motions that fit best, see `fit_rigid_motions`. Collective."""
-    return iterate_at(problem, multiplier, product, fit_rigid_motions(problem, multiplier, product))
+    """Return the iterate with α = (G_F G_Fᵀ)⁻¹ G_F (F λ − d)_F of the rows that λ says are free. Collective.
+
+    Free are the gluing rows, contacts with λ_N > 0, discs well inside their bound, and the tangents of the
+    others. There r should vanish; open rows have gaps and slipping ones slip, which must not be spread
+    over the bodies.
+    """
+    bound = (1.0 - SLIP_MARGIN) * problem.law.bound(multiplier)
+    step = contact_step(problem.layout, problem.diagonal)
+    face = classify(problem.layout, bound, multiplier, np.zeros_like(multiplier), step)
+    free = problem.coarse.restricted(face.restriction)
+    alpha = free.coefficients(face.restrict(product - problem.rhs))
+    return iterate_at(problem, multiplier, product, alpha)
 
 
 def iterate_between(problem: DualProblem, before: Iterate, after: Iterate, part: float) -> Iterate:
@@ -91,7 +101,7 @@ def iterate_between(problem: DualProblem, before: Iterate, after: Iterate, part:
 
 
 def answer_at(problem: DualProblem, multiplier: Vector, product: Vector, alpha: Vector) -> Iterate:
-    """Return the iterate with its jumps judged beside the displacements where those are known. Collective.
+    """Return the iterate with its jumps measured by the displacements where those are known. Collective.
 
     On the way to an answer jumps are compared with B K⁺(Bᵀλ − f), which costs nothing more. That says little
     where loads go straight into supports or press thin pieces that are held: alone they would move far.
@@ -109,53 +119,31 @@ def apply_unless_zero(problem: DualProblem, operator: Operator, x: Vector) -> Ve
     return operator(x) if problem.norm(x) > 0.0 else np.zeros_like(x)
 
 
-def fit_rigid_motions(problem: DualProblem, multiplier: Vector, product: Vector) -> Vector:
-    """Return α = (G_F G_Fᵀ)⁻¹ G_F (F λ − d)_F over the rows that λ says are free. Collective.
-
-    Free are the gluing rows, contacts with λ_N > 0, discs well inside their bound, and the tangents of the
-    others. There r should vanish; open rows have gaps and slipping ones slip, which must not be spread
-    over the bodies.
-
-    Args:
-        problem: The dual problem.
-        multiplier: λ, owned.
-        product: F λ, owned.
-    """
-    bound = (1.0 - SLIP_MARGIN) * problem.law.bound(multiplier)
-    step = contact_step(problem.layout, problem.diagonal)
-    face = classify(problem.layout, bound, multiplier, np.zeros_like(multiplier), step)
-    return problem.coarse.restricted(face.restriction).coefficients(face.restrict(product - problem.rhs))
-
-
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """A multiplier whose product, α and residuals were recomputed from it alone.
+    """A multiplier whose α and residuals were recomputed from its exact product.
 
     Attributes:
-        iterate: The multiplier with its exact product and residuals.
+        problem: The dual problem.
+        iterate: The multiplier.
         alpha: α, shape (m,), replicated.
-        slip_bound: Ψ, shape (n_friction,), owned.
     """
 
+    problem: DualProblem
     iterate: Iterate
     alpha: Vector
-    slip_bound: Vector
 
     def solution(
-        self,
-        problem: DualProblem,
-        history: Sequence[SolverStep],
-        products: int,
-        memory: SmalseMemory | None = None,
+        self, history: Sequence[SolverStep], products: int, memory: SmalseMemory | None = None
     ) -> DualSolution:
         """Return the answer of a solve that took ``products`` products."""
         return DualSolution(
-            problem=problem,
+            problem=self.problem,
             multiplier=self.iterate.multiplier,
             residual=self.iterate.residual,
             product=self.iterate.product,
             alpha=self.alpha,
-            slip_bound=self.slip_bound,
+            slip_bound=self.problem.law.bound(self.iterate.multiplier),
             residuals=self.iterate.residuals,
             iterations=len(history),
             products=products,
@@ -165,24 +153,22 @@ class Certificate:
         )
 
 
-def certify(problem: DualProblem, operator: Operator, multiplier: Vector, residual: Vector) -> Certificate:
-    """Recompute everything that can be said about a multiplier. Collective; one product.
+def certify(problem: DualProblem, multiplier: Vector, product: Vector, residual: Vector) -> Certificate:
+    """Recompute everything that can be said about a multiplier. Collective.
 
     Args:
         problem: The dual problem.
-        operator: F, counted.
         multiplier: λ, owned.
+        product: F λ, owned, computed and not carried by recursion.
         residual: A solver's own r, owned; of it only the choice of α is kept.
     """
-    product = operator(multiplier)
     alpha = problem.coarse.coefficients(product - problem.rhs - residual)
-    iterate = answer_at(problem, multiplier, product, alpha)
-    return Certificate(iterate, alpha, problem.law.bound(multiplier))
+    return Certificate(problem, answer_at(problem, multiplier, product, alpha), alpha)
 
 
-def count_status(problem: DualProblem, multiplier: Vector, slip_bound: Vector) -> tuple[int, int, int]:
+def count_status(problem: DualProblem, multiplier: Vector) -> tuple[int, int, int]:
     """Count closed contacts, sticking and slipping discs by the multiplier alone. Collective."""
-    layout = problem.layout
+    layout, slip_bound = problem.layout, problem.law.bound(multiplier)
     length = np.linalg.norm(multiplier[layout.tangential], axis=1)
     slip = length >= slip_bound * (1.0 - 1e-9)
     counts = global_sum(

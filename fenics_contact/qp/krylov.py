@@ -7,6 +7,7 @@ from enum import Enum
 
 import numpy as np
 
+from fenics_contact._libraries import MPI
 from fenics_contact.qp.face_system import CoupledSystem, FaceSystem
 from fenics_contact.qp.reductions import Vector, global_sum
 
@@ -46,32 +47,25 @@ class FaceStep:
     stop: Stop
 
 
-class DirectionStore:
-    """Directions p and projected products q = P A p as rows of two growing blocks."""
+class _Rows:
+    """Vectors of several kinds, each kind as the rows of a block that grows."""
 
-    def __init__(self, size: int) -> None:
-        """Start empty for vectors of this rank's length ``size``."""
-        self._p: Vector = np.empty((32, size))
-        self._q: Vector = np.empty((32, size))
-        self._curvature: Vector = np.empty(32)
-        self._count = 0
+    def __init__(self, *lengths: int) -> None:
+        """Start empty; lengths are those of this rank's vectors of each kind."""
+        self.count = 0
+        self._blocks: list[Vector] = [np.empty((32, length)) for length in lengths]
 
-    def append(self, p: Vector, q: Vector, curvature: float) -> None:
-        """Keep p, q and pᵀq; storage doubles when full."""
-        if self._count == len(self._p):
-            self._p, self._q = (np.vstack([block, np.empty_like(block)]) for block in (self._p, self._q))
-            self._curvature = np.concatenate([self._curvature, np.empty_like(self._curvature)])
-        self._p[self._count], self._q[self._count] = p, q
-        self._curvature[self._count] = curvature
-        self._count += 1
+    def append(self, *rows: Vector) -> None:
+        """Keep one vector of each kind; storage doubles when full."""
+        if self.count == len(self._blocks[0]):
+            self._blocks = [np.vstack([block, np.empty_like(block)]) for block in self._blocks]
+        for block, row in zip(self._blocks, rows, strict=True):
+            block[self.count] = row
+        self.count += 1
 
-    def local_products(self, y: Vector) -> Vector:
-        """Return this rank's share of qᵢᵀ y for all i."""
-        return self._q[: self._count] @ y
-
-    def conjugate(self, y: Vector, products: Vector) -> Vector:
-        """Subtract from y its components along all p, given the global qᵢᵀ y."""
-        return y - (products / self._curvature[: self._count]) @ self._p[: self._count]
+    def __getitem__(self, kind: int) -> Vector:
+        """Return all vectors of a kind, shape (count, length)."""
+        return self._blocks[kind][: self.count]
 
 
 def projected_cg(
@@ -100,14 +94,15 @@ def projected_cg(
     """
     residual = system.coarse.project(gradient)
     step, product = np.zeros_like(gradient), np.zeros(system.face.layout.size)
-    store = DirectionStore(len(gradient))
+    # Directions p and images P A p, and their curvatures pᵀA p.
+    rows, curvatures = _Rows(len(gradient), len(gradient)), list[float]()
     size = system.weighted_norm(residual, weights)
     first, best, since_best, iterations, stop = size, size, 0, 0, Stop.CONVERGED
     while not size <= tolerance:
         if iterations == max_iterations:
             stop = Stop.ITERATION_LIMIT
             break
-        direction, descent = _next_direction(system, residual, store)
+        direction, descent = _next_direction(system, residual, rows, curvatures)
         if not descent > 0.0:
             stop = Stop.BAD_PRECONDITIONER
             break
@@ -117,7 +112,8 @@ def projected_cg(
         if not curvature > smallest:
             stop = Stop.NO_CURVATURE
             break
-        store.append(direction, image, curvature)
+        rows.append(direction, image)
+        curvatures.append(curvature)
         length = -slope / curvature
         step += length * direction
         product += length * full
@@ -130,13 +126,17 @@ def projected_cg(
     return FaceStep(step, product, residual, iterations, size, stop)
 
 
-def _next_direction(system: FaceSystem, residual: Vector, store: DirectionStore) -> tuple[Vector, float]:
+def _next_direction(
+    system: FaceSystem, residual: Vector, rows: _Rows, curvatures: list[float]
+) -> tuple[Vector, float]:
     """Return the new direction and its product with the residual, both of the sign that descends."""
     z = system.precondition(residual)
     m = system.coarse.m
-    sums = global_sum(system.comm, system.coarse.local(z), store.local_products(z), residual @ z)
+    directions, images = rows[0], rows[1]
+    sums = global_sum(system.comm, system.coarse.local(z), images @ z, residual @ z)
     projected = z - system.coarse.transpose(system.coarse.solve(sums[:m]))
-    return -store.conjugate(projected, sums[m:-1]), float(sums[-1])
+    conjugate = projected - (sums[m:-1] / np.array(curvatures)) @ directions
+    return -conjugate, float(sums[-1])
 
 
 def _image(
@@ -159,7 +159,7 @@ def _image(
     return projected, slope, curvature, CURVATURE_TOLERANCE * float(lengths[0] * lengths[1])
 
 
-#: A recomputed residual this many times the tolerance is not the one that the recursion told.
+#: A recomputed residual this many times the tolerance is not the one that the recursion gave.
 FALSE_HOPE = 10.0
 
 
@@ -187,7 +187,8 @@ def projected_gmres(
     comm, operator = coupled.system.comm, coupled.system.operator
     first = -weights * coupled.oblique(gradient)
     size = float(np.sqrt(global_sum(comm, first @ first)[0]))
-    basis = _Basis(len(gradient), coupled.moving.shape[0])
+    # Krylov vectors v, preconditioned directions z and products F Z z.
+    basis = _Rows(len(gradient), len(gradient), coupled.moving.shape[0])
     small = _LeastSquares(size)
     stop = Stop.CONVERGED
     vector: Vector = np.asarray(first / (size or 1.0), dtype=np.float64)
@@ -199,7 +200,7 @@ def projected_gmres(
         full = operator(coupled.moving @ direction)
         image = weights * coupled.image(direction, full)
         basis.append(vector, direction, full)
-        image, column = _orthogonalised(comm, basis.vectors, image)
+        image, column = _orthogonalised(comm, basis[0], image)
         small.append(column)
         if basis.count - small.last_progress > coupled.system.patience:
             stop = Stop.STAGNATION
@@ -210,7 +211,7 @@ def projected_gmres(
             break
         vector = image / column[-1]
     factors = small.solution()
-    step, product = factors @ basis.directions, factors @ basis.products
+    step, product = factors @ basis[1], factors @ basis[2]
     residual = coupled.oblique(gradient + coupled.operate(step, product))
     left = float(np.sqrt(global_sum(comm, (weights * residual) @ (weights * residual))[0]))
     if stop is Stop.CONVERGED and left > FALSE_HOPE * tolerance:
@@ -219,42 +220,15 @@ def projected_gmres(
     return FaceStep(step, product, residual, basis.count, max(left, small.residual), stop)
 
 
-def _orthogonalised(comm: object, vectors: Vector, image: Vector) -> tuple[Vector, Vector]:
+def _orthogonalised(comm: MPI.Comm, vectors: Vector, image: Vector) -> tuple[Vector, Vector]:
     """Subtract the components along the basis, twice, and return the rest with the Hessenberg column."""
     coefficients = np.zeros(len(vectors))
     for _ in range(2):
-        correction = global_sum(comm, vectors @ image)  # type: ignore[arg-type]
+        correction = global_sum(comm, vectors @ image)
         image = image - correction @ vectors
         coefficients += correction
-    length = np.sqrt(global_sum(comm, image @ image))  # type: ignore[arg-type]
+    length = np.sqrt(global_sum(comm, image @ image))
     return image, np.concatenate([coefficients, length])
-
-
-class _Basis:
-    """Krylov vectors v, preconditioned directions z and products F Z z as rows of growing blocks."""
-
-    def __init__(self, n_face: int, n_owned: int) -> None:
-        self.count = 0
-        self._blocks: list[Vector] = [np.empty((32, n_face)), np.empty((32, n_face)), np.empty((32, n_owned))]
-
-    def append(self, *rows: Vector) -> None:
-        if self.count == len(self._blocks[0]):
-            self._blocks = [np.vstack([block, np.empty_like(block)]) for block in self._blocks]
-        for block, row in zip(self._blocks, rows, strict=True):
-            block[self.count] = row
-        self.count += 1
-
-    @property
-    def vectors(self) -> Vector:
-        return self._blocks[0][: self.count]
-
-    @property
-    def directions(self) -> Vector:
-        return self._blocks[1][: self.count]
-
-    @property
-    def products(self) -> Vector:
-        return self._blocks[2][: self.count]
 
 
 class _LeastSquares:

@@ -61,16 +61,12 @@ class BoundedMinimum:
     Attributes:
         x: The iterate, in the set, owned.
         gradient: A x − b there, owned, carried by recursion within a sequence of CG steps.
-        projected: Norm of the projected gradient.
         iterations: Steps of all kinds.
-        reached: Whether the projected gradient met the target.
     """
 
     x: Vector
     gradient: Vector
-    projected: float
     iterations: int
-    reached: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +110,7 @@ def minimise(
     direction = split.free
     for iteration in range(max_iterations):
         if split.projected <= target(x):
-            return BoundedMinimum(x, gradient, split.projected, iteration, True)
+            return BoundedMinimum(x, gradient, iteration)
         if split.proportional:
             image = quadratic.operator(direction)
             slope, curvature = global_sum(quadratic.comm, gradient @ direction, direction @ image)
@@ -132,8 +128,7 @@ def minimise(
         gradient = quadratic.gradient(x)
         split = _split(quadratic, x, gradient, step, parameters)
         direction = split.free
-    reached = split.projected <= target(x)
-    return BoundedMinimum(x, gradient, split.projected, max_iterations, reached)
+    return BoundedMinimum(x, gradient, max_iterations)
 
 
 def _split(quadratic: BoundedQuadratic, x: Vector, gradient: Vector, step: float, parameters: Mpgp) -> _Split:

@@ -1,4 +1,4 @@
-"""Newton steps on faces: classify, solve the linear face, settle floating bodies, go as far as it pays."""
+"""Newton steps on faces: classify, solve the linear face, let floating bodies rest, go as far as it pays."""
 
 from __future__ import annotations
 
@@ -114,6 +114,25 @@ class NewtonState:
 
 
 @dataclass(frozen=True, eq=False)
+class _SolvedFace:
+    """The multiplier of a face with its product F λ, and how the Krylov method ended.
+
+    Attributes:
+        system: The symmetric system of the face.
+        linear: The system that was solved: that one, or with growing friction.
+        multiplier: λ, owned.
+        product: F λ, owned.
+        inner: The step of the Krylov method.
+    """
+
+    system: FaceSystem
+    linear: FaceSystem | CoupledFace
+    multiplier: Vector
+    product: Vector
+    inner: FaceStep
+
+
+@dataclass(frozen=True, eq=False)
 class NewtonSteps:
     """Newton's method on the faces of one problem: `init` makes the first state, `step` the following ones.
 
@@ -181,29 +200,22 @@ class NewtonSteps:
             number: Number of the step in the history.
             care: Factor on the tolerance of the face, at most one.
         """
-        problem, before = self.problem, state.iterate
+        before = state.iterate
         # 1. The face that the natural map chooses, and how many statuses differ from those of the last one.
         step, face = self._next_face(state)
         count = face.changes(state.faces[0]) if state.faces else 0
-        changed = round(float(global_sum(problem.comm, count)[0]))
-        # 2. Its linear system, in which slipping forces grow with their normal forces.
-        system = self.systems.build(face)
-        linear = couple(system, problem.coarse, problem.law.growth, before.multiplier) or system
-        # 3. Onto the face and into equilibrium; the Krylov method keeps both.
-        entered = linear.enter(before.multiplier)
-        product = before.product + apply_unless_zero(problem, self.operator, entered - before.multiplier)
-        known = None if changed else state.mismatch
-        tolerance = self.forcing.tolerance_of_face(before.residuals, known, care)
-        solved = self._solve(system, linear, entered, product, before.residuals, tolerance)
-        multiplier, product = entered + linear.advance(solved.step), product + solved.product
-        # 4. Rigid motions, then as much of the step as pays.
-        alpha = self._motions(system, linear, before, multiplier, product, step)
-        after = iterate_at(problem, multiplier, product, alpha)
-        mismatch = abs(after.residuals.size - solved.measure) / (before.residuals.size or 1.0)
-        taken = self.safeguards.shorten(problem, before, after, state.before)
+        changed = round(float(global_sum(self.problem.comm, count)[0]))
+        # 2. Its solution, as accurate as the last face was right.
+        expected = None if changed else state.mismatch
+        solved = self._solve(face, before, self.forcing.tolerance_of_face(before.residuals, expected, care))
+        # 3. Rigid motions, then as much of the step as pays.
+        alpha = self._motions(solved, before, step)
+        after = iterate_at(self.problem, solved.multiplier, solved.product, alpha)
+        mismatch = abs(after.residuals.size - solved.inner.measure) / (before.residuals.size or 1.0)
+        taken = self.safeguards.shorten(self.problem, before, after, state.before)
         faces = (face, *state.faces[:LONGEST_CYCLE])
         following = NewtonState(taken.iterate, step, faces, mismatch, before.residuals)
-        return following, self._record(number, taken, system, solved, changed)
+        return following, self._record(number, taken, solved, changed)
 
     def _next_face(self, state: NewtonState) -> tuple[Vector, Face]:
         """Classify, with a smaller ρ for discs whose force would otherwise turn back."""
@@ -217,44 +229,37 @@ class NewtonSteps:
         step[layout.tangential[turned]] *= TURNED
         return step, classify(layout, bound, iterate.multiplier, iterate.residual, step)
 
-    def _solve(
-        self,
-        system: FaceSystem,
-        linear: FaceSystem | CoupledFace,
-        multiplier: Vector,
-        product: Vector,
-        residuals: Residuals,
-        tolerance: float,
-    ) -> FaceStep:
-        gradient = system.gradient(multiplier, product - self.problem.rhs)
-        weights = residual_weights(system.face, residuals, self.natural_step)
+    def _solve(self, face: Face, before: Iterate, tolerance: float) -> _SolvedFace:
+        """Solve the linear system of a face, in which slipping forces grow with normal forces. Collective."""
+        problem = self.problem
+        system = self.systems.build(face)
+        linear = couple(system, problem.coarse, problem.law.growth, before.multiplier) or system
+        # Onto the face and into equilibrium; the Krylov method keeps both.
+        entered = linear.enter(before.multiplier)
+        product = before.product + apply_unless_zero(problem, self.operator, entered - before.multiplier)
+        gradient = system.gradient(entered, product - problem.rhs)
+        weights = residual_weights(face, before.residuals, self.natural_step)
         limit = max(self.max_products - self.operator.products, 1)
         if isinstance(linear, CoupledFace):
-            return projected_gmres(linear.coupled, gradient, weights, tolerance, limit)
-        return projected_cg(system, gradient, weights, tolerance, limit)
+            inner = projected_gmres(linear.coupled, gradient, weights, tolerance, limit)
+        else:
+            inner = projected_cg(linear, gradient, weights, tolerance, limit)
+        return _SolvedFace(
+            system, linear, entered + linear.advance(inner.step), product + inner.product, inner
+        )
 
-    def _motions(
-        self,
-        system: FaceSystem,
-        linear: FaceSystem | CoupledFace,
-        before: Iterate,
-        multiplier: Vector,
-        product: Vector,
-        step: Vector,
-    ) -> Vector:
+    def _motions(self, solved: _SolvedFace, before: Iterate, step: Vector) -> Vector:
         """Return α after a step: from the rows of the face, then at rest. Collective."""
-        problem = self.problem
-        alpha = linear.motions(system.gradient(multiplier, product - problem.rhs))
+        problem, system, flexed = self.problem, solved.system, solved.product - self.problem.rhs
+        alpha = solved.linear.motions(system.gradient(solved.multiplier, flexed))
         alpha = keep_free_motions(system.coarse, before.motions(problem), alpha)
         if not self.safeguards.moves_held and system.coarse.gram.rank == problem.coarse.m:
             return alpha
-        residual = product - problem.rhs - problem.coarse.transpose(alpha)
-        return np.asarray(alpha + self.correction(multiplier, residual, step), dtype=np.float64)
+        residual = flexed - problem.coarse.transpose(alpha)
+        return np.asarray(alpha + self.correction(solved.multiplier, residual, step), dtype=np.float64)
 
-    def _record(
-        self, number: int, taken: Damped, system: FaceSystem, solved: FaceStep, changed: int
-    ) -> SolverStep:
-        face, coarse = system.face, system.coarse
+    def _record(self, number: int, taken: Damped, solved: _SolvedFace, changed: int) -> SolverStep:
+        inner, face, coarse = solved.inner, solved.system.face, solved.system.coarse
         counts = global_sum(
             self.problem.comm,
             np.count_nonzero(face.closed),
@@ -262,11 +267,11 @@ class NewtonSteps:
             np.count_nonzero(face.slip),
         )
         closed, stick, slip = (round(float(count)) for count in counts)
-        note = f"{solved.iterations} CG steps, {changed} status changes"
+        note = f"{inner.iterations} CG steps, {changed} status changes"
         if taken.fraction < 1.0:
             note += f", cut to {taken.fraction:g} of the step"
-        if solved.stop is not Stop.CONVERGED:
-            note += f", {solved.stop.value}"
+        if inner.stop is not Stop.CONVERGED:
+            note += f", {inner.stop.value}"
         if coarse.gram.rank < coarse.m:
             note += f", {coarse.m - coarse.gram.rank} rigid motions not held by the face"
         residuals, products = taken.iterate.residuals, self.operator.products

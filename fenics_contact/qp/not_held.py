@@ -75,13 +75,13 @@ class FrictionAlone:
         if self._forces is None:
             return
         bound = wedged * self.problem.law.bound(self._forces)
-        found = find_equilibrium(self.problem.with_law(Tresca(self.problem.layout, bound)))
-        if found.motion is not None:
+        equilibrium = find_equilibrium(self.problem.with_law(Tresca(self.problem.layout, bound)))
+        if equilibrium.motion is not None:
             raise InfeasibleError(
                 "friction needs surfaces that are pressed together, but without it they are pressed so "
                 f"little that even {wedged:g} times the forces that it may then bear leave "
-                f"{100 * found.error:.2g} % of the load unbalanced: support bodies that only friction holds, "
-                "press them, or raise the friction"
+                f"{100 * equilibrium.error:.2g} % of the load unbalanced: support bodies that only friction "
+                "holds, press them, or raise the friction"
             )
 
     @cached_property

@@ -220,17 +220,18 @@ class Rescue:
         path = self._first_centre(start)
         for number in range(PROXIMAL_STEPS):
             newton, line = path.steps.step(path.newton, number)
-            found = path.point.leave(newton.iterate)
-            if not found.residuals.worst < DIVERGED:
-                found = start.iterate
+            iterate = path.point.leave(newton.iterate)
+            if not iterate.residuals.worst < DIVERGED:
+                iterate = start.iterate
                 break
-            improved = _improved(found.residuals, start.iterate.residuals, further)
-            if improved or start.operator.products >= limit or found.residuals.within(self.forcing.tolerance):
+            improved = _improved(iterate.residuals, start.iterate.residuals, further)
+            solved = iterate.residuals.within(self.forcing.tolerance)
+            if improved or solved or start.operator.products >= limit:
                 break
             path = replace(path, newton=newton, since=path.since + 1)
-            if newton.iterate.residuals.worst < max(CENTRED, AHEAD * found.residuals.worst):
-                path = self._next_centre(path, start.operator, found)
-        return found, replace(line, method="proximal rescue")
+            if newton.iterate.residuals.worst < max(CENTRED, AHEAD * iterate.residuals.worst):
+                path = self._next_centre(path, start.operator, iterate)
+        return iterate, replace(line, method="proximal rescue")
 
     def _first_centre(self, start: Start) -> _ProximalPath:
         """Put soft springs between the bodies and their forces at the start. Collective."""
@@ -239,21 +240,21 @@ class Rescue:
         steps = self._steps(point)
         return _ProximalPath(point, steps, steps.init(steps.at_rest(point.enter(start.iterate))))
 
-    def _next_centre(self, path: _ProximalPath, operator: CountedOperator, found: Iterate) -> _ProximalPath:
+    def _next_centre(self, path: _ProximalPath, operator: CountedOperator, iterate: Iterate) -> _ProximalPath:
         """Move the centre to the force of the springs, and make them stiffer if it came quickly. Collective.
 
         Args:
             path: Where the steps came to rest.
             operator: F, counted.
-            found: The iterate there without springs.
+            iterate: The iterate there without springs.
         """
         force = path.point.force(path.newton.iterate)
         if path.since <= FEW:
             point = ProximalPoint.build(self.problem, operator, STIFFER * path.point.stiffness).centred(force)
             steps = self._steps(point)
-            return _ProximalPath(point, steps, steps.init(point.enter(found)))
+            return _ProximalPath(point, steps, steps.init(point.enter(iterate)))
         point = path.point.centred(force)
-        newton = replace(path.newton, iterate=point.enter(found))
+        newton = replace(path.newton, iterate=point.enter(iterate))
         return _ProximalPath(point, path.steps.moved(point.problem), newton)
 
     def _steps(self, point: ProximalPoint) -> NewtonSteps:
@@ -270,9 +271,9 @@ class Rescue:
         for state in outer_iterations(frozen, start, settings):
             if state.residuals.within(target) or start.operator.products >= limit:
                 break
-        improved = certify(problem, start.operator, state.multiplier, state.residual).iterate
-        line = state.record(0, problem, start.operator.products)
-        return improved, replace(line, method="SMALSE rescue"), state.memory
+        improved = certify(problem, state.multiplier, start.operator(state.multiplier), state.residual)
+        line = state.record(0, frozen, start.operator.products)
+        return improved.iterate, replace(line, method="SMALSE rescue"), state.memory
 
 
 @dataclass(frozen=True, eq=False)

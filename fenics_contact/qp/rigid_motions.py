@@ -12,7 +12,7 @@ from fenics_contact.qp.feasible import FeasibleSet
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 
-#: Imbalance relative to the sum of all forces at which bodies count as settled.
+#: Imbalance relative to the sum of all forces at which bodies count as at rest.
 BALANCED = 1e-11
 #: Imbalance relative to the multipliers of the whole problem that is rounding.
 ROUNDING = 1e-14
@@ -168,7 +168,7 @@ class _Springs:
         return _Balance(z, trial, bound, sums[:-1] - self.load, float(sums[-1] - self.load @ z))
 
     def target(self, balance: _Balance) -> float:
-        """Return the imbalance at which bodies count as settled. Collective.
+        """Return the imbalance at which bodies count as at rest. Collective.
 
         That is small beside the forces that act on them. Where next to none do, it is rounding of the others.
         """

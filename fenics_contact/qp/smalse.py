@@ -68,9 +68,10 @@ class Smalse:
             history.append(state.record(len(history), problem, operator.products))
             start.reached(history[-1])
             if state.residuals.within(0.5 * self.tolerance):
-                answer = certify(problem, operator, state.multiplier, state.residual)
+                product = operator(state.multiplier)
+                answer = certify(problem, state.multiplier, product, state.residual)
                 if answer.iterate.residuals.within(self.tolerance):
-                    return answer.solution(problem, history, operator.products, state.memory)
+                    return answer.solution(history, operator.products, state.memory)
             if operator.products >= self.max_products:
                 break
         raise ConvergenceError(
@@ -91,7 +92,6 @@ class SmalseState:
         residuals: Measured with `residual`.
         memory: Norm estimate and current M.
         iterations: MPGP steps of this outer iteration.
-        slip_bound: Ψ, owned.
     """
 
     multiplier: Vector
@@ -99,11 +99,10 @@ class SmalseState:
     residuals: Residuals
     memory: SmalseMemory
     iterations: int
-    slip_bound: Vector
 
     def record(self, iteration: int, problem: DualProblem, products: int) -> SolverStep:
         """Return the line for the history. Collective."""
-        closed, stick, slip = count_status(problem, self.multiplier, self.slip_bound)
+        closed, stick, slip = count_status(problem, self.multiplier)
         note = f"{self.iterations} MPGP steps, M = {self.memory.balance:.0e}"
         return SolverStep("SMALSE", iteration, products, self.residuals, closed, stick, slip, note)
 
@@ -137,6 +136,6 @@ def outer_iterations(problem: DualProblem, start: Start, parameters: Smalse) -> 
         v = v + lagrangian.drift(x)
         residuals = measure(problem, x, residual + rigid, residual)
         memory = SmalseMemory(lagrangian.norm, balance)
-        yield SmalseState(x, residual, residuals, memory, minimum.iterations, feasible.slip_bound)
+        yield SmalseState(x, residual, residuals, memory, minimum.iterations)
         caution *= 0.3 if minimum.iterations == 0 else 1.0
         floor = lagrangian.floor(residuals, parameters.tolerance)

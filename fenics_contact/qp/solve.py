@@ -11,10 +11,10 @@ from fenics_contact.errors import ConvergenceError, InvalidInputError, together
 from fenics_contact.progress import Task
 from fenics_contact.qp.equilibrium import require_equilibrium
 from fenics_contact.qp.iterate import (
-    Certificate,
     Start,
     answer_at,
     apply_unless_zero,
+    certify,
     count_status,
     iterate_at,
     iterate_fitted,
@@ -94,9 +94,9 @@ def _solve_as_given(
             problem.operator, lambda products, residual: task.step(products, measure=residual)
         )
         begin = _begin(problem, operator, start, same)
-        known = _as_it_is(problem, begin, solver.tolerance)
-        if known is not None:
-            return known
+        answer = _as_it_is(problem, begin, solver.tolerance)
+        if answer is not None:
+            return answer
         solution = solver.run(problem, begin)
     if not solution.residuals.within(solver.tolerance):
         raise ConvergenceError(
@@ -207,15 +207,14 @@ def _as_it_is(problem: DualProblem, start: Start, tolerance: float) -> DualSolut
     iterate = start.iterate
     if not iterate.residuals.within(tolerance):
         return None
-    alpha = iterate.motions(problem)
-    iterate = answer_at(problem, iterate.multiplier, iterate.product, alpha)
-    if not iterate.residuals.within(tolerance):
+    answer = certify(problem, iterate.multiplier, iterate.product, iterate.residual)
+    residuals = answer.iterate.residuals
+    if not residuals.within(tolerance):
         return None
-    answer = Certificate(iterate, alpha, problem.law.bound(iterate.multiplier))
-    closed, stick, slip = count_status(problem, iterate.multiplier, answer.slip_bound)
+    closed, stick, slip = count_status(problem, iterate.multiplier)
     products, note = start.operator.products, "the answer already"
-    line = SolverStep("start", 0, products, iterate.residuals, closed, stick, slip, note)
-    return answer.solution(problem, [line], products, start.memory)
+    line = SolverStep("start", 0, products, residuals, closed, stick, slip, note)
+    return answer.solution([line], products, start.memory)
 
 
 def _require_size(multiplier: Vector, size: int) -> None:
