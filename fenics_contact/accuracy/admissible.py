@@ -65,8 +65,8 @@ class Statuses:
 
     def settled(self, residual: Vector) -> Vector:
         """Return r without the rigid motions that fit it best on the free rows. Collective."""
-        evened = self.free.T @ (evening(self.problem) * residual)
-        return residual - self.problem.coarse.transpose(self.coarse.coefficients(evened))
+        scaled = self.free.T @ (evening(self.problem) * residual)
+        return residual - self.problem.coarse.transpose(self.coarse.coefficients(scaled))
 
 
 @dataclass(frozen=True, eq=False)

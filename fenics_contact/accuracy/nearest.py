@@ -38,7 +38,7 @@ def nearest(problem: DualProblem, feasible: FeasibleSet, start: Vector, enough: 
 
     whose gradient is e − G λ(α): a semismooth Newton method with as many unknowns as there are rigid motions.
     Where the cone has just one multiplier in equilibrium α grows without end, and G λ − e still vanishes.
-    Lengths are those of the evened multipliers.
+    Lengths are those of the scaled multipliers.
 
     Args:
         problem: The dual problem.
@@ -118,5 +118,5 @@ class _Search:
 
 
 def evening(problem: DualProblem) -> Vector:
-    """Return the factors of the evened multipliers, one where stiffness is even, owned."""
+    """Return the factors of the scaled multipliers, one where stiffness is even, owned."""
     return np.ones(problem.layout.size) if problem.scaling is None else problem.scaling.factor

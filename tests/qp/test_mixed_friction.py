@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from fenics_contact.qp import ContactLayout, Coulomb, FaceNewton, Smalse, Tresca, solve
+from fenics_contact.qp import ContactLayout, Coulomb, FaceNewton, Scaling, Smalse, Tresca, solve
+from tests.qp.random_problems import random_problem
 from tests.qp.torn_bricks import Bricks, torn_problem
 
 COUNT = 400
@@ -92,6 +95,24 @@ def test_the_mixed_law_holds_and_one_loop_equals_tresca_problems_with_its_bound(
     assert found.slip_bound == pytest.approx(given + mu_f * normal, abs=1e-14)
     again = solve(dual, found.slip_bound, Smalse(tolerance=1e-10))
     assert np.abs(again.multiplier - found.multiplier).max() < 1e-7 * normal.max()
+
+
+def test_a_law_in_scaled_multipliers_has_the_same_answer() -> None:
+    problem = random_problem(4)
+    rng = np.random.default_rng(0)
+    factor, mu_f = (
+        rng.uniform(0.1, 10.0, problem.layout.size),
+        rng.uniform(0.1, 0.8, problem.layout.n_friction),
+    )
+    factor[problem.layout.tangential] = factor[problem.layout.tangential_frictional, None]
+    scaled = replace(problem.dual, scaling=Scaling.build(factor, problem.dual.coarse))
+    solver = FaceNewton(tolerance=1e-9)
+    for bound, coefficient in ((problem.slip_bound, None), (0.3 * problem.slip_bound, mu_f)):
+        plain = solve(problem.dual, bound, solver, friction_coefficient=coefficient)
+        found = solve(scaled, bound, solver, friction_coefficient=coefficient)
+        assert found.problem is scaled
+        assert found.multiplier == pytest.approx(plain.multiplier, abs=1e-6 * np.abs(plain.multiplier).max())
+        assert found.slip_bound == pytest.approx(plain.slip_bound, rel=1e-5)
 
 
 @pytest.mark.parametrize("given", [-1.0, np.nan, np.full(COUNT, -1.0)])

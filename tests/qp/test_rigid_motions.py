@@ -51,7 +51,7 @@ def test_the_motion_strains_no_glue_and_costs_no_product():
     law = Coulomb(dual.layout, np.full(dual.layout.n_friction, 0.4))
 
     def no_product(x):
-        raise AssertionError("settling needs no product")
+        raise AssertionError("rigid motions need no product")
 
     motion, _ = settled(replace(dual, operator=no_product), law, multiplier, residual)
     moved = dual.coarse.transpose(motion)
@@ -82,7 +82,7 @@ def test_a_tilted_brick_on_a_round_one_that_hardly_anything_holds(friction_coeff
     assert found.history[-1].stick == 0 < found.history[-1].slip
     assert max(coulomb_violations(dual.layout, found.multiplier, found.residual, mu_f).values()) < 1e-5
     assert all(step.method == "face Newton" for step in found.history)
-    assert found.products < 100  # 6000 to more than 20 000 without settling
+    assert found.products < 100  # 6000 to more than 20 000 without the correction
 
 
 SOLVERS = {"face Newton": FaceNewton(), "SMALSE": Smalse()}
