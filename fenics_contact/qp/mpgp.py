@@ -61,12 +61,16 @@ class BoundedMinimum:
     Attributes:
         x: The iterate, in the set, owned.
         gradient: A x − b there, owned, carried by recursion within a sequence of CG steps.
+        projected: Norm of the projected gradient.
         iterations: Steps of all kinds.
+        reached: Whether the projected gradient met the target.
     """
 
     x: Vector
     gradient: Vector
+    projected: float
     iterations: int
+    reached: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +114,7 @@ def minimise(
     direction = split.free
     for iteration in range(max_iterations):
         if split.projected <= target(x):
-            return BoundedMinimum(x, gradient, iteration)
+            return BoundedMinimum(x, gradient, split.projected, iteration, True)
         if split.proportional:
             image = quadratic.operator(direction)
             slope, curvature = global_sum(quadratic.comm, gradient @ direction, direction @ image)
@@ -128,7 +132,8 @@ def minimise(
         gradient = quadratic.gradient(x)
         split = _split(quadratic, x, gradient, step, parameters)
         direction = split.free
-    return BoundedMinimum(x, gradient, max_iterations)
+    reached = split.projected <= target(x)
+    return BoundedMinimum(x, gradient, split.projected, max_iterations, reached)
 
 
 def _split(quadratic: BoundedQuadratic, x: Vector, gradient: Vector, step: float, parameters: Mpgp) -> _Split:
