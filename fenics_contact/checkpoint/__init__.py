@@ -9,18 +9,27 @@ from fenics_contact.checkpoint.interruption import (
     safe_point,
     telling_what_is_kept,
 )
-from fenics_contact.checkpoint.whole_file import CheckpointError, put_whole, synchronise, write_whole
+from fenics_contact.checkpoint.whole_file import (
+    CheckpointError,
+    hidden_folder,
+    put_whole,
+    remove_abandoned,
+    replace_all,
+    write_whole,
+)
 
 __all__ = [
     "Checkpoint",
     "CheckpointError",
     "Interrupted",
     "Interruption",
+    "hidden_folder",
     "interruptible",
     "put_whole",
     "read_archive",
+    "remove_abandoned",
+    "replace_all",
     "safe_point",
-    "synchronise",
     "telling_what_is_kept",
     "without_checkpoint",
     "write_archive",

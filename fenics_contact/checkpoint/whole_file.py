@@ -1,14 +1,28 @@
-"""One file, replaced at once: a reader finds the old or the new one, whatever happens to the writer."""
+"""Files appear whole: a reader finds the old or the new one, whatever happens to the writer.
+
+They are written under another name in the same folder and then renamed. The other name is that of a hidden
+folder, ``.NAME.XXXXXXXX.partial``, whose writer holds a lock on it. The system takes the lock away from a
+writer that dies, however it dies; the next one that comes to the folder removes what such writers have left.
+"""
 
 from __future__ import annotations
 
-import glob
+import errno
+import fcntl
 import os
+import re
 import secrets
-from contextlib import suppress
+import shutil
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from fenics_contact.errors import FenicsContactError
+
+_HIDDEN = re.compile(r"\..+\.[0-9a-f]{8}\.partial")
+#: Where the file system knows no locks, age tells: no writer takes that long for a file, [s].
+_ABANDONED = 24 * 3600.0
 
 
 class CheckpointError(FenicsContactError, OSError):
@@ -40,36 +54,110 @@ def write_whole(path: Path, content: bytes) -> None:
 def put_whole(path: Path, content: bytes) -> None:
     """Put a file in place of another, on the disk before it gets its name.
 
-    The content goes to ``.NAME.XXXXXXXX.partial`` beside the target. What writers that were killed have left
-    under such names is removed; a writer that loses its file that way says so.
-
     Args:
         path: The file; its folder is created.
         content: All of it.
 
     Raises:
-        OSError: If the disk is full or the folder cannot be written to; the target is then what it was.
+        OSError: If the disk is full, the folder cannot be written to, or another writer has replaced the file
+            meanwhile; the target is then what it was, or what that one has written.
     """
-    partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.partial")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    for left in path.parent.glob(f".{glob.escape(path.name)}.*.partial"):
-        left.unlink(missing_ok=True)
-    try:
-        _write(partial, content)
+    with hidden_folder(path.parent, path.name) as hidden:
+        partial, before = hidden / path.name, _version(path)
+        partial.write_bytes(content)
+        synchronise(partial)
+        if _version(path) != before:
+            raise FileExistsError(errno.EEXIST, "another run has written it meanwhile")
         os.replace(partial, path)
-    except OSError:
-        with suppress(OSError):
-            partial.unlink(missing_ok=True)
-        raise
     synchronise(path.parent)
 
 
-def _write(path: Path, content: bytes) -> None:
-    """Write and wait until the file is on the disk."""
-    with path.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
+def _version(path: Path) -> tuple[int, int] | None:
+    """Return what tells a file from one that has taken its place, None where there is none."""
+    with suppress(FileNotFoundError):
+        found = path.stat()
+        return found.st_ino, found.st_mtime_ns
+    return None
+
+
+@contextmanager
+def hidden_folder(folder: Path, stem: str) -> Iterator[Path]:
+    """Make a hidden folder to write in, and remove it in the end; remove those of dead writers before.
+
+    Args:
+        folder: Where to make it; created.
+        stem: What its name begins with.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    remove_abandoned(folder)
+    hidden, lock = _made(folder, stem)
+    try:
+        yield hidden
+    finally:
+        shutil.rmtree(hidden, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
+
+
+def remove_abandoned(folder: Path) -> None:
+    """Remove the hidden folders of writers that are dead."""
+    for left in folder.glob(".*.partial"):
+        if not _HIDDEN.fullmatch(left.name) or not left.is_dir():
+            continue
+        with suppress(OSError):  # another writer may remove it at the same time
+            taken, lock = _locked(left)
+            if taken or (lock is None and time.time() - left.stat().st_mtime > _ABANDONED):
+                shutil.rmtree(left, ignore_errors=True)
+            if lock is not None:
+                os.close(lock)
+
+
+def replace_all(written: Sequence[Path], folder: Path) -> None:
+    """Move complete files or folders into a folder, one after the other; each survives a loss of power.
+
+    The last of several names the others. The old one goes first, so that none ever names files of which some
+    are older than others.
+    """
+    for path in written:
+        for part in (*path.rglob("*"), path) if path.is_dir() else (path,):
+            synchronise(part)
+        if path.is_file() and (folder / path.name).is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), path.name)
+    if len(written) > 1:
+        (folder / written[-1].name).unlink(missing_ok=True)
+    for path in written:
+        target = folder / path.name
+        if path.is_dir() and target.is_dir():  # unlike a file, it cannot be replaced at once
+            shutil.rmtree(target)
+        os.replace(path, target)
+    synchronise(folder)
+
+
+def _made(folder: Path, stem: str) -> tuple[Path, int | None]:
+    """Make a hidden folder and lock it, where the file system can."""
+    while True:
+        hidden = folder / f".{stem}.{secrets.token_hex(4)}.partial"
+        hidden.mkdir()
+        with suppress(FileNotFoundError):
+            taken, lock = _locked(hidden)
+            # Between its making and its lock another writer may have taken it for an abandoned one.
+            if (taken or lock is None) and hidden.exists():
+                return hidden, lock
+            if lock is not None:
+                os.close(lock)
+
+
+def _locked(path: Path) -> tuple[bool, int | None]:
+    """Try to lock a folder: whether it worked, and the open folder, None where there are no locks."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False, descriptor
+    except OSError:
+        os.close(descriptor)
+        return False, None
+    return True, descriptor
 
 
 def synchronise(path: Path) -> None:

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact._libraries import MPI
+from fenics_contact.checkpoint import remove_abandoned
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.io.collection import Member, collection, read_collection, stem_of
 from fenics_contact.io.names import checked_name, file_of_each
-from fenics_contact.io.replacing import remove_abandoned, write_text
+from fenics_contact.io.replacing import write_text
 from fenics_contact.io.temporal_xdmf import grid_of, temporal
 from fenics_contact.io.vtu import write_vtu
 from fenics_contact.io.vtx import require_vtx, write_vtx

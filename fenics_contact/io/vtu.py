@@ -55,6 +55,8 @@ def write_vtu(
     Raises:
         InvalidInputError: If the name holds a folder, or a field lacks a body or does not fit its cells.
     """
+    import meshio  # costs a tenth of a second
+
     index = checked_name(folder, name, ".vtm")
     more = {body: _checked(state, body, cell_fields or {}) for body in state.scene.bodies}
     meshes = {body: _gathered(state, body, more[body]) for body in state.scene.bodies}
@@ -65,7 +67,7 @@ def write_vtu(
             # The index last: whoever finds it finds what it names.
             with replacing(*files, index) as paths:
                 for path, mesh in zip(paths, meshes.values(), strict=False):
-                    mesh.write(path, file_format="vtu")
+                    meshio.write(path, mesh, file_format="vtu")
                 paths[-1].write_text(_multi_block(list(meshes), files), encoding="utf-8")
     return index
 
@@ -88,7 +90,7 @@ def _checked(
 def _gathered(state: State, body: str, more: Mapping[str, np.ndarray]) -> meshio.Mesh:
     mesh = state.scene.bodies[body].mesh
     fields = gathered_fields(state, body)
-    import meshio  # costs a tenth of a second
+    import meshio
 
     return meshio.Mesh(
         in_space(mesh.points),

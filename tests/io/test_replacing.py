@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from fenics_contact.io.replacing import OutputError, hidden_folder, replacing
+from fenics_contact.checkpoint import hidden_folder
+from fenics_contact.io.replacing import OutputError, replacing
 
 
 def test_targets_are_replaced_at_the_end_only(tmp_path: Path) -> None:
