@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -114,15 +114,9 @@ class Builder:
                 self._mistakes.append(unknown(self._source, where, part.surface, what, sorted(surfaces)))
         self._check()
 
-    @contextmanager
-    def _at(self, *path: str | int) -> Iterator[None]:
+    def _at(self, *path: str | int) -> AbstractContextManager[None]:
         """Collect an error of the block as a mistake at a key."""
-        try:
-            yield
-        except SceneFileError as error:
-            self._mistakes.extend(error.mistakes)
-        except InvalidInputError as error:
-            self._mistakes.append(located(self._source, path, error))
+        return located(self._source, path, self._mistakes)
 
     def _check(self) -> None:
         """Raise on all ranks if one met a mistake, as in a file that it alone cannot read. Collective."""
@@ -131,9 +125,26 @@ class Builder:
                 raise SceneFileError(self._source.name, self._mistakes)
 
 
-def located(source: Source, path: Path, error: InvalidInputError) -> Mistake:
-    """Return an error of what was built from a key as a mistake there."""
-    return source.mistake(path, f"{written(path)}: {error}")
+@contextmanager
+def located(source: Source, path: Path, mistakes: list[Mistake] | None = None) -> Iterator[None]:
+    """Make an error of the block a mistake at a key.
+
+    Args:
+        source: Where the key stands.
+        path: The key.
+        mistakes: Takes what went wrong, which is raised unless given.
+    """
+    try:
+        yield
+    except SceneFileError as error:
+        if mistakes is None:
+            raise
+        mistakes.extend(error.mistakes)
+    except InvalidInputError as error:
+        found = source.mistake(path, f"{written(path)}: {error}")
+        if mistakes is None:
+            raise SceneFileError(source.name, [found]) from error
+        mistakes.append(found)
 
 
 def _refuse(empty: Scene, part: dict[str, Any]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +21,6 @@ from fenics_contact.scene_file.document import Document
 from fenics_contact.scene_file.mistakes import SceneFileError
 from fenics_contact.scene_file.names import wrong_names
 from fenics_contact.scene_file.own_python import refused_python
-from fenics_contact.scene_file.places import Path as Keys
 from fenics_contact.scene_file.placing import Shaped
 from fenics_contact.scene_file.source import Source, parse
 from fenics_contact.scene_file.steps import load_steps
@@ -147,23 +147,8 @@ class SceneFile:
             _, shapes = self._built
             return shape_task(self.source, self.document, self.problem, shapes)
 
-    def _at(self, *keys: str | int) -> _Located:
-        return _Located(self.source, keys)
-
-
-@dataclass(frozen=True)
-class _Located:
-    """Leads errors of a block back to a key."""
-
-    source: Source
-    keys: Keys
-
-    def __enter__(self) -> None:
-        """Begin."""
-
-    def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
-        if isinstance(error, InvalidInputError) and not isinstance(error, SceneFileError):
-            raise SceneFileError(self.source.name, [located(self.source, self.keys, error)]) from error
+    def _at(self, *keys: str | int) -> AbstractContextManager[None]:
+        return located(self.source, keys)
 
 
 def read_scene_file(
