@@ -73,7 +73,7 @@ scene = Scene(
     loads=[Traction("block", "z1", (200.0, 0.0, -500.0))],          # N/mm²
     contacts=[ContactPair(Surface("block", "z0"), RigidPlane((0, 0, 0), (0, 0, 1)), Coulomb(0.3))],
 )
-state = solve_scene(scene, None, MPI.COMM_WORLD)
+state = solve_scene(scene, MPI.COMM_WORLD)
 plot_contact_pressure(state, "output/first.png")
 
 if MPI.COMM_WORLD.rank == 0:
