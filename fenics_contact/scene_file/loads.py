@@ -35,8 +35,7 @@ class _Load(_Named):
         value = self.size if value is None else value
         if isinstance(value, tuple) and any(isinstance(entry, Expression) for entry in value):
             value = VectorExpression(value)
-        load: Load = self.made(**{self.changed: value})
-        return load
+        return self.made(**{self.changed: value})
 
 
 @keys_of(scene.Traction)
@@ -102,8 +101,7 @@ class SupportPart(_Named):
             dim: Dimension of the bodies.
             value: What a load step prescribes instead.
         """
-        support: Support = self.made(value=value or self.value or (0.0,) * dim)
-        return support
+        return self.made(value=value or self.value or (0.0,) * dim)
 
 
 AnyLoad: TypeAlias = Annotated[

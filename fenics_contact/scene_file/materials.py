@@ -25,8 +25,7 @@ ISOTROPIC: dict[str, Callable[..., Material]] = {
 class _Material(Part):
     def build(self, folder: Path) -> Material:
         """Return the material."""
-        material: Material = self.made()
-        return material
+        return self.made()
 
 
 @keys_of(scene.IsotropicElasticity)
@@ -56,8 +55,7 @@ class OrthotropicMaterial(_Material):
 
     def build(self, folder: Path) -> Material:
         """Return the material."""
-        material: Material = self.made(orientation=scene.material_axes(self.axis_1, self.axis_2))
-        return material
+        return self.made(orientation=scene.material_axes(self.axis_1, self.axis_2))
 
 
 @keys_of(scene.OrthotropicPlaneStress)
@@ -93,12 +91,11 @@ class OwnMaterial(Part):
         kind = load(self.model, folder)
         with running(f"{self.model!r} with the parameters {sorted(self.parameters)}"):
             try:
-                material: Material = kind(**self.parameters)
+                return kind(**self.parameters)
             except TypeError as error:
                 raise InvalidInputError(
                     f"parameters must be what {self.model!r} takes, got {sorted(self.parameters)}: {error}"
                 ) from error
-        return material
 
 
 AnyMaterial: TypeAlias = Annotated[

@@ -104,7 +104,7 @@ def keys_of(
             table.__name__, __base__=table, __doc__=table.__doc__, __module__=table.__module__, **fields
         )
         derived.of, derived.given = staticmethod(of), tuple(fields)
-        return derived  # type: ignore[no-any-return]
+        return derived
 
     return derive
 
