@@ -287,7 +287,8 @@ class _Run:
         parameters, products, history = self.parameters, self.start.operator.products, state.history
         up = [products >= parameters.max_products, len(history) >= parameters.max_steps]
         more = [f"raise {name}" for name, used in zip(("max_products", "max_steps"), up, strict=True) if used]
-        last, best = history[-1], state.best.residuals.worst
+        best = state.best.residuals.worst
+        last = history[-1] if history else "none of them was left for a step"
         reached = (
             f"face Newton needs residuals below {parameters.tolerance:.1e}, got after {products} products "
             f"and {len(history)} steps: {last}; the best was {best:.1e}, "
@@ -295,7 +296,7 @@ class _Run:
         )
         if slides(history) and best > HARDLY:
             ways = ["raise the friction", "lower the load", "add a support", *more]
-            why = f"all {last.slip} discs slip, and friction may not suffice for any equilibrium; "
+            why = f"all {history[-1].slip} discs slip, and friction may not suffice for any equilibrium; "
         else:
             ways = [*more, "start from the solution of a neighbouring load"]
             ways += ["loosen the tolerance if the best residual is near it", "use a FixedPoint of SMALSE"]
