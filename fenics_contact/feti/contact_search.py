@@ -23,6 +23,7 @@ from fenics_contact.feti.surface_doubts import tell_of_surface
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.geometry import asked, coordinate_rounding
 from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie
+from fenics_contact.scene.approach import master_share
 from fenics_contact.scene.true_surfaces import surface_of
 from fenics_contact.surfaces import Geometry
 from fenics_contact.surfaces.facets import FacetedSurface, shape_functions
@@ -117,11 +118,13 @@ def _points_of_pairs(
             name = f"what ContactPair {index} asks its obstacle, {type(pair.master).__name__}"
             require_alike(comm, described((points.slave, points.normal, points.gap), name))
         else:
-            find = _by_mortar if pair.discretisation == "mortar" else _by_projection
             master = _Side.of(scene, pair.master, geometry, tearing, finer)
             if not finer:
                 tell_of_surface(scene, pair.master, geometry, master.surface, comm)
-            points = find(slave, movable, master, comm)
+            if pair.discretisation == "mortar":
+                points = _by_mortar(slave, movable, master, comm, master_share(scene, pair))
+            else:
+                points = _by_projection(slave, movable, master, comm)
             points = replace(points, symmetric=_symmetric(points, slave, master))
         if comm.rank == 0 and not movable.all():
             tell(
@@ -179,8 +182,18 @@ def _tell_of_lost(places: np.ndarray, count: int) -> None:
     )  # fmt: skip
 
 
-def _by_mortar(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm) -> ContactPoints:
-    """Let each slave node meet the mean of the master under its dual basis function. Collective."""
+def _by_mortar(
+    slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm, share: float
+) -> ContactPoints:
+    """Let each slave node meet the mean of the master under its dual basis function. Collective.
+
+    Args:
+        slave: Side whose nodes carry multipliers.
+        movable: Which of them can move.
+        master: The other side.
+        comm: Communicator of the ranks that share the work.
+        share: The master's share of what closes the gap.
+    """
     from fenics_contact.feti.mortar import mortar_coupling  # not before a pair asks for it
 
     found = mortar_coupling(slave.surface, master.surface, comm)
@@ -190,12 +203,36 @@ def _by_mortar(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm)
     weight = (found.weight[kept] @ spread).tocsr()
     gap = found.gap[kept]
     if slave.surface.relief is not None or master.surface.relief is not None:
-        # Linear displacements close the gap's linear interpolant, not the mean of its bends between nodes,
-        # which is a mean for nodes beside the master alone.
-        hit = _shared_projection(slave.surface, found.node[kept], master.surface, comm)
-        gap[hit.point] = hit.gap
+        gap = _closable(slave, found.node[kept], master, found.weight[kept], gap, comm, share)
     points = _points(slave, found.node[kept], found.normal[kept], gap, weight)
     return replace(points, area=found.area[kept])
+
+
+def _closable(
+    slave: _Side,
+    chosen: np.ndarray,
+    master: _Side,
+    weight: sp.csr_matrix,
+    mean: np.ndarray,
+    comm: MPI.Comm,
+    share: float,
+) -> np.ndarray:
+    """Return the gaps between true surfaces that linear displacements can close, shape (n,). Collective.
+
+    Where the gap g closes, the slave moves by (1 − s) g and the master by s g, s its share of the compliance,
+    but for rigid motions. The constraint has linear interpolants of that, I g on the slave and J g on the
+    master: (1 − s) g(x_i) + s ∫ ψ_i J g is what it can close. The mean of g itself bends between nodes.
+    Nodes of which a part lies beside the other surface keep that mean.
+    """
+    nodes = np.flatnonzero(np.bincount(weight.indices, minlength=weight.shape[1]))
+    here = _shared_projection(slave.surface, chosen, master.surface, comm)
+    there = _shared_projection(master.surface, nodes, slave.surface, comm)
+    own, opposite = np.full(len(chosen), np.nan), np.full(weight.shape[1], np.nan)
+    own[here.point], opposite[nodes[there.point]] = here.gap, there.gap
+    lost = abs(weight) @ np.isnan(opposite).astype(np.float64) > 0
+    across = np.where(lost, own, weight @ np.nan_to_num(opposite))
+    found = (1.0 - share) * own + share * across
+    return np.where(np.isnan(found), mean, found)
 
 
 def _on_obstacle(slave: _Side, movable: np.ndarray, obstacle: RigidObstacle) -> ContactPoints:

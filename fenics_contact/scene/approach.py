@@ -10,7 +10,7 @@ from fenics_contact.geometry import vector_areas
 from fenics_contact.geometry.shapes.closest import tangent_bases
 from fenics_contact.scene.loads import BodyForce, Load, Pressure, ThermalStrain, TotalForce
 from fenics_contact.scene.materials import PlaneStress
-from fenics_contact.scene.pairs import ContactPair, Surface
+from fenics_contact.scene.pairs import ContactPair, Surface, Tie
 from fenics_contact.surfaces import quadrature_areas
 from fenics_contact.theory import contact_modulus, hertz_line, hertz_point
 
@@ -78,6 +78,16 @@ def modulus_of(scene: Scene, pair: ContactPair) -> float | None:
         return None
     (young_1, poisson_1), (young_2, poisson_2) = sides  # type: ignore[misc]
     return contact_modulus(young_1, poisson_1, young_2, poisson_2)
+
+
+def master_share(scene: Scene, pair: ContactPair | Tie) -> float:
+    """Return the master's share of the compliance 1/E* of two bodies; a half where one is not isotropic."""
+    assert isinstance(pair.master, Surface)
+    sides = [_constants(scene.bodies[surface.body]) for surface in (pair.slave, pair.master)]
+    if None in sides:
+        return 0.5
+    own, other = ((1.0 - ratio**2) / young for young, ratio in sides)  # type: ignore[misc]
+    return other / (own + other)
 
 
 def _constants(body: Body) -> tuple[float, float] | None:
