@@ -130,7 +130,7 @@ def test_a_body_cannot_be_tied_to_itself() -> None:
 
 def test_an_unknown_discretisation_is_refused() -> None:
     with pytest.raises(
-        InvalidInputError, match=r"Tie.discretisation must be 'node' or 'mortar', got 'x': as for"
+        InvalidInputError, match=r"Tie.discretisation must be 'node' or 'mortar', got 'x': \"node\" ties"
     ):
         Tie(Surface("a", "s"), Surface("b", "s"), discretisation="x")  # type: ignore[arg-type]
 
