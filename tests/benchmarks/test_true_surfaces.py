@@ -77,6 +77,8 @@ def test_the_chain_is_right_on_true_crowns_alone(record: dict[str, Any]) -> None
         assert graded["area"] == pytest.approx(27.4, rel=0.04)
         assert by[1.5, FINEST, way, "best"]["peak"] == pytest.approx(PEAK, rel=0.004)
         assert by[3.0, 0.0, way, "best"]["potential"] == pytest.approx(ENERGY, rel=0.006)
+    for size, error in ((1.0, 0.03), (1.5, 0.012), (2.0, 0.005), (3.0, 0.005)):
+        assert by[size, 0.0, "mortar", "best"]["peak"] == pytest.approx(PEAK, rel=error)
     potentials = [by[1.0, GRADING, way, "best"]["potential"] for way in ("node", "mortar")]
     assert potentials[0] == pytest.approx(potentials[1], rel=0.01)
 
