@@ -119,18 +119,6 @@ class LinkShape:
         """Volume of the smooth link, section times length of the centre line (Pappus)."""
         return self.section.area * (2.0 * np.pi * self.centre_radius + 2.0 * self.straight)
 
-    @property
-    def faceting(self) -> float:
-        """How far the flat facets of the inner crown stand off the smooth surface."""
-        spacing, section = self.spacing, self.section
-        around = np.pi / 2.0 * _steps(2 * spacing.quarter, spacing.along)
-        across = section.half_angle * _steps(self.n_b, spacing.across)
-        heights = [
-            radius * (1.0 - np.cos(angles.max() / 2.0))
-            for radius, angles in ((self.inner_radius, around), (section.crown_radius, across))
-        ]
-        return float(max(heights))
-
 
 def crown_start(shape: LinkShape) -> int:
     """Index around the ring of the first node of the contact crown, counted back from the crown's middle.
@@ -139,11 +127,6 @@ def crown_start(shape: LinkShape) -> int:
     into eight, so that no cut across the ring meets the spot where links touch.
     """
     return shape.n_around // 16 - shape.spacing.quarter
-
-
-def _steps(cells: int, strength: float) -> np.ndarray:
-    """Lengths of the pieces of [-1, 1], (cells,)."""
-    return np.diff(drawn_together(np.linspace(-1.0, 1.0, cells + 1), 0.0, strength))
 
 
 def stations(shape: LinkShape, spacing: Spacing | None = None) -> tuple[np.ndarray, np.ndarray]:

@@ -56,11 +56,6 @@ def shape_functions(local: np.ndarray, corners: int) -> tuple[np.ndarray, np.nda
     return values, 0.25 * np.stack([_S * v, u * _T], axis=2)
 
 
-def shape_second_mixed(corners: int) -> np.ndarray:
-    """Return ∂²N/∂s∂t of each shape function, the only second derivative not zero, shape (corners,)."""
-    return 0.25 * np.array([1.0, -1.0, 1.0, -1.0]) if corners == 4 else np.zeros(corners)
-
-
 def outside(local: np.ndarray, corners: int) -> np.ndarray:
     """Return by how much local coordinates lie outside the facet, shape (n,); zero inside."""
     if corners == 2:

@@ -158,20 +158,6 @@ def test_design_directions_are_normals_of_the_torus(graded: Link) -> None:
     assert middle[:, 1] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_the_faceting_is_that_of_the_largest_facet(graded: Link) -> None:
-    nodes = crown(graded)
-    along, across = (count // 2 for count in graded.crown.counts)
-    centres = np.array([[-graded.shape.inner_radius, 0.0], [graded.shape.section.crown_radius, 0.0]])
-    lines = [nodes[:, across][:, [0, 2]], nodes[along][:, [0, 1]]]
-    heights = []
-    for line, centre in zip(lines, centres, strict=True):
-        middles = (line[1:] + line[:-1]) / 2.0
-        radius = np.linalg.norm(line[0] - centre)
-        heights.append((radius - np.linalg.norm(middles - centre, axis=1)).max())
-    assert graded.shape.faceting == pytest.approx(max(heights))
-    assert graded.shape.faceting > 3.0 * LinkShape().faceting
-
-
 def test_graded_links_touch_in_pairs_and_in_chains() -> None:
     shape = LinkShape(n_around=36, n_a=4, n_b=12, grading=GRADING)
     pair = two_links(shape, gap=0.1)

@@ -79,9 +79,10 @@ def test_the_clearance_is_the_gap_asked_for(gap: float) -> None:
 @pytest.mark.parametrize("cell", CELLS)
 def test_coarse_links_touch_as_well(cell: str, n_b: int) -> None:
     pair = two_links(LinkShape(n_around=12, n_a=2, n_b=n_b, cell=cell))
-    assert abs(pair.second.mesh.points[:, 0].min() + 16.0) < pair.first.shape.faceting
+    height = 16.0 * (1.0 - np.cos(np.pi / 12))  # of the circle over the longest of its 12 facets
+    assert abs(pair.second.mesh.points[:, 0].min() + 16.0) < height
     distance = distances(pair.first.mesh, pair.second.mesh).min()
-    assert -1e-12 < distance < pair.first.shape.faceting
+    assert -1e-12 < distance < height
 
 
 def test_links_of_different_shape_may_be_paired() -> None:

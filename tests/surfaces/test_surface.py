@@ -13,7 +13,6 @@ from fenics_contact.surfaces.facets import (
     faceted_surface,
     outside,
     shape_functions,
-    shape_second_mixed,
 )
 
 
@@ -51,7 +50,6 @@ def test_shape_functions_of_edges_interpolate_linearly() -> None:
     values, slopes = shape_functions(local, 2)
     np.testing.assert_allclose(values, [[1, 0], [0.25, 0.75], [0, 1]])
     np.testing.assert_allclose(slopes, np.tile([[[-0.5], [0.5]]], (3, 1, 1)))
-    np.testing.assert_array_equal(shape_second_mixed(2), [0, 0])
 
 
 def test_local_coordinates_tell_how_far_outside_or_inside_an_edge_a_point_lies() -> None:
