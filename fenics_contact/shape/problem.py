@@ -235,6 +235,15 @@ class ShapeProblem:
         self._memory.judged(point)
         return point
 
+    @collectively("ShapeProblem.differentiate", _comm)
+    def differentiate(self, state: State) -> DesignPoint:
+        """Return value and subgradient at a known state of the reference shape, for one adjoint. Collective.
+
+        Args:
+            state: Equilibrium of the scene, with the subdomains of this problem (`ContactProblem.following`).
+        """
+        return self._point_at(np.zeros(self.size), state, self._tightest, None)
+
     @property
     def inexact(self) -> bool:
         """Whether an optimiser may ask for less accuracy, see `within`."""

@@ -57,28 +57,14 @@ def _nodes(mesh: BodyMesh, parts: int) -> float:
     return max(2.0**mesh.dim, (side + 1.0) ** mesh.dim)
 
 
-class GradientOf(ShapeProblem):
-    """Differentiates the total potential at a state that is known already."""
-
-    def __init__(self, problem: Problem, state: State) -> None:
-        """Prepare the adjoint, as accurate as the state. Collective."""
-        assert problem.design is not None
-        self._state = state
-        contact = ContactProblem.following(state, tolerance=max(reached(state), 1e-11))
-        super().__init__(contact, problem.design, TotalPotential())
-
-    def state_of(self, alpha: np.ndarray) -> State:
-        """Return the known state."""
-        return self._state
-
-
 def gradient_of(problem: Problem, state: State) -> tuple[np.ndarray, dict[str, float], int]:
     """Return the derivative of the total potential by the design, seconds by phase, products. Collective."""
     if problem.design is None:
         return np.zeros(0), {}, 0
     before = state.dual.products
-    differentiated = GradientOf(problem, state)
-    point = differentiated.evaluate(np.zeros(differentiated.size))
+    contact = ContactProblem.following(state, tolerance=max(reached(state), 1e-11))
+    differentiated = ShapeProblem(contact, problem.design, TotalPotential())
+    point = differentiated.differentiate(state)
     seconds = {name: differentiated.seconds.get(name, 0.0) for name in ("objective", "adjoint", "gradient")}
     return point.gradient, seconds, state.dual.products - before
 

@@ -112,6 +112,18 @@ def test_the_volume_agrees_with_central_differences() -> None:
     assert gradient.min() > 0.0
 
 
+def test_a_known_state_is_differentiated_without_being_solved_again() -> None:
+    problem = fresh(tolerance=1e-8)
+    point = problem.evaluate(np.zeros(problem.size))
+    contact = ContactProblem.following(point.state, tolerance=1e-8)
+    known = ShapeProblem(contact, problem.designs, TotalPotential())
+    again = known.differentiate(point.state)
+    assert again.state is point.state
+    assert again.value == point.value
+    np.testing.assert_allclose(again.gradient, point.gradient, rtol=1e-6, atol=1e-9 * abs(point.value))
+    assert "solve" not in known.seconds
+
+
 def test_two_designs_of_one_body_add_up() -> None:
     free = replace(scene(), loads=[])
     mesh = free.bodies["upper"].mesh
