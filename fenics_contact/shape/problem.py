@@ -19,7 +19,6 @@ from fenics_contact.errors import (
     tell,
 )
 from fenics_contact.fingerprint import described
-from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import Scene
 from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
 from fenics_contact.shape.beside import with_fewest_weak_points
@@ -32,7 +31,7 @@ from fenics_contact.shape.motion import motion_of, moving_nodes
 from fenics_contact.shape.objective import Objective, asking
 from fenics_contact.shape.pairs import check_pairs
 from fenics_contact.shape.state_error import state_error
-from fenics_contact.shape.tolerance import AdaptiveTolerance
+from fenics_contact.shape.tolerance import AdaptiveTolerance, tightest_of
 from fenics_contact.shape.volume import volume_by_points
 
 #: Tolerance of the adjoint relative to that of the state, and the least: no worse than the state it is of.
@@ -89,7 +88,7 @@ class ShapeProblem:
         self.contact, self.objective, self.choice = contact, objective, choice
         self.designs = (designs,) if isinstance(designs, SurfaceDesign) else tuple(designs)
         self._adaptive = tolerance if isinstance(tolerance, AdaptiveTolerance) else None
-        self._tightest = _tightest(contact, tolerance)
+        self._tightest = tightest_of(contact, tolerance)
         self._timer, scene = contact.timer, contact.scene
         self.evaluations, self.products = 0, 0
         self._memory = DesignMemory(self)
@@ -397,11 +396,3 @@ class ShapeProblem:
         if self._forms is None:
             self._forms = ShapeForms(state.torn, np.concatenate(list(self._moving.values())))
         return self._forms
-
-
-def _tightest(contact: ContactProblem, given: float | AdaptiveTolerance | None) -> float:
-    """Return the smallest tolerance of states."""
-    if isinstance(given, AdaptiveTolerance):
-        return given.tightest
-    number = contact.tolerance if given is None else given
-    return float(number) if isinstance(number, float | int) else (contact.solver or FaceNewton()).tolerance

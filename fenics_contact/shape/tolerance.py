@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.qp import FaceNewton
 
 #: Tolerance of a second attempt relative to the first: at most and at least.
 _TIGHTER = (0.3, 1e-3)
@@ -54,3 +56,11 @@ class AdaptiveTolerance:
 
     def _clipped(self, tolerance: float) -> float:
         return float(np.clip(tolerance, self.tightest, self.loosest))
+
+
+def tightest_of(contact: ContactProblem, given: float | AdaptiveTolerance | None) -> float:
+    """Return the smallest tolerance of states."""
+    if isinstance(given, AdaptiveTolerance):
+        return given.tightest
+    number = contact.tolerance if given is None else given
+    return float(number) if isinstance(number, float | int) else (contact.solver or FaceNewton()).tolerance
