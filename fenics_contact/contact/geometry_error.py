@@ -38,7 +38,9 @@ def geometry_error(state: State) -> GeometryError:
     The contact problem is solved once more with the gaps between surfaces that are known better: the shapes
     that the meshes carry, where facets or reconstructed surfaces were used; where there are none,
     reconstructed surfaces of the next order. Factors, coarse problem and preconditioner are those of the
-    state. It is no bound. Zero where shapes are known and used, and between flat surfaces.
+    state. Zero where shapes are known and used, and between flat surfaces. It is no bound: what the normals
+    of facets do is left out, which counts where their gaps happen to be right, as between mirrored bodies by
+    mortar.
 
     Raises:
         ConvergenceError: If the problem of the better geometry is not solved.

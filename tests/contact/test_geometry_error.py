@@ -43,12 +43,12 @@ def crossed_cylinders(size: int) -> Scene:
 
 
 def two_discs(size: int) -> Scene:
-    """Two half discs in the plane, with friction, on meshes that do not match."""
-    plane = PlaneStrain(1000.0, 0.3)
+    """Two half discs in the plane, the lower one stiff, with friction, on meshes that do not match."""
+    soft, stiff = PlaneStrain(1000.0, 0.3), PlaneStrain(1e5, 0.3)
     upper, lower = half_disc(10.0, size, symmetry=""), half_disc(14.0, size + 1, symmetry="")
     lower = lower.placed(np.diag([-1.0, -1.0]), np.zeros(2))
     return Scene(
-        {"upper": Body(upper, plane), "lower": Body(lower, plane)},
+        {"upper": Body(upper, soft), "lower": Body(lower, stiff)},
         [Support("lower", "top", (0.0, 0.0)), Support("upper", "top", (0.02, -0.1))],
         [],
         [ContactPair(Surface("upper", "contact"), Surface("lower", "contact"), Coulomb(0.2), "mortar")],

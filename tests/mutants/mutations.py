@@ -67,7 +67,7 @@ MUTATIONS = (
     ),
     Mutation(
         "load steps forget the slip before",
-        "contact/equilibrium.py",
+        "contact/problem.py",
         "if slip_from is not None:",
         "if slip_from is None:",
         ("tests/contact/test_steps.py::test_unloading_does_not_return_to_the_start",),
