@@ -21,8 +21,9 @@ def as_written(
     """Return the signature of a function or class without resolving its annotations."""
     if signature is None:
         return None
-    if inspect.isclass(obj) and (issubclass(obj, Enum) or getattr(obj, "_is_protocol", False)):
-        return "", None  # nobody calls these
+    uncalled = inspect.isclass(obj) and (issubclass(obj, Enum) or getattr(obj, "_is_protocol", False))
+    if uncalled or hasattr(obj, "model_fields"):
+        return "", None  # nobody calls these: tables of scene files, say, are made by reading one
     try:
         found = inspect.signature(obj)
     except (TypeError, ValueError):
