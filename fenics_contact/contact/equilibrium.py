@@ -135,13 +135,22 @@ def solve_dual(
         solver: `FaceNewton` and `FixedPoint` know Coulomb's law; a `FixedPoint` is put around `Smalse`.
         start: Earlier solution, or multiplier to start from, owned, or None.
     """
-    discs, torn = system.owned_discs(), system.torn
-    tresca, coefficient = torn.tresca_bound[discs], torn.friction_coefficient[discs]
-    if not np.any(torn.friction_coefficient > 0):
-        return solve(system.problem, tresca, solver, start)
-    if isinstance(solver, Smalse):
+    tresca, coefficient = friction_of(system)
+    if coefficient is not None and isinstance(solver, Smalse):
         solver = FixedPoint(solver)
     return solve(system.problem, tresca, solver, start, friction_coefficient=coefficient)
+
+
+def friction_of(system: DualSystem) -> tuple[np.ndarray, np.ndarray | None]:
+    """Return what the friction law of a scene gives for this rank's discs.
+
+    Returns:
+        The part of the slip bound that is given, shape (n_friction,), [force], and the friction coefficient,
+        shape (n_friction,), None if it is zero everywhere.
+    """
+    discs, torn = system.owned_discs(), system.torn
+    coefficient = torn.friction_coefficient[discs] if np.any(torn.friction_coefficient > 0) else None
+    return torn.tresca_bound[discs], coefficient
 
 
 def contact_result(system: DualSystem, solution: DualSolution, displacement: np.ndarray) -> ContactResult:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from fenics_contact.contact.equilibrium import friction_of
 from fenics_contact.contact.state import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import DirectSystem, DualSystem, TornSystem
@@ -71,8 +72,5 @@ def restored_solution(system: DualSystem, stored: Stored) -> DualSolution:
 
 
 def _law(system: DualSystem) -> SlipLaw:
-    discs, layout, torn = system.owned_discs(), system.problem.layout, system.torn
-    tresca, coefficient = torn.tresca_bound[discs], torn.friction_coefficient[discs]
-    if np.any(torn.friction_coefficient > 0):
-        return Coulomb(layout, coefficient, tresca)
-    return Tresca(layout, tresca)
+    (tresca, coefficient), layout = friction_of(system), system.problem.layout
+    return Tresca(layout, tresca) if coefficient is None else Coulomb(layout, coefficient, tresca)

@@ -83,11 +83,11 @@ def modulus_of(scene: Scene, pair: ContactPair) -> float | None:
 def master_share(scene: Scene, pair: ContactPair | Tie) -> float:
     """Return the master's share of the compliance 1/E* of two bodies; a half where one is not isotropic."""
     assert isinstance(pair.master, Surface)
-    sides = [_constants(scene.bodies[surface.body]) for surface in (pair.slave, pair.master)]
-    if None in sides:
+    own, other = (_constants(scene.bodies[surface.body]) for surface in (pair.slave, pair.master))
+    if own is None or other is None:
         return 0.5
-    own, other = ((1.0 - ratio**2) / young for young, ratio in sides)  # type: ignore[misc]
-    return other / (own + other)
+    moduli = [contact_modulus(*constants, np.inf, 0.0) for constants in (own, other)]
+    return moduli[0] / sum(moduli)
 
 
 def _constants(body: Body) -> tuple[float, float] | None:
