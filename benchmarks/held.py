@@ -6,9 +6,6 @@ from dataclasses import dataclass
 
 from benchmarks.row import Record, Summaries, unknowns
 
-#: More work than held is let pass up to this factor: other versions of BLAS and PETSc round differently.
-MARGIN = 1.05
-
 
 @dataclass(frozen=True)
 class Held:
@@ -17,10 +14,12 @@ class Held:
     Attributes:
         unknowns: Of the problem, see `unknowns`.
         work: See `work`.
+        margin: Factor up to which more work is let pass: other versions of BLAS and PETSc round differently.
     """
 
     unknowns: int
     work: int
+    margin: float = 1.05
 
 
 HELD = {
@@ -33,7 +32,8 @@ HELD = {
     "frictionless-block": Held(34992, 24),
     "block-28k": Held(28611, 37),
     "block-28k-default": Held(28611, 36),
-    "gamg-28k": Held(28611, 10),
+    # Its aggregates and estimates of eigenvalues are PETSc's own; without rigid motions it takes three times as many.
+    "gamg-28k": Held(28611, 10, margin=1.3),
     "cholesky-28k": Held(28611, 1),
     "newton-28k-threads": Held(28611, 9),
 }
@@ -54,7 +54,7 @@ def broken(summaries: Summaries) -> list[str]:
         spent = work(run)
         if spent is None:  # not measured, or skipped
             continue
-        if unknowns(run) != held.unknowns or spent > MARGIN * held.work:
+        if unknowns(run) != held.unknowns or spent > held.margin * held.work:
             found.append(
                 f"{name} must have {held.unknowns} unknowns and take {held.work} products or steps, got "
                 f"{unknowns(run)} and {spent}: find out why, or hold the new counts in benchmarks/held.py"
