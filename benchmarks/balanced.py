@@ -17,14 +17,9 @@ from mpi4py import MPI
 from benchmarks.cases.scenes import block_mesh, block_on_plane
 from fenics_contact.accuracy import Balanced
 from fenics_contact.contact import ContactProblem, State, solve_steps
-from fenics_contact.geometry import (
-    BodyMesh,
-    bisection_partition,
-    box_partition,
-    half_cylinder,
-    hemisphere,
-    rectangle_lattice,
-)
+from fenics_contact.gallery import half_cylinder, hemisphere, rectangle_lattice
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.partition import bisection_partition, box_partition
 from fenics_contact.scene import (
     Body,
     ContactPair,

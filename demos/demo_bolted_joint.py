@@ -20,7 +20,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, LoadSequence, Status
-from fenics_contact.geometry import block, bolt, drilled_plate
+from fenics_contact.gallery import block, bolt, drilled_plate
 from fenics_contact.io import ResultSeries, write_result
 from fenics_contact.progress import shown
 from fenics_contact.qp import FaceNewton

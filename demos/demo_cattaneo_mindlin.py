@@ -19,8 +19,9 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, Status, solve_steps
-from fenics_contact.geometry import BodyMesh, rectangle_lattice
+from fenics_contact.gallery import rectangle_lattice
 from fenics_contact.io import ResultSeries, write_result
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.progress import shown
 from fenics_contact.scene import (
     Body,

@@ -23,9 +23,10 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, Status, contact_area
-from fenics_contact.geometry import LinkShape, box_partition, two_links
+from fenics_contact.gallery import LinkShape, two_links
 from fenics_contact.io import ResultSeries, write_optimisation_result, write_vtu, write_xdmf
 from fenics_contact.optimize import BundleTrust, LinearConstraints, minimize
+from fenics_contact.partition import box_partition
 from fenics_contact.progress import shown
 from fenics_contact.scene import (
     Body,

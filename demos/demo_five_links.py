@@ -20,7 +20,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import Status, solve_scene
-from fenics_contact.geometry import LinkShape, chain
+from fenics_contact.gallery import LinkShape, chain
 from fenics_contact.io import write_result, write_vtu
 from fenics_contact.progress import shown
 from fenics_contact.scene import (

@@ -21,7 +21,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
-from fenics_contact.geometry import box_lattice, hemisphere
+from fenics_contact.gallery import box_lattice, hemisphere
 from fenics_contact.io import write_result, write_vtu
 from fenics_contact.progress import shown
 from fenics_contact.scene import (
@@ -178,6 +178,6 @@ assert abs(found["node"]["a"] / a - 1) < 0.01
 # - A rubber block: give it another material; $E^*$ knows both.
 # - Twice as many cells: the errors fall, also those that the state itself tells. Where they are large, cells
 #   are dark in `error.png`.
-# - Quadratic cells on a plane: `quadratic(ball)` from `fenics_contact.geometry` bends them onto the sphere.
+# - Quadratic cells on a plane: `quadratic(ball)` from `fenics_contact.mesh` bends them onto the sphere.
 # - A rigid plane instead of the block: `RigidPlane((0, 0, 0), (0, 0, 1))` as master of `Surface("ball",
 #   "contact")`; every node is then kept off the plane, and both discretisations are the same.

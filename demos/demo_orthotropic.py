@@ -25,7 +25,7 @@ import ufl
 from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
-from fenics_contact.geometry import box_lattice
+from fenics_contact.gallery import box_lattice
 from fenics_contact.io import write_result, write_vtu
 from fenics_contact.progress import shown
 from fenics_contact.scene import (

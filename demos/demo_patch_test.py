@@ -20,7 +20,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.io import write_result, write_vtu
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, Scene, Support, Surface, Traction

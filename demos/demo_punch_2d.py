@@ -18,7 +18,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
-from fenics_contact.geometry import half_disc, rectangle_lattice
+from fenics_contact.gallery import half_disc, rectangle_lattice
 from fenics_contact.io import write_result, write_vtu, write_xdmf
 from fenics_contact.progress import shown
 from fenics_contact.scene import Body, ContactPair, PlaneStrain, Scene, Support, Surface

@@ -22,8 +22,8 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, solve_steps
-from fenics_contact.geometry import BodyMesh
 from fenics_contact.io import ResultSeries, write_result
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.progress import shown
 from fenics_contact.scene import (
     Body,

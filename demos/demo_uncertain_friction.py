@@ -22,7 +22,7 @@ from mpi4py import MPI
 from scipy.stats import norm, qmc
 
 from fenics_contact.contact import Status
-from fenics_contact.geometry import rectangle_lattice
+from fenics_contact.gallery import rectangle_lattice
 from fenics_contact.io import write_result, write_vtu
 from fenics_contact.outer import SceneResponse, served
 from fenics_contact.scene import (

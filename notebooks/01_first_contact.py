@@ -55,7 +55,7 @@
 from mpi4py import MPI
 
 from fenics_contact.contact import Status, solve_scene
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.scene import (
     Body,
     ContactPair,

@@ -46,7 +46,7 @@
 # nodes does best where the facets on both sides are of one size.
 
 # %%
-from fenics_contact.geometry import LinkShape, two_links
+from fenics_contact.gallery import LinkShape, two_links
 
 links = two_links(LinkShape(inner_radius=9.6, n_around=72, n_a=3, n_b=10))
 print(f"{links.first.mesh.n_cells} hexahedra a link")

@@ -105,7 +105,7 @@ class Wood(FibreEnergy):
 #    + \Big(\frac1{G_{LT}} - \frac{2\nu_{LT}}{E_L}\Big) \sin^2\theta \cos^2\theta \quad [\mathrm{mm^2/N}]. $$
 
 # %%
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.scene import Body, ContactPair, Pressure, RigidPlane, Scene, Surface
 
 mesh = block((0, 0, 0), (20, 20, 40), (4, 4, 8))  # mm

@@ -41,7 +41,7 @@
 
 # %%
 from fenics_contact.contact import ContactProblem
-from fenics_contact.geometry import LinkShape, two_links
+from fenics_contact.gallery import LinkShape, two_links
 from fenics_contact.scene import (
     Body,
     ContactPair,

@@ -148,7 +148,7 @@ for sentence in advice(errors, targets=(0.05, 0.01)):
 
 # %%
 BUILD = """
-from fenics_contact.geometry import rectangle
+from fenics_contact.gallery import rectangle
 from fenics_contact.scene import Body, ContactPair, PlaneStress, RigidPlane, Scene, Support, Surface, Traction
 from fenics_contact.study import BALANCED, Parameters, Problem, Quantity, StudyScene, Sweep
 

@@ -31,7 +31,8 @@
 # into three subdomains, the upper one into two times two.
 
 # %%
-from fenics_contact.geometry import box_partition, rectangle
+from fenics_contact.gallery import rectangle
+from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
     ContactPair,

@@ -28,6 +28,7 @@ FLOORS = [
     [
         Room("progress", "how far work is", "ground"),
         Room("fingerprint", "what was given, in words; the same on all ranks", "ground"),
+        Room("checks", "types and numbers of arguments", "ground"),
     ],
     [
         Room("_requirements", "libraries", "ground"),
@@ -38,15 +39,23 @@ FLOORS = [
     [Room("_libraries", "MPI and PETSc, loaded when they are used", "ground")],
     [Room("_dolfinx", "the one room that knows the version of dolfinx", "ground")],
     [
-        Room("geometry", "meshes, names, partitions", "model"),
+        Room("surface_shapes", "spheres, tori, profiles", "model"),
         Room("linalg", "shared factors, cost model", "numbers"),
         Room("theory", "contacts known by formula", "numbers"),
     ],
-    [Room("surfaces", "what facets stand for: heights, normals, projection", "model")],
+    [Room("mesh", "meshes of bodies: cells, faces, names, quality", "model")],
+    [
+        Room("mesh_io", "gmsh, CAD, dolfinx, files", "model"),
+        Room("partition", "cuts into subdomains", "model"),
+        Room("surfaces", "heights, normals, projection", "model"),
+    ],
+    [Room("gallery", "blocks, links, rings, Hertz bodies", "model")],
     [
         Room("scene", "bodies, materials, loads, pairs", "model", "1"),
         Room("qp", "dual solvers: NumPy and MPI alone", "numbers", "3"),
     ],
+    [Room("fem", "forms of elasticity and loads on templates", "model")],
+    [Room("pairing", "which slave node meets the master where", "model")],
     [Room("feti", "subdomains, gluing, contact rows, coarse space, dual operator", "model", "2")],
     [Room("accuracy", "error estimates and certificates", "model")],
     [Room("contact", "scene → state: friction laws, load steps", "model", "4")],

@@ -60,7 +60,7 @@ say '## A scene of your own in Python' 'The fifteen lines of the front page as `
 file first.py python <<'PYTHON'
 from mpi4py import MPI
 from fenics_contact.contact import Status, solve_scene
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.scene import (
     Body, ContactPair, Coulomb, IsotropicElasticity, RigidPlane, Scene, Support, Surface, Traction,
 )

@@ -14,7 +14,8 @@ from benchmarks.cases.measuring import nodal_forces, run_case, state_record
 from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, PAPER_BOXES, PAPER_CELLS, Counts
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.errors import FenicsContactError
-from fenics_contact.geometry import BodyMesh, bisection_partition, box_partition
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.partition import bisection_partition, box_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.study.scenes.chain_links import chain, graded_links
 from fenics_contact.study.solving import slowest

@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from benchmarks.cases.scene_data import PAPER_BOXES, PAPER_CELLS
 from fenics_contact.contact import ContactProblem
-from fenics_contact.geometry import box_partition
+from fenics_contact.partition import box_partition
 from fenics_contact.shape import ShapeProblem, SurfaceDesign, TotalPotential
 from fenics_contact.study.scenes.chain_links import chain, graded_links
 

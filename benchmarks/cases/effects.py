@@ -13,7 +13,9 @@ from mpi4py import MPI
 from benchmarks.cases.measuring import run_case, state_record
 from benchmarks.cases.scene_data import LEVELS
 from fenics_contact.contact import ContactProblem, State, solve_scene
-from fenics_contact.geometry import BodyMesh, DesignSurface, block, box_partition
+from fenics_contact.gallery import DesignSurface, block
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
     BodyForce,

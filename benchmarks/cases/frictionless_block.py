@@ -10,7 +10,7 @@ from mpi4py import MPI
 from benchmarks.cases.measuring import run_case, state_record
 from benchmarks.cases.scenes import block_mesh, block_on_plane
 from fenics_contact.contact import solve_scene
-from fenics_contact.geometry import box_partition
+from fenics_contact.partition import box_partition
 from fenics_contact.study.solving import slowest
 
 #: Total potential and closed nodes by an independent active-set solver.

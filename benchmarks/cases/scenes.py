@@ -11,7 +11,8 @@ from benchmarks.cases.scene_data import (
     YOUNG_MODULUS,
     Counts,
 )
-from fenics_contact.geometry import BodyMesh, block
+from fenics_contact.gallery import block
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import (
     Body,
     ContactPair,

@@ -12,7 +12,7 @@ from benchmarks.cases.measuring import nodal_forces, run_case, state_record
 from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, Counts
 from benchmarks.cases.scenes import block_mesh, block_on_plane
 from fenics_contact.contact import solve_scene
-from fenics_contact.geometry import box_partition
+from fenics_contact.partition import box_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.study.solving import slowest
 

@@ -9,8 +9,9 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem
-from fenics_contact.geometry import TwoLinks, box_partition
+from fenics_contact.gallery import TwoLinks
 from fenics_contact.optimize import BundleTrust, LinearConstraints, Result, minimize
+from fenics_contact.partition import box_partition
 from fenics_contact.shape import AdaptiveTolerance, ShapeProblem, SurfaceDesign, TotalPotential
 from fenics_contact.study.scenes.chain_links import chain, graded_links
 

@@ -12,8 +12,9 @@ from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, ContactResult, State
 from fenics_contact.errors import ConvergenceError, InvalidDesignError
-from fenics_contact.geometry import TwoLinks, box_partition
+from fenics_contact.gallery import TwoLinks
 from fenics_contact.optimize import LinearConstraints, nearest_feasible
+from fenics_contact.partition import box_partition
 from fenics_contact.shape import (
     AdaptiveTolerance,
     ContactForces,

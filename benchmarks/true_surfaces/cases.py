@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.true_surfaces.bodies import bar, pad, ring, seat, stamp
-from fenics_contact.geometry import BodyMesh, half_cylinder
-from fenics_contact.geometry.block import graded
+from fenics_contact.gallery import half_cylinder
+from fenics_contact.gallery.block import graded
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import (
     Body,
     ContactPair,

@@ -8,7 +8,8 @@ from typing import Any
 from mpi4py import MPI
 
 from fenics_contact.contact import contact_area, solve_scene
-from fenics_contact.geometry import LinkShape, box_partition, two_links
+from fenics_contact.gallery import LinkShape, two_links
+from fenics_contact.partition import box_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import Discretisation
 from fenics_contact.study.scenes.chain_links import GRADING, chain

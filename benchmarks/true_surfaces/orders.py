@@ -10,15 +10,9 @@ from scipy.spatial import cKDTree
 
 from benchmarks.true_surfaces.bodies import seat
 from benchmarks.true_surfaces.measuring import WAYS
-from fenics_contact.geometry import (
-    BodyMesh,
-    LinkShape,
-    chain_link,
-    closest_points,
-    half_cylinder,
-    half_disc,
-    hemisphere,
-)
+from fenics_contact.gallery import LinkShape, chain_link, half_cylinder, half_disc, hemisphere
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.surface_shapes import closest_points
 from fenics_contact.surfaces import FacetedSurface, true_surface
 from fenics_contact.surfaces.projection import project
 

@@ -30,6 +30,14 @@ from fenics_contact._dolfinx.numbering import (
     update_coordinates,
 )
 from fenics_contact._dolfinx.output import has_vtx, write_vtx, write_xdmf
+from fenics_contact._dolfinx.reading import (
+    MeshArrays,
+    TagArrays,
+    mesh_arrays,
+    read_mesh,
+    read_tags,
+    tag_arrays,
+)
 from fenics_contact._dolfinx.templates import (
     cellwise_space,
     displacement_space,
@@ -41,6 +49,8 @@ from fenics_contact._dolfinx.templates import (
 __all__ = [
     "CELL_TYPES",
     "CompiledForm",
+    "MeshArrays",
+    "TagArrays",
     "assemble_csr",
     "assemble_matrix",
     "assemble_scalar",
@@ -61,12 +71,16 @@ __all__ = [
     "jit",
     "local_mesh",
     "match_facets",
+    "mesh_arrays",
     "nodal_space",
     "node_dofs",
     "rank_mesh",
+    "read_mesh",
+    "read_tags",
     "release",
     "scalar_space",
     "shape",
+    "tag_arrays",
     "template",
     "update_coordinates",
     "version",

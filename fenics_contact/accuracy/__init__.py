@@ -4,6 +4,7 @@ from fenics_contact.accuracy.balanced import Balanced
 from fenics_contact.accuracy.certificate import Certificate, certify, direct_error
 from fenics_contact.accuracy.discretisation import DiscretisationError, discretisation_error
 from fenics_contact.accuracy.fixed_point import friction_error
+from fenics_contact.accuracy.moduli import moduli
 from fenics_contact.accuracy.state_errors import SolverErrors, StateErrors, solver_errors, state_errors
 
 __all__ = [
@@ -16,6 +17,7 @@ __all__ = [
     "direct_error",
     "discretisation_error",
     "friction_error",
+    "moduli",
     "solver_errors",
     "state_errors",
 ]

@@ -10,9 +10,17 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.accuracy.nearest import evening, nearest
-from fenics_contact.qp import CoarseSpace, ContactLayout, DualProblem, FeasibleSet, contact_step
-from fenics_contact.qp.face import Marks, face_basis
-from fenics_contact.qp.reductions import Vector, global_max
+from fenics_contact.qp import (
+    CoarseSpace,
+    ContactLayout,
+    DualProblem,
+    FeasibleSet,
+    Marks,
+    Vector,
+    contact_step,
+    face_basis,
+    global_max,
+)
 
 #: Forces out of balance below this share of all forces are rounding.
 ROUNDING = 1e-13

@@ -9,8 +9,7 @@ import numpy as np
 from fenics_contact.accuracy.admissible import UNBALANCED, Admissible, admissible
 from fenics_contact.accuracy.lifted import ROUNDING, Lifted, lift
 from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem
-from fenics_contact.qp import DualProblem, DualSolution
-from fenics_contact.qp.reductions import Vector, global_max, global_sum
+from fenics_contact.qp import DualProblem, DualSolution, Vector, global_max, global_sum
 
 #: A multiplier that moves by less, relatively, is what it was.
 UNMOVED = 1e-14

@@ -6,8 +6,7 @@ import numpy as np
 
 from fenics_contact.accuracy.certificate import Certificate
 from fenics_contact.feti import DualSystem
-from fenics_contact.qp import DualSolution
-from fenics_contact.qp.reductions import global_sum
+from fenics_contact.qp import DualSolution, global_sum
 
 
 def friction_error(system: DualSystem, solution: DualSolution, certificate: Certificate) -> float:

@@ -10,9 +10,7 @@ import scipy.sparse as sp
 
 from fenics_contact.accuracy.admissible import Admissible, basis
 from fenics_contact.feti import DualSystem
-from fenics_contact.qp import contact_step
-from fenics_contact.qp.face import Marks
-from fenics_contact.qp.reductions import Vector, global_max, global_sum
+from fenics_contact.qp import Marks, Vector, contact_step, global_max, global_sum
 
 #: Corrections of what the regularised contact block leaves.
 REFINEMENTS = 12

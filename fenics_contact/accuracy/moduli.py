@@ -6,10 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.feti.composition import Composition
-from fenics_contact.feti.forms import FormLibrary
-from fenics_contact.feti.model_checks import stiffness_of_cell
-from fenics_contact.geometry.cell_types import CELL_TYPES
+from fenics_contact.fem import Composition, FormLibrary, stiffness_of_cell
+from fenics_contact.mesh import CELL_TYPES
 from fenics_contact.scene import Material
 
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.qp import DualProblem, FeasibleSet
-from fenics_contact.qp.reductions import Vector, global_sum
+from fenics_contact.qp import DualProblem, FeasibleSet, Vector, global_sum
 
 #: Newton steps and halvings of one.
 STEPS, HALVINGS = 100, 30

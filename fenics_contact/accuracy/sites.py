@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.feti import TornSystem
-from fenics_contact.feti.sharing import Sharing
+from fenics_contact.feti import Sharing, TornSystem
 
 
 @dataclass(frozen=True)

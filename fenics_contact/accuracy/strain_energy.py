@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.geometry import CELL_TYPES, CellType, quadrature, shape_gradients, shape_values
-from fenics_contact.geometry.quality import determinants
+from fenics_contact.mesh import CELL_TYPES, CellType, determinants, quadrature, shape_gradients, shape_values
 
 
 def energy_of_difference(

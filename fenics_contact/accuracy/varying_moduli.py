@@ -9,9 +9,8 @@ import ufl
 from ufl.algorithms import expand_derivatives
 
 from fenics_contact import _dolfinx
-from fenics_contact.feti.forms import FormLibrary
-from fenics_contact.feti.subdomain import Subdomain
-from fenics_contact.feti.templates import Template, Written, scalar_constants, volume_measure
+from fenics_contact.fem import FormLibrary, Template, Written, scalar_constants, volume_measure
+from fenics_contact.feti import Subdomain
 from fenics_contact.scene import Material
 
 #: Of the quadrature on linear cells, where gradients of both kinds are of first degree in each coordinate;

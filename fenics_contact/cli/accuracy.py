@@ -18,11 +18,18 @@ from fenics_contact.cli.endings import Terminated
 from fenics_contact.cli.streams import complain
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.io import only_run_in
-from fenics_contact.study.overview import write_overview
-from fenics_contact.study.parameters import Sweep, Tolerance
-from fenics_contact.study.report import write_report
-from fenics_contact.study.running import Settings, StudyPlan, collected, measure_all, prepare
-from fenics_contact.study.scenes import find_study
+from fenics_contact.study import (
+    Settings,
+    StudyPlan,
+    Sweep,
+    Tolerance,
+    collected,
+    find_study,
+    measure_all,
+    prepare,
+    write_overview,
+    write_report,
+)
 
 ABOUT = (
     f"Measure what accuracy costs in time. SCENE is one of {options.NAMES}, or a Python file that defines "

@@ -7,8 +7,7 @@ from typing import Annotated, Any, TypeAlias
 
 import typer
 
-from fenics_contact.study.parameters import BALANCED, DISCRETISATIONS, Tolerance
-from fenics_contact.study.scenes import BUILT_IN
+from fenics_contact.study import BALANCED, BUILT_IN, DISCRETISATIONS, Tolerance
 
 NAMES = ", ".join(BUILT_IN)
 #: Value of an option that was given without one.

@@ -18,7 +18,7 @@ from fenics_contact.cli.desk import Desk
 from fenics_contact.cli.endings import EPILOG, terminable, told
 from fenics_contact.cli.streams import complain, prepare_streams, say, unsaid
 from fenics_contact.io import versions
-from fenics_contact.progress.words import visible
+from fenics_contact.progress import visible
 
 if TYPE_CHECKING:
     from mpi4py import MPI

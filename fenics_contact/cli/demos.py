@@ -16,7 +16,7 @@ from fenics_contact.cli.optimize import optimize
 from fenics_contact.cli.run import run
 from fenics_contact.cli.shipped import Shipped, optimises, shipped, takes
 from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.scene_file.mistakes import suggestion
+from fenics_contact.scene_file import suggestion
 
 
 def add_to(app: typer.Typer) -> None:

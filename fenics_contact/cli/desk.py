@@ -14,8 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fenics_contact.cli.streams import say
-from fenics_contact.progress.places import terminal_width
-from fenics_contact.progress.words import visible
+from fenics_contact.progress import terminal_width, visible
 
 if TYPE_CHECKING:
     from mpi4py import MPI

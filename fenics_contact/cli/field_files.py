@@ -11,7 +11,7 @@ import numpy as np
 
 from fenics_contact._requirements import require_extra
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene_file.mistakes import suggestion
+from fenics_contact.scene_file import suggestion
 
 FIELD_FILES = (".vtu", ".vtm", ".pvd")
 
@@ -86,7 +86,7 @@ def draw(path: Path, save: Path | None, look: tuple[str, float], *, window: bool
         return "no window without a display; --save picture.png draws the fields to a file"
     if save is not None and save.suffix != ".png":
         raise InvalidInputError(f"a picture must be a PNG file, got {save.name!r}: let it end in '.png'")
-    from fenics_contact.viz.renderer import rendering
+    from fenics_contact.viz import rendering
 
     with rendering():
         plotter = _plotter(path, look, off_screen=save is not None)
@@ -102,7 +102,7 @@ def draw(path: Path, save: Path | None, look: tuple[str, float], *, window: bool
 def _plotter(path: Path, look: tuple[str, float], *, off_screen: bool) -> Any:
     import pyvista
 
-    from fenics_contact.viz.colours import STRESS_MAP
+    from fenics_contact.viz import STRESS_MAP
 
     field, scale = look
     blocks = _blocks(path)

@@ -10,7 +10,7 @@ import typer
 
 from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.progress.words import is_visible
+from fenics_contact.progress import is_visible
 from fenics_contact.scene_file import SceneFile, read_scene_file
 
 if TYPE_CHECKING:

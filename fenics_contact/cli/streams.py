@@ -10,7 +10,7 @@ from contextlib import suppress
 from typing import TextIO
 
 from fenics_contact.io import OutputError
-from fenics_contact.progress.words import visible
+from fenics_contact.progress import visible
 
 
 def prepare_streams() -> None:

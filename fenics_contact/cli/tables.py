@@ -15,7 +15,7 @@ from fenics_contact.scene import ContactPair, Surface
 from fenics_contact.scene_file import SceneFile
 
 if TYPE_CHECKING:
-    from fenics_contact.scene_file.document import UnitNames
+    from fenics_contact.scene_file import UnitNames
 
 
 def state_facts(state: State, units: UnitNames) -> dict[str, str]:

@@ -3,6 +3,8 @@
 from fenics_contact.contact.area import contact_area
 from fenics_contact.contact.coulomb import FixedPoint
 from fenics_contact.contact.energies import Energies
+from fenics_contact.contact.equilibrium import default_solver
+from fenics_contact.contact.fields import body_mesh
 from fenics_contact.contact.gathered import GatheredFields, contact_fields, gathered_fields, in_space
 from fenics_contact.contact.held import check_held
 from fenics_contact.contact.problem import ContactProblem, solve_scene
@@ -11,6 +13,7 @@ from fenics_contact.contact.slip_bounds import Damping
 from fenics_contact.contact.state import State
 from fenics_contact.contact.steps import LoadSequence, solve_steps
 from fenics_contact.contact.stored import stored_state
+from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.contact.unheld import UnheldMotion
 
 __all__ = [
@@ -23,10 +26,13 @@ __all__ = [
     "LoadSequence",
     "State",
     "Status",
+    "Tolerance",
     "UnheldMotion",
+    "body_mesh",
     "check_held",
     "contact_area",
     "contact_fields",
+    "default_solver",
     "gathered_fields",
     "in_space",
     "solve_scene",

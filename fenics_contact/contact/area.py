@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.contact.state import State
-from fenics_contact.scene import Surface
-from fenics_contact.scene.true_surfaces import surface_of
+from fenics_contact.scene import Surface, surface_of
 
 #: Steps to the root of a cubic, from above: no more are needed at any ratio of its coefficients in practice.
 NEWTON_STEPS = 60
@@ -53,7 +52,7 @@ def _modulus(state: State, pair: int) -> float:
 
     M and λ are the means of the moduli C_iiii and C_iijj, of isotropic bodies those of Lamé.
     """
-    from fenics_contact.accuracy.moduli import moduli  # not before an area is asked for
+    from fenics_contact.accuracy import moduli  # not before an area is asked for
 
     scene, forms = state.scene, state.torn.decomposition.forms
     compliance = 0.0

@@ -14,11 +14,11 @@ from fenics_contact.qp import (
     DualSolution,
     DualSolver,
     SolverStep,
+    Start,
     find_equilibrium,
     measure,
     solve,
 )
-from fenics_contact.qp.iterate import Start
 
 #: How much more than an equilibrium's own friction the first Tresca problem may use: it must have an answer.
 FIRST_MARGIN = 1.1

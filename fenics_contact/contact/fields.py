@@ -10,10 +10,16 @@ import ufl
 from fenics_contact import _dolfinx
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import together
+from fenics_contact.fem import (
+    Composition,
+    Temperature,
+    Template,
+    Written,
+    integrate,
+    stress_in_space,
+    volume_measure,
+)
 from fenics_contact.feti import Decomposition
-from fenics_contact.feti.composition import Composition, integrate
-from fenics_contact.feti.temperature import Temperature, stress_in_space
-from fenics_contact.feti.templates import Template, Written, volume_measure
 from fenics_contact.scene import Body, Material
 
 

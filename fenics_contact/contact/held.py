@@ -9,11 +9,9 @@ import scipy.sparse as sp
 
 from fenics_contact.contact.unheld import motion_in_words
 from fenics_contact.errors import ConvergenceError, InfeasibleError, together
-from fenics_contact.feti import ContactPoints, TornSystem
-from fenics_contact.feti.dual import BALANCED
-from fenics_contact.feti.subdomain import common_kernel
-from fenics_contact.scene import Body, rigid_body_modes
-from fenics_contact.scene.held import RANK_TOLERANCE, resisted_motions
+from fenics_contact.feti import BALANCED, TornSystem, common_kernel
+from fenics_contact.pairing import ContactPoints
+from fenics_contact.scene import RANK_TOLERANCE, Body, resisted_motions, rigid_body_modes
 
 #: A load that needs more of the friction than all but this part is at its limit: how far the body slides is
 #: left to rounding.

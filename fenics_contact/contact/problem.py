@@ -20,8 +20,14 @@ from fenics_contact.contact.state import State
 from fenics_contact.contact.stored import Stored, restored_solution, with_stored_slip
 from fenics_contact.contact.tolerance import Tolerance, checked_tolerance
 from fenics_contact.errors import collectively, together
-from fenics_contact.feti import Decomposition, DualSystem, TornSystem, build_torn_system, decompose
-from fenics_contact.feti.same_input import check_same_input
+from fenics_contact.feti import (
+    Decomposition,
+    DualSystem,
+    TornSystem,
+    build_torn_system,
+    check_same_input,
+    decompose,
+)
 from fenics_contact.qp import DualSolver
 from fenics_contact.scene import Scene, SolverKind, choose_solver
 from fenics_contact.timing import PhaseTimer

@@ -7,7 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from fenics_contact.feti import ContactPoints
+from fenics_contact.pairing import ContactPoints
 
 
 class Status(IntEnum):

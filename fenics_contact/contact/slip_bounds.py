@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.qp.reductions import Vector, global_sum
+from fenics_contact.qp import Vector, global_sum
 
 #: Slip bounds have returned to earlier ones when these are so much closer than the last ones.
 RETURN_RATIO = 0.3

@@ -23,8 +23,8 @@ from fenics_contact.contact.result import ContactResult
 from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.contact.unheld import UnheldMotion, unheld_motions
 from fenics_contact.errors import InvalidInputError, collectively
+from fenics_contact.fem import temperature_of
 from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem, TornSystem, nodal_mean
-from fenics_contact.feti.temperature import temperature_of
 from fenics_contact.progress import Task
 from fenics_contact.qp import DualSolution
 from fenics_contact.scene import Scene

@@ -10,8 +10,7 @@ from fenics_contact.contact.equilibrium import friction_of
 from fenics_contact.contact.state import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import DirectSystem, DualSystem, TornSystem
-from fenics_contact.qp import Coulomb, CountedOperator, DualSolution, SlipLaw, Tresca
-from fenics_contact.qp.iterate import iterate_at
+from fenics_contact.qp import Coulomb, CountedOperator, DualSolution, SlipLaw, Tresca, iterate_at
 
 Stored = Mapping[str, np.ndarray]
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.feti import ContactPoints, DualSystem
+from fenics_contact.feti import DualSystem
+from fenics_contact.pairing import ContactPoints
 from fenics_contact.qp import DualSolution
 
 

@@ -1,22 +1,29 @@
 """Total FETI: torn systems, contact rows, the dual problem and its operators."""
 
-from fenics_contact.feti.contact_points import ContactPoints
 from fenics_contact.feti.decomposition import Decomposition, decompose
 from fenics_contact.feti.direct import DirectSolution, DirectSystem
-from fenics_contact.feti.dual import DualSystem
+from fenics_contact.feti.dual import BALANCED, DualSystem
 from fenics_contact.feti.inverse import LocalKind
-from fenics_contact.feti.nodal_mean import nodal_mean
+from fenics_contact.feti.nodal_mean import nodal_mean, nodal_mean_at
+from fenics_contact.feti.same_input import check_same_input
+from fenics_contact.feti.sharing import Sharing
+from fenics_contact.feti.subdomain import Subdomain, common_kernel
 from fenics_contact.feti.torn import TornSystem, build_torn_system
 
 __all__ = [
-    "ContactPoints",
+    "BALANCED",
     "Decomposition",
     "DirectSolution",
     "DirectSystem",
     "DualSystem",
     "LocalKind",
+    "Sharing",
+    "Subdomain",
     "TornSystem",
     "build_torn_system",
+    "check_same_input",
+    "common_kernel",
     "decompose",
     "nodal_mean",
+    "nodal_mean_at",
 ]

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact.feti.contact_points import HELD, ContactPoints, movable
 from fenics_contact.feti.copies import Tearing
 from fenics_contact.feti.rows import Rows
+from fenics_contact.pairing import HELD, ContactPoints, movable
 from fenics_contact.scene import Tie
 
 #: Directions are parallel whose sine is below.

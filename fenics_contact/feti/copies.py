@@ -8,21 +8,20 @@ from functools import cached_property
 
 import numpy as np
 
-from fenics_contact.linalg.cost_model import expected_seconds
+from fenics_contact.linalg import expected_seconds
+from fenics_contact.pairing import NodeNumbers
 from fenics_contact.scene import Scene
 
 
 @dataclass(frozen=True)
-class Tearing:
+class Tearing(NodeNumbers):
     """How the bodies of a scene are cut into subdomains, and which rank owns which.
 
-    Replicated on all ranks. Nodes of all bodies are numbered together, body after body; so are the
-    subdomains. A *copy* is a pair (node, subdomain); copies are sorted by node, then by subdomain.
+    Replicated on all ranks. Subdomains are numbered together as nodes are, body after body. A *copy* is a
+    pair (node, subdomain); copies are sorted by node, then by subdomain.
 
     Attributes:
         dim: Displacement components of a node.
-        body_names: Names of the bodies, in numbering order.
-        node_offset: First node of each body and the total, shape (n_bodies + 1,).
         subdomain_offset: First subdomain of each body and the total, shape (n_bodies + 1,).
         subdomain_rank: Owner of each subdomain, shape (n_subdomains,).
         first_copy: First copy of each node and the total, shape (n_nodes + 1,).
@@ -31,18 +30,11 @@ class Tearing:
     """
 
     dim: int
-    body_names: tuple[str, ...]
-    node_offset: np.ndarray
     subdomain_offset: np.ndarray
     subdomain_rank: np.ndarray
     first_copy: np.ndarray
     copy_subdomain: np.ndarray
     copy_stiffness: np.ndarray
-
-    @property
-    def n_nodes(self) -> int:
-        """Number of nodes of all bodies."""
-        return int(self.node_offset[-1])
 
     @property
     def multiplicity(self) -> np.ndarray:
@@ -72,11 +64,6 @@ class Tearing:
         """Number of subdomains of all bodies."""
         return int(self.subdomain_offset[-1])
 
-    def global_nodes(self, body: str, nodes: np.ndarray) -> np.ndarray:
-        """Number nodes of one body among those of all bodies."""
-        return nodes + self.node_offset[self.body_names.index(body)]
-
-
 def tear(
     scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int, stiffness: Mapping[str, np.ndarray]
 ) -> Tearing:
@@ -89,9 +76,9 @@ def tear(
             subdomains.
         stiffness: Body name -> typical nodal stiffness of every cell, shape (n_cells,), [force / length].
     """
-    names = scene.body_names
+    numbers = NodeNumbers.of(scene)
+    names, node_offset = numbers.body_names, numbers.node_offset
     counts = [int(partitions[name].max()) + 1 for name in names]
-    node_offset = np.cumsum([0] + [scene.bodies[name].mesh.n_nodes for name in names])
     subdomain_offset = np.cumsum([0, *counts])
     total = int(subdomain_offset[-1])
     keys, sums = [], []
@@ -107,9 +94,9 @@ def tear(
     multiplicity = np.bincount(key // total, minlength=int(node_offset[-1]))
     costs = _costs(key % total, multiplicity[key // total] > 1, total, scene.dim)
     return Tearing(
-        scene.dim,
         names,
         node_offset,
+        scene.dim,
         subdomain_offset,
         _deal_out(np.split(costs, subdomain_offset[1:-1]), ranks),
         np.concatenate([[0], np.cumsum(multiplicity)]),

@@ -9,15 +9,14 @@ import numpy as np
 
 from fenics_contact._libraries import MPI, start
 from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.fem import FormLibrary, cell_stiffness
 from fenics_contact.feti.condensation import Condensations
 from fenics_contact.feti.copies import Tearing, tear
-from fenics_contact.feti.forms import FormLibrary
 from fenics_contact.feti.gluing import GluingRows, gluing_rows, prescribed_displacements
-from fenics_contact.feti.nodal_stiffness import cell_stiffness
 from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.feti.subdomain import SubdomainMesh, cut_out
-from fenics_contact.geometry import check_face_connected
-from fenics_contact.linalg.threads import warn_of_threads
+from fenics_contact.linalg import warn_of_threads
+from fenics_contact.partition import check_face_connected
 from fenics_contact.scene import Scene
 
 

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.inverse import TornInverse
 from fenics_contact.feti.numbering import DualNumbering
-from fenics_contact.qp.reductions import global_sum
+from fenics_contact.qp import global_sum
 
 #: Share of its diagonal added to the contact block of B D⁻¹ Bᵀ. A node in two contact pairs has more rows
 #: than displacements, which makes the block singular; elsewhere so small a share changes nothing.

@@ -16,8 +16,7 @@ from fenics_contact.feti.inverse import LocalKind, TornInverse, kernel_matrix
 from fenics_contact.feti.kernel_basis import whole_motions
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.linalg import sweep
-from fenics_contact.qp import CoarseSpace, ContactLayout, DualProblem, Scaling
-from fenics_contact.qp.problem import EVEN
+from fenics_contact.qp import EVEN, CoarseSpace, ContactLayout, DualProblem, Scaling
 from fenics_contact.timing import PhaseTimer
 
 #: Flexibility of rows that have none, relative to the mean of all contact rows.

@@ -14,7 +14,7 @@ from fenics_contact.feti.explicit import ExplicitOperator
 from fenics_contact.feti.implicit import ImplicitOperator
 from fenics_contact.feti.local import LocalOperator, interface_dofs
 from fenics_contact.feti.subdomain import Subdomain
-from fenics_contact.linalg.cost_model import prefers_explicit
+from fenics_contact.linalg import prefers_explicit
 
 
 class LocalKind(Enum):

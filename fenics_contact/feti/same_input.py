@@ -8,10 +8,9 @@ import numpy as np
 
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import calling, together
-from fenics_contact.feti.load_forms import is_scalar
+from fenics_contact.fem import is_scalar
 from fenics_contact.fingerprint import described, require_alike
-from fenics_contact.scene import Scene, Support, SurfaceLoad, Ufl
-from fenics_contact.scene.values import evaluate
+from fenics_contact.scene import Scene, Support, SurfaceLoad, Ufl, evaluate
 
 #: At so many nodes functions are compared: ranks that mean different ones differ nearly everywhere.
 COMPARED = 8

@@ -11,10 +11,8 @@ import scipy.sparse as sp
 
 from fenics_contact import _dolfinx
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.feti.composition import Composition, composition
-from fenics_contact.feti.forms import FormLibrary
-from fenics_contact.feti.model_checks import check_kernel, kernel_of
-from fenics_contact.geometry import corners_of
+from fenics_contact.fem import Composition, FormLibrary, check_kernel, composition, kernel_of
+from fenics_contact.mesh import corners_of
 from fenics_contact.scene import Body, Load, Material, SurfaceLoad, Ufl
 
 

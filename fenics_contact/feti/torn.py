@@ -9,23 +9,27 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.errors import tell, together
-from fenics_contact.feti.contact_points import ContactPoints, join_points
+from fenics_contact.fem import as_tractions
 from fenics_contact.feti.contact_rows import (
     Relations,
     normal_relations,
     tangential_relations,
     tied_relations,
 )
-from fenics_contact.feti.contact_search import find_contact_points, find_tied_points
 from fenics_contact.feti.decomposition import Decomposition
-from fenics_contact.feti.forms import as_tractions
-from fenics_contact.feti.friction import friction_data
 from fenics_contact.feti.gluing import prescribed_displacements
+from fenics_contact.feti.initial_gap import check_no_penetration, gap_with_room
 from fenics_contact.feti.nodal_mean import nodal_mean_at
 from fenics_contact.feti.numbering import DualNumbering
-from fenics_contact.feti.room import check_no_penetration, gap_with_room
 from fenics_contact.feti.rows import Rows, stack
 from fenics_contact.feti.subdomain import Subdomain, assemble
+from fenics_contact.pairing import (
+    ContactPoints,
+    find_contact_points,
+    find_tied_points,
+    friction_data,
+    join_points,
+)
 from fenics_contact.scene import Scene
 
 _LOG = logging.getLogger(__name__)
@@ -131,7 +135,7 @@ class TornSystem:
         """
         decomposition, points = self.decomposition, self.points
         tearing, comm = decomposition.tearing, decomposition.comm
-        finer = find_contact_points(self.scene, tearing, decomposition.fixed, comm, finer=True)
+        finer = find_contact_points(self.scene, decomposition.fixed, comm, finer=True)
         mine, theirs = (found.pair * tearing.n_nodes + found.slave for found in (points, finer))
         _, here, there = np.intersect1d(mine, theirs, return_indices=True)
         gap = points.gap.copy()
@@ -266,11 +270,11 @@ def _meeting_points(
     tearing, fixed, comm = decomposition.tearing, decomposition.fixed, decomposition.comm
     points = ties = join_points([], scene.dim, tearing.n_nodes)
     if scene.contacts:
-        points = find_contact_points(scene, tearing, fixed, comm)
+        points = find_contact_points(scene, fixed, comm)
         if not overlap:
             check_no_penetration(scene, points)
     if scene.ties:
-        ties = find_tied_points(scene, tearing, fixed, comm)
+        ties = find_tied_points(scene, fixed, comm)
     return points, ties
 
 

@@ -7,7 +7,7 @@ from fenics_contact.io.json_file import write_json
 from fenics_contact.io.one_run import only_run_in
 from fenics_contact.io.provenance import versions
 from fenics_contact.io.reading import read_result
-from fenics_contact.io.replacing import OutputError
+from fenics_contact.io.replacing import OutputError, write_text
 from fenics_contact.io.result import write_optimisation_result, write_result
 from fenics_contact.io.series import ResultSeries
 from fenics_contact.io.vtu import write_vtu
@@ -23,6 +23,7 @@ __all__ = [
     "write_json",
     "write_optimisation_result",
     "write_result",
+    "write_text",
     "write_vtu",
     "write_vtx",
     "write_xdmf",

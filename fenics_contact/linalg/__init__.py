@@ -1,6 +1,17 @@
 """Sparse linear algebra that the upper floors share."""
 
+from fenics_contact.linalg.cost_model import expected_bytes, expected_seconds, prefers_explicit
 from fenics_contact.linalg.disposal import dispose_with, sweep
 from fenics_contact.linalg.shared_factor import ROWS_PER_RANK, SharedFactor
+from fenics_contact.linalg.threads import warn_of_threads
 
-__all__ = ["ROWS_PER_RANK", "SharedFactor", "dispose_with", "sweep"]
+__all__ = [
+    "ROWS_PER_RANK",
+    "SharedFactor",
+    "dispose_with",
+    "expected_bytes",
+    "expected_seconds",
+    "prefers_explicit",
+    "sweep",
+    "warn_of_threads",
+]

@@ -10,13 +10,14 @@ from fenics_contact.optimize.for_scipy import ForScipy, Visit
 from fenics_contact.optimize.minimization import minimize
 from fenics_contact.optimize.objective import Inexact, Kinked
 from fenics_contact.optimize.problem import Problem, pose
-from fenics_contact.optimize.progress import Resumable
+from fenics_contact.optimize.progress import Callback, Resumable
 from fenics_contact.optimize.quadratic_program import SubproblemError
 from fenics_contact.optimize.result import Kind, NotConvergedError, Reason, Record, Result
 
 __all__ = [
     "Bounds",
     "BundleTrust",
+    "Callback",
     "Checkpoint",
     "CheckpointError",
     "ForScipy",

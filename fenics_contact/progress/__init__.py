@@ -10,8 +10,19 @@ Example:
 """
 
 from fenics_contact.progress.event import Event, Kind
+from fenics_contact.progress.places import terminal_width
 from fenics_contact.progress.shown import shown
 from fenics_contact.progress.task import LOGGER_NAME, Task
-from fenics_contact.progress.words import duration
+from fenics_contact.progress.words import duration, is_visible, visible
 
-__all__ = ["LOGGER_NAME", "Event", "Kind", "Task", "duration", "shown"]
+__all__ = [
+    "LOGGER_NAME",
+    "Event",
+    "Kind",
+    "Task",
+    "duration",
+    "is_visible",
+    "shown",
+    "terminal_width",
+    "visible",
+]

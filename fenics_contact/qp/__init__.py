@@ -9,15 +9,16 @@ from __future__ import annotations
 
 from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.equilibrium import Equilibrium, find_equilibrium, require_equilibrium
-from fenics_contact.qp.face import Face, classify
+from fenics_contact.qp.face import STEEP, Face, Marks, classify, face_basis
 from fenics_contact.qp.face_newton import FaceNewton, ProjectedCG
 from fenics_contact.qp.face_system import CoupledSystem, FaceSystem, FaceSystems
 from fenics_contact.qp.feasible import FeasibleSet
-from fenics_contact.qp.iterate import apply_unless_zero
+from fenics_contact.qp.iterate import Start, apply_unless_zero, iterate_at
 from fenics_contact.qp.krylov import FaceStep, Stop, projected_cg, projected_gmres
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.mpgp import Mpgp
-from fenics_contact.qp.problem import CountedOperator, DualProblem, Scaling
+from fenics_contact.qp.problem import EVEN, CountedOperator, DualProblem, Scaling
+from fenics_contact.qp.reductions import Vector, global_max, global_sum
 from fenics_contact.qp.slip_law import Coulomb, SlipLaw, Tresca
 from fenics_contact.qp.smalse import Smalse
 from fenics_contact.qp.solution import (
@@ -31,6 +32,8 @@ from fenics_contact.qp.solution import (
 from fenics_contact.qp.solve import DualSolver, solve
 
 __all__ = [
+    "EVEN",
+    "STEEP",
     "CoarseSpace",
     "ContactLayout",
     "Coulomb",
@@ -46,6 +49,7 @@ __all__ = [
     "FaceSystem",
     "FaceSystems",
     "FeasibleSet",
+    "Marks",
     "Mpgp",
     "ProjectedCG",
     "Residuals",
@@ -54,12 +58,18 @@ __all__ = [
     "Smalse",
     "SmalseMemory",
     "SolverStep",
+    "Start",
     "Stop",
     "Tresca",
+    "Vector",
     "apply_unless_zero",
     "classify",
     "contact_step",
+    "face_basis",
     "find_equilibrium",
+    "global_max",
+    "global_sum",
+    "iterate_at",
     "measure",
     "projected_cg",
     "projected_gmres",

@@ -1,8 +1,10 @@
 """Scenes: bodies, materials, supports, loads and contact pairs."""
 
+from fenics_contact.scene.approach import master_share
 from fenics_contact.scene.bodies import bodies_from
 from fenics_contact.scene.body import Body
 from fenics_contact.scene.effects import Effect, EffectName
+from fenics_contact.scene.held import RANK_TOLERANCE, resisted_motions
 from fenics_contact.scene.kernels import rigid_body_modes
 from fenics_contact.scene.loads import (
     BodyForce,
@@ -38,22 +40,16 @@ from fenics_contact.scene.obstacles import (
     RigidSphere,
 )
 from fenics_contact.scene.pair_geometry import PairGeometry
-from fenics_contact.scene.pairs import (
-    ContactPair,
-    Coulomb,
-    Discretisation,
-    Friction,
-    Surface,
-    Tie,
-    Tresca,
-)
+from fenics_contact.scene.pairs import ContactPair, Coulomb, Discretisation, Friction, Surface, Tie, Tresca
 from fenics_contact.scene.plan import ConeKind, Plan, SolverKind, choose_solver
 from fenics_contact.scene.scene import Scene
 from fenics_contact.scene.steps import LoadStep
 from fenics_contact.scene.supports import Support
-from fenics_contact.scene.values import Ufl
+from fenics_contact.scene.true_surfaces import surface_of
+from fenics_contact.scene.values import ScalarValue, Ufl, VectorValue, evaluate
 
 __all__ = [
+    "RANK_TOLERANCE",
     "Body",
     "BodyForce",
     "ConeKind",
@@ -81,6 +77,7 @@ __all__ = [
     "RigidObstacle",
     "RigidPlane",
     "RigidSphere",
+    "ScalarValue",
     "Scene",
     "SolverKind",
     "Support",
@@ -94,12 +91,17 @@ __all__ = [
     "Transverse",
     "Tresca",
     "Ufl",
+    "VectorValue",
     "VolumeLoad",
     "bodies_from",
     "can_expand",
     "choose_solver",
+    "evaluate",
     "gravity",
+    "master_share",
     "material_axes",
+    "resisted_motions",
     "rigid_body_modes",
     "strain",
+    "surface_of",
 ]

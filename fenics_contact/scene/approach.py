@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fenics_contact.geometry import vector_areas
-from fenics_contact.geometry.shapes.closest import tangent_bases
+from fenics_contact.mesh import vector_areas
 from fenics_contact.scene.loads import BodyForce, Load, Pressure, ThermalStrain, TotalForce
 from fenics_contact.scene.materials import PlaneStress
 from fenics_contact.scene.pairs import ContactPair, Surface, Tie
+from fenics_contact.surface_shapes import tangent_bases
 from fenics_contact.surfaces import quadrature_areas
 from fenics_contact.theory import contact_modulus, hertz_line, hertz_point
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from fnmatch import fnmatchcase
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene.body import Body
 from fenics_contact.scene.materials import Material
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact.checks import checked
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.errors.checked import checked
-from fenics_contact.geometry import BodyMesh
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene.materials import Material
 
 

@@ -11,9 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from fenics_contact.checks import Vector, checked
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.errors.checked import checked
-from fenics_contact.geometry.vectors import Vector
 from fenics_contact.scene.values import ScalarValue, VectorValue, checked_scalar, checked_vector
 
 

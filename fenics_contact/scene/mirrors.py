@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fenics_contact.geometry import vector_areas
+from fenics_contact.mesh import vector_areas
 
 if TYPE_CHECKING:
     from fenics_contact.scene.scene import Scene

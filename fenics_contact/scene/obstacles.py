@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Protocol, runtime_checkable
 
-from fenics_contact.geometry import Cylinder, Plane, SignedDistance, Sphere, SurfaceShape
+from fenics_contact.surface_shapes import Cylinder, Plane, SignedDistance, Sphere, SurfaceShape
 
 
 @runtime_checkable
 class RigidObstacle(SurfaceShape, Protocol):
-    """A body that does not move: any shape of `fenics_contact.geometry`, or an own class with its members."""
+    """A body that does not move: any of `fenics_contact.surface_shapes`, or an own class with its members."""
 
 
 class RigidPlane(Plane):

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fenics_contact.geometry import Joined, Placed, SurfaceShape, asked
 from fenics_contact.scene.approach import displacement_along, force_along, hertz_approach, modulus_of
 from fenics_contact.scene.pairs import ContactPair, Surface
 from fenics_contact.scene.true_surfaces import surface_of
-from fenics_contact.surfaces import FacetedSurface, heights
-from fenics_contact.surfaces.projection import project
+from fenics_contact.surface_shapes import Joined, Placed, SurfaceShape, asked
+from fenics_contact.surfaces import FacetedSurface, heights, project
 
 if TYPE_CHECKING:
     from fenics_contact.scene.scene import Scene

@@ -7,8 +7,8 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from fenics_contact.checks import checked
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.errors.checked import checked
 from fenics_contact.scene.obstacles import RigidObstacle
 from fenics_contact.surfaces import Geometry
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fenics_contact.geometry import BodyMesh
-from fenics_contact.linalg.cost_model import expected_bytes
+from fenics_contact.linalg import expected_bytes
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene.effects import Effect, EffectName, effects_of
 from fenics_contact.scene.held import held_by_supports
 from fenics_contact.scene.pair_geometry import PairGeometry, pair_geometry

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from fenics_contact.checks import checked
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.errors.checked import checked
-from fenics_contact.geometry import BodyMesh, default_partition
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.partition import default_partition
 from fenics_contact.scene.body import Body
 from fenics_contact.scene.effects import Effect, effects_of
 from fenics_contact.scene.loads import Load, SurfaceLoad, ThermalStrain
@@ -37,7 +38,7 @@ class Scene:
             dimension or material, or a load is none of the package's.
 
     Example:
-        >>> from fenics_contact.geometry import block
+        >>> from fenics_contact.gallery import block
         >>> from fenics_contact.scene import Coulomb, IsotropicElasticity, RigidPlane, Traction
         >>> steel = IsotropicElasticity(2.1e5, 0.3)  # N/mm²
         >>> floor = RigidPlane((0, 0, 0), (0, 0, 1))

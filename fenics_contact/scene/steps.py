@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from fenics_contact.errors.checked import checked
+from fenics_contact.checks import checked
 from fenics_contact.scene.loads import Load
 from fenics_contact.scene.scene import Scene
 from fenics_contact.scene.supports import Support

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact.checks import checked
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.errors.checked import checked
 from fenics_contact.scene.values import OfPosition, evaluate
 
 #: What a support does with one component: leave it free, give it a number, or a function of the points.

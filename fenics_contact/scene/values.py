@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from fenics_contact.checks import checked
 from fenics_contact.errors import InvalidInputError, calling
-from fenics_contact.errors.checked import checked
 
 #: A function of points, shape (n, dim), [length], with a row (a vector) or a number (a scalar) for each.
 OfPosition = Callable[[np.ndarray], np.ndarray]

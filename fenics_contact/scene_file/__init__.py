@@ -6,9 +6,9 @@ and what was given.
 """
 
 from fenics_contact.scene_file import _libraries  # noqa: F401
-from fenics_contact.scene_file.document import Document
+from fenics_contact.scene_file.document import Document, UnitNames
 from fenics_contact.scene_file.expression import Expression, VectorExpression
-from fenics_contact.scene_file.mistakes import Mistake, SceneFileError
+from fenics_contact.scene_file.mistakes import Mistake, SceneFileError, suggestion
 from fenics_contact.scene_file.reading import SceneFile, read_scene_file
 from fenics_contact.scene_file.schema import json_schema
 from fenics_contact.scene_file.source import Source
@@ -22,7 +22,9 @@ __all__ = [
     "SceneFileError",
     "ShapeTask",
     "Source",
+    "UnitNames",
     "VectorExpression",
     "json_schema",
     "read_scene_file",
+    "suggestion",
 ]

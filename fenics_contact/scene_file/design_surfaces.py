@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh, DesignSurface, vector_areas
+from fenics_contact.gallery import DesignSurface
+from fenics_contact.mesh import BodyMesh, vector_areas
 from fenics_contact.scene_file.placing import Shaped
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from pydantic import Field, PositiveFloat
 
-from fenics_contact import geometry
+from fenics_contact import mesh_io
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene_file.placing import Placed, Shaped
 from fenics_contact.scene_file.values import PlaceOfFile, Read, said
 
@@ -85,16 +85,16 @@ class MeshFile(Placed):
                 "choose groups with bodies and surfaces"
             )
         if kind in CAD:
-            return geometry.read_cad(path, self.size, *groups, comm=comm)
+            return mesh_io.read_cad(path, self.size, *groups, comm=comm)
         if self.size is not None:
             raise InvalidInputError(
                 f"size is for CAD files ({', '.join(CAD)}), got {self.file!r}: leave it away, or mesh the "
                 "body anew"
             )
         if kind == ".msh":
-            return geometry.read_msh(path, *groups, comm=comm)
+            return mesh_io.read_msh(path, *groups, comm=comm)
         if kind == ".xdmf":
-            return geometry.read_xdmf(path, *groups, comm=comm)
-        return geometry.read_mesh(
+            return mesh_io.read_xdmf(path, *groups, comm=comm)
+        return mesh_io.read_mesh(
             path, *groups, labels=self.labels, corners_only=self.corners_only, comm=comm
         )

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
-from fenics_contact import geometry
-from fenics_contact.geometry import BodyMesh, Link, LinkShape
-from fenics_contact.geometry.arguments import MOST, STEEPEST
+from fenics_contact import gallery
+from fenics_contact.checks import MOST, STEEPEST
+from fenics_contact.gallery import Link, LinkShape
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene_file.mesh_files import MeshFile
 from fenics_contact.scene_file.part import keys_of
 from fenics_contact.scene_file.placing import Placed, Shaped
@@ -24,7 +25,7 @@ SolidCell: TypeAlias = Literal["hexahedron", "tetrahedron"]
 Grading: TypeAlias = Annotated[float, Field(ge=0, le=STEEPEST)]
 
 
-@keys_of(geometry.block)
+@keys_of(gallery.block)
 class BlockMesh(Placed):
     """A box of hexahedra or tetrahedra with surfaces x0, x1, y0, y1, z0, z1."""
 
@@ -35,7 +36,7 @@ class BlockMesh(Placed):
     cell: SolidCell
 
 
-@keys_of(geometry.rectangle)
+@keys_of(gallery.rectangle)
 class RectangleMesh(Placed):
     """A rectangle of quadrilaterals or triangles with surfaces x0, x1, y0, y1."""
 
@@ -52,7 +53,7 @@ class _Hertz(Placed):
     grading: Grading
 
 
-@keys_of(geometry.hemisphere)
+@keys_of(gallery.hemisphere)
 class HemisphereMesh(_Hertz):
     """The lower half of a ball on the plane z = 0; surfaces contact, side, top and the cuts x0, y0."""
 
@@ -60,7 +61,7 @@ class HemisphereMesh(_Hertz):
     symmetry: Literal["xy", "x", ""]
 
 
-@keys_of(geometry.half_cylinder)
+@keys_of(gallery.half_cylinder)
 class HalfCylinderMesh(_Hertz):
     """The lower half of a cylinder along y on the plane z = 0; surfaces contact, side, top, y0, y1, x0."""
 
@@ -70,7 +71,7 @@ class HalfCylinderMesh(_Hertz):
     symmetry: Literal["x", ""]
 
 
-@keys_of(geometry.half_disc)
+@keys_of(gallery.half_disc)
 class HalfDiscMesh(_Hertz):
     """The lower half of a disc on the line y = 0, plane; surfaces contact, side, top and the cut x0."""
 
@@ -99,7 +100,7 @@ def _plate(
         n_radial: Cells from the hole to the square around it; n unless given.
     """
     levels = np.linspace(*heights, n_layers + 1)
-    return geometry.drilled_plate(hole, half_width, ends, levels, n, n_radial=n_radial)
+    return gallery.drilled_plate(hole, half_width, ends, levels, n, n_radial=n_radial)
 
 
 @keys_of(_plate)
@@ -114,7 +115,7 @@ class DrilledPlateMesh(Placed):
     n_radial: PositiveInt | None
 
 
-@keys_of(geometry.bolt)
+@keys_of(gallery.bolt)
 class BoltMesh(Placed):
     """Half a bolt along the z-axis with head and nut; surfaces head, nut, shank, side, top, bottom, y0."""
 
@@ -144,7 +145,7 @@ class _Links(Placed):
 
     def links_of(self, comm: MPI.Comm) -> Mapping[str, Link]:
         """Return the links, a single one unless it is overridden. Collective."""
-        return {"": geometry.chain_link(self.made(), comm)}
+        return {"": gallery.chain_link(self.made(), comm)}
 
 
 @keys_of(LinkShape)
@@ -163,7 +164,7 @@ class TwoLinksMesh(_Links):
 
     def links_of(self, comm: MPI.Comm) -> Mapping[str, Link]:
         """Return both links. Collective."""
-        links = geometry.two_links(self.made(), gap=self.gap, comm=comm)
+        links = gallery.two_links(self.made(), gap=self.gap, comm=comm)
         return {"first": links.first, "second": links.second}
 
 
@@ -177,7 +178,7 @@ class ChainMesh(_Links):
 
     def links_of(self, comm: MPI.Comm) -> Mapping[str, Link]:
         """Return all links. Collective."""
-        found = geometry.chain([self.made()] * self.links, gap=self.gap, comm=comm)
+        found = gallery.chain([self.made()] * self.links, gap=self.gap, comm=comm)
         return {str(number): link for number, link in enumerate(found.links, 1)}
 
 

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fenics_contact.checks import require_file
 from fenics_contact.errors import InvalidInputError, running
-from fenics_contact.geometry.files import require_file
 from fenics_contact.scene_file.places import as_toml, written
 
 if TYPE_CHECKING:

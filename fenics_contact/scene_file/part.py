@@ -10,8 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, cr
 from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
 
-from fenics_contact.errors.checked import meaning
-from fenics_contact.scene.values import ScalarValue, VectorValue
+from fenics_contact.checks import meaning
+from fenics_contact.scene import ScalarValue, VectorValue
 from fenics_contact.scene_file.values import (
     CountPair,
     CountTriple,

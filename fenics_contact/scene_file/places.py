@@ -10,7 +10,7 @@ import tomlkit
 import tomlkit.items
 from pydantic import BaseModel
 
-from fenics_contact.progress.words import visible
+from fenics_contact.progress import visible
 
 #: Keys and positions from the top of the file: ("contacts", 0, "friction").
 Path: TypeAlias = tuple[str | int, ...]

@@ -12,7 +12,8 @@ from pydantic import Field, PositiveFloat
 from scipy.spatial.transform import Rotation
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh, DesignSurface, quadratic
+from fenics_contact.gallery import DesignSurface
+from fenics_contact.mesh import BodyMesh, quadratic
 from fenics_contact.scene_file.part import Part
 from fenics_contact.scene_file.values import Triple, Vector
 

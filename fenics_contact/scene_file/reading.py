@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fenics_contact.checkpoint import Checkpoint
+from fenics_contact.checks import require_file
 from fenics_contact.contact import ContactProblem, LoadSequence, State
 from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.geometry.files import require_file
 from fenics_contact.scene import LoadStep, Scene
 from fenics_contact.scene_file.building import Builder, located
 from fenics_contact.scene_file.document import Document

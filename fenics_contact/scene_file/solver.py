@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, Field, PositiveInt
 
-from fenics_contact.contact.equilibrium import default_solver
-from fenics_contact.geometry import box_partition, graph_partition
+from fenics_contact.contact import default_solver
+from fenics_contact.partition import box_partition, graph_partition
 from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG, Smalse
 from fenics_contact.scene import Scene, choose_solver
 from fenics_contact.scene_file.part import Part
 from fenics_contact.scene_file.values import Read, said
 
 if TYPE_CHECKING:
-    from fenics_contact.contact.tolerance import Tolerance
+    from fenics_contact.contact import Tolerance
 
 BALANCED = "balanced"
 

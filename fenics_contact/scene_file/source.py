@@ -14,7 +14,7 @@ from typing import Any
 import tomlkit
 import tomlkit.exceptions
 
-from fenics_contact.progress.words import visible
+from fenics_contact.progress import visible
 from fenics_contact.scene_file.lines import key_parts, lines_of, nearest
 from fenics_contact.scene_file.mistakes import Mistake, SceneFileError
 from fenics_contact.scene_file.places import Path, replaced, shortened, value_at

@@ -11,8 +11,7 @@ import numpy as np
 from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError, running, together
-from fenics_contact.optimize import BundleTrust, LinearConstraints, Result, minimize
-from fenics_contact.optimize.progress import Callback
+from fenics_contact.optimize import BundleTrust, Callback, LinearConstraints, Result, minimize
 from fenics_contact.scene_file.design import TOTAL_POTENTIAL, DesignPart, VolumeConstraint
 from fenics_contact.scene_file.design_surfaces import design_surface
 from fenics_contact.scene_file.document import Document

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from fenics_contact.progress.words import is_visible
+from fenics_contact.progress import is_visible
 from fenics_contact.scene_file.document import Document
 from fenics_contact.scene_file.mistakes import Mistake, SceneFileError, listed, suggestion
 from fenics_contact.scene_file.places import Path, as_toml, branches, value_at, written

@@ -12,8 +12,8 @@ from typing import Annotated, Any, Literal, TypeAlias, get_args
 from pydantic import AfterValidator, Discriminator, Field, GetCoreSchemaHandler, Tag, WrapValidator
 from pydantic_core import PydanticCustomError, ValidationError
 
+from fenics_contact.checks import MOST
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry.arguments import MOST
 from fenics_contact.scene_file.expression import Expression
 
 #: What a support's component is called that it leaves alone.

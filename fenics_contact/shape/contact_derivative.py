@@ -8,11 +8,9 @@ import numpy as np
 
 from fenics_contact.contact import State
 from fenics_contact.errors import together
-from fenics_contact.feti import ContactPoints, TornSystem
-from fenics_contact.feti.nodal_mean import nodal_mean_at
-from fenics_contact.geometry import asked
-from fenics_contact.scene import ContactPair, RigidObstacle, Surface, Tresca
-from fenics_contact.scene.true_surfaces import surface_of
+from fenics_contact.feti import TornSystem, nodal_mean_at
+from fenics_contact.pairing import ContactPoints
+from fenics_contact.scene import ContactPair, RigidObstacle, Surface, Tresca, surface_of
 from fenics_contact.shape.adjoint import Adjoint
 from fenics_contact.shape.linearised_face import LinearisedFace
 from fenics_contact.shape.objective import Partials
@@ -22,6 +20,7 @@ from fenics_contact.shape.projection_derivative import (
     projection_pulled_back,
 )
 from fenics_contact.shape.surface_derivative import areas_pulled_back
+from fenics_contact.surface_shapes import asked
 
 
 @dataclass(frozen=True, eq=False)

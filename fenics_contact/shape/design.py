@@ -10,7 +10,8 @@ from scipy.spatial import cKDTree
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.fingerprint import described, require_alike
-from fenics_contact.geometry import BodyMesh, DesignSurface, boundary_faces
+from fenics_contact.gallery import DesignSurface
+from fenics_contact.mesh import BodyMesh, boundary_faces
 from fenics_contact.shape.bernstein import tensor_bernstein
 
 #: Default width of the transition strip, relative to the extent of the design surface.

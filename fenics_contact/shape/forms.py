@@ -10,12 +10,22 @@ import ufl
 
 from fenics_contact import _dolfinx
 from fenics_contact.errors import InvalidInputError, calling
-from fenics_contact.feti import TornSystem
-from fenics_contact.feti.composition import integrate, possible
-from fenics_contact.feti.load_forms import Symbol, load_key, load_name, load_parameters, load_work
-from fenics_contact.feti.subdomain import Subdomain
-from fenics_contact.feti.temperature import Temperature, stress_left
-from fenics_contact.feti.templates import Template, Templates, Written, volume_measure
+from fenics_contact.fem import (
+    Symbol,
+    Temperature,
+    Template,
+    Templates,
+    Written,
+    integrate,
+    load_key,
+    load_name,
+    load_parameters,
+    load_work,
+    possible,
+    stress_left,
+    volume_measure,
+)
+from fenics_contact.feti import Subdomain, TornSystem
 from fenics_contact.scene import Load, Material, ThermalStrain, VolumeLoad
 
 #: Builds an integrand (UFL) from a displacement u, the coordinate x and the stress σ(u).

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from fenics_contact.contact import State
 from fenics_contact.qp import ContactLayout, DualProblem, DualSolution, Face, classify, contact_step
 from fenics_contact.scene import Surface
-from fenics_contact.surfaces.facets import edge_distance
+from fenics_contact.surfaces import edge_distance
 
 #: A contact point is weakly active when it is closer to the switch than this many times the state's residual.
 UNCERTAINTY = 3.0

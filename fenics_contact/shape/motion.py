@@ -9,10 +9,10 @@ import ufl
 
 from fenics_contact import _dolfinx
 from fenics_contact._libraries import MPI, PETSc, check_not_forked
-from fenics_contact.contact.fields import body_mesh
+from fenics_contact.contact import body_mesh
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.fem import Template, volume_measure
 from fenics_contact.feti import Decomposition
-from fenics_contact.feti.forms import Template, volume_measure
 from fenics_contact.linalg import dispose_with
 from fenics_contact.scene import Body, Scene, SurfaceLoad
 from fenics_contact.shape.design import SurfaceDesign

@@ -14,9 +14,8 @@ from fenics_contact import _dolfinx
 from fenics_contact._libraries import MPI
 from fenics_contact.contact import ContactResult, State
 from fenics_contact.errors import InvalidInputError, calling, collective, together
-from fenics_contact.feti.composition import possible
-from fenics_contact.feti.subdomain import Subdomain
-from fenics_contact.feti.temperature import temperature_of
+from fenics_contact.fem import possible, temperature_of
+from fenics_contact.feti import Subdomain
 from fenics_contact.scene import Body
 from fenics_contact.shape.forms import (
     Integrand,

@@ -6,11 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.feti.contact_points import reference_axes
+from fenics_contact.pairing import reference_axes
 from fenics_contact.shape.surface_derivative import normals_pulled_back, slopes_pulled_back
-from fenics_contact.surfaces.facets import FacetedSurface, shape_functions
-from fenics_contact.surfaces.projection import interpolated_normal, newton_matrix
-from fenics_contact.surfaces.relief import heights
+from fenics_contact.surfaces import (
+    FacetedSurface,
+    heights,
+    interpolated_normal,
+    newton_matrix,
+    shape_functions,
+)
 
 
 @dataclass(frozen=True)
@@ -37,7 +41,7 @@ def frames_pulled_back(
 ) -> np.ndarray:
     """Return the derivative by the unit normals from that by the tangents built on them, shape (n, 3).
 
-    Reverse of `fenics_contact.feti.contact_points.tangent_frames`.
+    Reverse of `fenics_contact.pairing.contact_points.tangent_frames`.
 
     Args:
         normal: Unit normals, shape (n, 3).

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.contact import State
-from fenics_contact.qp import ContactLayout, FeasibleSet, contact_step
-from fenics_contact.qp.face import STEEP
+from fenics_contact.qp import STEEP, ContactLayout, FeasibleSet, contact_step
 from fenics_contact.shape.adjoint import Adjoint
 from fenics_contact.shape.linearised_face import LinearisedFace
 from fenics_contact.shape.objective import Partials

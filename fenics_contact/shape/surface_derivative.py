@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.surfaces.facets import FacetedSurface, corner_products
-from fenics_contact.surfaces.relief import corner_normals, edges_at_corners, slopes
+from fenics_contact.surfaces import FacetedSurface, corner_normals, corner_products, edges_at_corners, slopes
 
 
 def normals_pulled_back(

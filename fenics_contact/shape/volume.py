@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.geometry import BodyMesh, boundary_faces, vector_areas
-from fenics_contact.surfaces.facets import shape_functions
+from fenics_contact.mesh import BodyMesh, boundary_faces, vector_areas
+from fenics_contact.surfaces import shape_functions
 
 
 def volume_by_points(mesh: BodyMesh) -> np.ndarray:

@@ -7,15 +7,18 @@ of one's own is a Python file that defines ``study``, a `StudyScene`.
 from __future__ import annotations
 
 from fenics_contact.study.errors import Errors
-from fenics_contact.study.parameters import BALANCED, Parameters, Sweep
+from fenics_contact.study.overview import write_overview
+from fenics_contact.study.parameters import BALANCED, DISCRETISATIONS, Parameters, Sweep, Tolerance
 from fenics_contact.study.protocol import Outcome, Problem, Quantity, StudyScene
 from fenics_contact.study.report import write_report
 from fenics_contact.study.results import Results, Run, read_study
-from fenics_contact.study.running import Settings, run_study
-from fenics_contact.study.scenes import find_study
+from fenics_contact.study.running import Settings, StudyPlan, collected, measure_all, prepare, run_study
+from fenics_contact.study.scenes import BUILT_IN, find_study
 
 __all__ = [
     "BALANCED",
+    "BUILT_IN",
+    "DISCRETISATIONS",
     "Errors",
     "Outcome",
     "Parameters",
@@ -24,10 +27,16 @@ __all__ = [
     "Results",
     "Run",
     "Settings",
+    "StudyPlan",
     "StudyScene",
     "Sweep",
+    "Tolerance",
+    "collected",
     "find_study",
+    "measure_all",
+    "prepare",
     "read_study",
     "run_study",
+    "write_overview",
     "write_report",
 ]

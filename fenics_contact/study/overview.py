@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.io.replacing import write_text
+from fenics_contact.io import write_text
 from fenics_contact.study.advice import advice
 from fenics_contact.study.certificates import check_certificates
 from fenics_contact.study.errors import Errors

@@ -8,7 +8,7 @@ from itertools import product
 from typing import Any, Literal, TypeAlias
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import CELL_TYPES
+from fenics_contact.mesh import CELL_TYPES
 from fenics_contact.scene import Discretisation
 
 #: The tolerance that follows the discretisation estimate.

@@ -9,7 +9,8 @@ import numpy as np
 
 from fenics_contact._libraries import MPI
 from fenics_contact.contact import ContactProblem, FixedPoint, State, solve_steps
-from fenics_contact.geometry import BodyMesh, default_partition
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.partition import default_partition
 from fenics_contact.qp import DualSolver, FaceNewton
 from fenics_contact.scene import Scene
 from fenics_contact.shape import ShapeProblem, TotalPotential

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from fenics_contact.io.replacing import write_text
+from fenics_contact.io import write_text
 from fenics_contact.study.certificates import CertificateCheck
 from fenics_contact.study.errors import Errors
 from fenics_contact.study.progress import described

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fenics_contact.geometry import CELL_TYPES
+from fenics_contact.mesh import CELL_TYPES
 
 
 def percent(value: float) -> str:

@@ -1,17 +1,38 @@
 """Surfaces of meshes: facets, the true surfaces that they stand for, and where points project on them."""
 
 from fenics_contact.surfaces.facet_areas import nodal_areas, quadrature_areas
-from fenics_contact.surfaces.facets import FacetedSurface, Relief, faceted_surface
-from fenics_contact.surfaces.relief import heights
+from fenics_contact.surfaces.facets import (
+    FacetedSurface,
+    Relief,
+    corner_products,
+    edge_distance,
+    faceted_surface,
+    shape_functions,
+    shape_values,
+)
+from fenics_contact.surfaces.projection import Projection, interpolated_normal, join, newton_matrix, project
+from fenics_contact.surfaces.relief import corner_normals, edges_at_corners, heights, slopes
 from fenics_contact.surfaces.true_surface import Geometry, true_surface
 
 __all__ = [
     "FacetedSurface",
     "Geometry",
+    "Projection",
     "Relief",
+    "corner_normals",
+    "corner_products",
+    "edge_distance",
+    "edges_at_corners",
     "faceted_surface",
     "heights",
+    "interpolated_normal",
+    "join",
+    "newton_matrix",
     "nodal_areas",
+    "project",
     "quadrature_areas",
+    "shape_functions",
+    "shape_values",
+    "slopes",
     "true_surface",
 ]

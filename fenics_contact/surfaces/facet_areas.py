@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.geometry import FACET_TYPES, quadrature, shape_gradients, shape_values
+from fenics_contact.mesh import FACET_TYPES, quadrature, shape_gradients, shape_values
 
 
 def quadrature_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:

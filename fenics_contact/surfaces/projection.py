@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fenics_contact.geometry import coordinate_rounding
+from fenics_contact.mesh import coordinate_rounding
 from fenics_contact.surfaces.facets import FacetedSurface, outside, shape_functions
 from fenics_contact.surfaces.relief import heights
 

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from fenics_contact.geometry.shapes.closest import tangent_bases
+from fenics_contact.surface_shapes import tangent_bases
 from fenics_contact.surfaces.facets import FacetedSurface, Relief, corner_products
 from fenics_contact.surfaces.relief import edges_at_corners, slopes
 

@@ -10,7 +10,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh, Joined, SurfaceShape, asked, coordinate_rounding
+from fenics_contact.mesh import BodyMesh, coordinate_rounding
+from fenics_contact.surface_shapes import Joined, SurfaceShape, asked
 from fenics_contact.surfaces.facet_areas import nodal_areas
 from fenics_contact.surfaces.facets import FacetedSurface, Relief, faceted_surface, shape_values
 from fenics_contact.surfaces.projection import interpolated_normal

@@ -9,26 +9,37 @@ given.
 from fenics_contact.viz._libraries import check_libraries
 from fenics_contact.viz.before_after import plot_before_after
 from fenics_contact.viz.browser import InteractiveScene
+from fenics_contact.viz.colours import BLUE, FAMILIES, GREEN, GREY, INK, ORANGE, SPARE, STRESS_MAP
 from fenics_contact.viz.control_net import plot_control_net
 from fenics_contact.viz.convergence import plot_convergence
 from fenics_contact.viz.curves import plot_curves
 from fenics_contact.viz.decomposition import plot_decomposition
 from fenics_contact.viz.error import plot_error
 from fenics_contact.viz.interactive import interactive
-from fenics_contact.viz.picture import Picture
+from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.pressure import plot_contact_pressure
-from fenics_contact.viz.renderer import check_renderer
+from fenics_contact.viz.renderer import check_renderer, rendering
 from fenics_contact.viz.residuals import plot_residuals
+from fenics_contact.viz.sheet import sheet
 from fenics_contact.viz.status import plot_contact_status
 from fenics_contact.viz.stress import plot_stress
 from fenics_contact.viz.units import Units
 
 __all__ = [
+    "BLUE",
+    "FAMILIES",
+    "GREEN",
+    "GREY",
+    "INK",
+    "ORANGE",
+    "SPARE",
+    "STRESS_MAP",
     "InteractiveScene",
     "Picture",
     "Units",
     "check_libraries",
     "check_renderer",
+    "draw_picture",
     "interactive",
     "plot_before_after",
     "plot_contact_pressure",
@@ -40,4 +51,7 @@ __all__ = [
     "plot_error",
     "plot_residuals",
     "plot_stress",
+    "png_path",
+    "rendering",
+    "sheet",
 ]

@@ -11,7 +11,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import DesignSurface
+from fenics_contact.gallery import DesignSurface
 from fenics_contact.viz.colours import GREY, INK, ORANGE, SIGNED_MAP
 from fenics_contact.viz.curved_net import curved_net
 from fenics_contact.viz.picture import Picture, draw_picture, png_path

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.collections import PolyCollection
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh, boundary_faces
+from fenics_contact.mesh import BodyMesh, boundary_faces
 from fenics_contact.scene import Scene
 from fenics_contact.viz.colours import INK, colour_subdomains, neighbours
 from fenics_contact.viz.picture import Picture, draw_picture, png_path

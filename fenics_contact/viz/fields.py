@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.contact import State
-from fenics_contact.geometry import BodyMesh
+from fenics_contact.mesh import BodyMesh
 
 
 @dataclass(frozen=True)

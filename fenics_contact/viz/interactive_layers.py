@@ -10,7 +10,7 @@ import numpy as np
 import pyvista as pv
 
 from fenics_contact.contact import State, Status, contact_fields, in_space
-from fenics_contact.geometry import boundary_faces
+from fenics_contact.mesh import boundary_faces
 from fenics_contact.scene import ContactPair
 from fenics_contact.viz.colours import (
     GREY,

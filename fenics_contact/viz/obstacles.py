@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.geometry import Cylinder, Plane, Sphere
 from fenics_contact.scene import RigidObstacle, Scene, Surface
+from fenics_contact.surface_shapes import Cylinder, Plane, Sphere
 from fenics_contact.viz.colours import GREY, PALE
 from fenics_contact.viz.stage import Layer, segments, surface
 from fenics_contact.viz.view import View

@@ -8,7 +8,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from fenics_contact.geometry import boundary_faces
+from fenics_contact.mesh import boundary_faces
 from fenics_contact.scene import Scene
 from fenics_contact.viz.colours import INK
 from fenics_contact.viz.fields import Moved

@@ -9,7 +9,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.tri import Triangulation
 
-from fenics_contact.geometry import boundary_faces
+from fenics_contact.mesh import boundary_faces
 from fenics_contact.viz.colours import INK
 
 #: Edges closer than this, relative to the size of the picture, would blacken it, and fade.

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fenics_contact.contact import State
-from fenics_contact.geometry import boundary_faces
+from fenics_contact.mesh import boundary_faces
 from fenics_contact.viz.painting_in_plane import contact_window
 from fenics_contact.viz.section import section_frame, section_views, strongest_contact
 from fenics_contact.viz.stage import surface

@@ -12,15 +12,9 @@ from mpi4py import MPI
 from fenics_contact.accuracy import Certificate, certify, friction_error
 from fenics_contact.contact import ContactProblem, State, solve_scene
 from fenics_contact.contact.equilibrium import solve_dual
-from fenics_contact.geometry import (
-    bisection_partition,
-    block,
-    box_partition,
-    graph_partition,
-    hemisphere,
-    quadratic,
-    rectangle,
-)
+from fenics_contact.gallery import block, hemisphere, rectangle
+from fenics_contact.mesh import quadratic
+from fenics_contact.partition import bisection_partition, box_partition, graph_partition
 from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG, solve
 from fenics_contact.scene import (
     Body,

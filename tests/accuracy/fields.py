@@ -11,7 +11,8 @@ from fenics_contact.accuracy import DiscretisationError, discretisation_error
 from fenics_contact.accuracy.recovery import recovered_gradients
 from fenics_contact.accuracy.sites import Sites, find_sites
 from fenics_contact.feti import TornSystem, build_torn_system, decompose, nodal_mean
-from fenics_contact.geometry import BodyMesh, bisection_partition
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.partition import bisection_partition
 from fenics_contact.scene import Body, IsotropicElasticity, Material, PlaneStrain, Scene, Support
 
 #: Displacement of points, (n, dim) -> (n, dim).

@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from fenics_contact.accuracy import discretisation_error
 from fenics_contact.feti import build_torn_system, decompose
-from fenics_contact.geometry import bisection_partition, box_partition
+from fenics_contact.partition import bisection_partition, box_partition
 from fenics_contact.scene import Body, IsotropicElasticity, Scene
 from tests.accuracy.fields import quadratic, torn_field
 from tests.models.bodies import bent, box, in_halves

@@ -10,7 +10,9 @@ import ufl
 from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
-from fenics_contact.geometry import CELL_TYPES, BodyMesh, bisection_partition, block, quadratic, rectangle
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.mesh import CELL_TYPES, BodyMesh, quadratic
+from fenics_contact.partition import bisection_partition
 from fenics_contact.scene import Body, BodyForce, IsotropicElasticity, PlaneStrain, Scene, Support, Ufl
 from fenics_contact.scene.materials.constants import lame
 from tests.accuracy.true_error import error_by_cell

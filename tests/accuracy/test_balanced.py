@@ -11,7 +11,8 @@ from mpi4py import MPI
 from fenics_contact.accuracy import Balanced, SolverErrors
 from fenics_contact.contact import ContactProblem, State, solve_scene, solve_steps
 from fenics_contact.errors import ConvergenceError, InvalidInputError
-from fenics_contact.geometry import block, box_partition
+from fenics_contact.gallery import block
+from fenics_contact.partition import box_partition
 from fenics_contact.qp import DualProblem, DualSolution, FaceNewton
 from fenics_contact.qp.iterate import Start
 from fenics_contact.scene import Body, Coulomb, Scene, Support, Traction

@@ -26,7 +26,8 @@ from fenics_contact.accuracy import (
 )
 from fenics_contact.contact import FixedPoint, State, solve_scene
 from fenics_contact.contact.equilibrium import solve_dual
-from fenics_contact.geometry import box_partition, rectangle
+from fenics_contact.gallery import rectangle
+from fenics_contact.partition import box_partition
 from fenics_contact.qp import DualSolution, FaceNewton, Smalse
 from fenics_contact.scene import (
     Body,

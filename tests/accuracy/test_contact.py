@@ -16,7 +16,9 @@ from mpi4py import MPI
 
 from fenics_contact.accuracy import discretisation_error
 from fenics_contact.contact import ContactProblem, State, Status, solve_scene, solve_steps
-from fenics_contact.geometry import BodyMesh, bisection_partition, box_lattice, rectangle_lattice
+from fenics_contact.gallery import box_lattice, rectangle_lattice
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.partition import bisection_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,

@@ -12,7 +12,7 @@ from ufl.domain import extract_unique_domain
 
 from fenics_contact.accuracy import discretisation_error
 from fenics_contact.accuracy.moduli import moduli
-from fenics_contact.feti.forms import FormLibrary
+from fenics_contact.fem.forms import FormLibrary
 from fenics_contact.scene import (
     Elasticity,
     IsotropicElasticity,

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh, block, half_disc, hemisphere, rectangle
-from fenics_contact.geometry import quadratic as quadratic_cells
-from fenics_contact.geometry.rectangle import rectangle_lattice
+from fenics_contact.gallery import block, half_disc, hemisphere, rectangle, rectangle_lattice
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.mesh import quadratic as quadratic_cells
 from fenics_contact.scene import Body, IsotropicElasticity, PlaneStrain, Scene
 from tests.accuracy.fields import (
     cubic,

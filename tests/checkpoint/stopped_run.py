@@ -21,7 +21,7 @@ from mpi4py import MPI
 
 from fenics_contact.checkpoint import Checkpoint, interruptible
 from fenics_contact.contact import ContactProblem, solve_steps
-from fenics_contact.geometry import box_partition
+from fenics_contact.partition import box_partition
 from fenics_contact.progress import LOGGER_NAME, Event
 from fenics_contact.qp import FaceNewton
 from tests.contact.step_cases import sheared_block, shears

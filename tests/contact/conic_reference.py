@@ -18,7 +18,7 @@ import clarabel
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.geometry import BodyMesh, vector_areas
+from fenics_contact.mesh import BodyMesh, vector_areas
 from fenics_contact.scene import (
     BodyForce,
     ContactPair,

@@ -11,7 +11,9 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
-from fenics_contact.geometry import block, graph_partition, quadratic, rectangle
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.mesh import quadratic
+from fenics_contact.partition import graph_partition
 from fenics_contact.scene import (
     Body,
     ContactPair,

@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from fenics_contact.geometry import BodyMesh, block, box_partition
+from fenics_contact.gallery import block
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
     BodyForce,

@@ -13,7 +13,8 @@ from mpi4py import MPI
 from fenics_contact import _dolfinx
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.errors import ConvergenceError, InfeasibleError
-from fenics_contact.geometry import bisection_partition, block
+from fenics_contact.gallery import block
+from fenics_contact.partition import bisection_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import Body, Coulomb, Scene, Support, Traction
 from tests.contact.gallery import SOFT, block_on_plane, partitions, two_blocks

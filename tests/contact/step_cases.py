@@ -12,7 +12,8 @@ from mpi4py import MPI
 
 from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.contact import ContactProblem, LoadSequence, State
-from fenics_contact.geometry import block, box_partition
+from fenics_contact.gallery import block
+from fenics_contact.partition import box_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,

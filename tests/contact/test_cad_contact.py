@@ -12,16 +12,9 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
-from fenics_contact.geometry import (
-    BodyMesh,
-    Parametric,
-    Plane,
-    Revolved,
-    SurfaceShape,
-    Torus,
-    read_cad,
-)
-from fenics_contact.geometry.gmsh_session import gmsh_model
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.mesh_io import read_cad
+from fenics_contact.mesh_io.gmsh_session import gmsh_model
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,
@@ -32,6 +25,7 @@ from fenics_contact.scene import (
     Surface,
     TotalForce,
 )
+from fenics_contact.surface_shapes import Parametric, Plane, Revolved, SurfaceShape, Torus
 
 STEEL = IsotropicElasticity(1000.0, 0.3)
 #: Ends of the parts along z, which are held and pulled.

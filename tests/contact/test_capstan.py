@@ -11,7 +11,9 @@ from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, State, Status, solve_scene, solve_steps
 from fenics_contact.errors import InfeasibleError
-from fenics_contact.geometry import BodyMesh, block, box_partition, rectangle
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.partition import box_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import State, contact_area, solve_scene
-from fenics_contact.geometry import block, half_disc, hemisphere, rectangle
+from fenics_contact.gallery import block, half_disc, hemisphere, rectangle
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,

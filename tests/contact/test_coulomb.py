@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import FixedPoint, State, Status, solve_scene
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.qp import DualSolver, FaceNewton, Smalse
 from fenics_contact.scene import Body, Coulomb, Scene, Support, Traction, Tresca
 from tests.contact.checks import assert_solved, balance, body_displacements, friction_law

@@ -12,8 +12,10 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, LoadSequence, State, held, solve_scene
-from fenics_contact.feti import TornSystem, contact_search, dual, mortar, torn
-from fenics_contact.geometry import block, box_partition
+from fenics_contact.feti import TornSystem, dual, torn
+from fenics_contact.gallery import block
+from fenics_contact.pairing import contact_search, mortar
+from fenics_contact.partition import box_partition
 from fenics_contact.qp import face_newton, face_system, slip_law
 from fenics_contact.scene import (
     Body,
@@ -267,7 +269,8 @@ SCRIPT = """
 import sys
 from mpi4py import MPI
 from fenics_contact.contact import solve_scene
-from fenics_contact.geometry import block, box_partition
+from fenics_contact.gallery import block
+from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body, ContactPair, Coulomb, IsotropicElasticity, Scene, Support, Surface, Traction,
 )
@@ -290,7 +293,7 @@ NEVER = {
     *(f"fenics_contact.{room}" for room in ("shape", "optimize", "viz", "io", "study")),
     "pyvista", "matplotlib", "vtk", "vtkmodules", "gmsh", "pymetis", "meshio",
 }  # fmt: skip
-AT_NEED = {"fenics_contact.feti.mortar", "fenics_contact.accuracy", "clarabel"}
+AT_NEED = {"fenics_contact.pairing.mortar", "fenics_contact.accuracy", "clarabel"}
 
 
 @pytest.mark.parametrize(
@@ -298,7 +301,7 @@ AT_NEED = {"fenics_contact.feti.mortar", "fenics_contact.accuracy", "clarabel"}
     [
         ("None", "node", HELD, 1e-6, set()),
         ("None", "node", HELD, None, {"fenics_contact.accuracy"}),
-        ("Coulomb(0.3)", "mortar", HELD, 1e-6, {"fenics_contact.feti.mortar"}),
+        ("Coulomb(0.3)", "mortar", HELD, 1e-6, {"fenics_contact.pairing.mortar"}),
         ("Coulomb(0.3)", "node", FLOATING, 1e-6, {"clarabel"}),
     ],
 )

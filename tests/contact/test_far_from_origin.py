@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.scene import (
     Body,
     ContactPair,

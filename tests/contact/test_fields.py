@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from fenics_contact import _dolfinx
 from fenics_contact.contact.fields import cell_values
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 
 
 @pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])
@@ -29,7 +29,7 @@ RANKS = """
     from mpi4py import MPI
     from fenics_contact import _dolfinx
     from fenics_contact.contact.fields import cell_values
-    from fenics_contact.geometry import block
+    from fenics_contact.gallery import block
 
     comm = MPI.COMM_WORLD
     body = block((0, 0, 0), (1, 2, 3), (3, 2, 2))

@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
-from fenics_contact.geometry import LinkShape, block, half_cylinder, half_disc, two_links
+from fenics_contact.gallery import LinkShape, block, half_cylinder, half_disc, two_links
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,

@@ -12,7 +12,8 @@ from mpi4py import MPI
 from fenics_contact.contact import Status, check_held, solve_scene
 from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.feti import build_torn_system, decompose
-from fenics_contact.geometry import block, graph_partition
+from fenics_contact.gallery import block
+from fenics_contact.partition import graph_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,

@@ -18,7 +18,9 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
-from fenics_contact.geometry import BodyMesh, bisection_partition, half_cylinder, hemisphere
+from fenics_contact.gallery import half_cylinder, hemisphere
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.partition import bisection_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,

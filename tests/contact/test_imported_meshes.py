@@ -11,7 +11,9 @@ from mpi4py import MPI
 
 from fenics_contact.contact import Status, solve_scene
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh, block, boundary_faces, near_surfaces, read_mesh, read_msh
+from fenics_contact.gallery import block
+from fenics_contact.mesh import BodyMesh, boundary_faces, near_surfaces
+from fenics_contact.mesh_io import read_mesh, read_msh
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -25,7 +27,7 @@ from fenics_contact.scene import (
     Traction,
     bodies_from,
 )
-from tests.geometry.mesh_files import joined
+from tests.mesh_io.mesh_files import joined
 
 DATA = Path(__file__).parents[1] / "data"
 STEEL = IsotropicElasticity(1000.0, 0.3)

@@ -7,8 +7,9 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
-from fenics_contact.feti.contact_search import without_rounding
-from fenics_contact.geometry import block, graph_partition
+from fenics_contact.gallery import block
+from fenics_contact.pairing.contact_search import without_rounding
+from fenics_contact.partition import graph_partition
 from fenics_contact.qp import FaceNewton, Smalse
 from fenics_contact.scene import (
     Body,

@@ -10,7 +10,8 @@ from mpi4py import MPI
 
 from fenics_contact.contact import State, Status, solve_scene
 from fenics_contact.errors import InfeasibleError
-from fenics_contact.geometry import bisection_partition, block, box_partition, hemisphere, rectangle
+from fenics_contact.gallery import block, hemisphere, rectangle
+from fenics_contact.partition import bisection_partition, box_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,

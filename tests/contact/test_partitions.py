@@ -9,7 +9,10 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import State, Status, solve_scene
-from fenics_contact.geometry import BodyMesh, block, from_gmsh_model, graph_partition
+from fenics_contact.gallery import block
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.mesh_io import from_gmsh_model
+from fenics_contact.partition import graph_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,
@@ -23,7 +26,7 @@ from fenics_contact.scene import (
     Traction,
 )
 from tests.contact.checks import assert_solved
-from tests.geometry.msh_files import name, own_gmsh, within
+from tests.mesh_io.msh_files import name, own_gmsh, within
 
 TOLERANCE = 1e-9
 COUNTS = (1, 4, 17, 64)

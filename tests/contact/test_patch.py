@@ -10,7 +10,8 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
-from fenics_contact.geometry import BodyMesh, block, rectangle
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.qp import FaceNewton, ProjectedCG
 from fenics_contact.scene import (
     Body,

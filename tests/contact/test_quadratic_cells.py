@@ -11,8 +11,10 @@ from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh, bisection_partition, block, half_cylinder, quadratic, rectangle
+from fenics_contact.gallery import block, half_cylinder, rectangle
 from fenics_contact.io import write_vtu
+from fenics_contact.mesh import BodyMesh, quadratic
+from fenics_contact.partition import bisection_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,

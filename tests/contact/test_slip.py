@@ -9,7 +9,8 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, State, Status, solve_scene, solve_steps
-from fenics_contact.geometry import block, box_partition
+from fenics_contact.gallery import block
+from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
     ContactPair,

@@ -16,7 +16,7 @@ from mpi4py import MPI
 from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.contact import ContactProblem, LoadSequence, Status, solve_steps
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.scene import Body, IsotropicElasticity, LoadStep, Scene, Support, Traction
 from tests.conftest import run_on_ranks
 from tests.contact.step_cases import PATH, collect, sequence, shears

@@ -11,7 +11,8 @@ from mpi4py import MPI
 from fenics_contact.contact import ContactProblem, State, Status, solve_scene, solve_steps
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
-from fenics_contact.geometry import block, box_partition
+from fenics_contact.gallery import block
+from fenics_contact.partition import box_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,

@@ -13,8 +13,9 @@ from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.errors import InvalidInputError, MissingRequirementError
-from fenics_contact.geometry import block, quadratic, rectangle
+from fenics_contact.gallery import block, rectangle
 from fenics_contact.io import write_vtu
+from fenics_contact.mesh import quadratic
 from fenics_contact.scene import Body, IsotropicElasticity, PlaneStrain, Scene, Support, Traction
 from tests.viz.plane_states import plane_block
 from tests.viz.states import touching_blocks

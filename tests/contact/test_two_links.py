@@ -10,7 +10,8 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 from fenics_contact.contact import State, Status, solve_scene
-from fenics_contact.geometry import LinkShape, box_partition, two_links
+from fenics_contact.gallery import LinkShape, two_links
+from fenics_contact.partition import box_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,

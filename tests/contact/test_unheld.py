@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation
 from fenics_contact.contact import FixedPoint, State, solve_scene
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
-from fenics_contact.geometry import block, graph_partition, rectangle
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.partition import graph_partition
 from fenics_contact.qp import FaceNewton, Smalse
 from fenics_contact.scene import (
     Body,
@@ -176,7 +177,7 @@ def test_unheld_motions_are_the_same_on_any_number_of_ranks(mpirun) -> None:
         import numpy as np
         from mpi4py import MPI
         from fenics_contact.contact import solve_scene
-        from fenics_contact.geometry import graph_partition
+        from fenics_contact.partition import graph_partition
         from tests.contact.test_unheld import cut, turned_stack
         scene = turned_stack()
         state = solve_scene(scene, MPI.COMM_WORLD, partitions=cut(scene, 4), tolerance=1e-9)

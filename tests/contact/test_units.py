@@ -11,7 +11,7 @@ from mpi4py import MPI
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.feti.inverse import LocalKind
-from fenics_contact.geometry import rectangle
+from fenics_contact.gallery import rectangle
 from fenics_contact.scene import (
     Body,
     ContactPair,

@@ -85,11 +85,11 @@ def test_a_name_of_another_room_is_described_there() -> None:
 
 
 @pytest.mark.parametrize(
-    "target", ["fenics_contact.geometry.mesh.BodyMesh", "BodyMesh", "fenics_contact.geometry.BodyMesh"]
+    "target", ["fenics_contact.mesh.body_mesh.BodyMesh", "BodyMesh", "fenics_contact.mesh.BodyMesh"]
 )
 def test_a_class_is_found_by_every_name_that_it_has(target: str) -> None:
     found = [*reference.candidates(target), target]
-    assert "fenics_contact.geometry.BodyMesh" in found
+    assert "fenics_contact.mesh.BodyMesh" in found
 
 
 def test_the_comment_above_a_constant_describes_it() -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 
 CELLS = ["triangle", "quadrilateral", "tetrahedron", "hexahedron"]
 

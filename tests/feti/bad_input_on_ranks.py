@@ -11,7 +11,8 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
-from fenics_contact.geometry import block, box_partition
+from fenics_contact.gallery import block
+from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
     ContactPair,

@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.geometry import BodyMesh, bisection_partition, block, box_partition
+from fenics_contact.gallery import block
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.partition import bisection_partition, box_partition
 from fenics_contact.scene import (
     Body,
     BodyForce,

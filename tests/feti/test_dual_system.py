@@ -14,7 +14,8 @@ from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.feti.dirichlet import REGULARISATION
 from fenics_contact.feti.inverse import LocalKind
 from fenics_contact.feti.kernel_basis import whole_motions
-from fenics_contact.geometry import block, box_partition
+from fenics_contact.gallery import block
+from fenics_contact.partition import box_partition
 from fenics_contact.scene import Body, ContactPair, Coulomb, RigidPlane, Scene, Support, Surface
 from tests.feti.scenes import CELLS, STEEL, Cut, clamped_block, lone_block, ragged_block, touching_blocks
 

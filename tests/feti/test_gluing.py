@@ -13,7 +13,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.copies import Tearing, tear
 from fenics_contact.feti.gluing import gluing_rows, prescribed_displacements, weighted_helmert
 from fenics_contact.feti.rows import Rows
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.scene import Body, Scene, Support
 from tests.feti.scenes import CELLS, STEEL, Cut, lone_block, ragged_block
 

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from fenics_contact.feti import build_torn_system, decompose
 from fenics_contact.feti.factor import Factor, fixing_nodes, regularised
 from fenics_contact.feti.subdomain import Subdomain
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.scene import Body, Scene
 from tests.feti.scenes import CELLS, STEEL, Cut, lone_block, ragged_block
 

@@ -16,8 +16,9 @@ from fenics_contact.feti.implicit import ImplicitOperator
 from fenics_contact.feti.inverse import LocalKind
 from fenics_contact.feti.local import LocalOperator, interface_dofs
 from fenics_contact.feti.subdomain import Subdomain
-from fenics_contact.geometry import block, box_partition
+from fenics_contact.gallery import block
 from fenics_contact.linalg.cost_model import LocalCost, explicit_cost, implicit_cost, prefers_explicit
+from fenics_contact.partition import box_partition
 from fenics_contact.qp import FaceNewton, solve
 from fenics_contact.scene import Body, IsotropicElasticity, Scene, Support, TotalForce
 from tests.feti.scenes import CELLS, STEEL, touching_blocks

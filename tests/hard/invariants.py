@@ -11,7 +11,7 @@ from mpi4py import MPI
 from fenics_contact.contact import State
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
 from fenics_contact.feti.gluing import prescribed_displacements
-from fenics_contact.feti.room import gap_with_room
+from fenics_contact.feti.initial_gap import gap_with_room
 from fenics_contact.scene import Scene, rigid_body_modes
 from fenics_contact.scene.held import resisted_motions
 from tests.contact.checks import residuals

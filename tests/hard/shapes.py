@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, ContactResult
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import Body, BodyForce, ContactPair, Coulomb, Scene, Support, Surface
 from fenics_contact.shape import (

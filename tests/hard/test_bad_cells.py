@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh, block
+from fenics_contact.gallery import block
+from fenics_contact.mesh import BodyMesh
 from tests.hard.conftest import Record
 
 CELLS = ("hexahedron", "tetrahedron")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.geometry import BodyMesh, orient
+from fenics_contact.mesh import BodyMesh, orient
 from fenics_contact.scene import (
     Body,
     BodyForce,

@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, State, Status, solve_scene, solve_steps
 from fenics_contact.errors import ConvergenceError
-from fenics_contact.geometry import bisection_partition, box_partition, graph_partition
+from fenics_contact.partition import bisection_partition, box_partition, graph_partition
 from fenics_contact.qp import DualSolver, FaceNewton, SolverStep
 from fenics_contact.scene import LoadStep, Scene
 from tests.hard.transform import in_units, steps_in_units

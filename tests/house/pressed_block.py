@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from fenics_contact.contact import State, solve_scene
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, RigidPlane, Scene, Support, Surface
 
 #: ½ E (δ/h)² V.

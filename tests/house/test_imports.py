@@ -12,13 +12,17 @@ from tests.house.source import PACKAGE, Module, modules, room_of
 #: From the ground up; rooms on one floor do not know each other.
 FLOORS = [
     {"errors"},
-    {"progress", "fingerprint"},
+    {"progress", "fingerprint", "checks"},
     {"_requirements", "launching", "timing", "checkpoint"},
     {"_libraries"},
     {"_dolfinx"},
-    {"geometry", "linalg", "theory"},
-    {"surfaces"},
+    {"surface_shapes", "linalg", "theory"},
+    {"mesh"},
+    {"mesh_io", "partition", "surfaces"},
+    {"gallery"},
     {"scene", "qp"},
+    {"fem"},
+    {"pairing"},
     {"feti"},
     {"accuracy"},
     {"contact"},
@@ -57,6 +61,27 @@ def pointing_up(module: Module) -> list[str]:
         if not below:
             wrong.append(f"{module.path.name}:{found.line} ({module.name}) imports {found.target}")
     return wrong
+
+
+def hidden_files(house: list[Module]) -> set[str]:
+    """Return the files of rooms; not those after whose one function they are called, which a face offers."""
+    offered = {
+        f"{module.name}.{found.target.rpartition('.')[2]}"
+        for module in house
+        if module.path.name == "__init__.py"
+        for found in module.imports()
+    }
+    return {module.name for module in house if module.name.count(".") > 1} - offered
+
+
+def past_faces(module: Module, hidden: set[str]) -> list[str]:
+    """List the imports of a module that reach past the ``__init__`` of another room into one of its files."""
+    return [
+        f"{module.name}:{found.line} imports {found.target}"
+        for found in module.imports()
+        if room_of(found.target) not in {None, module.room}
+        and (found.target.count(".") > 2 or found.target in hidden)
+    ]
 
 
 def reached(room: str, house: list[Module]) -> set[str]:
@@ -150,6 +175,27 @@ def test_an_import_that_points_down_passes(room: str, line: str, tmp_path: Path)
     module = a_module(room, line, tmp_path)
     assert module.imports()
     assert pointing_up(module) == []
+
+
+def test_rooms_are_entered_by_their_faces() -> None:
+    house = modules()
+    hidden = hidden_files(house)
+    assert f"{PACKAGE}.qp.face" in hidden, "no files of rooms were found: nothing was tested"
+    assert [line for module in house for line in past_faces(module, hidden)] == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "from fenics_contact.qp.face import Face",
+        "from fenics_contact.qp import face",
+        "def f():\n    import fenics_contact.qp.face",
+    ],
+)
+def test_an_import_past_a_face_is_found(line: str, tmp_path: Path) -> None:
+    hidden = {f"{PACKAGE}.qp.face"}
+    assert len(past_faces(a_module("feti", line, tmp_path), hidden)) == 1
+    assert past_faces(a_module("qp", line, tmp_path / "inside"), hidden) == []
 
 
 @pytest.mark.parametrize("room", sorted(WITHOUT_FENICS))

@@ -16,7 +16,7 @@ from mpi4py import MPI
 from fenics_contact.accuracy import Balanced
 from fenics_contact.contact import Status, solve_scene
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.io import read_result, write_optimisation_result, write_result
 from fenics_contact.io.described_scene import described_scene, readable
 from fenics_contact.optimize import Kind, Result

@@ -11,7 +11,8 @@ from mpi4py import MPI
 
 from fenics_contact import _dolfinx
 from fenics_contact.contact import State, solve_scene
-from fenics_contact.geometry import block, box_partition
+from fenics_contact.gallery import block
+from fenics_contact.partition import box_partition
 from fenics_contact.scene import Body, Scene, Support, Traction
 from tests.feti.scenes import CELLS, STEEL
 from tests.linear import monolithic

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.contact import State
-from fenics_contact.geometry import bisection_partition, block, box_partition
+from fenics_contact.gallery import block
+from fenics_contact.partition import bisection_partition, box_partition
 from fenics_contact.scene import Body, BodyForce, Scene, Support, Traction
 from tests.feti.scenes import RUBBER, STEEL, skewed
 from tests.linear import monolithic

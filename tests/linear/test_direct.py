@@ -9,7 +9,7 @@ from mpi4py import MPI
 from fenics_contact.contact import solve_scene
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti import DirectSystem
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.scene import Body, IsotropicElasticity, Scene, Support, Traction
 
 

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
 from fenics_contact.contact.equilibrium import default_solver
-from fenics_contact.geometry import bisection_partition
+from fenics_contact.partition import bisection_partition
 from fenics_contact.qp import FaceNewton, ProjectedCG, Smalse
 from fenics_contact.scene import Support
 from tests.feti.scenes import CELLS

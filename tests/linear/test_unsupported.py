@@ -8,7 +8,8 @@ from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.errors import InfeasibleError
-from fenics_contact.geometry import block, box_partition
+from fenics_contact.gallery import block
+from fenics_contact.partition import box_partition
 from fenics_contact.scene import Body, Load, Scene, Support, Traction
 from tests.feti.scenes import STEEL
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from fenics_contact.geometry import BodyMesh, block, rectangle
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import IsotropicElasticity, Material, PlaneStrain
 from tests.models.elements import PLANE
 

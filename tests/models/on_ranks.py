@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import box_partition
+from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
     BodyForce,

@@ -12,9 +12,9 @@ import ufl
 from mpi4py import MPI
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.feti.forms import FormLibrary
-from fenics_contact.feti.model_checks import check_kernel
-from fenics_contact.geometry import block, rectangle
+from fenics_contact.fem.forms import FormLibrary
+from fenics_contact.fem.model_checks import check_kernel
+from fenics_contact.gallery import block, rectangle
 from fenics_contact.scene import (
     Body,
     Elasticity,

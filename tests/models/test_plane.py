@@ -7,7 +7,8 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
-from fenics_contact.geometry import BodyMesh, box_partition
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
     Material,

@@ -10,9 +10,9 @@ from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.fem.forms import FormLibrary
 from fenics_contact.feti import build_torn_system, decompose
-from fenics_contact.feti.forms import FormLibrary
-from fenics_contact.geometry import box_partition
+from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
     BodyForce,

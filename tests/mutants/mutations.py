@@ -25,24 +25,24 @@ MUTATIONS = (
     ),
     Mutation(
         "Tresca's bound is too large by a percent",
-        "feti/friction.py",
+        "pairing/friction.py",
         "traction[points.pair] * points.area",
         "1.01 * traction[points.pair] * points.area",
         (CONIC,),
     ),
     Mutation(
         "gaps to rigid obstacles are forgotten",
-        "feti/contact_search.py",
+        "pairing/contact_search.py",
         'gap = asked(obstacle, "distance", slave.surface.points[chosen])',
         'gap = 0.0 * asked(obstacle, "distance", slave.surface.points[chosen])',
         ("tests/contact/test_obstacles.py::test_nodes_lie_outside_of_the_round_obstacle_after_pressing",),
     ),
     Mutation(
         "bodies may overlap",
-        "feti/room.py",
+        "feti/initial_gap.py",
         "FACETING = 0.1",
         "FACETING = 10.0",
-        ("tests/feti/test_contact_search.py::test_overlapping_bodies_are_refused",),
+        ("tests/pairing/test_contact_search.py::test_overlapping_bodies_are_refused",),
     ),
     Mutation(
         "no body is ever too loose",
@@ -161,7 +161,7 @@ MUTATIONS = (
     ),
     Mutation(
         "rows that are free by more than rounding count as held",
-        "feti/contact_points.py",
+        "pairing/contact_points.py",
         "HELD = 1e-6",
         "HELD = 1e-5",
         ("tests/contact/test_symmetry_planes.py::test_what_is_left_free_by_rounding_alone_is_held",),

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.geometry import rectangle
+from fenics_contact.gallery import rectangle
 from fenics_contact.outer import SceneResponse
 from fenics_contact.scene import (
     Body,

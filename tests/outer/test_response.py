@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.errors import InfeasibleError, InvalidDesignError, InvalidInputError
-from fenics_contact.geometry import rectangle
+from fenics_contact.gallery import rectangle
 from fenics_contact.outer import DesignResponse, SceneResponse
 from fenics_contact.scene import Coulomb, Scene, Support
 from tests.outer.pushed import NOMINAL, PUSH, QUANTITIES, response, scene

@@ -11,8 +11,8 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, solve_steps
-from fenics_contact.geometry import box_partition
 from fenics_contact.optimize import BundleTrust, Record, minimize
+from fenics_contact.partition import box_partition
 from fenics_contact.progress import LOGGER_NAME, Event, Kind, Task
 from fenics_contact.qp import FaceNewton, Smalse
 from fenics_contact.timing import PhaseTimer

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fenics_contact.geometry import BodyMesh
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import (
     ContactPair,
     Coulomb,

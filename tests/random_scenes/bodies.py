@@ -6,14 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenics_contact.geometry import (
-    BodyMesh,
-    box_lattice,
-    half_disc,
-    hemisphere,
-    quadratic,
-    rectangle_lattice,
-)
+from fenics_contact.gallery import box_lattice, half_disc, hemisphere, rectangle_lattice
+from fenics_contact.mesh import BodyMesh, quadratic
 from fenics_contact.scene import (
     Body,
     IsotropicElasticity,

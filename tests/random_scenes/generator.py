@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.geometry import bisection_partition, box_partition, graph_partition
+from fenics_contact.partition import bisection_partition, box_partition, graph_partition
 from fenics_contact.scene import (
     Body,
     BodyForce,

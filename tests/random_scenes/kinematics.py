@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.feti import ContactPoints
-from fenics_contact.geometry import BodyMesh
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.pairing import ContactPoints
 from fenics_contact.scene import (
     ContactPair,
     RigidCylinder,

@@ -13,7 +13,8 @@ from mpi4py import MPI
 from scipy.optimize import linprog
 
 from fenics_contact.errors import FenicsContactError, InfeasibleError, InvalidInputError
-from fenics_contact.feti import ContactPoints, TornSystem, build_torn_system, decompose
+from fenics_contact.feti import TornSystem, build_torn_system, decompose
+from fenics_contact.pairing import ContactPoints
 from fenics_contact.scene import ContactPair, Coulomb, Surface, Tie, Tresca, rigid_body_modes
 from tests.random_scenes.generator import Sample
 from tests.random_scenes.kinematics import Side, above, own_distance

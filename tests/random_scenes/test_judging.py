@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.errors import InfeasibleError, InvalidInputError
-from fenics_contact.geometry import block, hemisphere
+from fenics_contact.gallery import block, hemisphere
 from fenics_contact.scene import (
     Body,
     ContactPair,

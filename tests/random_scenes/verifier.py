@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from fenics_contact.contact import State
-from fenics_contact.feti import ContactPoints
+from fenics_contact.pairing import ContactPoints
 from fenics_contact.scene import Coulomb, Tresca, rigid_body_modes
 from tests.random_scenes.generator import Sample
 from tests.random_scenes.kinematics import misplaced

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from fenics_contact.geometry import BodyMesh
-from fenics_contact.geometry.cell_types import CELL_TYPES, FACET_TYPES, CellType
+from fenics_contact.mesh import CELL_TYPES, FACET_TYPES, BodyMesh, CellType
 from fenics_contact.scene import (
     BodyForce,
     IsotropicElasticity,

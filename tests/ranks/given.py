@@ -8,7 +8,9 @@ from typing import Any
 from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
-from fenics_contact.geometry import BodyMesh, bisection_partition, block
+from fenics_contact.gallery import block
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.partition import bisection_partition
 from fenics_contact.scene import (
     Body,
     ContactPair,

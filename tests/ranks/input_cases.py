@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from mpi4py import MPI
 
-from fenics_contact.geometry import bisection_partition, block
+from fenics_contact.gallery import block
+from fenics_contact.partition import bisection_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import block, read_msh
+from fenics_contact.gallery import block
+from fenics_contact.mesh_io import read_msh
 from fenics_contact.scene import Body, IsotropicElasticity, PlaneStrain, Scene, Support, bodies_from
 from tests.conftest import ROOT
 

@@ -10,7 +10,7 @@ import pytest
 
 import fenics_contact.scene as package
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.scene import (
     Body,
     BodyForce,

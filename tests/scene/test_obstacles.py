@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import rectangle
+from fenics_contact.gallery import rectangle
 from fenics_contact.scene import (
     Body,
     ContactPair,

@@ -11,7 +11,8 @@ from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.feti import DirectSystem, DualSystem
-from fenics_contact.geometry import block, box_partition, half_cylinder, half_disc, hemisphere, rectangle
+from fenics_contact.gallery import block, half_cylinder, half_disc, hemisphere, rectangle
+from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
     ConeKind,

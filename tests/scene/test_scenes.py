@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import BodyMesh, block
+from fenics_contact.gallery import block
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import (
     Body,
     BodyForce,

@@ -9,8 +9,9 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, State, solve_scene, solve_steps
-from fenics_contact.geometry import LinkShape, block, box_lattice, box_partition, hemisphere, two_links
+from fenics_contact.gallery import LinkShape, block, box_lattice, hemisphere, two_links
 from fenics_contact.optimize import BundleTrust, LinearConstraints, minimize
+from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
     ContactPair,

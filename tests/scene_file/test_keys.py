@@ -8,7 +8,7 @@ from typing import Literal
 import pytest
 from pydantic import Field, PositiveFloat, ValidationError
 
-from fenics_contact.geometry import LinkShape
+from fenics_contact.gallery import LinkShape
 from fenics_contact.scene import Coulomb
 from fenics_contact.scene_file import json_schema
 from fenics_contact.scene_file.contacts import CoulombFriction

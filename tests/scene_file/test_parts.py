@@ -10,9 +10,9 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact import scene
-from fenics_contact.geometry import block, chain, half_disc, hemisphere, read_msh, rectangle
-from fenics_contact.geometry.gmsh_session import gmsh_model
-from fenics_contact.geometry.ring import LinkShape
+from fenics_contact.gallery import LinkShape, block, chain, half_disc, hemisphere, rectangle
+from fenics_contact.mesh_io import read_msh
+from fenics_contact.mesh_io.gmsh_session import gmsh_model
 from fenics_contact.scene_file import Expression, SceneFile, SceneFileError, VectorExpression, read_scene_file
 from tests.conftest import ROOT
 

@@ -8,7 +8,8 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem
-from fenics_contact.geometry import BodyMesh, DesignSurface, block
+from fenics_contact.gallery import DesignSurface, block
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import (
     Body,
     BodyForce,

@@ -10,13 +10,8 @@ from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
 from fenics_contact.contact import ContactProblem
-from fenics_contact.geometry import (
-    PULL_AXIS,
-    LinkShape,
-    TwoLinks,
-    box_partition,
-    two_links,
-)
+from fenics_contact.gallery import PULL_AXIS, LinkShape, TwoLinks, two_links
+from fenics_contact.partition import box_partition
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,

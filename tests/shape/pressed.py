@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from fenics_contact.contact import ContactResult, Status
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.scene import Body, ContactPair, Coulomb, Scene, Support, Surface
 from fenics_contact.shape import WeakChoice
 from tests.contact.gallery import FLOOR, Friction, crowned

@@ -11,8 +11,8 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem
-from fenics_contact.geometry import box_partition
 from fenics_contact.optimize import BundleTrust, Checkpoint, LinearConstraints, Result, minimize
+from fenics_contact.partition import box_partition
 from fenics_contact.scene import Coulomb
 from fenics_contact.shape import AdaptiveTolerance, ContactForces, ShapeProblem, TotalPotential
 from tests.contact.gallery import partitions

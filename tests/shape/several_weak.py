@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, ContactResult
-from fenics_contact.geometry import DesignSurface, block
+from fenics_contact.gallery import DesignSurface, block
 from fenics_contact.optimize import BundleTrust, Checkpoint, Result, minimize
 from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, Scene, Support, Surface
 from fenics_contact.shape import ContactForces, ShapeProblem, SurfaceDesign

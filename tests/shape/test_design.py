@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.shape import SurfaceDesign
 from fenics_contact.shape.bernstein import bernstein, tensor_bernstein
 from tests.shape.blocks import side

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.scene import (
     Body,
     BodyForce,

@@ -10,7 +10,8 @@ from mpi4py import MPI
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import decompose
-from fenics_contact.geometry import block, box_partition
+from fenics_contact.gallery import block
+from fenics_contact.partition import box_partition
 from fenics_contact.scene import Body, Scene, Support
 from fenics_contact.shape import HarmonicExtension
 from tests.shape.blocks import RUBBER

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.contact import Status
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.scene import (
     Body,
     ContactPair,

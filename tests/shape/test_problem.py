@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, ContactResult
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
-from fenics_contact.geometry import rectangle
+from fenics_contact.gallery import rectangle
 from fenics_contact.scene import Body, Coulomb, PlaneStrain, Scene, Surface, Tie
 from fenics_contact.shape import ContactForces, ShapeProblem, SurfaceDesign, TotalPotential, VolumeIntegral
 from tests.contact.gallery import partitions

@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fenics_contact.feti.contact_points import tangent_frames
-from fenics_contact.geometry import Torus, block
+from fenics_contact.gallery import block
+from fenics_contact.pairing.contact_points import tangent_frames
 from fenics_contact.shape import projection_derivative
 from fenics_contact.shape.projection_derivative import (
     PointDerivatives,
@@ -17,6 +17,7 @@ from fenics_contact.shape.projection_derivative import (
     projection_pulled_back,
 )
 from fenics_contact.shape.surface_derivative import normals_pulled_back
+from fenics_contact.surface_shapes import Torus
 from fenics_contact.surfaces.facets import FacetedSurface, Relief, faceted_surface, outside, shape_functions
 from fenics_contact.surfaces.projection import Projection, project
 from fenics_contact.surfaces.reconstruction import reconstructed

@@ -11,7 +11,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, Status
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.qp import DualSolver, FaceNewton, Smalse
 from fenics_contact.scene import Body, ContactPair, Coulomb, Scene, Support, Surface, Tresca
 from fenics_contact.shape import DesignPoint, TotalPotential, linearise_face

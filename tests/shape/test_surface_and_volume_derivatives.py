@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenics_contact.geometry import BodyMesh, block, rectangle
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.shape.surface_derivative import areas_pulled_back, normals_pulled_back
 from fenics_contact.shape.volume import volume_by_points
 from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface

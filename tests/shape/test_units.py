@@ -12,7 +12,7 @@ import ufl
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, ContactResult, State, Status
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.scene import (
     Body,
     BodyForce,

@@ -11,7 +11,8 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, ContactResult, Status, solve_scene
-from fenics_contact.geometry import BodyMesh, block
+from fenics_contact.gallery import block
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import Body, ContactPair, Coulomb, IsotropicElasticity, Scene, Support, Surface
 from fenics_contact.shape import ContactForces, Objective, WeakChoice, linearise_face
 from tests.contact.gallery import partitions, two_blocks

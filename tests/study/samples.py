@@ -94,7 +94,7 @@ class Machine:
 #: A block pressed on a plane, whose shortening is exact on every mesh; its size 3 cannot be built.
 BLOCK = """
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import rectangle
+from fenics_contact.gallery import rectangle
 from fenics_contact.scene import (
     Body, ContactPair, PlaneStress, RigidPlane, Scene, Support, Surface, Traction,
 )

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenics_contact.geometry import Cylinder, Joined, Plane, SurfaceShape, placed
+from fenics_contact.surface_shapes import Cylinder, Joined, Plane, SurfaceShape, placed
 from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface, shape_values
 from fenics_contact.surfaces.projection import interpolated_normal
 from fenics_contact.surfaces.reconstruction import reconstructed
 from fenics_contact.surfaces.relief import corner_normals, heights
 from fenics_contact.surfaces.true_surface import by_shape, height_over
-from tests.feti.mortar_surfaces import lattice
+from tests.pairing.mortar_surfaces import lattice
 
 CAN = (Cylinder((0, 0, 0), (0, 0, 1), 2.0), Plane((0, 0, 0), (0, 0, 1)))
 FILLET = (Cylinder((0, 0, 0), (0, 1, 0), 1.0), Plane((0, 0, 1), (0, 0, 1)))

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import Cylinder
+from fenics_contact.surface_shapes import Cylinder
 from fenics_contact.surfaces import FacetedSurface, heights
 from fenics_contact.surfaces.reconstruction import reconstructed, without_folds
 from fenics_contact.surfaces.relief import slopes
 from fenics_contact.surfaces.true_surface import height_over
-from tests.feti.mortar_surfaces import lattice
+from tests.pairing.mortar_surfaces import lattice
 
 
 def bump(kind: str) -> FacetedSurface:

@@ -8,13 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fenics_contact.geometry import BodyMesh, Cylinder, Sphere, SurfaceShape, Torus, block, hemisphere
+from fenics_contact.gallery import block, hemisphere
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.surface_shapes import Cylinder, Sphere, SurfaceShape, Torus
 from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface, shape_values
 from fenics_contact.surfaces.projection import interpolated_normal
 from fenics_contact.surfaces.reconstruction import reconstructed
 from fenics_contact.surfaces.relief import heights
 from fenics_contact.surfaces.true_surface import by_shape, height_over, true_surface
-from tests.feti.mortar_surfaces import lattice, ticks
+from tests.pairing.mortar_surfaces import lattice, ticks
 
 TORUS = Torus((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 3.0, 1.0)
 CYLINDER = Cylinder((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 2.0)

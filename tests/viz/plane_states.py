@@ -8,7 +8,8 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import State, Status, solve_scene
-from fenics_contact.geometry import BodyMesh, block, rectangle
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import (
     Body,
     ContactPair,

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from matplotlib.colors import Colormap, to_rgb
 
-from fenics_contact.geometry import block, box_partition
+from fenics_contact.gallery import block
+from fenics_contact.partition import box_partition
 from fenics_contact.viz.colours import (
     BLUE,
     ERROR_MAP,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.viz.fields import BodyFields, gather
 from tests.viz.states import touching_blocks
 

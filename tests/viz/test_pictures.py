@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.geometry import DesignSurface, block, box_partition
+from fenics_contact.gallery import DesignSurface, block
+from fenics_contact.partition import box_partition
 from fenics_contact.scene import Body, IsotropicElasticity, Scene
 from fenics_contact.viz import plot_control_net, plot_convergence, plot_decomposition
 from fenics_contact.viz.curved_net import PIECES, curved_net

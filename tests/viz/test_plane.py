@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.contact import Status
-from fenics_contact.geometry import rectangle
+from fenics_contact.gallery import rectangle
 from fenics_contact.scene import Body, PlaneStrain, Scene
 from fenics_contact.viz import plot_contact_pressure, plot_decomposition, plot_stress
 from fenics_contact.viz.plane import centred

@@ -7,7 +7,7 @@ from typing import Any
 
 import ufl
 
-from fenics_contact.errors.checked import checked
+from fenics_contact.checks import checked
 from fenics_contact.scene.materials.constants import check_isotropic, lame
 from fenics_contact.scene.materials.elasticity import Elasticity, strain
 

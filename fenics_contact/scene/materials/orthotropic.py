@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from fenics_contact.checks import checked
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.errors.checked import checked
 from fenics_contact.scene.materials.constants import numbers
 from fenics_contact.scene.materials.elasticity import Elasticity, strain
 from fenics_contact.scene.materials.voigt import (

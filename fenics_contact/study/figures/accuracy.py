@@ -9,9 +9,7 @@ from fenics_contact.study.errors import Errors
 from fenics_contact.study.figures.series import WIDTH, against, height, logarithmic, panels, series_of, style
 from fenics_contact.study.pareto import pareto_front
 from fenics_contact.study.protocol import QuantityFacts
-from fenics_contact.viz.colours import INK
-from fenics_contact.viz.picture import Picture, draw_picture, png_path
-from fenics_contact.viz.sheet import sheet
+from fenics_contact.viz import INK, Picture, draw_picture, png_path, sheet
 
 
 def plot_accuracy(errors: Errors, path: Path | None = None) -> Picture:

@@ -20,9 +20,7 @@ from fenics_contact.study.figures.series import (
 )
 from fenics_contact.study.protocol import QuantityFacts
 from fenics_contact.study.richardson import measured_rate
-from fenics_contact.viz.colours import INK
-from fenics_contact.viz.picture import Picture, draw_picture, png_path
-from fenics_contact.viz.sheet import sheet
+from fenics_contact.viz import INK, Picture, draw_picture, png_path, sheet
 
 #: Height of the legends under a row of panels in pixels.
 LEGENDS = 120

@@ -11,9 +11,7 @@ from fenics_contact.study.errors import Errors
 from fenics_contact.study.figures.series import WIDTH, style
 from fenics_contact.study.parameters import BALANCED
 from fenics_contact.study.results import Run
-from fenics_contact.viz.colours import BLUE, GREEN, INK, ORANGE
-from fenics_contact.viz.picture import Picture, draw_picture, png_path
-from fenics_contact.viz.sheet import sheet
+from fenics_contact.viz import BLUE, GREEN, INK, ORANGE, Picture, draw_picture, png_path, sheet
 
 #: Part -> words, colour, symbol.
 PARTS = {

@@ -12,9 +12,7 @@ from fenics_contact.study.figures.parts import tolerance_words
 from fenics_contact.study.figures.series import WIDTH, style
 from fenics_contact.study.parameters import BALANCED
 from fenics_contact.study.results import Run
-from fenics_contact.viz.colours import FAMILIES, SPARE
-from fenics_contact.viz.picture import Picture, draw_picture, png_path
-from fenics_contact.viz.sheet import sheet
+from fenics_contact.viz import FAMILIES, SPARE, Picture, draw_picture, png_path, sheet
 
 #: Phases from the bottom of a bar to its top.
 ORDER = (

@@ -12,7 +12,7 @@ from fenics_contact.study.errors import Errors
 from fenics_contact.study.parameters import BALANCED
 from fenics_contact.study.results import Run
 from fenics_contact.study.words import plural
-from fenics_contact.viz.colours import BLUE, GREEN, GREY, ORANGE
+from fenics_contact.viz import BLUE, GREEN, GREY, ORANGE
 
 WIDTH = 1600
 #: Colours and symbols of cells and of discretisations of contact other than the base's, in turn.

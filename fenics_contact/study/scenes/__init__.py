@@ -7,8 +7,8 @@ import importlib.util
 import sys
 from pathlib import Path
 
+from fenics_contact.checks import require_file
 from fenics_contact.errors import InvalidInputError, running
-from fenics_contact.geometry.files import require_file
 from fenics_contact.study.protocol import StudyScene
 
 BUILT_IN = ("hertz", "cattaneo_mindlin", "chain_links")

@@ -27,7 +27,7 @@ import numpy as np
 
 from fenics_contact._libraries import MPI
 from fenics_contact.contact import State, Status
-from fenics_contact.geometry import CELL_TYPES, BodyMesh, quadratic
+from fenics_contact.mesh import CELL_TYPES, BodyMesh, quadratic
 from fenics_contact.scene import Body, ContactPair, Coulomb, LoadStep, PlaneStrain, Scene, Support, Surface
 from fenics_contact.study.parameters import BALANCED, Parameters, Sweep
 from fenics_contact.study.protocol import Outcome, Problem, Quantity, StudyScene

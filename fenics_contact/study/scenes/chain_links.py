@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.geometry import LinkShape, TwoLinks, two_links
+from fenics_contact.gallery import LinkShape, TwoLinks, two_links
 from fenics_contact.scene import (
     Body,
     ContactPair,

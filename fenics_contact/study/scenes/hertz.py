@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.geometry import BodyMesh
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import (
     Body,
     ContactPair,

@@ -8,7 +8,7 @@ import numpy as np
 
 from fenics_contact.contact import State, Status
 from fenics_contact.errors import InfeasibleError, InvalidInputError
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.scene import (
     Body,
     BodyForce,

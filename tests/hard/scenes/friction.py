@@ -9,7 +9,7 @@ import numpy as np
 
 from fenics_contact.contact import State, Status
 from fenics_contact.errors import InfeasibleError
-from fenics_contact.geometry import block
+from fenics_contact.gallery import block
 from fenics_contact.scene import (
     Body,
     BodyForce,

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from fenics_contact.geometry import BodyMesh, block
-from fenics_contact.geometry.quality import jacobians, scaled_jacobian
+from fenics_contact.gallery import block
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.mesh.quality import jacobians, scaled_jacobian
 from fenics_contact.scene import Body, Coulomb, Scene
 from tests.contact.gallery import SOFT, block_on_plane, crowned, two_blocks
 from tests.hard.transform import renumbered_mesh, turned

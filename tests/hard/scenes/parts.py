@@ -7,7 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from fenics_contact.geometry import BodyMesh, block
+from fenics_contact.gallery import block
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import (
     Body,
     ContactPair,

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from fenics_contact.contact import State, Status
-from fenics_contact.geometry import BodyMesh, block, box_lattice, quadratic, rectangle
+from fenics_contact.gallery import block, box_lattice, rectangle
+from fenics_contact.mesh import BodyMesh, quadratic
 from fenics_contact.scene import (
     Body,
     BodyForce,

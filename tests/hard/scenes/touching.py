@@ -8,7 +8,8 @@ from functools import partial
 import numpy as np
 
 from fenics_contact.contact import State, Status
-from fenics_contact.geometry import BodyMesh, block, hemisphere, rectangle
+from fenics_contact.gallery import block, hemisphere, rectangle
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import (
     Body,
     BodyForce,

@@ -1,0 +1,179 @@
+"""Arguments are of the types that a class declares, or refused: others would mean something else unseen."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import reprlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import MISSING, fields, is_dataclass
+from functools import cache
+from types import NoneType, UnionType
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+
+Class = TypeVar("Class", bound=type)
+
+#: Plain types, what they are called, and what else stands for them; a truth value is no number.
+_PLAIN: dict[Any, tuple[str, tuple[type, ...]]] = {
+    float: ("a number", (int, float, np.integer, np.floating)),
+    int: ("an integer", (int, np.integer)),
+    bool: ("True or False", (bool, np.bool_)),
+    str: ("a string", (str,)),
+    NoneType: ("None", (NoneType,)),
+}
+
+
+def checked(*own: str) -> Callable[[Class], Class]:
+    """Let a dataclass refuse values of other types than its fields declare, before its own checks.
+
+    Stands below ``@dataclass``.
+
+    Args:
+        own: Fields whose types the class checks itself.
+
+    Example:
+        >>> from dataclasses import dataclass
+        >>> @dataclass
+        ... @checked()
+        ... class Wire:
+        ...     '''A wire.
+        ...
+        ...     Attributes:
+        ...         radius: Above zero.
+        ...     '''
+        ...     radius: float
+        >>> Wire("thick")
+        Traceback (most recent call last):
+        fenics_contact.errors.InvalidInputError: Wire.radius must be a number, got 'thick': above zero
+    """
+
+    def with_check(cls: Class) -> Class:
+        further = cls.__dict__.get("__post_init__")
+
+        def __post_init__(self: Any) -> None:
+            _check(self, cls, own)
+            if further is not None:
+                further(self)
+
+        __post_init__.__doc__ = getattr(further, "__doc__", None) or "Refuse values of other types."
+        cls.__post_init__ = __post_init__  # type: ignore[attr-defined]
+        return cls
+
+    return with_check
+
+
+def _check(instance: Any, cls: type, own: tuple[str, ...]) -> None:
+    """Refuse the first field whose value does not fit its type.
+
+    Raises:
+        InvalidInputError: What the field must be, what it is, and what it stands for.
+    """
+    hints = _hints(cls)
+    for field in fields(instance):
+        if field.name in own or field.name not in hints:
+            continue
+        name = f"{type(instance).__name__}.{field.name}"
+        wrong = _misfit(getattr(instance, field.name), hints[field.name], name)
+        if wrong is not None:
+            place, hint, value = wrong
+            told = meaning(type(instance), field.name)
+            given = f"{place} must be {_named(hint)}, got {reprlib.repr(value)}"
+            raise InvalidInputError(f"{given}: {told}" if told else given)
+
+
+@cache
+def _hints(cls: type) -> dict[str, Any]:
+    return get_type_hints(cls)
+
+
+def _misfit(value: Any, hint: Any, place: str) -> tuple[str, Any, Any] | None:
+    """Return where a value does not fit, what is declared there and what is there; None if it fits."""
+    if get_origin(hint) in (Union, UnionType):
+        if any(_misfit(value, option, place) is None for option in get_args(hint)):
+            return None
+        # What has the right form tells more exactly where.
+        inner = (_misfit(value, option, place) for option in get_args(hint))
+        return next((wrong for wrong in inner if wrong and wrong[0] != place), (place, hint, value))
+    if not _is_one(value, hint):
+        return place, hint, value
+    for key, part in _parts(value, hint):
+        inside = get_args(hint)[-1 if get_origin(hint) is Mapping else 0]
+        if (wrong := _misfit(part, inside, f"{place}[{key!r}]")) is not None:
+            return wrong
+    return None
+
+
+def _is_one(value: Any, hint: Any) -> bool:
+    """Tell whether a value is what a hint says, whatever it holds."""
+    kind = get_origin(hint) or hint
+    if kind is Any:
+        return True
+    if kind is Literal:
+        return any(value == option and type(value) is type(option) for option in get_args(hint))
+    if kind in _PLAIN:
+        return isinstance(value, _PLAIN[kind][1]) and (kind is bool or not isinstance(value, bool))
+    if kind in (Sequence, tuple):
+        many = value.ndim > 0 if isinstance(value, np.ndarray) else isinstance(value, Sequence)
+        return many and not isinstance(value, str | bytes)
+    if members := _members(kind):
+        return all(hasattr(value, member) for member in members)
+    return callable(value) if kind is Callable else isinstance(value, kind)
+
+
+def _parts(value: Any, hint: Any) -> Sequence[tuple[Any, Any]]:
+    """Return what a sequence or a mapping holds, with places or keys."""
+    kind = get_origin(hint)
+    if kind is Mapping:
+        return list(value.items())
+    return list(enumerate(value)) if kind in (Sequence, tuple) else []
+
+
+def _members(kind: Any) -> list[str]:
+    """Return what a protocol asks for; nothing where it is none."""
+    if not getattr(kind, "_is_protocol", False):
+        return []
+    protocols = [each for each in kind.__mro__ if getattr(each, "_is_protocol", False)]
+    return [name for each in reversed(protocols) for name in vars(each) if not name.startswith("_")]
+
+
+def _named(hint: Any) -> str:
+    """Say what a type asks for."""
+    kind, inside = get_origin(hint) or hint, get_args(hint)
+    if kind in (Union, UnionType, Literal):
+        *first, last = [repr(part) if kind is Literal else _named(part) for part in inside]
+        return f"{', '.join(first)} or {last}" if first else last
+    if kind in _PLAIN:
+        return _PLAIN[kind][0]
+    if kind in (Sequence, tuple):
+        return f"a sequence (each {_named(inside[0])})"
+    if kind is Mapping:
+        return f"a mapping (each value {_named(inside[-1])})"
+    if members := _members(kind):
+        return f"a {kind.__name__} with {', '.join(members[:-1])} and {members[-1]}"
+    if kind is Callable:
+        return "a function"
+    name = str(kind.__name__)
+    if not is_dataclass(kind):
+        return f"a {name}"
+    needed = [field.name for field in fields(kind) if field.default is field.default_factory is MISSING]
+    return f"{name}({', '.join(needed)})"
+
+
+def meaning(owner: Any, name: str) -> str:
+    """Return what the documentation of a class or function says about a field or an argument, "" if nothing.
+
+    Args:
+        owner: The class or function.
+        name: Name of the field or argument.
+    """
+    for known in getattr(owner, "__mro__", (owner,)):
+        text = inspect.cleandoc(known.__doc__ or "")
+        if found := re.search(rf"^    {name}: (.*(?:\n {{8}}.*)*)", text, re.MULTILINE):
+            words = re.split(r"\.(?: |$)", " ".join(found[1].split()))[0].replace("``", "")
+            ordinary = words[1:2].islower() and "'s" not in words.split()[0]  # neither ΔT nor Poisson's
+            return f"{words[0].lower() if ordinary else words[0]}{words[1:]}"
+    return ""

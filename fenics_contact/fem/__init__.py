@@ -1,0 +1,39 @@
+"""Forms of elasticity and of loads, written once on templates and bound to any mesh."""
+
+from __future__ import annotations
+
+from fenics_contact.fem.composition import Composition, composition, integrate, possible
+from fenics_contact.fem.forms import FormLibrary, Template, as_tractions, volume_measure
+from fenics_contact.fem.load_forms import Symbol, is_scalar, load_key, load_name, load_parameters, load_work
+from fenics_contact.fem.model_checks import check_kernel, kernel_of, stiffness_of_cell
+from fenics_contact.fem.nodal_stiffness import cell_stiffness
+from fenics_contact.fem.temperature import Temperature, stress_in_space, stress_left, temperature_of
+from fenics_contact.fem.templates import Templates, Written, scalar_constants
+
+__all__ = [
+    "Composition",
+    "FormLibrary",
+    "Symbol",
+    "Temperature",
+    "Template",
+    "Templates",
+    "Written",
+    "as_tractions",
+    "cell_stiffness",
+    "check_kernel",
+    "composition",
+    "integrate",
+    "is_scalar",
+    "kernel_of",
+    "load_key",
+    "load_name",
+    "load_parameters",
+    "load_work",
+    "possible",
+    "scalar_constants",
+    "stiffness_of_cell",
+    "stress_in_space",
+    "stress_left",
+    "temperature_of",
+    "volume_measure",
+]

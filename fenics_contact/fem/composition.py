@@ -1,0 +1,86 @@
+"""Which material is where on a mesh, and integrals over all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fenics_contact.errors import calling
+from fenics_contact.fem.templates import scalar_constants
+from fenics_contact.scene import Body, Material
+
+#: Builds an integrand (UFL) from a material and its constants.
+OfMaterial = Callable[[Material, Sequence[Any]], Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Composition:
+    """The materials of the cells of one mesh.
+
+    Attributes:
+        materials: The materials.
+        cells: Tag (from 1, in the order of the materials) -> cells of the mesh; None where there is but one.
+    """
+
+    materials: tuple[Material, ...]
+    cells: dict[int, np.ndarray] | None = None
+
+    def same_as(self, other: Composition) -> bool:
+        """Return whether the other has the same materials at the same cells."""
+        if self.materials != other.materials or self.cells is None or other.cells is None:
+            return self.materials == other.materials and self.cells is other.cells
+        return all(np.array_equal(cells, other.cells[tag]) for tag, cells in self.cells.items())
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """Numbers for the constants that `integrate` makes."""
+        return tuple(value for material in self.materials for value in material.parameters)
+
+
+def composition(body: Body, cells: np.ndarray) -> Composition:
+    """Return what some cells of a body are made of.
+
+    Args:
+        body: The body.
+        cells: Cells of the body in the order of the mesh on which forms are to be bound.
+    """
+    materials = body.materials
+    if len(materials) == 1:
+        return Composition(materials)
+    number = body.material_of_cells[cells]
+    here = np.unique(number)
+    if len(here) == 1:
+        return Composition((materials[here[0]],))
+    return Composition(materials, {k + 1: np.flatnonzero(number == k) for k in range(len(materials))})
+
+
+def possible(body: Body) -> tuple[tuple[Material, ...], ...]:
+    """Return the materials of all compositions that parts of a body can have."""
+    single = tuple((material,) for material in body.materials)
+    return single if len(single) == 1 else (*single, body.materials)
+
+
+def integrate(
+    materials: tuple[Material, ...], cell_type: str, integrand: OfMaterial, measure: Any
+) -> tuple[Any, tuple[Any, ...]]:
+    """Return ∫ integrand over all materials (a form) and its constants.
+
+    Args:
+        materials: As in `Composition`.
+        cell_type: Of the template.
+        integrand: Gets each material with its constants.
+        measure: dx on the template.
+    """
+    all_constants: list[Any] = []
+    form = None
+    for number, material in enumerate(materials):
+        constants = scalar_constants(cell_type, len(material.parameters))
+        with calling(f"the UFL of material {type(material).__name__}"):
+            density = integrand(material, constants)
+        part = density * (measure if len(materials) == 1 else measure(number + 1))
+        form = part if form is None else form + part
+        all_constants.extend(constants)
+    return form, tuple(all_constants)

@@ -1,0 +1,162 @@
+"""UFL forms of a scene, each compiled once and bound to every subdomain mesh."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import ufl
+
+from fenics_contact import _dolfinx
+from fenics_contact._libraries import MPI
+from fenics_contact.errors import together
+from fenics_contact.fem.composition import Composition, integrate, possible
+from fenics_contact.fem.load_forms import Symbol, fields_of, load_key, load_name, load_parameters, load_work
+from fenics_contact.fem.model_checks import check_model, unit_cell_stiffness
+from fenics_contact.fem.templates import (
+    LOADED,
+    QUADRATURE_DEGREE,
+    Template,
+    Templates,
+    Written,
+    scalar_constants,
+    surface_measure,
+    volume_measure,
+)
+from fenics_contact.scene import Load, Material, Scene, ThermalStrain, TotalForce, Traction
+from fenics_contact.surfaces import quadrature_areas
+
+__all__ = [
+    "LOADED",
+    "QUADRATURE_DEGREE",
+    "FormLibrary",
+    "Template",
+    "Templates",
+    "as_tractions",
+    "scalar_constants",
+    "surface_measure",
+    "volume_measure",
+]
+
+
+class FormLibrary:
+    """The compiled forms of a scene, by what they express and for which cell type."""
+
+    def __init__(self, comm: MPI.Comm) -> None:
+        """Start empty; `prepare` fills it."""
+        self._comm, self._templates = comm, Templates(comm)
+        self._typical_modulus: dict[tuple[Material, str], float] = {}
+
+    @property
+    def compiled(self) -> tuple[tuple[Any, ...], ...]:
+        """Names of the forms compiled so far."""
+        return self._templates.names
+
+    @property
+    def templates(self) -> Templates:
+        """The compiled forms; what floors above write joins them, when it is asked for."""
+        return self._templates
+
+    def prepare(self, scene: Scene) -> None:
+        """Compile what the scene calls for and is not there yet. Collective on the library's communicator.
+
+        Raises:
+            InvalidInputError: If a material contradicts itself (see `check_model`), or the value of a load
+                has the wrong shape.
+        """
+        for body in scene.bodies.values():
+            cell_type = body.mesh.cell_type
+            for materials in possible(body):
+                self._prepare_stiffness(materials, cell_type)
+        with together(self._comm):
+            for body in scene.bodies.values():
+                for material in body.materials:
+                    self._check(material, body.mesh.cell_type)
+        for load in as_tractions(scene):
+            body = scene.bodies[load.body]
+            for materials in possible(body):
+                self._prepare_load(load, materials, body.mesh.cell_type)
+
+    def stiffness(self, parts: Composition, cell_type: str, space: Any) -> Any:
+        """Return the bilinear form of the materials ``parts`` bound to ``space``."""
+        template = self._templates["stiffness", parts.materials, cell_type]
+        return template.bind([space, space], parts.parameters, cells=parts.cells)
+
+    def load(
+        self,
+        load: Load,
+        parts: Composition,
+        cell_type: str,
+        space: Any,
+        points: np.ndarray,
+        facets: Any = None,
+    ) -> Any:
+        """Return the linear form of ``load`` bound to ``space``.
+
+        Args:
+            load: The load; a resultant must have been spread.
+            parts: Materials of the mesh.
+            cell_type: Of the mesh.
+            space: Displacements on the mesh.
+            points: Coordinates by input node of the mesh, shape (n, dim), [length].
+            facets: (cells, local facets) that a surface load acts on.
+        """
+        template = self._templates[load_key(load, parts.materials, cell_type)]
+        cells = parts.cells if isinstance(load, ThermalStrain) else None
+        functions = fields_of(load, space, points)
+        return template.bind([space], load_parameters(load, parts), functions, facets, cells=cells)
+
+    def varies(self, material: Material, cell_type: str) -> bool:
+        """Return whether the stiffness of a material mentions the place that it is at."""
+        return self._templates["stiffness", (material,), cell_type].mentions(ufl.geometry.SpatialCoordinate)
+
+    def typical_modulus(self, material: Material, cell_type: str) -> float:
+        """Return the mean diagonal entry of the stiffness of a cell of edge length one.
+
+        [force / length²] times [length^(dim − 2)]; a measure of how stiff materials are beside one another.
+        """
+        return self._typical_modulus[material, cell_type]
+
+    def _check(self, material: Material, cell_type: str) -> None:
+        if (material, cell_type) in self._typical_modulus:
+            return
+        parts = Composition((material,))
+
+        def bind(space: Any) -> Any:
+            return self.stiffness(parts, cell_type, space)
+
+        check_model(material, cell_type, bind)
+        stiffness = unit_cell_stiffness(cell_type, bind)
+        self._typical_modulus[material, cell_type] = float(np.diag(stiffness).mean())
+
+    def _prepare_stiffness(self, materials: tuple[Material, ...], cell_type: str) -> None:
+        def write() -> Written:
+            V = _dolfinx.displacement_space(cell_type)
+            u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
+            form, constants = integrate(
+                materials, cell_type, lambda m, c: m.stiffness(u, v, c), volume_measure(cell_type)
+            )
+            return form, constants, ()
+
+        name = ("stiffness", *(type(material) for material in materials), cell_type)
+        self._templates.get(("stiffness", materials, cell_type), name, write)
+
+    def _prepare_load(self, load: Load, materials: tuple[Material, ...], cell_type: str) -> None:
+        def write() -> Written:
+            v = ufl.TestFunction(_dolfinx.displacement_space(cell_type))
+            symbol = Symbol(load, cell_type)
+            form, constants = load_work(load, materials, cell_type, symbol.expression, v)
+            return form, (*symbol.constants, *constants), symbol.coefficients
+
+        self._templates.get(load_key(load, materials, cell_type), load_name(load, cell_type), write)
+
+
+def as_tractions(scene: Scene) -> tuple[Load, ...]:
+    """Return the scene's loads with every resultant spread over the present area of its surface."""
+    return tuple(_spread(scene, load) if isinstance(load, TotalForce) else load for load in scene.loads)
+
+
+def _spread(scene: Scene, load: TotalForce) -> Traction:
+    mesh = scene.bodies[load.body].mesh
+    area = float(quadrature_areas(mesh.points, mesh.surfaces[load.surface]).sum())
+    return Traction(load.body, load.surface, tuple(component / area for component in load.value))

@@ -1,0 +1,130 @@
+"""Virtual work of loads in UFL, and the numbers and fields to bind it with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import ufl
+
+from fenics_contact import _dolfinx
+from fenics_contact.errors import InvalidInputError, calling
+from fenics_contact.fem.composition import Composition, integrate
+from fenics_contact.fem.templates import scalar_constants, surface_measure, volume_measure
+from fenics_contact.scene import BodyForce, Load, Material, Pressure, ThermalStrain, Ufl, evaluate, strain
+
+#: Coefficients of loads are counted from here, behind those of displacement fields.
+FIRST_COUNT = 4
+KIND = {BodyForce: "body force", ThermalStrain: "thermal strain", Pressure: "pressure"}
+
+
+def is_scalar(load: Load) -> bool:
+    """Return whether the value of a load is a scalar."""
+    return isinstance(load, Pressure | ThermalStrain)
+
+
+def load_name(load: Load, cell_type: str) -> tuple[Any, ...]:
+    """Return what the form of a load is called: kind, how its value is given, cell type."""
+    given = "UFL" if isinstance(load.value, Ufl) else "of position" if callable(load.value) else "numbers"
+    return (KIND.get(type(load), "surface load"), given, cell_type)
+
+
+def load_key(load: Load, materials: tuple[Material, ...], cell_type: str) -> tuple[Any, ...]:
+    """Return all that the form of a load depends on."""
+    own = load.value if isinstance(load.value, Ufl) else None
+    return (*load_name(load, cell_type), own, materials if isinstance(load, ThermalStrain) else ())
+
+
+class Symbol:
+    """The value of a load as UFL, with the constants and coefficients that stand for it."""
+
+    def __init__(self, load: Load, cell_type: str, number: int = 0) -> None:
+        """Write the value of ``load``; ``number`` tells apart the loads of one form."""
+        dim = _dolfinx.dimension(cell_type)
+        self.constants: tuple[Any, ...] = ()
+        self.coefficients: tuple[Any, ...] = ()
+        if isinstance(load.value, Ufl):
+            self.expression = from_ufl(load, load.value, cell_type)
+        elif callable(load.value):
+            nodal = _dolfinx.nodal_space if is_scalar(load) else _dolfinx.displacement_space
+            self.expression = ufl.Coefficient(nodal(cell_type), count=FIRST_COUNT + number)
+            self.coefficients = (self.expression,)
+        else:
+            self.constants = scalar_constants(cell_type, 1 if is_scalar(load) else dim)
+            self.expression = self.constants[0] if is_scalar(load) else ufl.as_vector(list(self.constants))
+
+
+def from_ufl(load: Load, value: Ufl, cell_type: str) -> Any:
+    """Return a value given as `Ufl`, written on the template, after a check of its shape."""
+    dim = _dolfinx.dimension(cell_type)
+    shape = () if is_scalar(load) else (dim,)
+    with calling(f"the function given as Ufl of {type(load).__name__} on body {load.body!r}"):
+        found = value.function(ufl.SpatialCoordinate(_dolfinx.template(cell_type)))
+        found = ufl.as_vector(list(found)) if isinstance(found, list | tuple) else ufl.as_ufl(found)
+    if found.ufl_shape != shape:
+        raise InvalidInputError(
+            f"the UFL value of {type(load).__name__} on body {load.body!r} must have shape {shape}, got "
+            f"{found.ufl_shape}: return {'a scalar' if is_scalar(load) else f'a vector of {dim} components'}"
+        )
+    return found
+
+
+def numbers_of(load: Load) -> tuple[float, ...]:
+    """Return the numbers for a symbol's constants."""
+    if callable(load.value) or isinstance(load.value, Ufl):
+        return ()
+    return tuple(load.value) if isinstance(load.value, Sequence) else (float(load.value),)
+
+
+def fields_of(load: Load, space: Any, points: np.ndarray) -> tuple[Any, ...]:
+    """Return the Functions for a symbol's coefficients.
+
+    Args:
+        load: The load.
+        space: Space of displacements on the mesh.
+        points: Coordinates by input node of that mesh, shape (n, dim), [length].
+    """
+    if isinstance(load.value, Ufl) or not callable(load.value):
+        return ()
+    space = _dolfinx.scalar_space(space.mesh, 1) if is_scalar(load) else space
+    nodes, dofs = _dolfinx.node_dofs(space)
+    dim = points.shape[1]
+    shape = () if is_scalar(load) else (dim,)
+    name = f"{type(load).__name__} on body {load.body!r}"
+    field = _dolfinx.fem.Function(space, name="load")
+    field.x.array.reshape(-1, 1 if is_scalar(load) else dim)[dofs] = evaluate(
+        name, load.value, points[nodes], shape
+    ).reshape(len(nodes), -1)
+    return (field,)
+
+
+def load_work(
+    load: Load, materials: tuple[Material, ...], cell_type: str, value: Any, v: Any
+) -> tuple[Any, tuple[Any, ...]]:
+    """Return the virtual work of a load along ``v``, a UFL form, and the constants of the materials in it.
+
+    Args:
+        load: A load whose resultant, if it is one, was spread already.
+        materials: Of the cells it acts on.
+        cell_type: Of the template.
+        value: Value of the load (UFL), see `Symbol`.
+        v: Test function or another field.
+    """
+    if isinstance(load, ThermalStrain):
+
+        def thermal(material: Any, constants: Sequence[Any]) -> Any:
+            return value * ufl.inner(material.thermal_stress(constants), strain(v))
+
+        return integrate(materials, cell_type, thermal, volume_measure(cell_type, 2))
+    if isinstance(load, BodyForce):
+        return ufl.dot(value, v) * volume_measure(cell_type, 2), ()
+    if isinstance(load, Pressure):
+        normal = ufl.FacetNormal(_dolfinx.template(cell_type))
+        return -value * ufl.dot(normal, v) * surface_measure(cell_type), ()
+    return ufl.dot(value, v) * surface_measure(cell_type), ()
+
+
+def load_parameters(load: Load, parts: Composition) -> tuple[float, ...]:
+    """Return the numbers for the constants of a load's form: its own, then those of the materials."""
+    return numbers_of(load) + (parts.parameters if isinstance(load, ThermalStrain) else ())

@@ -1,0 +1,105 @@
+"""The temperature change of a body in UFL, and the stress that is left when it has strained the body."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import ufl
+
+from fenics_contact import _dolfinx
+from fenics_contact.fem.load_forms import FIRST_COUNT, from_ufl
+from fenics_contact.fem.templates import scalar_constants
+from fenics_contact.scene import Load, Material, ThermalStrain, Transverse, Ufl, evaluate
+
+
+@dataclass(frozen=True)
+class Temperature:
+    """The sum of the temperature changes of one body.
+
+    Attributes:
+        loads: They; none means that no temperature enters any form.
+    """
+
+    loads: tuple[ThermalStrain, ...] = ()
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """All of it that a form depends on."""
+        return bool(self._numbers), bool(self._of_position), tuple(load.value for load in self._ufl)
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Numbers for the constants: the sum of the uniform changes."""
+        return (sum(self._numbers),) if self._numbers else ()
+
+    def write(self, cell_type: str) -> tuple[Any, tuple[Any, ...], tuple[Any, ...]]:
+        """Return ΔT (UFL, None without loads), its constants and its coefficients."""
+        constants = scalar_constants(cell_type, 1) if self._numbers else ()
+        coefficients: tuple[Any, ...] = ()
+        if self._of_position:
+            coefficients = (ufl.Coefficient(_dolfinx.nodal_space(cell_type), count=FIRST_COUNT),)
+        terms = [*constants, *coefficients, *(from_ufl(load, load.value, cell_type) for load in self._ufl)]
+        return (sum(terms[1:], terms[0]) if terms else None), constants, coefficients
+
+    def fields(self, mesh: Any, points: np.ndarray) -> tuple[Any, ...]:
+        """Return the Functions for the coefficients.
+
+        Args:
+            mesh: The mesh.
+            points: Coordinates by input node, shape (n, dim), [length].
+        """
+        if not self._of_position:
+            return ()
+        space = _dolfinx.scalar_space(mesh, 1)
+        nodes, dofs = _dolfinx.node_dofs(space)
+        field = _dolfinx.fem.Function(space, name="temperature")
+        for load in self._of_position:
+            field.x.array[dofs] += evaluate("temperature_change", load.value, points[nodes], ())
+        return (field,)
+
+    @property
+    def _numbers(self) -> list[float]:
+        return [load.value for load in self.loads if isinstance(load.value, float)]
+
+    @property
+    def _ufl(self) -> list[Any]:
+        return [load for load in self.loads if isinstance(load.value, Ufl)]
+
+    @property
+    def _of_position(self) -> list[Any]:
+        return [load for load in self.loads if not isinstance(load.value, float | Ufl)]
+
+
+def temperature_of(loads: Iterable[Load], body: str) -> Temperature:
+    """Return the temperature change of a body."""
+    return Temperature(tuple(load for load in loads if isinstance(load, ThermalStrain) and load.body == body))
+
+
+def stress_left(material: Any, u: Any, constants: Sequence[Any], temperature: Any) -> Any:
+    """Return the stress (dim x dim, UFL) of a displacement at a temperature change.
+
+    Args:
+        material: The material.
+        u: The displacement (UFL).
+        constants: The material's constants.
+        temperature: ΔT (UFL) or None.
+    """
+    stress = material.stress(u, constants)
+    return stress if temperature is None else stress - temperature * material.thermal_stress(constants)
+
+
+def stress_in_space(material: Material, u: Any, constants: Sequence[Any], temperature: Any) -> Any:
+    """Return the stress (3 x 3, UFL), in the plane with what the material carries normal to it."""
+    stress = stress_left(material, u, constants, temperature)
+    if stress.ufl_shape == (3, 3):
+        return stress
+    normal: Any = 0
+    if isinstance(material, Transverse):
+        normal = material.transverse_stress(u, constants)
+        if temperature is not None:
+            normal = normal - temperature * material.transverse_thermal_stress(constants)
+    rows = [[stress[i, j] for j in range(2)] + [0] for i in range(2)]
+    return ufl.as_tensor([*rows, [0, 0, normal]])

@@ -1,0 +1,63 @@
+"""Room between surfaces: faceting takes some away, supports must not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.contact_rows import Relations
+from fenics_contact.pairing import ContactPoints
+from fenics_contact.scene import Scene
+
+#: Supports hold a point along its normal if they leave no larger part of it free: normals of facets are
+#: tilted a little, and what only slips down that tilt makes no room.
+SLIGHT = 0.02
+#: Penetration that faceting explains, relative to the size of a slave facet.
+FACETING = 0.1
+
+
+def check_no_penetration(scene: Scene, points: ContactPoints) -> None:
+    """Refuse a start geometry whose bodies overlap by more than their faceting explains.
+
+    Raises:
+        InvalidInputError: Names the pair, the number of nodes and the depth.
+    """
+    allowed = -_explained(points)
+    deep = points.gap < allowed
+    if deep.any():
+        worst = int(np.argmin(points.gap))
+        pair = scene.contacts[int(points.pair[worst])]
+        raise InvalidInputError(
+            f"bodies must not overlap at the start: {int(deep.sum())} nodes of {pair.slave.body!r} lie up to "
+            f"{-points.gap[worst]:.3g} inside the master, more than the faceting of the surfaces explains "
+            f"({-allowed[worst]:.3g}): move the bodies apart"
+        )
+
+
+def gap_with_room(normal: Relations, fixed: np.ndarray, prescribed: np.ndarray) -> np.ndarray:
+    """Return the gaps; between surfaces that supports hold, what faceting takes away is given back.
+
+    Args:
+        normal: The normal rows of all contact points.
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+        prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
+
+    Raises:
+        InvalidInputError: If supports press surfaces into one another.
+    """
+    points = normal.points
+    missing = np.where(normal.freedom(fixed) <= SLIGHT, normal.of_supports(prescribed) - points.gap, 0.0)
+    pressed = missing > _explained(points)
+    if pressed.any():
+        raise InvalidInputError(
+            f"supports must leave room between surfaces that they hold on both sides, but {pressed.sum()} "
+            f"contact nodes are pressed up to {missing.max():.3g} into their master: prescribe one of the "
+            "bodies only, or another displacement"
+        )
+    return points.gap + np.maximum(missing, 0.0)
+
+
+def _explained(points: ContactPoints) -> np.ndarray:
+    """Return the penetration that faceting explains at each point, [length]."""
+    dim = points.normal.shape[1]
+    return np.asarray(FACETING * points.area ** (1.0 / (dim - 1)))

@@ -1,0 +1,247 @@
+"""The mesh of one body: coordinates, cells, named surfaces; checked once, then passed around as a value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from fenics_contact.mesh import quality
+from fenics_contact.mesh.cell_types import cell_type_of
+from fenics_contact.mesh.coincidence import check_no_coincident_nodes
+from fenics_contact.mesh.shape_fit import check_shapes
+from fenics_contact.mesh.similarity import similarity
+from fenics_contact.mesh.validation import (
+    check_jacobians,
+    checked_cells,
+    checked_grid,
+    checked_points,
+    checked_regions,
+    checked_surfaces,
+)
+from fenics_contact.surface_shapes import SurfaceShape, placed
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMesh:
+    """Cells of one body, replicated on all ranks.
+
+    Three coordinates make hexahedra or tetrahedra of it, two quadrilaterals or triangles. The arrays are
+    copied and made read-only; a body that moves is a new value, see `moved`.
+
+    Attributes:
+        points: Coordinates, (n_nodes, 3 | 2) float64, in the scene's unit of length.
+        cells: Node numbers, (n_cells, 8) for hexahedra, (n_cells, 4) for tetrahedra; in two dimensions
+            (n_cells, 4) for quadrilaterals, (n_cells, 3) for triangles; quadratic hexahedra have 27 nodes,
+            quadratic quadrilaterals 9 and triangles 6 (`quadratic` makes them); int64, nodes in the order of
+            VTK, Jacobian positive (in two dimensions: counter-clockwise).
+        surfaces: Name to facets, (n_facets, 4 | 3) int64 node numbers in cyclic order, the right-hand
+            normal pointing out of the body. In two dimensions (n_facets, 2) edges with the body on their
+            left: run through in their direction, the boundary goes round the body counter-clockwise. Facets
+            of quadratic cells have their midpoints after the corners, 9 or 3 nodes in all.
+        grid: Structured index of every cell, (n_cells, 3 | 2) int64, or None. The simplices that a cell was
+            split into share its index.
+        regions: Name to ascending cell numbers, int64, of the parts of the body that differ, in their
+            material for instance; no part unless given, else every cell belongs to exactly one.
+        coincident_nodes: Whether nodes may lie at the same place, as on the two sides of a crack.
+        shapes: Name of a surface to the true shape that its facets stand for, such as a `Cylinder`; contact
+            asks it for gaps and normals. Those of other surfaces are reconstructed from their nodes.
+
+    Raises:
+        InvalidInputError: If an array has the wrong shape or type, a coordinate is not finite, a node
+            number is out of range or unused, a cell is inverted, nodes coincide, a facet is not an outward
+            boundary face or is listed twice, the regions overlap or leave out a cell, or a surface does not
+            lie on its shape.
+
+    Example:
+        A square of two triangles, whose lower edge is named.
+
+        >>> corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+        >>> mesh = BodyMesh(corners, [[0, 1, 2], [0, 2, 3]], {"bottom": [[0, 1]]})
+        >>> mesh.dim, mesh.n_nodes, mesh.volume
+        (2, 4, 1.0)
+    """
+
+    points: np.ndarray
+    cells: np.ndarray
+    surfaces: Mapping[str, np.ndarray] = field(default_factory=dict)
+    grid: np.ndarray | None = None
+    regions: Mapping[str, np.ndarray] = field(default_factory=dict)
+    coincident_nodes: bool = False
+    shapes: Mapping[str, SurfaceShape] = field(default_factory=dict)
+    _origin: BodyMesh | None = field(default=None, init=False, repr=False)
+    _off_shapes: Mapping[str, np.ndarray] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check everything, cheap things first."""
+        points = checked_points(self.points)
+        cells = checked_cells(self.cells, *points.shape)
+        self._set(
+            points=points,
+            cells=cells,
+            grid=checked_grid(self.grid, cells.shape[0], points.shape[1]),
+            regions=checked_regions(self.regions, cells.shape[0]),
+        )
+        check_jacobians(
+            points, cells, "list the vertices of the cells in VTK order and check the coordinates"
+        )
+        if not self.coincident_nodes:
+            check_no_coincident_nodes(points)
+        self._set(surfaces=checked_surfaces(self.surfaces, cells, *points.shape))
+        self._set(_off_shapes=check_shapes(self.points, self.surfaces, self.shapes))
+
+    def _set(self, **values: object) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def cell_type(self) -> str:
+        """Name of the type of cells.
+
+        ``"hexahedron"``, ``"tetrahedron"``, ``"quadrilateral"`` or ``"triangle"``; the quadratic ones are
+        ``"hexahedron27"``, ``"quadrilateral9"`` and ``"triangle6"``.
+        """
+        return cell_type_of(self.cells, self.dim).name
+
+    @property
+    def order(self) -> int:
+        """Degree of the displacements and of the map from the reference cell, 1 or 2."""
+        return cell_type_of(self.cells, self.dim).order
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space the body lies in, 2 or 3."""
+        return int(self.points.shape[1])
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return int(self.points.shape[0])
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells."""
+        return int(self.cells.shape[0])
+
+    @property
+    def volume(self) -> float:
+        """Volume of the body, in two dimensions its area; exact for its cells."""
+        return quality.volume(self.points, self.cells)
+
+    @property
+    def origin(self) -> BodyMesh:
+        """The mesh for which its shapes were given, before it was `reshaped`; else the mesh itself."""
+        return self if self._origin is None else self._origin
+
+    @property
+    def off_shapes(self) -> Mapping[str, np.ndarray]:
+        """Name of a surface with a shape to how far each of its nodes, ascending, lies off the shape.
+
+        Relative to the shortest edge around the node, as found when the mesh got its shapes.
+        """
+        return self._off_shapes
+
+    def with_shapes(self, shapes: Mapping[str, SurfaceShape]) -> BodyMesh:
+        """Return the same mesh with these shapes of its surfaces and no others.
+
+        Args:
+            shapes: Name of a surface -> its shape in the present place.
+
+        Raises:
+            InvalidInputError: If there is no such surface, or its nodes do not lie on the shape.
+        """
+        off = check_shapes(self.points, self.surfaces, shapes)
+        result = copy(self)
+        result._set(shapes=dict(shapes), _origin=None, _off_shapes=off)
+        return result
+
+    def placed(self, rotation: np.ndarray, translation: np.ndarray, scale: float = 1.0) -> BodyMesh:
+        """Return the mesh scaled and turned about the origin of coordinates, then moved; so are its shapes.
+
+        Args:
+            rotation: Proper rotation matrix, (3, 3) or (2, 2).
+            translation: Displacement, (3,) or (2,), [length].
+            scale: Positive factor on all coordinates.
+        """
+        result = self._at(scale * self.points @ np.asarray(rotation).T + translation)
+        shift = tuple(float(component) for component in translation)
+        shapes = {name: placed(shape, rotation, shift, scale) for name, shape in self.shapes.items()}
+        origin = self._origin and self._origin.placed(rotation, translation, scale)
+        result._set(shapes=shapes, _origin=origin)
+        return result
+
+    def moved(self, points: np.ndarray) -> BodyMesh:
+        """Return the same mesh at new coordinates.
+
+        Cells, surfaces, grid and regions are shared with this mesh and not checked again, nor is whether
+        nodes coincide. Its shapes come along where the mesh is only scaled, turned and shifted; where it is
+        deformed, they are not known any more.
+
+        Args:
+            points: New coordinates, (n_nodes, 3 | 2).
+
+        Returns:
+            The moved mesh.
+
+        Raises:
+            InvalidInputError: If the shape is wrong, a coordinate is not finite or a cell is inverted.
+        """
+        result = self._at(points)
+        motion = similarity(self.points, result.points) if self.shapes else None
+        if motion is not None:
+            return self.placed(*motion)
+        result._set(shapes={}, _origin=None, _off_shapes={})
+        return result
+
+    def reshaped(self, points: np.ndarray) -> BodyMesh:
+        """Return the mesh at slightly different coordinates, as `moved`; its shapes follow the nodes.
+
+        What a surface is between its nodes, and how its normals differ from those of its facets, stays as it
+        was; so gaps are smooth functions of the coordinates.
+
+        Args:
+            points: New coordinates, (n_nodes, 3 | 2).
+        """
+        result = self._at(points)
+        result._set(_origin=self.origin)
+        return result
+
+    def _at(self, points: np.ndarray) -> BodyMesh:
+        new_points = checked_points(points, self.points.shape)
+        check_jacobians(
+            new_points,
+            self.cells,
+            "move the nodes less, spread the motion over more cells, or coarsen the mesh there",
+        )
+        result = copy(self)
+        result.__dict__.pop("linear", None)
+        result._set(points=new_points)
+        return result
+
+    @cached_property
+    def linear(self) -> BodyMesh:
+        """The linear cells through the same nodes; the mesh itself unless its cells are quadratic.
+
+        Contact is searched and pictures are drawn on them. Each cell of order two makes 2^dim of them, one
+        after the other; facets in the same way. There is no grid.
+        """
+        kind = cell_type_of(self.cells, self.dim)
+        if kind.order == 1:
+            return self
+        count, pieces = len(kind.pieces), kind.face_pieces
+        result = copy(self)
+        result._set(
+            cells=self.cells[:, kind.pieces].reshape(-1, kind.pieces.shape[1]),
+            surfaces={
+                name: facets[:, pieces].reshape(-1, pieces.shape[1]) for name, facets in self.surfaces.items()
+            },
+            grid=None,
+            regions={
+                name: (count * cells[:, None] + np.arange(count)).ravel()
+                for name, cells in self.regions.items()
+            },
+        )
+        return result

@@ -1,0 +1,202 @@
+"""Faces of cells: numbering, neighbours, boundary, outward orientation.
+
+A face is written as its node numbers in cyclic order, such that the right-hand rule gives the normal
+that points out of the cell. In two dimensions faces are edges, listed such that the cell lies to the left of
+them. Faces of quadratic cells list their corners first, then the midpoints of the edges that follow the
+corners, then the centre. Two faces are the same when they have the same corners.
+
+Cells of four nodes are tetrahedra unless the caller says ``dim=2``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.cell_types import HEXAHEDRON27, cell_type_of
+
+
+def cell_faces(cells: np.ndarray, dim: int = 3) -> np.ndarray:
+    """List the faces of every cell, outward.
+
+    Args:
+        cells: Node numbers, (n_cells, 8) for hexahedra, (n_cells, 4) for tetrahedra or (dim=2)
+            quadrilaterals, (n_cells, 3) for triangles; quadratic ones have 27, 9 or 6.
+        dim: Dimension of the space, 2 or 3.
+
+    Returns:
+        Node numbers of the faces, (n_cells, faces of a cell, nodes of a face).
+    """
+    return cells[:, cell_type_of(cells, dim).faces]
+
+
+def corners_of(faces: np.ndarray, dim: int) -> np.ndarray:
+    """Return the corners of faces, linear or quadratic, in cyclic order, (n, 4 | 3 | 2)."""
+    return faces[:, : min(faces.shape[1], 4 if dim == 3 else 2)]
+
+
+def face_keys(faces: np.ndarray) -> np.ndarray:
+    """Reduce faces to two integers each that do not depend on the order of the nodes.
+
+    Args:
+        faces: Node numbers, (n, 4 | 3 | 2) or of quadratic cells (n, 9 | 3), all below 2**31.
+
+    Returns:
+        (n, 2) int64; equal rows belong to faces with equal nodes.
+    """
+    nodes = np.zeros((faces.shape[0], 4), dtype=np.int64)
+    corners = faces[:, :4]
+    nodes[:, : corners.shape[1]] = np.sort(corners, axis=1)
+    return (nodes[:, [0, 2]] << 31) + nodes[:, [1, 3]]
+
+
+def number_faces(faces: np.ndarray) -> np.ndarray:
+    """Number faces so that those with the same nodes get the same number.
+
+    Args:
+        faces: Node numbers, as in `face_keys`.
+
+    Returns:
+        (n,) int64 numbers from 0 without holes.
+    """
+    if faces.shape[0] == 0:
+        return np.zeros(0, dtype=np.int64)
+    keys = face_keys(faces)
+    order = np.lexsort((keys[:, 1], keys[:, 0]))
+    changes = np.any(np.diff(keys[order], axis=0) != 0, axis=1)
+    numbers = np.empty(faces.shape[0], dtype=np.int64)
+    numbers[order] = np.concatenate([[0], np.cumsum(changes)])
+    return numbers
+
+
+def boundary_faces(cells: np.ndarray, dim: int = 3) -> tuple[np.ndarray, np.ndarray]:
+    """Extract the faces that belong to one cell only.
+
+    Args:
+        cells: Node numbers, as in `cell_faces`.
+        dim: Dimension of the space, 2 or 3.
+
+    Returns:
+        The faces, outward, (n, nodes of a face), and the cell that each belongs to, (n,), ascending.
+    """
+    faces = cell_faces(cells, dim)
+    flat = faces.reshape(-1, faces.shape[2])
+    numbers = number_faces(flat)
+    single = np.flatnonzero(np.bincount(numbers)[numbers] == 1)
+    return flat[single], single // faces.shape[1]
+
+
+def neighbours(cells: np.ndarray, dim: int = 3) -> np.ndarray:
+    """Find the pairs of cells that share a face.
+
+    Args:
+        cells: Node numbers, as in `cell_faces`.
+        dim: Dimension of the space, 2 or 3.
+
+    Returns:
+        (n_pairs, 2) cell numbers.
+
+    Raises:
+        InvalidInputError: If more than two cells share a face.
+    """
+    faces = cell_faces(cells, dim)
+    flat = faces.reshape(-1, faces.shape[2])
+    numbers = number_faces(flat)
+    counts = np.bincount(numbers)
+    if counts.max() > 2:
+        worst = flat[np.argmax(numbers == np.argmax(counts))]
+        raise InvalidInputError(
+            f"a face must belong to at most 2 cells, the face with nodes {worst.tolist()} belongs to "
+            f"{counts.max()}: remove duplicated or overlapping cells"
+        )
+    order = np.argsort(numbers, kind="stable")
+    order = order[counts[numbers[order]] == 2]
+    return (order // faces.shape[1]).reshape(-1, 2)
+
+
+def match_faces(faces: np.ndarray, candidates: np.ndarray) -> np.ndarray:
+    """Find each face among the candidates, whatever its orientation.
+
+    Args:
+        faces: Node numbers, (n, k).
+        candidates: Node numbers, (m, k), all different faces.
+
+    Returns:
+        (n,) positions in ``candidates``, -1 where there is none.
+    """
+    numbers = number_faces(np.concatenate([candidates, faces]))
+    position = np.full(numbers.max(initial=-1) + 1, -1, dtype=np.int64)
+    position[numbers[: candidates.shape[0]]] = np.arange(candidates.shape[0])
+    return position[numbers[candidates.shape[0] :]]
+
+
+def orient(cells: np.ndarray, facets: np.ndarray, dim: int = 3) -> np.ndarray:
+    """Write boundary facets as the cells have them: cyclic and outward.
+
+    Args:
+        cells: Node numbers, as in `cell_faces`.
+        facets: Node numbers, (n, nodes of a face), the corners in any order.
+        dim: Dimension of the space, 2 or 3.
+
+    Returns:
+        The same facets, outward.
+
+    Raises:
+        InvalidInputError: If a facet is not on the boundary.
+    """
+    boundary, _ = boundary_faces(cells, dim)
+    found = match_faces(corners_of(facets, dim), corners_of(boundary, dim))
+    if np.any(found < 0):
+        lost = np.flatnonzero(found < 0)
+        raise InvalidInputError(
+            f"facets must be boundary faces of the cells, {lost.size} of {facets.shape[0]} are not, first "
+            f"facet {lost[0]} with nodes {facets[lost[0]].tolist()}: take them from `boundary_faces(cells)`"
+        )
+    return boundary[found]
+
+
+def start_at_smallest(facets: np.ndarray) -> np.ndarray:
+    """Rotate every facet so that it starts at its smallest node; equal cycles become equal rows.
+
+    Edges stay as they are: both directions would be one cycle, but differ in the side the normal points to.
+
+    Args:
+        facets: Node numbers in cyclic order, (n, k).
+
+    Returns:
+        The rotated facets, (n, k).
+    """
+    k = facets.shape[1]
+    if k == 2:
+        return facets
+    columns = (np.argmin(facets, axis=1)[:, None] + np.arange(k)) % k
+    return np.take_along_axis(facets, columns, axis=1)
+
+
+def vector_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
+    """Integrate the outward normal over every facet.
+
+    The vector area of a bilinear facet is half the cross product of its diagonals, exactly. In two dimensions
+    it is the chord turned clockwise by a right angle, whatever the edge between its ends. Quadratic facets in
+    space are looked at as four bilinear ones. Over a closed surface the vector areas add up to zero.
+
+    Args:
+        points: Coordinates, (n_nodes, 3 | 2).
+        facets: Node numbers in cyclic order, (n, 4 | 3) or quadratic (n, 9), or edges with the body on their
+            left, (n, 2 | 3).
+
+    Returns:
+        (n, 3 | 2) vectors: normal times area (for a warped facet: of its projection along the mean normal) or
+        length.
+    """
+    if facets.shape[1] == 9:
+        return np.asarray(sum(vector_areas(points, facets[:, piece]) for piece in HEXAHEDRON27.face_pieces))
+    corners = points[facets]
+    if points.shape[1] == 2:
+        along = corners[:, 1] - corners[:, 0]
+        return np.column_stack([along[:, 1], -along[:, 0]])
+    if facets.shape[1] == 3:
+        first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    else:
+        first, second = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+    return np.asarray(0.5 * np.cross(first, second))

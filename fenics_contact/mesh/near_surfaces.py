@@ -1,0 +1,97 @@
+"""Which parts of the boundaries may touch, where a mesh file does not say: those that face each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.faces import boundary_faces, corners_of, vector_areas
+
+OPPOSED = -0.5
+"""Facets face each other whose normals have a smaller product: they are within 60 degrees of opposite."""
+_NEIGHBOURS = 8
+
+
+def near_surfaces(
+    meshes: Mapping[str, BodyMesh], distance: float
+) -> tuple[dict[str, BodyMesh], list[tuple[str, str]]]:
+    """Name the facets of bodies that face another body within a distance.
+
+    Facets are looked at as pieces of planes: two of them are near if they lie over each other, at most so far
+    apart, within 60 degrees of parallel. Look at what was found before you trust it.
+
+    Example:
+        >>> meshes, pairs = near_surfaces(read_mesh("press.inp"), 0.5)  # doctest: +SKIP
+        >>> contacts = [
+        ...     ContactPair(Surface(a, f"near {b}"), Surface(b, f"near {a}"), Coulomb(0.2)) for a, b in pairs
+        ... ]  # doctest: +SKIP
+
+    Args:
+        meshes: Name to body.
+        distance: Largest distance across the gap, [length].
+
+    Returns:
+        The bodies with a surface "near B" on A and "near A" on B for every pair that was found, and the pairs
+        of names, each in the order of the bodies.
+
+    Raises:
+        InvalidInputError: If the distance is not positive, or a surface of that name is there already.
+    """
+    if not 0.0 < distance < np.inf:
+        raise InvalidInputError(f"distance must be positive and finite, got {distance}: give the largest gap")
+    sides = {name: _Side(mesh) for name, mesh in meshes.items()}
+    surfaces = {name: dict(mesh.surfaces) for name, mesh in meshes.items()}
+    pairs = []
+    for one, other in combinations(meshes, 2):
+        if not sides[one].may_meet(sides[other], distance):
+            continue
+        first, second = sides[one].over(sides[other], distance), sides[other].over(sides[one], distance)
+        found = {one: first[0] | second[1], other: first[1] | second[0]}
+        if not (found[one].any() and found[other].any()):
+            continue
+        pairs.append((one, other))
+        for a, b in ((one, other), (other, one)):
+            if f"near {b}" in surfaces[a]:
+                raise InvalidInputError(
+                    f"body {a!r} must have no surface 'near {b}' yet, it has one: rename it, or use it"
+                )
+            surfaces[a][f"near {b}"] = sides[a].facets[found[a]]
+    return {name: replace(mesh, surfaces=surfaces[name]) for name, mesh in meshes.items()}, pairs
+
+
+class _Side:
+    """The boundary of a body, facet by facet."""
+
+    def __init__(self, mesh: BodyMesh) -> None:
+        self.facets, _ = boundary_faces(mesh.cells, mesh.dim)
+        corners = mesh.points[corners_of(self.facets, mesh.dim)]
+        self.centre = corners.mean(axis=1)
+        self.radius = np.linalg.norm(corners - self.centre[:, None], axis=2).max(axis=1)
+        area = vector_areas(mesh.points, self.facets)
+        self.normal = area / np.linalg.norm(area, axis=1)[:, None]
+        self.low, self.high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+
+    def may_meet(self, other: _Side, distance: float) -> bool:
+        """Whether the boxes around both are near each other."""
+        return bool(np.all((self.low <= other.high + distance) & (other.low <= self.high + distance)))
+
+    def over(self, other: _Side, distance: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return which facets have their centre over one of the other body's, and which these are, bool."""
+        count = min(_NEIGHBOURS, len(other.centre))
+        _, nearest = cKDTree(other.centre).query(self.centre, count)
+        nearest = nearest.reshape(len(self.centre), count)
+        away = other.centre[nearest] - self.centre[:, None]
+        normal = other.normal[nearest]
+        across = np.abs(np.einsum("nkd,nkd->nk", away, normal))
+        along = np.sqrt(np.maximum(np.einsum("nkd,nkd->nk", away, away) - across**2, 0.0))
+        opposed = np.einsum("nd,nkd->nk", self.normal, normal) < OPPOSED
+        match = opposed & (across <= distance) & (along <= other.radius[nearest])
+        theirs = np.zeros(len(other.centre), dtype=bool)
+        theirs[nearest[match]] = True
+        return match.any(axis=1), theirs

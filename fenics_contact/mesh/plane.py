@@ -1,0 +1,105 @@
+"""Plane meshes that come with three coordinates, and cells whose vertices are listed the other way round."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.cell_types import cell_type_of
+from fenics_contact.mesh.faces import cell_faces, corners_of, number_faces, start_at_smallest
+from fenics_contact.mesh.quality import jacobians
+from fenics_contact.mesh.rounding import coordinate_rounding
+
+FLAT = 1e-10
+"""A mesh is plane whose z coordinates differ by less than this part of its size and their rounding."""
+
+_MIRRORED = {
+    "triangle": [0, 2, 1],
+    "quadrilateral": [0, 3, 2, 1],
+    "tetrahedron": [0, 2, 1, 3],
+    "hexahedron": [4, 5, 6, 7, 0, 1, 2, 3],
+    "triangle6": [0, 2, 1, 5, 4, 3],
+    "quadrilateral9": [0, 3, 2, 1, 7, 6, 5, 4, 8],
+    "hexahedron27": [
+        *(4, 5, 6, 7, 0, 1, 2, 3),
+        *(12, 13, 14, 15, 8, 9, 10, 11, 16, 17, 18, 19),
+        *(20, 21, 22, 23, 25, 24, 26),
+    ],
+}
+"""The same cell with its Jacobian's sign changed."""
+
+
+def flattened(points: np.ndarray, used: np.ndarray, source: str) -> np.ndarray:
+    """Drop the constant third coordinate of a plane mesh.
+
+    Args:
+        points: Coordinates, (n_nodes, 3 | 2).
+        used: Numbers of the nodes that cells have; others may lie anywhere.
+        source: Where the mesh comes from, for the message.
+
+    Returns:
+        Coordinates, (n_nodes, 2).
+
+    Raises:
+        InvalidInputError: If the nodes do not lie in a plane of constant z.
+    """
+    if points.shape[1] == 2:
+        return points
+    extent = np.ptp(points[used], axis=0)
+    if extent[2] > FLAT * np.linalg.norm(extent) + coordinate_rounding(points[used]):
+        raise InvalidInputError(
+            f"plane cells must lie in a plane of constant z, those of {source} reach over {extent[2]:.6g} in "
+            "z: put a plane body into the x-y plane; of a solid save the volume cells too (gmsh -3)"
+        )
+    return np.ascontiguousarray(points[:, :2])
+
+
+def turned_counter_clockwise(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Turn the cells of one plane surface if all of them run clockwise: its normal was chosen to be -z.
+
+    Args:
+        points: Coordinates, (n_nodes, 2).
+        cells: Node numbers, (n_cells, nodes of a cell).
+
+    Returns:
+        The cells; untouched if only some run clockwise, which is a mistake in the mesh.
+    """
+    if np.all(jacobians(points, cells).max(axis=1) < 0.0):
+        return cells[:, _MIRRORED[cell_type_of(cells, 2).name]]
+    return cells
+
+
+def turned_right_handed(points: np.ndarray, cells: np.ndarray, source: str) -> np.ndarray:
+    """Turn every cell whose Jacobian is negative, in meshes that leave the order of vertices open.
+
+    Args:
+        points: Coordinates, (n_nodes, 3 | 2).
+        cells: Node numbers, (n_cells, nodes of a cell).
+        source: Where the mesh comes from, for the message.
+
+    Returns:
+        The cells.
+
+    Raises:
+        InvalidInputError: If cells that share a face then lie on the same side of it: one is flipped over.
+    """
+    dim = points.shape[1]
+    negative = jacobians(points, cells).max(axis=1) < 0.0
+    turned = np.where(negative[:, None], cells[:, _MIRRORED[cell_type_of(cells, dim).name]], cells)
+    faces = cell_faces(turned, dim)
+    flat = corners_of(faces.reshape(-1, faces.shape[2]), dim)
+    numbers = number_faces(flat)
+    order = np.argsort(numbers, kind="stable")
+    one, other = order[:-1], order[1:]
+    first = start_at_smallest(flat)
+    same = (numbers[one] == numbers[other]) & (first[one] == first[other]).all(axis=1)
+    if same.any():
+        face = flat[one[np.argmax(same)]]
+        place = ", ".join(f"{x:.6g}" for x in points[face].mean(axis=0))
+        raise InvalidInputError(
+            f"cells that share a face must lie on its two sides, {np.count_nonzero(same)} faces of "
+            f"{source} have both on one side, first at ({place}): a cell there is flipped over or "
+            f"there twice; "
+            "mesh again"
+        )
+    return turned

@@ -1,0 +1,100 @@
+"""Quadratic cells from linear ones: more nodes on edges, faces and inside."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.body_mesh import BodyMesh
+from fenics_contact.mesh.cell_types import HEXAHEDRON27, QUADRILATERAL9, TRIANGLE6, CellType, cell_type_of
+from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
+from fenics_contact.mesh.shape_functions import shape_values
+from fenics_contact.mesh.validation import check_jacobians
+from fenics_contact.surface_shapes import closest_points
+
+_QUADRATIC = {cell.vertices.shape: cell for cell in (TRIANGLE6, QUADRILATERAL9, HEXAHEDRON27)}
+
+
+def quadratic(mesh: BodyMesh) -> BodyMesh:
+    """Return the mesh with quadratic cells.
+
+    The new nodes are the midpoints of edges, faces and cells; on surfaces whose shape the mesh carries, the
+    closest points of the shape. Displacements, and such surfaces, become piecewise quadratic. The numbers of
+    the old nodes, cells and facets stay.
+
+    Args:
+        mesh: Hexahedra, quadrilaterals or triangles. Quadratic tetrahedra are refused: under a uniform
+            pressure the nodal forces of their facets vanish at the corners.
+
+    Raises:
+        InvalidInputError: If the cells have no quadratic counterpart or are quadratic already, or nodes are
+            moved so far onto a shape that a cell is inverted.
+
+    Example:
+        >>> from fenics_contact.gallery import half_disc
+        >>> from fenics_contact.mesh import quadratic
+        >>> disc = quadratic(half_disc(1.0, 8))
+        >>> disc.cell_type
+        'quadrilateral9'
+    """
+    linear = cell_type_of(mesh.cells, mesh.dim)
+    kind = _QUADRATIC.get(linear.vertices.shape)
+    if linear.order == 2 or kind is None:
+        raise InvalidInputError(
+            f"quadratic needs linear hexahedra, quadrilaterals or triangles, got {linear.plural}: mesh the "
+            "body with hexahedra; facets of quadratic tetrahedra bear no force at their corners"
+        )
+    points, cells = _with_more_nodes(mesh.points, mesh.cells, linear, kind)
+    boundary, _ = boundary_faces(cells, mesh.dim)
+    surfaces = {
+        name: boundary[match_faces(facets, corners_of(boundary, mesh.dim))]
+        for name, facets in mesh.surfaces.items()
+    }
+    placed = np.zeros(len(points), dtype=bool)
+    for name, shape in mesh.shapes.items():
+        own = np.unique(surfaces[name])
+        own = own[own >= mesh.n_nodes]
+        points[own] = closest_points(shape, points[own])
+        placed[own] = True
+    if placed.any():
+        _follow(points, cells, kind, placed)
+    check_jacobians(points, cells, "refine the mesh along its curved surfaces, or leave their shapes away")
+    return BodyMesh(points, cells, surfaces, mesh.grid, mesh.regions, mesh.coincident_nodes, mesh.shapes)
+
+
+def _with_more_nodes(
+    points: np.ndarray, cells: np.ndarray, linear: CellType, kind: CellType
+) -> tuple[np.ndarray, np.ndarray]:
+    """Add a node in the middle of all vertices that lie around it, once for all cells that share it."""
+    # Those whose linear shape functions are not zero there.
+    parents = [np.flatnonzero(values) for values in shape_values(linear, kind.nodes[len(linear.nodes) :])]
+    result = np.concatenate([cells, np.empty((len(cells), len(parents)), dtype=np.int64)], axis=1)
+    for count in sorted({len(around) for around in parents}):
+        columns = [index for index, around in enumerate(parents) if len(around) == count]
+        groups = np.sort(cells[:, [parents[index] for index in columns]], axis=2)
+        found, number = np.unique(groups.reshape(-1, count), axis=0, return_inverse=True)
+        where = len(cells[0]) + np.array(columns)
+        result[:, where] = number.reshape(len(cells), -1) + len(points)
+        points = np.concatenate([points, points[found].mean(axis=1)])
+    return points, result
+
+
+def _follow(points: np.ndarray, cells: np.ndarray, kind: CellType, placed: np.ndarray) -> None:
+    """Move the centres of faces and cells after the midpoints of edges, so that thin cells keep their shape.
+
+    A centre lies where serendipity functions have it: ½ Σ midpoints − ¼ Σ corners of a face, ¼ Σ midpoints
+    − ¼ Σ corners of a hexahedron.
+    """
+    if kind is TRIANGLE6:
+        return
+    if kind is HEXAHEDRON27:
+        for face in kind.faces:
+            centre = cells[:, face[8]]
+            found = 0.5 * points[cells[:, face[4:8]]].sum(axis=1) - 0.25 * points[cells[:, face[:4]]].sum(
+                axis=1
+            )
+            free = ~placed[centre]
+            points[centre[free]] = found[free]
+        points[cells[:, 26]] = 0.25 * (points[cells[:, 8:20]].sum(axis=1) - points[cells[:, :8]].sum(axis=1))
+        return
+    points[cells[:, 8]] = 0.5 * points[cells[:, 4:8]].sum(axis=1) - 0.25 * points[cells[:, :4]].sum(axis=1)

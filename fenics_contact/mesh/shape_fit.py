@@ -1,0 +1,77 @@
+"""Whether the nodes of surfaces lie on the shapes that they are said to have."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh.faces import corners_of
+from fenics_contact.surface_shapes import SurfaceShape, asked
+
+#: How far nodes may lie off their shape, relative to the shortest edge of a facet around them.
+FARTHEST = 0.1
+
+
+def distance_in_edges(points: np.ndarray, facets: np.ndarray, shape: SurfaceShape) -> np.ndarray:
+    """Return how far the nodes of a surface lie off a shape, relative to the shortest edge around each.
+
+    Args:
+        points: Coordinates, (n_nodes, 3 | 2), [length].
+        facets: Node numbers of facets, linear or quadratic, (n_facets, nodes of a facet).
+        shape: The shape.
+
+    Returns:
+        For each node in ascending order of its number, (n,).
+    """
+    nodes, local = np.unique(facets, return_inverse=True)
+    corners = corners_of(facets, points.shape[1])
+    edges = np.linalg.norm(points[np.roll(corners, -1, axis=1)] - points[corners], axis=2)
+    size = np.full(len(nodes), np.inf)
+    np.minimum.at(
+        size, local.reshape(facets.shape), np.broadcast_to(edges.min(axis=1)[:, None], facets.shape)
+    )
+    return np.asarray(np.abs(asked(shape, "distance", points[nodes])) / size)
+
+
+def check_shapes(
+    points: np.ndarray, surfaces: Mapping[str, np.ndarray], shapes: Mapping[str, SurfaceShape]
+) -> dict[str, np.ndarray]:
+    """Refuse shapes that surfaces do not have.
+
+    Args:
+        points: Coordinates, (n_nodes, 3 | 2), [length].
+        surfaces: Name to facets.
+        shapes: Name of a surface to its shape.
+
+    Returns:
+        Name of each of these surfaces to how far its nodes lie off, see `distance_in_edges`.
+
+    Raises:
+        InvalidInputError: If there is no such surface, the shape is of another dimension, or nodes lie off it
+            by more than a tenth of an edge.
+    """
+    found = {}
+    for name, shape in shapes.items():
+        if name not in surfaces:
+            raise InvalidInputError(
+                f"shapes names surface {name!r}, the mesh has {sorted(surfaces)}: use one of them"
+            )
+        dim = getattr(shape, "dim", points.shape[1])
+        if dim != points.shape[1]:
+            raise InvalidInputError(
+                f"the shape of surface {name!r} must be of the mesh's dimension {points.shape[1]}, "
+                f"{type(shape).__name__} is for {dim}: in the plane give curves, such as a Sphere of two "
+                "coordinates"
+            )
+        away = distance_in_edges(points, surfaces[name], shape)
+        off = away > FARTHEST
+        if off.any():
+            raise InvalidInputError(
+                f"the nodes of surface {name!r} must lie on its shape, {np.count_nonzero(off)} of {len(off)} "
+                f"lie off {type(shape).__name__} by more than a tenth of an edge, up to {away.max():.3g} "
+                "edges: check its place and size and the unit of length, or give the shape of another surface"
+            )
+        found[name] = away
+    return found

@@ -1,0 +1,179 @@
+"""From a mesh file's labels to bodies: who owns which cells, and on whose boundary which facets lie."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh import BodyMesh, boundary_faces, cell_faces, corners_of, match_faces
+from fenics_contact.mesh_io.tagged_mesh import (
+    BodyParts,
+    SurfaceParts,
+    TaggedMesh,
+    chosen_bodies,
+    chosen_surfaces,
+)
+
+Facets = Mapping[str, SurfaceParts]
+"""Name of a surface to what makes it up."""
+
+
+def bodies_of(mesh: TaggedMesh, bodies: Any = None, surfaces: Any = None) -> dict[str, BodyMesh]:
+    """Make bodies of a mesh with labels.
+
+    Every body gets nodes of its own: those on a boundary that two bodies share are there twice afterwards.
+
+    Args:
+        mesh: The mesh.
+        bodies: Which groups make up which bodies, see `chosen_bodies`.
+        surfaces: Which labels of facets become surfaces, see `chosen_surfaces`.
+
+    Returns:
+        Name to body. A surface is a part of every body on whose boundary some of its facets lie.
+
+    Raises:
+        InvalidInputError: If a label is not there, cells belong to two bodies or regions, a body has cells of
+            several types or does not make a sound mesh, or a facet lies inside a body or on no cell at all.
+    """
+    chosen, facets = chosen_bodies(mesh, bodies), chosen_surfaces(mesh, surfaces)
+    _check_facets_belong(mesh, facets)
+    owner = {kind: np.full(len(cells), -1) for kind, cells in mesh.cells.items()}
+    result = {}
+    for number, (name, parts) in enumerate(chosen.items()):
+        kind, cells, region = _cells_of(mesh, name, parts)
+        taken = owner[kind][cells]
+        if np.any(taken >= 0):
+            other = list(chosen)[int(taken.max())]
+            raise InvalidInputError(
+                f"a cell must belong to one body, {np.count_nonzero(taken >= 0)} cells of {mesh.source} "
+                f"belong to '{other}' and '{name}': say which {mesh.words[0]}s are bodies with "
+                "bodies={name: label}"
+            )
+        owner[kind][cells] = number
+        result[name] = _body(mesh, name, mesh.cells[kind][cells], parts.regions, region, facets)
+    if surfaces is not None:
+        _check_nodes_make_facets(mesh, facets, result)
+    return result
+
+
+def _cells_of(mesh: TaggedMesh, name: str, parts: BodyParts) -> tuple[str, np.ndarray, np.ndarray]:
+    """Return the cell type of a body, its ascending cells, and which of its groups each belongs to."""
+    found = [
+        (kind, cells, n) for n, label in enumerate(parts.labels) for kind, cells in mesh.groups[label].items()
+    ]
+    found = [(kind, cells, n) for kind, cells, n in found if cells.size]
+    kinds = sorted({kind for kind, _, _ in found})
+    if len(kinds) > 1:
+        counts = [sum(cells.size for kind, cells, _ in found if kind == one) for one in kinds]
+        there = " and ".join(f"{count} of type {kind}" for count, kind in zip(counts, kinds, strict=True))
+        raise InvalidInputError(
+            f"a body must have cells of one type, body '{name}' of {mesh.source} has {there}: mesh it with "
+            "one type, or make bodies of its parts"
+        )
+    if not kinds:
+        raise InvalidInputError(
+            f"a body must have cells, body '{name}' of {mesh.source} has none: mesh it, or leave it out"
+        )
+    cells = np.concatenate([cells for _, cells, _ in found])
+    region = np.concatenate([np.full(cells.size, n) for _, cells, n in found])
+    order = np.argsort(cells, kind="stable")
+    cells, region = cells[order], region[order]
+    double = np.flatnonzero(np.diff(cells) == 0)
+    if double.size:
+        pair = [parts.labels[region[double[0] + i]] for i in (0, 1)]
+        raise InvalidInputError(
+            f"a cell must belong to one region, {double.size} cells of body '{name}' of {mesh.source} belong "
+            f"to {pair[0]!r} and {pair[1]!r}: leave one of them out"
+        )
+    return kinds[0], cells, region
+
+
+def _body(
+    mesh: TaggedMesh,
+    name: str,
+    cells: np.ndarray,
+    regions: Sequence[str] | None,
+    region: np.ndarray,
+    facets: Facets,
+) -> BodyMesh:
+    """Number the nodes of a body from zero and find the surfaces on its boundary."""
+    nodes, local = np.unique(cells, return_inverse=True)
+    local = local.reshape(cells.shape)
+    number = np.full(mesh.points.shape[0], -1, dtype=np.int64)
+    number[nodes] = np.arange(nodes.size)
+    boundary, _ = boundary_faces(local, mesh.dim)
+    corners = corners_of(boundary, mesh.dim)
+    surfaces = {}
+    for surface, parts in facets.items():
+        found: list[np.ndarray] = [np.zeros(0, dtype=np.int64)]
+        mine = [number[block] for block in parts.facets if block.shape[1] == corners.shape[1]]
+        mine = [block[(block >= 0).all(axis=1)] for block in mine]
+        if mine and (candidates := np.concatenate(mine)).size:
+            matches = match_faces(candidates, corners)
+            _check_none_inside(mesh, name, surface, candidates[matches < 0], local)
+            found.append(matches[matches >= 0])
+        for inside in parts.nodes:
+            found.append(np.flatnonzero(np.isin(nodes[corners], inside).all(axis=1)))
+        if (there := np.unique(np.concatenate(found))).size:
+            surfaces[surface] = boundary[there]
+    named = {} if regions is None else {label: np.flatnonzero(region == n) for n, label in enumerate(regions)}
+    try:
+        return BodyMesh(mesh.points[nodes], local, surfaces, regions=named)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"body '{name}' of {mesh.source} is no sound mesh: {error}") from error
+
+
+def _check_none_inside(
+    mesh: TaggedMesh, name: str, surface: str, facets: np.ndarray, cells: np.ndarray
+) -> None:
+    """Refuse facets between two cells of one body; those that are none of its faces are another body's."""
+    faces = cell_faces(cells, mesh.dim)
+    inside = (
+        np.count_nonzero(match_faces(facets, corners_of(faces.reshape(-1, faces.shape[2]), mesh.dim)) >= 0)
+        if facets.size
+        else 0
+    )
+    if inside:
+        raise InvalidInputError(
+            f"a surface must lie on the boundary of a body, {inside} facets of '{surface}' of {mesh.source} "
+            f"lie inside body '{name}': make bodies of the parts on its two sides, or leave the "
+            f"surface out with "
+            "surfaces=[...]"
+        )
+
+
+def _check_nodes_make_facets(mesh: TaggedMesh, facets: Facets, bodies: Mapping[str, BodyMesh]) -> None:
+    """Refuse a wanted surface that is a set of nodes, but not all nodes of any facet."""
+    for name, parts in facets.items():
+        if parts.nodes and not any(name in body.surfaces for body in bodies.values()):
+            count = sum(len(nodes) for nodes in parts.nodes)
+            raise InvalidInputError(
+                f"a set of nodes must hold all corners of some facets to be a surface, the {count} nodes of "
+                f"'{name}' of {mesh.source} hold those of none on the bodies {list(bodies)}: save the "
+                "facets, or all their nodes"
+            )
+
+
+def _check_facets_belong(mesh: TaggedMesh, surfaces: Facets) -> None:
+    """Refuse facets that are the face of no cell."""
+    known: dict[int, list[np.ndarray]] = {}
+    for cells in mesh.cells.values():
+        faces = cell_faces(cells, mesh.dim)
+        corners = corners_of(faces.reshape(-1, faces.shape[2]), mesh.dim)
+        known.setdefault(corners.shape[1], []).append(corners)
+    joined = {columns: np.concatenate(blocks) for columns, blocks in known.items()}
+    for name, parts in surfaces.items():
+        for block in parts.facets:
+            faces = joined.get(block.shape[1], np.zeros((0, block.shape[1]), dtype=np.int64))
+            lost = np.flatnonzero(match_faces(block, faces) < 0)
+            if lost.size:
+                place = ", ".join(f"{x:.6g}" for x in mesh.points[block[lost[0]]].mean(axis=0))
+                raise InvalidInputError(
+                    f"a surface must consist of faces of cells, {lost.size} of {len(block)} facets of "
+                    f"'{name}' of {mesh.source} are none, first at ({place}): mesh bodies and "
+                    f"surfaces together, or "
+                    "leave the surface out with surfaces=[...]"
+                )

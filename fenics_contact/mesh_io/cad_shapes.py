@@ -1,0 +1,153 @@
+"""True shapes of a body's surfaces from the geometry of gmsh's current model, whichever kernel built it."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from types import ModuleType
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh import BodyMesh, corners_of, vector_areas
+from fenics_contact.mesh_io.gmsh_elements import physical_groups
+from fenics_contact.mesh_io.gmsh_geometry import shape_of_entity
+from fenics_contact.mesh_io.gmsh_session import running_gmsh
+from fenics_contact.surface_shapes import Joined, SplinePatch, SurfaceShape
+
+_LOGGER = logging.getLogger(__name__)
+#: How far nodes may lie off a face that is theirs, relative to the shortest edge of the surface.
+FAR = 0.01
+#: Middles of facets are the same when they are closer than this part of that edge.
+SAME = 1e-6
+#: Two faces have one shape if on one of them their shapes differ by less than this part of its extent.
+ALIKE = 1e-8
+
+
+def cad_shapes(
+    mesh: BodyMesh, surfaces: Mapping[str, str | int | Sequence[str | int]] | None = None
+) -> dict[str, SurfaceShape]:
+    """Return the true shapes of a body's surfaces from the geometry of gmsh's current model.
+
+    Planes, spheres, cylinders, cones and tori are known again, also where the model holds them as splines;
+    other faces become splines through points of theirs. So the shapes need gmsh no more, and can be sent to
+    other ranks. A surface of several faces is `Joined`.
+
+    Args:
+        mesh: A body of the model, with the nodes of gmsh's mesh: from `from_gmsh_model`, not moved since.
+        surfaces: Name of a surface of the body to the physical groups (by name, or number), or named
+            entities, that it is made of. All surfaces that are called as such a group unless given.
+
+    Returns:
+        Name of the surface to its shape. Surfaces whose faces have no geometry, as in a mesh that was read
+        from a file, and those whose nodes have left it are not among them.
+
+    Raises:
+        InvalidInputError: If gmsh is not initialised, or the body or the model does not have a surface.
+        MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
+    """
+    gmsh = running_gmsh()
+    if gmsh is None:
+        raise InvalidInputError(
+            "cad_shapes needs a model in memory, gmsh is not initialised: call gmsh.initialize(), build and "
+            "mesh a model first, or read it with `read_cad`"
+        )
+    known, nodes = _named(gmsh, mesh.dim - 1), _nodes(gmsh)
+    chosen = {name: name for name in mesh.surfaces if name in known} if surfaces is None else surfaces
+    shapes = {}
+    for name, labels in chosen.items():
+        if name not in mesh.surfaces:
+            raise InvalidInputError(
+                f"cad_shapes names surface {name!r}, the body has {sorted(mesh.surfaces)}: use one of them"
+            )
+        several = [labels] if isinstance(labels, str | int) else labels
+        tags = sorted({tag for label in several for tag in _tags(known, str(label), name)})
+        shape = _shape(gmsh, tags, nodes, mesh, mesh.surfaces[name])
+        if shape is None:
+            _LOGGER.info("surface %r stays as its facets are: it has no geometry, or has left it", name)
+        else:
+            shapes[name] = shape
+    return shapes
+
+
+def _named(gmsh: ModuleType, dim: int) -> dict[str, list[int]]:
+    """Return the entities of each physical group and of each name, by text."""
+    groups = {str(label): tags for label, tags in physical_groups(gmsh, dim).items()}
+    for _, tag in gmsh.model.getEntities(dim):
+        if name := gmsh.model.getEntityName(dim, tag):
+            groups.setdefault(name, []).append(int(tag))
+    return groups
+
+
+def _tags(known: Mapping[str, list[int]], label: str, surface: str) -> list[int]:
+    if label not in known:
+        there = ", ".join(map(repr, sorted(known))) or "none at all"
+        raise InvalidInputError(
+            f"the shape of surface {surface!r} needs the physical group {label!r}, which gmsh's model does "
+            f"not have: it has {there}"
+        )
+    return known[label]
+
+
+def _nodes(gmsh: ModuleType) -> np.ndarray:
+    """Return the coordinates of the node of each tag, (largest + 1, 3)."""
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    points = np.zeros((int(tags.max(initial=0)) + 1, 3))
+    points[tags.astype(np.int64)] = coordinates.reshape(-1, 3)
+    return points
+
+
+def _shape(
+    gmsh: ModuleType, tags: list[int], nodes: np.ndarray, mesh: BodyMesh, facets: np.ndarray
+) -> SurfaceShape | None:
+    """Return the shape of a surface of the body; None if any of its facets is on no geometry."""
+    corners, outwards = mesh.points[corners_of(facets, mesh.dim)], vector_areas(mesh.points, facets)
+    middles = corners.mean(axis=1)
+    edge = float(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).min())
+    shapes: list[SurfaceShape] = []
+    parts: list[np.ndarray] = []
+    left = np.ones(len(facets), dtype=bool)
+    for entity in ((mesh.dim - 1, tag) for tag in tags):
+        mine = left & _on_entity(gmsh, entity, nodes, middles, edge)
+        if not mine.any():  # on another body's boundary
+            continue
+        shape = shape_of_entity(gmsh, entity, middles[mine], outwards[mine])
+        if shape is None or np.abs(shape.distance(mesh.points[np.unique(facets[mine])])).max() > FAR * edge:
+            return None
+        left &= ~mine
+        _add(shapes, parts, shape, corners[mine])
+    if left.any() or not shapes:
+        return None
+    return shapes[0] if len(shapes) == 1 else Joined(tuple(shapes), tuple(parts))
+
+
+def _on_entity(
+    gmsh: ModuleType, entity: tuple[int, int], nodes: np.ndarray, middles: np.ndarray, edge: float
+) -> np.ndarray:
+    """Tell which facets are elements of an entity: those with the same middle, (n,)."""
+    on = np.zeros(len(middles), dtype=bool)
+    types, _, elements = gmsh.model.mesh.getElements(*entity)
+    for kind, found in zip(types, elements, strict=True):
+        _, _, _, each, _, first, *_ = gmsh.model.mesh.getElementProperties(kind)
+        theirs = nodes[found.astype(np.int64).reshape(-1, each)[:, :first]].mean(axis=1)
+        on |= cKDTree(theirs[:, : middles.shape[1]]).query(middles)[0] < SAME * edge
+    return on
+
+
+def _add(
+    shapes: list[SurfaceShape], parts: list[np.ndarray], shape: SurfaceShape, corners: np.ndarray
+) -> None:
+    """Add the shape of a part, or the part to a shape that goes on in it: halves of a hole, of a torus."""
+    middles = corners.mean(axis=1)
+    for number, other in enumerate(shapes):
+        if isinstance(other, SplinePatch) or isinstance(shape, SplinePatch):
+            continue
+        size = float(np.ptp(corners.reshape(-1, corners.shape[2]), axis=0).max())
+        apart = np.abs(other.distance(middles) - shape.distance(middles)).max()
+        along = np.einsum("nd,nd->n", other.normals(middles), shape.normals(middles)).min()
+        if apart <= ALIKE * size and along > 0:
+            parts[number] = np.concatenate([parts[number], corners])
+            return
+    shapes.append(shape)
+    parts.append(corners)

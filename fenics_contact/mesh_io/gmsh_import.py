@@ -1,0 +1,132 @@
+"""Bodies from gmsh: from a .msh file of any version, or from the model in memory.
+
+Physical groups say what is what. By default every physical volume (in two dimensions: physical surface) is a
+body of that name, and every physical surface (curve) a surface of each body on whose boundary it lies. A
+group without a name goes by its number, as text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fenics_contact.checks import require_file
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.mesh_io.bodies import bodies_of
+from fenics_contact.mesh_io.cad_shapes import cad_shapes
+from fenics_contact.mesh_io.gmsh_elements import tagged_mesh_of
+from fenics_contact.mesh_io.gmsh_session import gmsh_model, running_gmsh
+from fenics_contact.mesh_io.tagged_mesh import TaggedMesh
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+Bodies = Sequence[str] | Mapping[str, str | Sequence[str] | Mapping[str, str]]
+"""Names of groups; or body to group, to groups that become regions, or to region to group."""
+
+Surfaces = Sequence[str] | Mapping[str, str | Sequence[str]]
+"""Names of groups; or surface to group or groups."""
+
+
+def read_msh(
+    path: str | Path,
+    bodies: Bodies | None = None,
+    surfaces: Surfaces | None = None,
+    *,
+    comm: MPI.Comm | None = None,
+) -> dict[str, BodyMesh]:
+    """Read bodies from a .msh file of any version.
+
+    Every body gets nodes of its own; those that bodies share in the file are there once for each of them.
+    Plane meshes lose their constant z coordinate. Quadratic hexahedra and plane cells stay so.
+
+    Example:
+        ``read_msh("press.msh")`` makes a body of every physical volume. ``read_msh("press.msh",
+        bodies={"tool": "punch", "sheet": ["steel", "copper"]})`` makes one of the group "punch" and one with
+        the regions "steel" and "copper", and leaves out all other groups.
+
+    Args:
+        path: The file.
+        bodies: Which physical volumes make up which bodies: names of groups that are bodies; or name of the
+            body to a group, to several groups, which become its regions, or to name of the region to a group.
+            Every group is a body unless given.
+        surfaces: Which physical surfaces are wanted: their names, or name of the surface to a group or to
+            several. All unless given.
+        comm: If given, rank 0 reads the file and all ranks receive the bodies.
+
+    Returns:
+        Name to body.
+
+    Raises:
+        InvalidInputError: If the file is missing or cannot be read, a group is not in it, a volume has no
+            group, cells are quadratic tetrahedra, prisms or pyramids, of several types in one body, flipped,
+            or do not hang together, a cell is in two bodies, or a surface lies inside a body.
+        MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
+
+    Note:
+        Collective on ``comm`` if given.
+    """
+    if comm is None:
+        return bodies_of(_read(Path(path)), bodies, surfaces)
+    read = None
+    with together(comm):
+        read = _read(Path(path)) if comm.rank == 0 else None
+    return bodies_of(comm.bcast(read, root=0), bodies, surfaces)
+
+
+def from_gmsh_model(
+    bodies: Bodies | None = None, surfaces: Surfaces | None = None, *, shapes: bool = True
+) -> dict[str, BodyMesh]:
+    """Take bodies from gmsh's current model, which has been meshed and stays as it is.
+
+    Args:
+        bodies: As in `read_msh`.
+        surfaces: As in `read_msh`.
+        shapes: Whether surfaces keep the true shapes that the model's geometry, where it has one, gives them,
+            see `cad_shapes`; else they are their facets.
+
+    Returns:
+        Name to body.
+
+    Raises:
+        InvalidInputError: As `read_msh`, or if gmsh is not initialised.
+        MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
+    """
+    gmsh = running_gmsh()
+    if gmsh is None:
+        raise InvalidInputError(
+            "from_gmsh_model needs a model in memory, gmsh is not initialised: call gmsh.initialize(), build "
+            "and mesh a model first, or read a file with `read_msh`"
+        )
+    made = bodies_of(tagged_mesh_of(gmsh, f"model '{gmsh.model.getCurrent()}'"), bodies, surfaces)
+    if not shapes:
+        return made
+    groups = surfaces if isinstance(surfaces, Mapping) else {}
+    return {name: _with_shapes(mesh, groups) for name, mesh in made.items()}
+
+
+def _with_shapes(mesh: BodyMesh, groups: Mapping[str, str | Sequence[str]]) -> BodyMesh:
+    """Give a body the shapes of its surfaces, which are made of these groups or those of their names."""
+    return mesh.with_shapes(cad_shapes(mesh, {name: groups.get(name, name) for name in mesh.surfaces}))
+
+
+def _read(path: Path) -> TaggedMesh:
+    require_file(path)
+    with path.open("rb") as file:
+        start = file.read(11)
+    # gmsh would run any other file as a script.
+    if start != b"$MeshFormat":
+        raise InvalidInputError(
+            f"file '{path}' must be a .msh file, which starts with $MeshFormat, it starts with {start!r}: "
+            "let gmsh write it (gmsh.write, or `gmsh -3 part.geo -o part.msh`)"
+        )
+    with gmsh_model("fenics_contact import") as gmsh:
+        try:
+            gmsh.merge(str(path))
+        except Exception as reason:  # gmsh raises no other class
+            raise InvalidInputError(
+                f"file '{path}' must be a .msh file that gmsh can read, it says: {reason}: write it again"
+            ) from reason
+        return tagged_mesh_of(gmsh, f"file '{path}'")

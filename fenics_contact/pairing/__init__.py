@@ -1,0 +1,20 @@
+"""Which slave node meets the master where, by nodes or by mortar."""
+
+from __future__ import annotations
+
+from fenics_contact.pairing.contact_points import HELD, ContactPoints, join_points, movable, reference_axes
+from fenics_contact.pairing.contact_search import find_contact_points, find_tied_points
+from fenics_contact.pairing.friction import friction_data
+from fenics_contact.pairing.node_numbers import NodeNumbers
+
+__all__ = [
+    "HELD",
+    "ContactPoints",
+    "NodeNumbers",
+    "find_contact_points",
+    "find_tied_points",
+    "friction_data",
+    "join_points",
+    "movable",
+    "reference_axes",
+]

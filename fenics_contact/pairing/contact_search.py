@@ -1,0 +1,267 @@
+"""Contact points of a scene: which slave node meets the master where, in which direction, how far away."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._libraries import MPI
+from fenics_contact.errors import InvalidInputError, tell, together
+from fenics_contact.fingerprint import described, require_alike
+from fenics_contact.mesh import coordinate_rounding
+from fenics_contact.pairing.contact_points import (
+    ContactPoints,
+    in_free_frames,
+    join_points,
+    reference_axes,
+    tangent_frames,
+)
+from fenics_contact.pairing.node_numbers import NodeNumbers
+from fenics_contact.pairing.surface_doubts import tell_of_surface
+from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie, master_share, surface_of
+from fenics_contact.surface_shapes import asked
+from fenics_contact.surfaces import FacetedSurface, Geometry, Projection, join, project, shape_functions
+
+#: A gap of so many roundings of coordinates is none: a few operations lie between the two.
+ROUNDING = 8
+
+_LOG = logging.getLogger(__name__)
+
+
+def find_contact_points(
+    scene: Scene, fixed: np.ndarray, comm: MPI.Comm | None = None, *, finer: bool = False
+) -> ContactPoints:
+    """Find where the slave surface of every contact pair meets its master. Collective on ``comm``.
+
+    Each rank does a share of the search, and all receive all points. Nodes whose displacement is prescribed
+    in all components cannot move and are left out.
+
+    Args:
+        scene: The scene.
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+        comm: Communicator of the ranks that share the work; this rank alone by default.
+        finer: Take surfaces that are known better than those the scene asks for, see `true_surface`.
+
+    Raises:
+        InvalidInputError: If no node of a slave surface finds its master.
+    """
+    return _points_of_pairs(scene, scene.contacts, fixed, comm or MPI.COMM_SELF, finer)
+
+
+def find_tied_points(
+    scene: Scene, fixed: np.ndarray, comm: MPI.Comm | None = None
+) -> ContactPoints:
+    """Find where tied surfaces meet, as `find_contact_points` does; ``pair`` counts the ties. Collective."""
+    return _points_of_pairs(scene, scene.ties, fixed, comm or MPI.COMM_SELF)
+
+
+def without_rounding(gap: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return gaps, zero where surfaces touch but for the rounding of their coordinates.
+
+    Bodies that only touch would else press each other apart by that rounding, in units of their own.
+
+    Args:
+        gap: Gaps, shape (n,), [length].
+        points: Coordinates of one of the surfaces, shape (m, dim), [length].
+    """
+    return np.where(np.abs(gap) <= ROUNDING * coordinate_rounding(points), 0.0, gap)
+
+
+@dataclass(frozen=True)
+class _Side:
+    """One of two surfaces that meet.
+
+    Attributes:
+        surface: The surface.
+        nodes: Its nodes among those of all bodies, shape (n,).
+        n_nodes: Number of nodes of all bodies.
+    """
+
+    surface: FacetedSurface
+    nodes: np.ndarray
+    n_nodes: int
+
+    @classmethod
+    def of(
+        cls, scene: Scene, surface: Surface, geometry: Geometry, numbers: NodeNumbers, finer: bool
+    ) -> _Side:
+        """Return a named surface as a side."""
+        own = surface_of(scene, surface, geometry, finer=finer)
+        return cls(own, numbers.global_nodes(surface.body, own.nodes), numbers.n_nodes)
+
+
+def _points_of_pairs(
+    scene: Scene,
+    pairs: Sequence[ContactPair | Tie],
+    fixed: np.ndarray,
+    comm: MPI.Comm,
+    finer: bool = False,
+) -> ContactPoints:
+    parts, numbers = [], NodeNumbers.of(scene)
+    for index, pair in enumerate(pairs):
+        # What lies between tied surfaces stays as it is; their gaps count for nothing.
+        geometry = pair.geometry if isinstance(pair, ContactPair) else "faceted"
+        slave = _Side.of(scene, pair.slave, geometry, numbers, finer)
+        movable = ~fixed[slave.nodes].all(axis=1)
+        if not finer:
+            tell_of_surface(scene, pair.slave, geometry, slave.surface, comm)
+        if not isinstance(pair.master, Surface):
+            with together(comm):
+                points = _on_obstacle(slave, movable, pair.master)
+            name = f"what ContactPair {index} asks its obstacle, {type(pair.master).__name__}"
+            require_alike(comm, described((points.slave, points.normal, points.gap), name))
+        else:
+            master = _Side.of(scene, pair.master, geometry, numbers, finer)
+            if not finer:
+                tell_of_surface(scene, pair.master, geometry, master.surface, comm)
+            if pair.discretisation == "mortar":
+                points = _by_mortar(slave, movable, master, comm, master_share(scene, pair))
+            else:
+                points = _by_projection(slave, movable, master, comm)
+            points = replace(points, symmetric=_symmetric(points, slave, master))
+        if comm.rank == 0 and not movable.all():
+            tell(
+                _LOG.info,
+                "%d of %d nodes of %s %d are left out as supports hold them in all directions",
+                np.count_nonzero(~movable), len(movable), type(pair).__name__, index,
+            )  # fmt: skip
+        if points.count == 0:
+            raise InvalidInputError(
+                f"{type(pair).__name__} {index} needs slave nodes that face the master, but none of the "
+                f"{np.count_nonzero(movable)} movable nodes of {pair.slave.name!r} meets it: check the "
+                "surfaces' names and where the bodies lie"
+            )
+        gap = without_rounding(points.gap, slave.surface.points)
+        parts.append(in_free_frames(replace(points, pair=np.full(points.count, index), gap=gap), fixed))
+    return join_points(parts, scene.dim, len(fixed))
+
+
+def _symmetric(points: ContactPoints, slave: _Side, master: _Side) -> np.ndarray:
+    """Return the components across planes of symmetry that cut both surfaces at a point, (n_points, dim)."""
+    place = np.zeros((slave.n_nodes, points.normal.shape[1]))
+    cut = np.zeros(place.shape, dtype=bool)
+    for side in (slave, master):
+        place[side.nodes], cut[side.nodes] = side.surface.points, side.surface.mirrored
+    met = points.master.tocoo()
+    node, other = points.slave[met.row], met.col
+    same = np.abs(place[node] - place[other]) <= coordinate_rounding(place)
+    found = np.zeros(points.normal.shape, dtype=bool)
+    np.logical_or.at(found, met.row, cut[node] & cut[other] & same)
+    return found
+
+
+def _by_projection(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm) -> ContactPoints:
+    """Let each slave node meet the master facet that it projects on. Collective."""
+    candidates = np.flatnonzero(movable)
+    hit = _shared_projection(slave.surface, candidates, master.surface, comm)
+    if len(hit.lost) and comm.rank == 0:
+        _tell_of_lost(slave.surface.points[candidates[hit.lost]], len(candidates))
+    values, _ = shape_functions(hit.local, master.surface.corners)
+    corners = master.nodes[master.surface.facets[hit.facet]]
+    row = np.repeat(np.arange(len(hit.point)), master.surface.corners)
+    shape = (len(hit.point), slave.n_nodes)
+    weight = sp.csr_matrix((values.ravel(), (row, corners.ravel())), shape=shape)
+    chosen = candidates[hit.point]
+    return replace(_points(slave, chosen, hit.normal, hit.gap, weight), facet=hit.facet, local=hit.local)
+
+
+def _tell_of_lost(places: np.ndarray, count: int) -> None:
+    where = ", ".join(f"{x:.6g}" for x in places[0])
+    tell(
+        _LOG.warning,
+        "%d of %d slave nodes face their master, but no point of it was found for them, the first at (%s): "
+        "nothing keeps them out of it; refine the master there, or let the other surface be the slave",
+        len(places), count, where,
+    )  # fmt: skip
+
+
+def _by_mortar(
+    slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm, share: float
+) -> ContactPoints:
+    """Let each slave node meet the mean of the master under its dual basis function. Collective.
+
+    Args:
+        slave: Side whose nodes carry multipliers.
+        movable: Which of them can move.
+        master: The other side.
+        comm: Communicator of the ranks that share the work.
+        share: The master's share of what closes the gap.
+    """
+    from fenics_contact.pairing.mortar import mortar_coupling  # not before a pair asks for it
+
+    found = mortar_coupling(slave.surface, master.surface, comm)
+    kept = np.flatnonzero(movable[found.node])
+    count = len(master.nodes)
+    spread = sp.csr_matrix((np.ones(count), (np.arange(count), master.nodes)), shape=(count, master.n_nodes))
+    weight = (found.weight[kept] @ spread).tocsr()
+    gap = found.gap[kept]
+    if slave.surface.relief is not None or master.surface.relief is not None:
+        gap = _closable(slave, found.node[kept], master, found.weight[kept], gap, comm, share)
+    points = _points(slave, found.node[kept], found.normal[kept], gap, weight)
+    return replace(points, area=found.area[kept])
+
+
+def _closable(
+    slave: _Side,
+    chosen: np.ndarray,
+    master: _Side,
+    weight: sp.csr_matrix,
+    mean: np.ndarray,
+    comm: MPI.Comm,
+    share: float,
+) -> np.ndarray:
+    """Return the gaps between true surfaces that linear displacements can close, shape (n,). Collective.
+
+    Where the gap g closes, the slave moves by (1 − s) g and the master by s g, s its share of the compliance,
+    but for rigid motions. The constraint has linear interpolants of that, I g on the slave and J g on the
+    master: (1 − s) g(x_i) + s ∫ ψ_i J g is what it can close. The mean of g itself bends between nodes.
+    Nodes of which a part lies beside the other surface keep that mean.
+    """
+    nodes = np.flatnonzero(np.bincount(weight.indices, minlength=weight.shape[1]))
+    here = _shared_projection(slave.surface, chosen, master.surface, comm)
+    there = _shared_projection(master.surface, nodes, slave.surface, comm)
+    own, opposite = np.full(len(chosen), np.nan), np.full(weight.shape[1], np.nan)
+    own[here.point], opposite[nodes[there.point]] = here.gap, there.gap
+    lost = abs(weight) @ np.isnan(opposite).astype(np.float64) > 0
+    across = np.where(lost, own, weight @ np.nan_to_num(opposite))
+    found = (1.0 - share) * own + share * across
+    return np.where(np.isnan(found), mean, found)
+
+
+def _on_obstacle(slave: _Side, movable: np.ndarray, obstacle: RigidObstacle) -> ContactPoints:
+    """Let each slave node that faces a rigid obstacle meet it."""
+    candidates = np.flatnonzero(movable)
+    normals = asked(obstacle, "normals", slave.surface.points[candidates])
+    facing = np.einsum("nd,nd->n", slave.surface.normals[candidates], normals) < 0
+    chosen = candidates[facing]
+    gap = asked(obstacle, "distance", slave.surface.points[chosen])
+    return _points(slave, chosen, normals[facing], gap, sp.csr_matrix((len(chosen), slave.n_nodes)))
+
+
+def _points(
+    slave: _Side, chosen: np.ndarray, normal: np.ndarray, gap: np.ndarray, weight: sp.csr_matrix
+) -> ContactPoints:
+    """Return points on chosen nodes of a slave, not yet numbered by pair and on no facet."""
+    count, axes = len(chosen), reference_axes(normal)
+    return ContactPoints(
+        np.zeros(count, dtype=np.int64), slave.nodes[chosen], weight, normal, tangent_frames(normal, axes),
+        gap, slave.surface.areas[chosen], np.full(count, -1), np.zeros((count, normal.shape[1] - 1)), axes,
+        np.zeros(normal.shape, dtype=bool),
+    )  # fmt: skip
+
+
+def _shared_projection(
+    slave: FacetedSurface, movable: np.ndarray, master: FacetedSurface, comm: MPI.Comm
+) -> Projection:
+    """Project the movable nodes, each rank every so manieth. Collective."""
+    mine = np.arange(comm.rank, len(movable), comm.size)
+    found: Projection | None = None
+    with together(comm):
+        chosen = movable[mine]
+        hit = project(slave.points[chosen], slave.normals[chosen], master)
+        found = replace(hit, point=mine[hit.point], lost=mine[hit.lost])
+    return join([part for part in comm.allgather(found) if part is not None])

@@ -1,0 +1,251 @@
+"""Cutting a mesh into subdomains.
+
+A partition is an int64 array with the subdomain 0..S-1 of every cell. A subdomain must hang together through
+faces: pieces joined by an edge or a node only can move against each other at no energy, beyond the rigid
+body modes that the solver knows of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from fenics_contact.checks import check_count
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh import BodyMesh, coordinate_rounding, neighbours
+
+LAYER = 1e-12
+"""Cells whose centres differ by less than this part of the body's extent lie in one layer."""
+
+
+def box_partition(mesh: BodyMesh, boxes: tuple[int, ...]) -> np.ndarray:
+    """Cut a structured mesh into boxes of cells.
+
+    Where a count does not divide, the boxes differ by at most one layer of cells. Subdomains are numbered
+    with the last direction running fastest, so that consecutive numbers are mostly neighbours.
+
+    Args:
+        mesh: Mesh with a ``grid``.
+        boxes: Number of boxes in each direction of the grid.
+
+    Returns:
+        (n_cells,) subdomain numbers.
+
+    Raises:
+        InvalidInputError: If the mesh is not structured or has fewer cells than boxes in some direction.
+    """
+    if mesh.grid is None:
+        raise InvalidInputError(
+            "box_partition needs a structured mesh, this one has grid None: use `graph_partition(mesh, "
+            "parts)`"
+        )
+    if not isinstance(boxes, Sequence | np.ndarray) or np.shape(boxes) != (mesh.dim,):
+        number = {2: "two", 3: "three"}[mesh.dim]
+        raise InvalidInputError(
+            f"boxes must be {number} integers, got {boxes!r}: give one for each grid direction"
+        )
+    counts = mesh.grid.max(axis=0) + 1
+    for d in range(mesh.dim):
+        check_count(boxes[d], f"boxes[{d}]")
+        if boxes[d] > counts[d]:
+            raise InvalidInputError(
+                f"boxes[{d}] must be at most the {counts[d]} layers of cells in that direction, got "
+                f"{boxes[d]}: take fewer boxes or a finer mesh"
+            )
+    position = mesh.grid * np.asarray(boxes) // counts
+    return np.ravel_multi_index(tuple(position.T), boxes).astype(np.int64)
+
+
+def bisection_partition(mesh: BodyMesh, parts: int) -> np.ndarray:
+    """Cut any mesh by recursive coordinate bisection of the cell centres.
+
+    Every cut is across the longest side of the piece's bounding box and shares the cells in proportion.
+    Pieces that a cut leaves hanging by an edge or a node are given to a neighbour, see `merge_pieces`.
+
+    Args:
+        mesh: Any mesh.
+        parts: Number of subdomains.
+
+    Returns:
+        (n_cells,) subdomain numbers.
+
+    Raises:
+        InvalidInputError: If there are fewer cells than parts.
+    """
+    check_count(parts, "parts")
+    if parts > mesh.n_cells:
+        raise InvalidInputError(
+            f"parts must be at most the {mesh.n_cells} cells, got {parts}: take fewer parts"
+        )
+    centres = mesh.points[mesh.cells].mean(axis=1)
+    # Counted in units that rounding does not reach: layers of cells are not split by the last bits.
+    unit = LAYER * float(np.ptp(mesh.points, axis=0).max()) + coordinate_rounding(mesh.points)
+    centres = np.round((centres - mesh.points.min(axis=0)) / unit)
+    partition = np.zeros(mesh.n_cells, dtype=np.int64)
+    pending: list[tuple[np.ndarray, int, int]] = [(np.arange(mesh.n_cells), 0, parts)]
+    while pending:
+        cells, first, count = pending.pop()
+        if count == 1:
+            partition[cells] = first
+            continue
+        extent = centres[cells].max(axis=0) - centres[cells].min(axis=0)
+        order = cells[np.argsort(centres[cells, np.argmax(extent)], kind="stable")]
+        left = count // 2
+        cut = cells.size * left // count
+        pending += [(order[:cut], first, left), (order[cut:], first + left, count - left)]
+    return merge_pieces(mesh, partition)
+
+
+def _face_pieces(mesh: BodyMesh, partition: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Number the face-connected pieces: piece of every cell, (n_cells,), and subdomain of every piece."""
+    inside = pairs[partition[pairs[:, 0]] == partition[pairs[:, 1]]]
+    graph = coo_matrix((np.ones(inside.shape[0], dtype=bool), tuple(inside.T)), shape=2 * (mesh.n_cells,))
+    n_pieces, piece = connected_components(graph, directed=False)
+    owner = np.empty(n_pieces, dtype=np.int64)
+    owner[piece] = partition
+    return piece, owner
+
+
+def merge_pieces(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> np.ndarray:
+    """Make every subdomain connected through faces.
+
+    The largest piece of each subdomain stays; every other piece goes to the subdomain whose largest piece it
+    shares most faces with, those that touch none in a later round.
+
+    Args:
+        mesh: A mesh that is itself connected through faces.
+        partition: (n_cells,) subdomain numbers.
+        body: Name of the body, for messages.
+
+    Returns:
+        (n_cells,) subdomain numbers, the same subdomains.
+
+    Raises:
+        InvalidInputError: If the mesh consists of separate parts, so that a piece has no neighbour.
+    """
+    partition = _checked_partition(mesh, partition).copy()
+    pairs = neighbours(mesh.cells, mesh.dim)
+    while True:
+        piece, owner = _face_pieces(mesh, partition, pairs)
+        by_size = np.lexsort((np.arange(owner.size), -np.bincount(piece)))
+        kept = np.zeros(owner.size, dtype=bool)
+        kept[by_size[np.unique(owner[by_size], return_index=True)[1]]] = True
+        if kept.all():
+            return partition
+        links = np.concatenate([piece[pairs], piece[pairs][:, ::-1]])
+        links = links[~kept[links[:, 0]] & kept[links[:, 1]]]
+        if links.shape[0] == 0:
+            raise InvalidInputError(
+                f"{_named(body)} must be connected through faces to be cut, {np.count_nonzero(~kept)} pieces "
+                f"of it have no neighbour: {_APART}"
+            )
+        shared, counts = np.unique(links, axis=0, return_counts=True)
+        order = np.argsort(counts, kind="stable")  # the last assignment wins: the one with most faces
+        target = owner.copy()
+        target[shared[order, 0]] = owner[shared[order, 1]]
+        partition = target[piece]
+
+
+_APART = (
+    "join nodes that coincide with `merge_duplicate_nodes`, or give each separate part a mesh and a body of "
+    "its own"
+)
+
+
+def _named(body: str) -> str:
+    return f"body '{body}'" if body else "a mesh"
+
+
+def check_one_piece(mesh: BodyMesh, body: str = "") -> None:
+    """Refuse a mesh that does not hang together through faces.
+
+    Args:
+        mesh: The mesh.
+        body: Name of the body, for the message.
+
+    Raises:
+        InvalidInputError: Saying in how many parts it is.
+    """
+    piece, owner = _face_pieces(
+        mesh, np.zeros(mesh.n_cells, dtype=np.int64), neighbours(mesh.cells, mesh.dim)
+    )
+    if owner.size > 1:
+        sizes = np.sort(np.bincount(piece))[::-1]
+        raise InvalidInputError(
+            f"{_named(body)} must be connected through faces to be cut, it consists of {owner.size} parts, "
+            f"the largest of {sizes[0]} and {sizes[1]} cells: {_APART}"
+        )
+
+
+def check_face_connected(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> None:
+    """Refuse a partition with a subdomain that is empty or does not hang together through faces.
+
+    Args:
+        mesh: The mesh.
+        partition: (n_cells,) subdomain numbers.
+        body: Name of the body, for the message.
+
+    Raises:
+        InvalidInputError: Naming the subdomain.
+    """
+    partition = _checked_partition(mesh, partition)
+    _, owner = _face_pieces(mesh, partition, neighbours(mesh.cells, mesh.dim))
+    pieces = np.bincount(owner)
+    torn = np.flatnonzero(pieces > 1)
+    if torn.size:
+        raise InvalidInputError(
+            f"every subdomain{f' of {_named(body)}' if body else ''} must be connected through cell faces, "
+            f"{torn.size} of {pieces.size} are not, "
+            f"first subdomain {torn[0]} in {pieces[torn[0]]} pieces: cut differently, or "
+            "give each piece to a neighbour with `merge_pieces`"
+        )
+
+
+def _checked_partition(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
+    array = np.asarray(partition)
+    if array.shape != (mesh.n_cells,) or not np.issubdtype(array.dtype, np.integer):
+        raise InvalidInputError(
+            f"partition must be integers of shape ({mesh.n_cells},), got {array.dtype} of shape "
+            f"{array.shape}: give the subdomain number of every cell"
+        )
+    if array.min() < 0:
+        raise InvalidInputError(f"subdomain numbers must start at 0, got {array.min()}: shift them")
+    empty = np.flatnonzero(np.bincount(array) == 0)
+    if empty.size:
+        raise InvalidInputError(
+            f"subdomains must be numbered without holes, number {empty[0]} of {array.max() + 1} has no cell: "
+            "renumber"
+        )
+    return array.astype(np.int64)
+
+
+def combine(partitions: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Number the subdomains of several bodies through.
+
+    Args:
+        partitions: One partition for each body, each counting from zero.
+
+    Returns:
+        The same with offsets, so that no number occurs in two bodies.
+    """
+    sizes = [int(np.max(p)) + 1 for p in partitions]
+    offsets = np.concatenate([[0], np.cumsum(sizes)])
+    return [np.asarray(p) + offset for p, offset in zip(partitions, offsets, strict=False)]
+
+
+def torn_node_counts(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
+    """Count the nodes of every subdomain, a node once for each subdomain that it belongs to.
+
+    Args:
+        mesh: The mesh.
+        partition: (n_cells,) subdomain numbers.
+
+    Returns:
+        (S,) node counts; their sum times the dimension is the number of torn displacements.
+    """
+    owner = np.repeat(partition, mesh.cells.shape[1])
+    pairs = np.unique(owner * mesh.n_nodes + mesh.cells.ravel())
+    return np.bincount(pairs // mesh.n_nodes)

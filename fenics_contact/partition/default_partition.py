@@ -1,0 +1,131 @@
+"""How many subdomains a body gets, and which, when nobody says."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.checks import check_count
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.partition.cutting import box_partition, check_face_connected, check_one_piece
+from fenics_contact.partition.graph_partition import graph_partition
+
+TARGET_NODES = {3: 700, 2: 1000}
+"""Nodes of a subdomain by dimension: about 2000 displacements in both.
+
+In 3D these are 9 nodes along an edge, as in the published chain of links. As many displacements make 32 nodes
+along an edge in 2D: the matrices are as large, their factors sparser and the interface smaller, and the
+condition number grows with the logarithm, squared, of the cells along an edge only."""
+
+NEAR = (0.8, 1.25)
+"""By which factors the number of boxes may miss the target."""
+
+COMPACT = 2.0
+"""Largest ratio of the sides of a box, in cells."""
+
+_NODES_PER_CELL = {
+    "hexahedron": 1.0,
+    "tetrahedron": 1.0 / 5.5,
+    "quadrilateral": 1.0,
+    "triangle": 0.5,
+    "hexahedron27": 8.0,
+    "quadrilateral9": 4.0,
+    "triangle6": 2.0,
+}
+"""In the interior of a large mesh; for tetrahedra as mesh generators make them (6 in a split hexahedron)."""
+
+
+def target_parts(mesh: BodyMesh, nodes: float | None = None) -> int:
+    """Choose the number of subdomains so that each has about a given number of nodes.
+
+    A subdomain that would have m nodes inside a large mesh has (m^(1/d) + 1)^d once it is torn out.
+
+    Args:
+        mesh: Any mesh.
+        nodes: Nodes of one subdomain, at least 2^d; unless given 700 in 3D and 1000 in 2D, about 2000
+            displacements.
+
+    Returns:
+        Number of subdomains, at least 1 and at most the number of cells.
+
+    Raises:
+        InvalidInputError: If no subdomain can have so few nodes.
+    """
+    nodes = TARGET_NODES[mesh.dim] if nodes is None else nodes
+    if not 2**mesh.dim <= nodes < np.inf:
+        raise InvalidInputError(
+            f"nodes must be at least {2**mesh.dim}, which one cell has, got {nodes}: a few hundred are usual"
+        )
+    inside = (nodes ** (1.0 / mesh.dim) - 1.0) ** mesh.dim
+    parts = round(mesh.n_cells * _NODES_PER_CELL[mesh.cell_type] / inside)
+    return int(np.clip(parts, 1, mesh.n_cells))
+
+
+def default_partition(
+    mesh: BodyMesh, ranks: int = 1, *, nodes: float | None = None, body: str = ""
+) -> np.ndarray:
+    """Cut a body into as many subdomains as suit its size, and at least one for every rank.
+
+    A structured mesh is cut into boxes of about the size aimed at, where some are compact: they are all
+    alike then, so that their matrices have one pattern. Otherwise METIS cuts it. Only a body with fewer cells
+    than ranks gets fewer subdomains than there are ranks.
+
+    Args:
+        mesh: Any mesh that is connected through faces.
+        ranks: Number of MPI ranks.
+        nodes: As in `target_parts`.
+        body: Name of the body, for messages.
+
+    Returns:
+        (n_cells,) subdomain numbers, every subdomain connected through faces; the same on every rank.
+
+    Raises:
+        InvalidInputError: If the mesh consists of separate parts, or an argument cannot be used.
+        MissingRequirementError: If pymetis is missing, too old or cannot be loaded.
+    """
+    check_count(ranks, "ranks")
+    check_one_piece(mesh, body)
+    target, least = target_parts(mesh, nodes), min(ranks, mesh.n_cells)
+    boxes = _boxes(mesh, target, least)
+    return graph_partition(mesh, max(target, least), body) if boxes is None else boxes
+
+
+def _boxes(mesh: BodyMesh, target: int, least: int) -> np.ndarray | None:
+    """Cut a structured mesh into compact boxes; None where there are none of about the size aimed at."""
+    if mesh.grid is None:
+        return None
+    counts = mesh.grid.max(axis=0) + 1
+    first, last = (max(least, round(factor * target)) for factor in NEAR)
+    choices = [
+        boxes
+        for number in range(max(first, 1), last + 1)
+        for boxes in _factorisations(number, mesh.dim)
+        if np.all(np.array(boxes) <= counts) and _aspect(counts, boxes) <= COMPACT
+    ]
+    if not choices:
+        return None
+    best = min(choices, key=lambda boxes: (bool(np.any(counts % boxes)), _aspect(counts, boxes)))
+    try:
+        partition = box_partition(mesh, best)
+        check_face_connected(mesh, partition)
+    except InvalidInputError:  # the grid has holes
+        return None
+    return partition
+
+
+def _aspect(counts: np.ndarray, boxes: tuple[int, ...]) -> float:
+    """Return the longest over the shortest side of a box, in cells."""
+    sides = counts / np.array(boxes)
+    return float(sides.max() / sides.min())
+
+
+def _factorisations(number: int, factors: int) -> list[tuple[int, ...]]:
+    """All ways to write a number as an ordered product of so many factors."""
+    if factors == 1:
+        return [(number,)]
+    return [
+        (first, *rest)
+        for first in range(1, number + 1)
+        if number % first == 0
+        for rest in _factorisations(number // first, factors - 1)
+    ]

@@ -1,0 +1,78 @@
+"""METIS of pymetis, and of no other library that the process holds.
+
+pymetis carries METIS inside its extension and exports its functions. The dynamic linker prefers functions of
+the same name in libraries that were opened for all (RTLD_GLOBAL), and so does dolfinx 0.5 open the METIS of
+the system, whose indices have 32 bits where those of pymetis have 64: a pymetis that is loaded after it
+computes partly with the one and partly with the other, and crashes or never ends. Here it is loaded so that
+it prefers its own functions.
+
+A library is loaded once. What a program has loaded itself stays as it is, and where another METIS may have
+taken its calls, the graph is cut in a process of its own.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import io
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+
+import numpy as np
+
+from fenics_contact._requirements import load_pymetis, pymetis_error
+from fenics_contact.launching import clean_environment
+from fenics_contact.partition import metis_call
+
+
+def part_graph(indptr: np.ndarray, indices: np.ndarray, parts: int) -> np.ndarray:
+    """Return METIS's part of every vertex; arguments and answer as in `metis_call.part_graph`.
+
+    Raises:
+        MissingRequirementError: If pymetis is missing, too old, cannot be loaded or does not run.
+    """
+    alone = _may_have_lost_its_calls()
+    with _own_functions_first():
+        load_pymetis()
+    if alone:
+        return _part_graph_elsewhere(indptr, indices, parts)
+    return metis_call.part_graph(indptr, indices, parts)
+
+
+@cache  # of the first call, before which nothing of the package has loaded pymetis
+def _may_have_lost_its_calls() -> bool:
+    """Tell whether the program has loaded pymetis itself and there is a METIS for all that it may call."""
+    return "pymetis._internal" in sys.modules and hasattr(ctypes.CDLL(None), "METIS_PartGraphKway")
+
+
+@contextmanager
+def _own_functions_first() -> Iterator[None]:
+    """Let what is loaded in this block prefer its own functions to those of libraries opened for all."""
+    flags = sys.getdlopenflags()
+    sys.setdlopenflags(os.RTLD_NOW | os.RTLD_LOCAL | getattr(os, "RTLD_DEEPBIND", 0))
+    try:
+        yield
+    finally:
+        sys.setdlopenflags(flags)
+
+
+def _part_graph_elsewhere(indptr: np.ndarray, indices: np.ndarray, parts: int) -> np.ndarray:
+    """Return METIS's part of every vertex, found by a new Python that loads nothing but pymetis."""
+    given, path = io.BytesIO(), os.pathsep.join(filter(None, sys.path))
+    np.savez(given, indptr=indptr, indices=indices, parts=parts)
+    done = subprocess.run(
+        [sys.executable, "-P", metis_call.__file__],  # -P: modules beside the program are none of its imports
+        input=given.getvalue(),
+        capture_output=True,
+        env=clean_environment() | {"PYTHONPATH": path},
+    )
+    if done.returncode != 0:
+        raise pymetis_error(
+            f"does not run in a process of its own (exit status {done.returncode}: "
+            f"{done.stderr.decode(errors='replace').strip()[-500:]}), as it must where the program has "
+            "imported another METIS before it: cut the mesh before dolfinx and pymetis are imported"
+        )
+    return np.load(io.BytesIO(done.stdout))

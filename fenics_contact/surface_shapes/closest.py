@@ -1,0 +1,72 @@
+"""What follows from a signed distance: closest points and principal curvatures."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.surface_shapes.protocol import SurfaceShape, asked
+
+#: Most steps onto a surface: one where the distance is exact, a few where it is close to exact.
+STEPS = 8
+#: Points this close to the surface, relative to their coordinates, lie on it.
+ROUNDING = 16 * float(np.finfo(float).eps)
+
+
+def closest_points(shape: SurfaceShape, points: np.ndarray) -> np.ndarray:
+    """Return the points of a surface that are closest to given ones.
+
+    x − d(x) n(x), repeated where the distance is not exact, until the points lie on the surface or come no
+    closer.
+
+    Args:
+        shape: The shape.
+        points: Where, shape (n, dim), [length].
+
+    Returns:
+        One point of the surface each, shape (n, dim); of several closest ones any.
+
+    Raises:
+        InvalidInputError: If the shape answers with NaN or arrays of other shapes.
+        UserCodeError: If it raises.
+    """
+    closest = np.array(points, dtype=np.float64)
+    before = np.inf
+    for _ in range(STEPS):
+        distance = asked(shape, "distance", closest)
+        far = float(np.abs(distance).max(initial=0.0))
+        if far <= ROUNDING * np.abs(closest).max(initial=0.0) or far > 0.5 * before:
+            break
+        closest, before = closest - distance[:, None] * asked(shape, "normals", closest), far
+    return closest
+
+
+def principal_curvatures(shape: SurfaceShape, points: np.ndarray) -> np.ndarray:
+    """Return the principal curvatures of a surface, positive where its body is convex.
+
+    Args:
+        shape: The shape.
+        points: Points of the surface, shape (n, dim), [length]; elsewhere the parallel surface through the
+            point is meant.
+
+    Returns:
+        Shape (n, dim − 1), ascending, [1 / length].
+
+    Raises:
+        InvalidInputError: If the shape answers with NaN or arrays of other shapes.
+        UserCodeError: If it raises.
+    """
+    tangents = tangent_bases(asked(shape, "normals", points))
+    bend = asked(shape, "curvatures", points)
+    return np.asarray(np.linalg.eigvalsh(tangents @ bend @ np.swapaxes(tangents, 1, 2)))
+
+
+def tangent_bases(normals: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis of the plane across each unit normal, (n, dim) -> (n, dim − 1, dim).
+
+    The reflection that takes ∓e_dim to the normal takes the other axes there.
+    """
+    dim = normals.shape[1]
+    mirror = normals + np.where(normals[:, -1:] >= 0, 1.0, -1.0) * np.eye(dim)[-1]
+    length = np.einsum("nd,nd->n", mirror, mirror)[:, None, None]
+    reflection = np.eye(dim) - 2 * mirror[:, :, None] * mirror[:, None, :] / length
+    return np.asarray(reflection[:, :-1, :])

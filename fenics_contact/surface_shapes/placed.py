@@ -1,0 +1,110 @@
+"""Shapes that are turned, scaled and moved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.checks import Vector, checked
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.surface_shapes.joined import Joined
+from fenics_contact.surface_shapes.places import require_place
+from fenics_contact.surface_shapes.protocol import SurfaceShape
+
+#: By how much the columns of a rotation may miss being orthonormal.
+ORTHOGONAL = 1e-9
+
+
+@dataclass(frozen=True)
+@checked()
+class Placed:
+    """A shape whose points x have moved to scale R x + translation; built by `placed`.
+
+    Attributes:
+        shape: What is placed.
+        rotation: The orthogonal matrix R by rows; it may mirror, too.
+        translation: Where the origin goes, [length].
+        scale: Factor > 0 on all lengths.
+    """
+
+    shape: SurfaceShape
+    rotation: Sequence[Vector]
+    translation: Vector
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no motion and no positive scale."""
+        dim = len(self.translation)
+        require_place(self, self.translation)
+        turn = np.array([[float(entry) for entry in row] for row in self.rotation if len(row) == dim])
+        if turn.shape != (dim, dim) or not np.abs(turn @ turn.T - np.eye(dim)).max() <= ORTHOGONAL:
+            raise InvalidInputError(
+                f"Placed.rotation must be an orthogonal matrix of shape ({dim}, {dim}), whose rows are "
+                f"perpendicular and of length one, got {self.rotation!r}: give the scale by itself"
+            )
+        if not (np.isfinite(self.scale) and self.scale > 0):
+            raise InvalidInputError(
+                f"Placed.scale must be a positive number, got {self.scale!r}: to mirror a shape give a "
+                "rotation that mirrors"
+            )
+        if getattr(self.shape, "dim", dim) != dim:
+            raise InvalidInputError(
+                f"Placed.translation must have as many entries as the shape has dimensions, {dim} were given "
+                f"for a {type(self.shape).__name__} in {self.shape.dim}: give {self.shape.dim}"  # type: ignore[attr-defined]
+            )
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space that it lies in."""
+        return len(self.translation)
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """Return the shape's distance, scaled."""
+        return np.asarray(self.scale * self.shape.distance(self._back(points)))
+
+    def normals(self, points: np.ndarray) -> np.ndarray:
+        """Return the shape's normals, turned."""
+        return np.asarray(self.shape.normals(self._back(points)) @ self._turn.T)
+
+    def curvatures(self, points: np.ndarray) -> np.ndarray:
+        """Return the shape's curvatures, turned and divided by the scale."""
+        return np.asarray(self._turn @ self.shape.curvatures(self._back(points)) @ self._turn.T / self.scale)
+
+    @property
+    def _turn(self) -> np.ndarray:
+        return np.asarray(self.rotation, dtype=np.float64)
+
+    def _back(self, points: np.ndarray) -> np.ndarray:
+        return np.asarray((points - np.asarray(self.translation)) @ self._turn / self.scale)
+
+
+def placed(
+    shape: SurfaceShape, rotation: np.ndarray | None, translation: Sequence[float], scale: float = 1.0
+) -> SurfaceShape:
+    """Move a shape: its points x go to scale R x + translation.
+
+    Args:
+        shape: Any shape.
+        rotation: The orthogonal matrix R, shape (dim, dim); None does not turn.
+        translation: Where the origin goes, dim entries, [length].
+        scale: Factor > 0 on all lengths.
+
+    Returns:
+        The moved shape; of one that was placed before, both motions in one; of joined ones, them moved.
+
+    Raises:
+        InvalidInputError: If the matrix is not orthogonal, the scale not positive, or the dimensions differ.
+    """
+    turn = np.eye(len(translation)) if rotation is None else np.asarray(rotation, dtype=np.float64)
+    moved = Placed(shape, tuple(map(tuple, np.atleast_2d(turn).tolist())), tuple(translation), scale)
+    if isinstance(shape, Joined):
+        facets = [scale * part @ turn.T + np.asarray(translation) for part in shape.facets]
+        return Joined([placed(part, rotation, translation, scale) for part in shape.shapes], facets)
+    if not isinstance(shape, Placed):
+        return moved
+    both, origin = turn @ np.asarray(shape.rotation), np.asarray(shape.translation)
+    place = scale * turn @ origin + np.asarray(translation)
+    rows = tuple(map(tuple, both.tolist()))
+    return Placed(shape.shape, rows, tuple(place.tolist()), scale * shape.scale)

@@ -1,0 +1,53 @@
+"""Where shapes lie and how large they are: what is no place or no radius is refused by the class's name."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.checks import Vector
+from fenics_contact.errors import InvalidInputError
+
+
+def require_place(shape: object, point: Vector, dims: tuple[int, ...] = (2, 3)) -> None:
+    """Refuse a point without so many finite coordinates.
+
+    Raises:
+        InvalidInputError: Names the shape's class.
+    """
+    if len(point) not in dims or not np.all(np.isfinite(point)):
+        needed = " or ".join(str(dim) for dim in dims)
+        raise InvalidInputError(
+            f"{type(shape).__name__} must be placed by {needed} finite numbers, got {point!r}: give the "
+            "coordinates of a point"
+        )
+
+
+def require_radius(shape: object, radius: float, name: str = "radius") -> None:
+    """Refuse a radius that is not positive.
+
+    Raises:
+        InvalidInputError: Names the shape's class.
+    """
+    if not (np.isfinite(radius) and radius > 0):
+        raise InvalidInputError(
+            f"{type(shape).__name__}.{name} must be a positive number, got {radius!r}: for a socket or a "
+            "hole give the positive radius and hollow=True"
+        )
+
+
+def outer(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return products a bᵀ of vectors in rows, (n, dim) -> (n, dim, dim)."""
+    return np.asarray(first[:, :, None] * second[:, None, :])
+
+
+def require_plane(shape: object, profile: object) -> None:
+    """Refuse a profile that is a shape in space.
+
+    Raises:
+        InvalidInputError: Names the shape's class and the profile's.
+    """
+    if getattr(profile, "dim", 2) != 2:
+        raise InvalidInputError(
+            f"{type(shape).__name__}.profile must be a shape in the plane, got a {type(profile).__name__} in "
+            "space: place it by two coordinates"
+        )

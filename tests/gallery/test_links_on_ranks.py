@@ -1,0 +1,54 @@
+"""Every rank gets the same link, and all ranks stop together."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Callable
+
+from mpi4py import MPI
+
+from fenics_contact.gallery import LinkShape, two_links
+
+SMALL = LinkShape(n_around=12, n_a=2, n_b=4, cell="tetrahedron")
+CODE = """
+    import sys
+    from mpi4py import MPI
+    from fenics_contact.gallery import link
+    from tests.gallery.test_links_on_ranks import SMALL, digest
+
+    comm = MPI.COMM_WORLD
+
+    def fail(shape):
+        raise ValueError("gmsh is unwell")
+
+    if comm.rank > 0:
+        link.mesh_ring = None  # only rank 0 may mesh
+    elif sys.argv[1] == "broken":
+        link.mesh_ring = fail
+    try:
+        word = digest(comm)
+    except Exception as error:
+        word = f"{type(error).__name__}: {error}"
+    lines = comm.gather(word, root=0) or []
+    sys.stdout.write("".join(f"{line}\\n" for line in lines))
+"""
+
+
+def digest(comm: MPI.Comm | None) -> str:
+    """Reduce two links to one word that changes with every bit of them."""
+    pair = two_links(SMALL, comm=comm)
+    meshes = (pair.first.mesh, pair.second.mesh)
+    arrays = [a for mesh in meshes for a in (mesh.points, mesh.cells, mesh.grid, *mesh.surfaces.values())]
+    arrays += [pair.first.crown.directions, pair.second.crown.directions]
+    return hashlib.sha256(b"".join(a.tobytes() for a in arrays if a is not None)).hexdigest()
+
+
+def test_all_ranks_hold_the_same_bits(mpirun: Callable[..., str]) -> None:
+    assert mpirun(CODE, 3, "sound").splitlines() == 3 * [digest(None)]
+
+
+def test_an_error_of_gmsh_stops_all_ranks(mpirun: Callable[..., str]) -> None:
+    lines = mpirun(CODE, 2, "broken").splitlines()
+    assert lines[0] == "ValueError: gmsh is unwell"
+    assert re.fullmatch(r"RemoteError: ValueError: gmsh is unwell \(.*\) \(met on rank 0\)", lines[1])

@@ -1,0 +1,126 @@
+"""Bodies come out of XDMF files and dolfinx meshes whole, named by their tags."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import rectangle
+from fenics_contact.mesh import BodyMesh, vector_areas
+from fenics_contact.mesh_io import from_dolfinx, read_xdmf
+from tests.mesh_io.xdmf_files import CELLS, bar, cell_tags, facet_tags, meshio, write
+
+__all__ = ["meshio"]
+
+
+def check_bar(bodies: dict[str, BodyMesh], cell: str) -> None:
+    """Check the two halves of the bar."""
+    left, right = bodies["1"], bodies["2"]
+    assert (left.cell_type, left.volume, right.volume) == (cell, pytest.approx(1.0), pytest.approx(1.0))
+    assert left.points[:, 0].max() == right.points[:, 0].min() == 1.0
+    assert (set(left.surfaces), set(right.surfaces)) == ({"4"}, {"3", "4"})
+    end = vector_areas(right.points, right.surfaces["3"]).sum(axis=0)
+    assert end == pytest.approx(np.eye(left.dim)[0])
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_file_of_dolfinx_gives_every_cell_tag_as_a_body(cell: str, tmp_path: Path) -> None:
+    mesh = bar(cell)
+    bodies = read_xdmf(write(tmp_path / "bar.xdmf", mesh, cell_tags(mesh), facet_tags(mesh)))
+    check_bar(bodies, cell)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_mesh_in_memory_gives_the_same_bodies(cell: str) -> None:
+    mesh = bar(cell)
+    check_bar(from_dolfinx(mesh, cell_tags(mesh), facet_tags(mesh)), cell)
+
+
+def test_tags_get_names_and_become_regions(tmp_path: Path) -> None:
+    mesh = bar("hexahedron")
+    path = write(tmp_path / "bar.xdmf", mesh, cell_tags(mesh), facet_tags(mesh))
+    (body,) = read_xdmf(path, {"bar": {"steel": 1, "copper": 2}}, {"end": 3, "held": [3, 4]}).values()
+    assert {name: cells.size for name, cells in body.regions.items()} == {"steel": 8, "copper": 8}
+    assert body.points[body.cells[body.regions["steel"]], 0].max() == 1.0
+    assert {name: len(facets) for name, facets in body.surfaces.items()} == {"end": 4, "held": 12}
+    assert set(read_xdmf(path, {"bar": [1, 2]}, [])["bar"].regions) == {"1", "2"}
+    assert list(read_xdmf(path, [2])) == ["2"]
+
+
+def test_a_file_without_tags_is_one_body(tmp_path: Path) -> None:
+    path = write(tmp_path / "bar.xdmf", bar("tetrahedron"))
+    assert list(read_xdmf(path)) == ["mesh"]
+    body = read_xdmf(path, {"bar": "mesh"})["bar"]
+    assert (body.volume, dict(body.surfaces), dict(body.regions)) == (pytest.approx(2.0), {}, {})
+
+
+def test_grids_are_chosen_by_name_where_several_would_do(tmp_path: Path) -> None:
+    mesh = bar("triangle")
+    path = write(tmp_path / "bar.xdmf", mesh, cell_tags(mesh, "materials"), cell_tags(mesh, "bodies"))
+    message = r"several grids that could be cell_tags: it has 'mesh' \(triangle\), 'materials' .*; name one"
+    with pytest.raises(InvalidInputError, match=message):
+        read_xdmf(path)
+    assert list(read_xdmf(path, cell_tags="bodies")) == ["1", "2"]
+    with pytest.raises(InvalidInputError, match=r"no grid for cell_tags='parts': it has 'mesh' \(triangle\)"):
+        read_xdmf(path, cell_tags="parts")
+    with pytest.raises(InvalidInputError, match="no grid for facet_tags='materials'"):
+        read_xdmf(path, cell_tags="bodies", facet_tags="materials")
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_files_of_meshio_give_bodies_in_the_order_of_the_file(
+    meshio: ModuleType, dim: int, tmp_path: Path
+) -> None:
+    plate = rectangle((0, 0), (4, 2), (4, 2))
+    points = np.pad(plate.points, ((0, 0), (0, dim - 2)))
+    tags = (plate.points[plate.cells, 0].max(axis=1) > 2.0) + 1
+    cells = meshio.Mesh(points, {"quad": plate.cells}, cell_data={"gmsh:physical": [tags]})
+    ends = np.concatenate([plate.surfaces["y0"], plate.surfaces["x1"]])
+    facets = meshio.Mesh(points, {"line": ends}, cell_data={"gmsh:physical": [np.repeat([5, 6], [4, 2])]})
+    meshio.write(tmp_path / "cells.xdmf", cells, data_format="XML")
+    meshio.write(tmp_path / "facets.xdmf", facets, data_format="XML")
+    names = {"floor": 5, "end": 6}
+    (whole,) = read_xdmf(
+        tmp_path / "cells.xdmf", {"plate": [1, 2]}, names, facet_file=tmp_path / "facets.xdmf"
+    ).values()
+    assert np.array_equal(whole.points, plate.points)
+    assert np.array_equal(whole.cells, plate.cells)
+    for ours, theirs in (("floor", "y0"), ("end", "x1")):
+        assert {*map(tuple, whole.surfaces[ours])} == {*map(tuple, plate.surfaces[theirs])}
+    assert whole.regions["2"].tolist() == np.flatnonzero(tags == 2).tolist()
+
+
+def test_all_ranks_receive_the_bodies_that_rank_0_reads(mpirun: Callable[..., str], tmp_path: Path) -> None:
+    mesh = bar("tetrahedron")
+    path = write(tmp_path / "bar.xdmf", mesh, cell_tags(mesh), facet_tags(mesh))
+    script = f"""
+        from mpi4py import MPI
+        from fenics_contact.mesh_io import read_xdmf
+        bodies = read_xdmf("{path}", {{"bar": [1, 2]}}, {{"end": 3}}, comm=MPI.COMM_WORLD)
+        found = [(name, round(body.volume, 9), *body.surfaces) for name, body in bodies.items()]
+        every = MPI.COMM_WORLD.gather(found)
+        if every:
+            print(every)
+    """
+    assert mpirun(script, 2).strip() == str(2 * [[("bar", 2.0, "end")]])
+
+
+def test_a_distributed_mesh_is_refused(mpirun: Callable[..., str]) -> None:
+    script = """
+        from mpi4py import MPI
+        from fenics_contact import _dolfinx
+        import dolfinx.mesh
+        from fenics_contact.mesh_io import from_dolfinx
+        try:
+            from_dolfinx(dolfinx.mesh.create_unit_square(MPI.COMM_WORLD, 4, 4))
+        except ValueError as error:
+            message = str(error)
+        if MPI.COMM_WORLD.rank == 0:
+            print(message)
+    """
+    assert "needs a mesh on one rank, this one is on 2: create it on" in mpirun(script, 2)

@@ -1,0 +1,247 @@
+"""METIS's subdomains hang together through faces, whatever METIS returns; their number suits the mesh."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fenics_contact.errors import InvalidInputError, MissingRequirementError
+from fenics_contact.gallery import block, chain_link, half_disc, hemisphere, rectangle
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.mesh.faces import neighbours
+from fenics_contact.partition import (
+    box_partition,
+    check_face_connected,
+    check_one_piece,
+    default_partition,
+    graph_partition,
+    merge_pieces,
+    target_parts,
+    torn_node_counts,
+)
+
+SMALL = {
+    "tetrahedron": block((0, 0, 0), (2, 2, 1), (2, 2, 1), "tetrahedron"),
+    "hexahedron": block((0, 0, 0), (4, 3, 2), (4, 3, 2)),
+    "triangle": rectangle((0, 0), (4, 3), (4, 3), "triangle"),
+    "quadrilateral": rectangle((0, 0), (5, 4), (5, 4)),
+}
+
+
+@pytest.mark.parametrize("cell", SMALL)
+@settings(max_examples=25)
+@given(share=st.floats(0.0, 1.0))
+def test_any_number_of_parts_is_full_and_connected(cell: str, share: float) -> None:
+    mesh = SMALL[cell]
+    parts = 1 + round(share * (mesh.n_cells - 1))
+    partition = graph_partition(mesh, parts)
+    check_face_connected(mesh, partition)
+    assert np.unique(partition).tolist() == list(range(parts))
+
+
+@pytest.mark.parametrize("cell", SMALL)
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**32 - 1), parts=st.integers(1, 6))
+def test_any_partition_is_mended_without_losing_a_subdomain(cell: str, seed: int, parts: int) -> None:
+    mesh = SMALL[cell]
+    scattered = np.random.default_rng(seed).permutation(np.arange(mesh.n_cells) % parts)
+    mended = merge_pieces(mesh, scattered)
+    check_face_connected(mesh, mended)
+    assert np.unique(mended).tolist() == list(range(parts))
+
+
+def test_parts_are_of_like_size_and_touch_in_few_faces() -> None:
+    mesh = hemisphere(1.0, 10)
+    partition = graph_partition(mesh, 6)
+    sizes = np.bincount(partition)
+    assert sizes.max() < 1.1 * sizes.min()
+    pairs = neighbours(mesh.cells)
+    assert 0.0 < np.mean(partition[pairs[:, 0]] != partition[pairs[:, 1]]) < 0.1
+
+
+def cells_sharing(mesh: BodyMesh, nodes: int) -> np.ndarray:
+    """A pair of cells that share exactly so many nodes."""
+    for first, vertices in enumerate(mesh.cells):
+        common = np.isin(mesh.cells, vertices).sum(axis=1)
+        if np.any(common == nodes):
+            return np.array([first, np.flatnonzero(common == nodes)[0]])
+    raise AssertionError("there is no such pair: nothing would be tested")
+
+
+@pytest.mark.parametrize("nodes", [0, 1, 2])
+def test_tetrahedra_that_share_an_edge_a_node_or_nothing_are_found_and_mended(nodes: int) -> None:
+    mesh = block((0, 0, 0), (3, 3, 3), (3, 3, 3), "tetrahedron")
+    partition = np.zeros(mesh.n_cells, dtype=np.int64)
+    partition[cells_sharing(mesh, nodes)] = 1
+    message = r"every subdomain of body 'lug' must .* 1 of 2 are not, first subdomain 1 in 2 pieces"
+    with pytest.raises(InvalidInputError, match=message):
+        check_face_connected(mesh, partition, "lug")
+    mended = merge_pieces(mesh, partition)
+    check_face_connected(mesh, mended)
+    assert np.bincount(mended).tolist() == [mesh.n_cells - 1, 1]
+
+
+@pytest.mark.parametrize("empty", [[2], [0, 1], [1, 2, 3]])
+def test_parts_that_metis_leaves_empty_are_filled(empty: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = block((0, 0, 0), (4, 4, 2), (4, 4, 2), "tetrahedron")
+    full = np.setdiff1d(np.arange(4), empty)
+
+    def metis(indptr: np.ndarray, indices: np.ndarray, parts: int) -> np.ndarray:
+        return full[np.arange(mesh.n_cells) % full.size]
+
+    module = importlib.import_module("fenics_contact.partition.graph_partition")
+    monkeypatch.setattr(module, "part_graph", metis)
+    partition = graph_partition(mesh, 4)
+    check_face_connected(mesh, partition)
+    assert np.unique(partition).tolist() == [0, 1, 2, 3]
+
+
+def test_more_parts_than_cells_are_refused() -> None:
+    with pytest.raises(InvalidInputError, match="parts must be at most the 20 cells, got 21: take fewer"):
+        graph_partition(SMALL["quadrilateral"], 21)
+
+
+def test_a_count_that_is_none_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match="parts must be an integer of at least 1, got 0"):
+        graph_partition(SMALL["quadrilateral"], 0)
+
+
+def two_bricks() -> BodyMesh:
+    """Two bricks that touch nowhere, of 4 and 2 cells."""
+    one, other = block((0, 0, 0), (2, 2, 1), (2, 2, 1)), block((5, 0, 0), (7, 1, 1), (2, 1, 1))
+    return BodyMesh(np.vstack([one.points, other.points]), np.vstack([one.cells, other.cells + one.n_nodes]))
+
+
+@pytest.mark.parametrize(
+    "cut",
+    [
+        lambda mesh, body: graph_partition(mesh, 2, body),
+        lambda mesh, body: default_partition(mesh, body=body),
+    ],
+)
+def test_a_body_in_separate_parts_is_named(cut: Callable[[BodyMesh, str], object]) -> None:
+    message = r"body 'rail' must be connected .* consists of 2 parts, the largest of 4 and 2 cells: join"
+    with pytest.raises(InvalidInputError, match=message):
+        cut(two_bricks(), "rail")
+    with pytest.raises(
+        InvalidInputError, match="a mesh must be connected through faces to be cut, it consists"
+    ):
+        cut(two_bricks(), "")
+
+
+def test_a_body_that_hangs_by_an_edge_is_in_two_parts() -> None:
+    mesh = rectangle((0, 0), (2, 2), (2, 2))
+    used, cells = np.unique(mesh.cells[[0, 3]], return_inverse=True)
+    with pytest.raises(InvalidInputError, match="consists of 2 parts, the largest of 1 and 1 cells"):
+        check_one_piece(BodyMesh(mesh.points[used], cells.reshape(2, 4)))
+    check_one_piece(mesh)
+
+
+def test_a_missing_pymetis_is_reported_with_the_way_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    find_spec = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name == "pymetis" else find_spec(name)
+    )
+    assert not graph_partition(SMALL["triangle"], 1).any(), "one part needs no METIS"
+    with pytest.raises(MissingRequirementError, match=r"needs pymetis .* found none\. .*pip install pymetis"):
+        graph_partition(SMALL["triangle"], 2)
+
+
+def test_all_ranks_get_the_same_subdomains(mpirun: Callable[..., str]) -> None:
+    script = """
+        import hashlib
+        from mpi4py import MPI
+        from fenics_contact.partition import graph_partition
+        from fenics_contact.gallery import hemisphere
+        partition = graph_partition(hemisphere(1.0, 8), 11)
+        hashes = MPI.COMM_WORLD.gather(hashlib.sha256(partition.tobytes()).hexdigest())
+        if hashes:
+            print(*hashes)
+    """
+    hashes = mpirun(script, 2).split()
+    assert len(hashes) == 2
+    assert len({*hashes, *mpirun(script, 1).split()}) == 1
+
+
+TARGETS = {
+    "block": (lambda: block((0, 0, 0), (1, 1, 1), (16, 16, 16)), 700),
+    "tetrahedra": (lambda: block((0, 0, 0), (1, 1, 1), (14, 14, 14), "tetrahedron"), 700),
+    "hemisphere": (lambda: hemisphere(1.0, 14), 700),
+    "square": (lambda: rectangle((0, 0), (1, 1), (100, 100)), 1000),
+    "triangles": (lambda: rectangle((0, 0), (1, 1), (80, 80), "triangle"), 1000),
+    "disc": (lambda: half_disc(1.0, 40), 1000),
+}
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_subdomains_have_about_the_nodes_aimed_at(name: str) -> None:
+    build, nodes = TARGETS[name]
+    mesh = build()
+    partition = default_partition(mesh)
+    counts = torn_node_counts(mesh, partition)
+    target = target_parts(mesh)
+    assert target > 1
+    assert round(0.8 * target) <= counts.size <= round(1.25 * target)
+    assert 0.7 * nodes < counts.min()
+    assert counts.max() < 1.3 * nodes
+
+
+def test_a_structured_mesh_is_cut_into_equal_boxes_near_a_prime_target() -> None:
+    mesh = block((0, 0, 0), (2, 1, 1), (32, 16, 16))
+    assert target_parts(mesh) == 17
+    assert np.array_equal(default_partition(mesh), box_partition(mesh, (4, 2, 2)))
+    assert default_partition(mesh, 18).max() >= 17
+
+
+def test_smaller_subdomains_are_more() -> None:
+    mesh = block((0, 0, 0), (1, 1, 1), (12, 12, 12))
+    assert target_parts(mesh, nodes=7**3) == 8
+    assert target_parts(mesh, nodes=5**3) == 27
+    assert target_parts(mesh, nodes=8) == mesh.n_cells
+    assert target_parts(SMALL["hexahedron"]) == 1
+
+
+@pytest.mark.parametrize("nodes", [7.9, np.nan, np.inf])
+def test_subdomains_without_a_cell_are_refused(nodes: float) -> None:
+    with pytest.raises(InvalidInputError, match=f"nodes must be at least 8, which one cell has, got {nodes}"):
+        target_parts(SMALL["hexahedron"], nodes)
+    assert target_parts(SMALL["quadrilateral"], 4) == 20
+
+
+def test_every_rank_gets_a_subdomain_while_there_are_cells() -> None:
+    mesh = SMALL["hexahedron"]
+    assert default_partition(mesh, 5).max() == 4
+    assert default_partition(mesh, 1000).max() == mesh.n_cells - 1
+    assert not default_partition(mesh).any()
+    with pytest.raises(InvalidInputError, match="ranks must be an integer of at least 1, got 0"):
+        default_partition(mesh, 0)
+
+
+def test_the_published_link_is_cut_into_the_published_boxes() -> None:
+    mesh = chain_link().mesh
+    assert np.array_equal(default_partition(mesh), box_partition(mesh, (8, 1, 2)))
+
+
+def test_a_body_that_no_compact_boxes_fit_is_left_to_metis() -> None:
+    mesh = block((0, 0, 0), (1, 1, 1), (12, 12, 12))
+    partition = default_partition(mesh, 7)
+    check_face_connected(mesh, partition)
+    slabs = torn_node_counts(mesh, box_partition(mesh, (7, 1, 1))).sum()
+    assert torn_node_counts(mesh, partition).sum() < slabs
+    assert np.array_equal(default_partition(mesh, 8), box_partition(mesh, (2, 2, 2)))
+
+
+def test_a_grid_with_a_hole_is_cut_all_the_same() -> None:
+    mesh = rectangle((0, 0), (4, 4), (4, 4))
+    assert mesh.grid is not None
+    kept = ~np.all((mesh.grid > 0) & (mesh.grid < 3), axis=1)
+    used, cells = np.unique(mesh.cells[kept], return_inverse=True)
+    ring = BodyMesh(mesh.points[used], cells.reshape(-1, 4), grid=mesh.grid[kept])
+    partition = default_partition(ring, 3)
+    check_face_connected(ring, partition)
+    assert np.unique(partition).tolist() == [0, 1, 2]

@@ -1,0 +1,128 @@
+"""Shapes of surfaces that are none are refused, and answers that a shape must not give."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from fenics_contact.errors import InvalidInputError, UserCodeError
+from fenics_contact.surface_shapes import (
+    Extruded,
+    Joined,
+    Parametric,
+    Plane,
+    Profile,
+    Revolved,
+    SignedDistance,
+    Sphere,
+    Torus,
+    asked,
+    placed,
+)
+
+AXIS = (1.0, 2.0, -1.0)
+CENTRE = (0.1, -0.2, 0.3)
+
+
+def circle(u: np.ndarray) -> np.ndarray:
+    return 1.2 * np.column_stack([np.cos(u[:, 0]), np.sin(u[:, 0])])
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (
+            lambda: Torus(CENTRE, AXIS, 1.0, 1.0),
+            r"^Torus.ring_radius must be a number above the tube_radius 1.0, got 1.0: it is measured from",
+        ),
+        (lambda: Torus(CENTRE, AXIS, np.nan, 1.0), "Torus.ring_radius must be a number above"),
+        (
+            lambda: Torus(CENTRE, AXIS, 1.0, 0.0),
+            "^Torus.tube_radius must be a positive number, got 0.0: for a",
+        ),
+        (
+            lambda: Torus(CENTRE, (0.0, 0.0, 0.0), 2.0, 1.0),
+            "^Torus.axis must be 3 finite numbers, not all zero",
+        ),
+        (lambda: Torus((0.0, 0.0), AXIS, 2.0, 1.0), "^Torus must be placed by 3 finite numbers"),
+        (lambda: Sphere(CENTRE, -1.0), "^Sphere.radius must be a positive number, got -1.0"),
+        (
+            lambda: Extruded(Sphere((0.0, 0.0), 1.0), CENTRE, AXIS, AXIS),
+            r"^Extruded.across must not be parallel to the axis, got \(1.0, 2.0, -1.0\) and .*: give the",
+        ),
+        (
+            lambda: Extruded(Sphere(CENTRE, 1.0), CENTRE, AXIS, (1.0, 0.0, 0.0)),
+            "^Extruded.profile must be a shape in the plane, got a Sphere in space: place it by two",
+        ),
+        (
+            lambda: Revolved(Plane(CENTRE, AXIS), CENTRE, AXIS),
+            "^Revolved.profile must be a shape in the plane",
+        ),
+        (lambda: Revolved("wire", CENTRE, AXIS), "^Revolved.profile must be a SurfaceShape with distance"),
+        (
+            lambda: placed(Sphere(CENTRE, 1.0), 2.0 * np.eye(3), (0.0, 0.0, 0.0)),
+            r"^Placed.rotation must be an orthogonal matrix of shape \(3, 3\), .*: give the scale by itself",
+        ),
+        (lambda: placed(Sphere(CENTRE, 1.0), np.eye(2), (0.0, 0.0, 0.0)), "^Placed.rotation must be an orth"),
+        (
+            lambda: placed(Sphere(CENTRE, 1.0), None, CENTRE, -1.0),
+            "^Placed.scale must be a positive number, got -1",
+        ),
+        (
+            lambda: placed(Sphere((0.0, 0.0), 1.0), None, CENTRE),
+            "^Placed.translation must have as many entries as the shape has dimensions, 3 were given for a",
+        ),
+        (lambda: Profile([(0.0, 0.0), (1.0, 0.0)]), "^Profile.points must be at least three points of two"),
+        (lambda: Profile([(0.0, 0.0), (0.0, 0.0), (1.0, 0.0)]), "each apart from the next"),
+        (lambda: Profile([(0.0, 0.0), (1.0, 1.0), (0.0, 0.0)], closed=True), "of a closed one each once"),
+        (
+            lambda: Joined((Plane(CENTRE, AXIS),), ()),
+            r"^Joined.facets must hold facets for each of the 1 shapes",
+        ),
+        (lambda: Parametric(circle, (1.0,), (0.0,)), "^Parametric.lower must be one or two finite numbers"),
+        (
+            lambda: Parametric(circle, (0.0,), (1.0,), periodic=(True, True)),
+            "^Parametric.periodic must hold 1",
+        ),
+        (
+            lambda: Parametric(lambda u: u, (0.0,), (1.0,)),
+            r"^Parametric.position must return finite numbers of",
+        ),
+    ],
+)
+def test_a_shape_that_is_none_is_refused(build: Callable[[], object], message: str) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        build()
+
+
+def test_a_pole_of_a_parametrisation_is_refused_where_it_is_met() -> None:
+    def ball(u: np.ndarray) -> np.ndarray:
+        (a, b), (s, t) = np.cos(u).T, np.sin(u).T
+        return np.column_stack([a * b, s * b, t])
+
+    shape = Parametric(ball, (0.0, -np.pi / 2), (2 * np.pi, np.pi / 2), periodic=(True, False))
+    np.testing.assert_allclose(shape.distance(np.array([[2.0, 0.0, 0.1]])), np.hypot(2.0, 0.1) - 1)
+    message = (
+        r"a parametrised surface needs derivatives that are not zero and not parallel, got such at \[.*1.0\]"
+    )
+    with pytest.raises(InvalidInputError, match=message):
+        shape.normals(np.array([[0.0, 0.0, 2.0]]))
+
+
+def test_an_answer_of_another_shape_is_refused_and_an_error_is_named() -> None:
+    class Wrong(SignedDistance):
+        def curvatures(self, points: np.ndarray) -> np.ndarray:
+            return np.zeros(3)
+
+    def fails(x: np.ndarray) -> np.ndarray:
+        raise ZeroDivisionError
+
+    message = (
+        r"^the curvatures of Wrong must be finite numbers of shape \(4, 2, 2\) for points of shape \(4, 2\)"
+    )
+    with pytest.raises(InvalidInputError, match=message):
+        asked(Wrong(lambda x: x[:, 0]), "curvatures", np.ones((4, 2)))
+    with pytest.raises(UserCodeError, match="the distance of SignedDistance"):
+        asked(SignedDistance(fails), "distance", np.ones((4, 2)))
