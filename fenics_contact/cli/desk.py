@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fenics_contact.cli.streams import say
-from fenics_contact.progress import terminal_width, visible
+from fenics_contact.progress import at_terminal, visible
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -50,18 +50,18 @@ class Desk:
         """Write on rank 0: with colours to a terminal, else without blanks at the ends of lines."""
         if self.comm.rank != 0:
             return
-        width = terminal_width(sys.stdout)
+        drawn = at_terminal(sys.stdout)
         console = Console(
             file=io.StringIO(),
-            width=width or WIDTH,
-            force_terminal=width is not None,
-            no_color=True if width is None else None,
+            width=None if drawn else WIDTH,
+            force_terminal=drawn,
+            no_color=None if drawn else True,
             highlight=False,
         )
         console.print(_Visible(what), soft_wrap=isinstance(what, Text))
         lines = console.file.getvalue().split("\n")  # type: ignore[attr-defined]
         # Through sys.stdout itself: bars that are drawn at this moment stay below.
-        say("\n".join(lines if width else [line.rstrip() for line in lines]))
+        say("\n".join(lines if drawn else [line.rstrip() for line in lines]))
 
 
 @dataclass(frozen=True)

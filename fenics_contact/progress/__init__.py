@@ -10,7 +10,7 @@ Example:
 """
 
 from fenics_contact.progress.event import Event, Kind
-from fenics_contact.progress.places import terminal_width
+from fenics_contact.progress.places import at_terminal
 from fenics_contact.progress.shown import shown
 from fenics_contact.progress.task import LOGGER_NAME, Task
 from fenics_contact.progress.words import duration, is_visible, visible
@@ -20,9 +20,9 @@ __all__ = [
     "Event",
     "Kind",
     "Task",
+    "at_terminal",
     "duration",
     "is_visible",
     "shown",
-    "terminal_width",
     "visible",
 ]

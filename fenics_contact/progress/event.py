@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from fenics_contact.progress.words import joined, scientific
+from fenics_contact.progress.words import joined
 
 
 class Kind(Enum):
@@ -63,23 +63,15 @@ class Event:
     @property
     def details(self) -> str:
         """The numbers in words."""
-        return joined(self._count(), self._value(), self._measure(), self.words)
-
-    def _count(self) -> str:
-        if self.number is None:
-            return ""
-        if self.total is not None:
-            return f"{self.number} of {self.total}"
-        unit = self.unit.removesuffix("s") if self.number == 1 else self.unit
-        return f"{self.number} {unit}"
-
-    def _value(self) -> str:
-        return "" if self.value is None else f"best {self.value:.6g}"
-
-    def _measure(self) -> str:
-        if self.measure is None:
-            return ""
-        if self.target is None:
-            return f"{self.measured} {self.measure:.1e}"
-        sign = "≤" if self.measure <= self.target else ">"
-        return f"{self.measured} {self.measure:.1e} {sign} {scientific(self.target)}"
+        count = value = measure = ""
+        if self.number is not None:
+            unit = self.unit.removesuffix("s") if self.number == 1 else self.unit
+            count = f"{self.number} {unit}" if self.total is None else f"{self.number} of {self.total}"
+        if self.value is not None:
+            value = f"best {self.value:.6g}"
+        if self.measure is not None:
+            measure = f"{self.measured} {self.measure:.1e}"
+            if self.target is not None:
+                sign = "≤" if self.measure <= self.target else ">"
+                measure += f" {sign} {self.target:.1e}".replace(".0e", "e")
+        return joined(count, value, measure, self.words)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from contextlib import suppress
+from pathlib import Path
 from typing import TextIO
 
 #: Programs that start ranks and pass on what they write.
@@ -13,62 +14,39 @@ LAUNCHERS = {
 }  # fmt: skip
 
 
-def terminal_width(stream: TextIO) -> int | None:
-    """Return the columns of the terminal at which a stream ends, None where there is none.
+def at_terminal(stream: TextIO | None) -> bool:
+    """Tell whether a stream ends at a terminal that can draw.
 
     What a rank writes goes to mpirun through a pipe, or through a pseudo-terminal even where mpirun's own
     output is a file. So under mpirun it counts where that one writes to.
-
-    Args:
-        stream: The stream.
     """
-    try:
-        descriptor = stream.fileno()
-    except (OSError, ValueError, AttributeError):
-        # No file of the system: a stream that a program has put together knows itself what it is.
-        return 80 if _says_terminal(stream) else None
-    launcher = _launcher()
-    if launcher is None or descriptor > 2:
-        return _columns(descriptor)
-    with suppress(OSError):
-        opened = os.open(f"/proc/{launcher}/fd/{descriptor}", os.O_WRONLY | os.O_NOCTTY)
-        try:
-            return _columns(opened)
-        finally:
-            os.close(opened)
-    return None
+    if stream is None or os.environ.get("TERM") == "dumb":
+        return False
+    with suppress(OSError, ValueError, AttributeError):  # no file of the system knows itself what it is
+        launcher, descriptor = _launcher(), stream.fileno()
+        if launcher is not None and descriptor <= 2:
+            with suppress(OSError):
+                return os.readlink(f"/proc/{launcher}/fd/{descriptor}").startswith(("/dev/pts/", "/dev/tty"))
+            return False
+    with suppress(ValueError, AttributeError):
+        return stream.isatty()
+    return False
 
 
 def in_notebook() -> bool:
     """Tell whether this process is the kernel of a notebook."""
     shell = sys.modules.get("IPython")
-    found = None if shell is None else shell.get_ipython()
-    return found is not None and getattr(found, "kernel", None) is not None
-
-
-def _says_terminal(stream: TextIO) -> bool:
-    try:
-        return bool(stream.isatty())
-    except (ValueError, AttributeError):
-        return False
-
-
-def _columns(descriptor: int) -> int | None:
-    if not os.isatty(descriptor) or os.environ.get("TERM") == "dumb":
-        return None
-    with suppress(OSError):
-        return os.get_terminal_size(descriptor).columns or 80
-    return 80
+    return getattr(shell and shell.get_ipython(), "kernel", None) is not None
 
 
 def _launcher() -> int | None:
     """Return the process that started the ranks on this machine, None where this is none of them."""
     found, candidate = None, os.getppid()
-    while candidate > 1:
-        with suppress(OSError, ValueError), open(f"/proc/{candidate}/stat") as file:
-            name, _, rest = file.read().partition("(")[2].rpartition(")")
-            if name in LAUNCHERS:
-                found, candidate = candidate, int(rest.split()[1])
-                continue
-        break
+    with suppress(OSError):
+        while True:
+            status = Path(f"/proc/{candidate}/stat").read_text()
+            name, _, rest = status.partition("(")[2].rpartition(")")
+            if name not in LAUNCHERS:
+                break
+            found, candidate = candidate, int(rest.split()[1])
     return found

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
+from dataclasses import replace
 from types import TracebackType
 from typing import Any
 
@@ -11,6 +13,8 @@ from fenics_contact.progress.event import Event, Kind
 
 #: Through this logger everything is reported.
 LOGGER_NAME = "fenics_contact.progress"
+#: What else hears every event: `shown` while it draws.
+LISTENERS: list[Callable[[Event], None]] = []
 
 _LOGGER = logging.getLogger(LOGGER_NAME)
 
@@ -19,7 +23,6 @@ class Task:
     """A piece of work that tells how far it is, if anybody listens.
 
     Attributes:
-        what: Name of the work.
         outcome: What is told when it ends.
 
     Example:
@@ -48,22 +51,12 @@ class Task:
             target: What the measure of the steps must fall to.
             measured: What that measure is.
         """
-        self.what, self.outcome = what, ""
-        # Work of which steps are known or a limit shows from its beginning that none is done.
-        self._first = None if total is None and most is None else 0
-        self._known: dict[str, Any] = {
-            "unit": unit, "total": total, "most": most, "target": target, "measured": measured
-        }  # fmt: skip
+        self.outcome = ""
+        self._event = Event(id(self), what, Kind.BEGIN, unit, None, total, most, None, target, measured)
 
-    def begin(self, number: int | None = None, words: str = "") -> None:
-        """Say that the work begins.
-
-        Args:
-            number: How many an earlier run has done.
-            words: What else there is to say.
-        """
-        if _LOGGER.isEnabledFor(logging.DEBUG):
-            self._tell(Kind.BEGIN, number=number, words=words)
+    def begin(self, number: int | None = None) -> None:
+        """Say that the work begins, and how many steps an earlier run has done."""
+        self._tell(Kind.BEGIN, number=number)
 
     def step(
         self,
@@ -76,54 +69,33 @@ class Task:
         words: str = "",
         timed: bool = True,
     ) -> None:
-        """Say how far the work is.
-
-        Args:
-            number: How many are done.
-            measure: What must become small; None if it is not known now.
-            target: What it must fall to, where that has changed.
-            value: Best value so far.
-            left: How long the rest will take, [s], where the work knows better than the time of its steps.
-            words: What else there is to say.
-            timed: Whether the time since the last step tells how long others take.
-        """
-        if _LOGGER.isEnabledFor(logging.DEBUG):
+        """Say how far the work is: the attributes of an `Event`; a target is told where it has changed."""
+        if LISTENERS or _LOGGER.isEnabledFor(logging.DEBUG):
             known = {} if target is None else {"target": target}
-            self._tell(
-                Kind.STEP,
-                number=number,
-                measure=measure,
-                value=value,
-                left=left,
-                words=words,
-                timed=timed,
-                **known,
-            )
+            found = {"measure": measure, "value": value, "left": left, "words": words, "timed": timed}
+            self._tell(Kind.STEP, number=number, **found, **known)
 
-    def end(self, error: BaseException | None = None, words: str = "") -> None:
-        """Say that the work is over.
-
-        Args:
-            error: What it ended with instead of its result: a failure, or Ctrl-C and the like.
-            words: What else there is to say.
-        """
-        if _LOGGER.isEnabledFor(logging.DEBUG):
-            kind = Kind.END
-            if error is not None:
-                kind = Kind.FAILED if isinstance(error, Exception) else Kind.STOPPED
-            self._tell(kind, words=words)
+    def end(self, error: BaseException | None = None) -> None:
+        """Say that the work is over, and what it ended with instead of its result: a failure, or Ctrl-C."""
+        kind = Kind.END
+        if error is not None:
+            kind = Kind.FAILED if isinstance(error, Exception) else Kind.STOPPED
+        self._tell(kind, words=self.outcome)
 
     def __enter__(self) -> Task:
-        """Begin."""
-        self.begin(self._first)
+        """Begin; work of which steps are known or a limit shows that none is done."""
+        self.begin(None if self._event.total is None and self._event.most is None else 0)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End, as a failure where an exception passes."""
-        self.end(error, words=self.outcome)
+        self.end(error)
 
     def _tell(self, kind: Kind, **found: Any) -> None:
-        event = Event(task=id(self), what=self.what, kind=kind, **{**self._known, **found})
-        tell(_LOGGER.debug, "%s", event, extra={"progress": event})
+        if LISTENERS or _LOGGER.isEnabledFor(logging.DEBUG):
+            event = replace(self._event, kind=kind, **found)
+            for listen in LISTENERS:
+                listen(event)
+            tell(_LOGGER.debug, "%s", event, extra={"progress": event})

@@ -29,11 +29,6 @@ def joined(*parts: str) -> str:
     return ", ".join(part for part in parts if part)
 
 
-def scientific(value: float) -> str:
-    """Write a tolerance as briefly as two digits allow: 1e-06, 2.5e-03."""
-    return f"{value:.1e}".replace(".0e", "e")
-
-
 def is_visible(text: str) -> bool:
     """Tell whether a text holds nothing that a terminal obeys instead of showing it."""
     return not _OBEYED.search(text)

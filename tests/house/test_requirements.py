@@ -18,9 +18,9 @@ import pytest
 
 from fenics_contact import _requirements
 from fenics_contact.errors import MissingRequirementError
-from fenics_contact.progress.lines import Lines
-from fenics_contact.progress.shown import _presenter
-from fenics_contact.progress.tracker import Tracker
+from fenics_contact.progress.shown import _writer
+from fenics_contact.progress.works import Works
+from fenics_contact.progress.writers import Log
 from tests.conftest import ROOT, launch
 
 LIBRARIES = ["numpy", "scipy", "clarabel", "mpi4py", "petsc4py", "dolfinx"]
@@ -283,5 +283,5 @@ def test_progress_is_told_in_lines_where_nothing_draws_bars(
     without: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     without("rich")
-    monkeypatch.setattr(sys.modules[_presenter.__module__], "terminal_width", lambda _: 80)
-    assert isinstance(_presenter(Tracker(), StringIO(), own=True, interval=1.0), Lines)
+    monkeypatch.setattr(sys.modules[_writer.__module__], "at_terminal", lambda _: True)
+    assert isinstance(_writer(Works(), StringIO(), 1.0), Log)

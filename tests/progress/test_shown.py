@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from fenics_contact.progress import LOGGER_NAME, Task, shown
-from fenics_contact.progress.places import LAUNCHERS, terminal_width
+from fenics_contact.progress.places import LAUNCHERS, at_terminal
+from fenics_contact.progress.task import LISTENERS
 
 LOGGER = logging.getLogger(LOGGER_NAME)
 
@@ -52,7 +53,8 @@ def work(clock: Clock, pause: float = 4.0) -> None:
 def as_it_was() -> tuple[Any, ...]:
     root = logging.getLogger()
     streams = [handler.stream for handler in root.handlers if isinstance(handler, logging.StreamHandler)]
-    return (LOGGER.level, LOGGER.propagate, list(LOGGER.handlers), sys.stdout, sys.stderr, streams)
+    mine = (LOGGER.level, LOGGER.propagate, list(LOGGER.handlers), list(LISTENERS))
+    return (*mine, sys.stdout, sys.stderr, streams)
 
 
 def test_elsewhere_a_line_is_logged_now_and_then(clock: Clock, caplog: pytest.LogCaptureFixture) -> None:
@@ -181,8 +183,8 @@ def test_a_notebook_gets_one_output_that_ends_with_what_came_out(
 
 
 def test_a_stream_that_is_no_file_says_itself_whether_it_is_a_terminal() -> None:
-    assert terminal_width(Screen()) == 80
-    assert terminal_width(io.StringIO()) is None
+    assert at_terminal(Screen())
+    assert not at_terminal(io.StringIO())
 
 
 def test_launchers_of_ranks_are_known() -> None:
