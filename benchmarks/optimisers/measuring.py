@@ -35,7 +35,8 @@ FULL = (
     Case("coarse", "largest force", 1.0, 0.1, 0),
     Case("small", "largest force", 1.0, 0.3, 0),
 )
-QUICK = (Case("coarse", "largest force", 1.0, 0.3, 0),)
+#: A start of twice the largest force of the others: a dozen evaluations do not go far from a good one.
+QUICK = (Case("coarse", "largest force", 1.0, 0.3, 56),)
 
 
 def budget_of(case: Case, method: str, quick: bool) -> int:
