@@ -6,28 +6,29 @@ from fenics_contact.checks.arguments import (
     LARGEST,
     MOST,
     STEEPEST,
+    brief,
     check_count,
     check_grading,
     check_numbers,
     check_row,
-    shown,
 )
 from fenics_contact.checks.checked import checked, meaning
 from fenics_contact.checks.files import require_file
-from fenics_contact.checks.vectors import Vector, unit_vector
+from fenics_contact.checks.vectors import GivenVector, floats, unit_vector
 
 __all__ = [
     "LARGEST",
     "MOST",
     "STEEPEST",
-    "Vector",
+    "GivenVector",
+    "brief",
     "check_count",
     "check_grading",
     "check_numbers",
     "check_row",
     "checked",
+    "floats",
     "meaning",
     "require_file",
-    "shown",
     "unit_vector",
 ]

@@ -21,10 +21,10 @@ def check_count(value: int, name: str, least: int = 1) -> None:
     """Refuse a count that is not an integer from ``least`` to `MOST`."""
     if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
         raise InvalidInputError(
-            f"{name} must be an integer of at least {least}, got {shown(value)}: choose another count"
+            f"{name} must be an integer of at least {least}, got {brief(value)}: choose another count"
         )
     if value > MOST:
-        raise InvalidInputError(f"{name} must be at most {MOST}, got {shown(value)}: choose a smaller count")
+        raise InvalidInputError(f"{name} must be at most {MOST}, got {brief(value)}: choose a smaller count")
 
 
 def check_numbers(**given: Any) -> None:
@@ -32,7 +32,7 @@ def check_numbers(**given: Any) -> None:
     for name, value in given.items():
         if not _is_number(value):
             raise InvalidInputError(
-                f"{name} must be a finite number of less than {LARGEST:g}, got {shown(value)}: give another"
+                f"{name} must be a finite number of less than {LARGEST:g}, got {brief(value)}: give another"
             )
 
 
@@ -51,11 +51,11 @@ def check_row(values: Any, name: str, count: int) -> None:
     known = isinstance(values, Sequence | np.ndarray) and np.ndim(values) == 1 and len(values) == count
     if not known or not all(map(_is_number, values)):
         raise InvalidInputError(
-            f"{name} must be {count} finite numbers of less than {LARGEST:g}, got {shown(values)}: give them"
+            f"{name} must be {count} finite numbers of less than {LARGEST:g}, got {brief(values)}: give them"
         )
 
 
-def shown(value: Any) -> str:
+def brief(value: Any) -> str:
     """Return a value as messages repeat it, also an integer that Python refuses to write."""
     if isinstance(value, int) and value.bit_length() > 100:
         return "an integer of more than thirty digits"

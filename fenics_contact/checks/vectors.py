@@ -8,10 +8,15 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 
-Vector: TypeAlias = tuple[float, ...]
+GivenVector: TypeAlias = tuple[float, ...]
 
 
-def unit_vector(name: str, value: Vector, dim: int) -> Vector:
+def floats(values: np.ndarray) -> GivenVector:
+    """Return the entries of an array of one dimension as a user would give them."""
+    return tuple(float(value) for value in values)
+
+
+def unit_vector(name: str, value: GivenVector, dim: int) -> GivenVector:
     """Return a direction at unit length.
 
     Raises:
@@ -23,4 +28,4 @@ def unit_vector(name: str, value: Vector, dim: int) -> Vector:
             f"{name} must be {dim} finite numbers, not all zero, got {value!r}: for a floor in space give "
             "(0, 0, 1)"
         )
-    return tuple(float(component / length) for component in value)
+    return floats(np.asarray(value) / length)

@@ -19,10 +19,10 @@ from fenics_contact.cli.streams import complain
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.io import only_run_in
 from fenics_contact.study import (
+    RunTolerance,
     Settings,
     StudyPlan,
     Sweep,
-    Tolerance,
     collected,
     find_study,
     measure_all,
@@ -77,7 +77,7 @@ class Varied:
     """What the options say about the runs; None where they say nothing."""
 
     sizes: tuple[int, ...] | None
-    tolerances: tuple[Tolerance, ...] | None
+    tolerances: tuple[RunTolerance, ...] | None
     cells: tuple[str, ...] | None
     discretisations: tuple[str, ...] | None
     fixed_points: tuple[float, ...] | None

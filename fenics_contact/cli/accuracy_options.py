@@ -7,7 +7,7 @@ from typing import Annotated, Any, TypeAlias
 
 import typer
 
-from fenics_contact.study import BALANCED, BUILT_IN, DISCRETISATIONS, Tolerance
+from fenics_contact.study import BALANCED, BUILT_IN, DISCRETISATIONS, RunTolerance
 
 NAMES = ", ".join(BUILT_IN)
 #: Value of an option that was given without one.
@@ -41,7 +41,7 @@ def _seconds(text: str) -> float:
     return value
 
 
-def _tolerance(text: str) -> Tolerance | None:
+def _tolerance(text: str) -> RunTolerance | None:
     if text in (NOTHING, BALANCED):
         return BALANCED if text else None
     try:

@@ -10,7 +10,7 @@ from fenics_contact.contact.equilibrium import friction_of
 from fenics_contact.contact.state import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import DirectSystem, DualSystem, TornSystem
-from fenics_contact.qp import Coulomb, CountedOperator, DualSolution, SlipLaw, Tresca, iterate_at
+from fenics_contact.qp import CoulombLaw, CountedOperator, DualSolution, SlipLaw, TrescaLaw, iterate_at
 
 Stored = Mapping[str, np.ndarray]
 
@@ -72,4 +72,4 @@ def restored_solution(system: DualSystem, stored: Stored) -> DualSolution:
 
 def _law(system: DualSystem) -> SlipLaw:
     (tresca, coefficient), layout = friction_of(system), system.problem.layout
-    return Tresca(layout, tresca) if coefficient is None else Coulomb(layout, coefficient, tresca)
+    return TrescaLaw(layout, tresca) if coefficient is None else CoulombLaw(layout, coefficient, tresca)

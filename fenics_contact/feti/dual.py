@@ -24,7 +24,7 @@ STIFF = 1e-6
 #: Entries of G below this part of the largest are rounding: gluing rows do not feel the motion of a body.
 UNFELT = 1e-13
 #: A resultant below this fraction of the loads' sum is rounding: the loads balance each other.
-BALANCED = 1e-13
+LOAD_ROUNDING = 1e-13
 #: Work of the loads on a motion that nothing holds, relative to their sum, that is more than rounding.
 UNBALANCED = 1e-8
 
@@ -265,7 +265,7 @@ class DualSystem:
     def _resultants(self, comm: MPI.Comm) -> np.ndarray:
         """Return e = Rᵀ f, replicated; what is only rounding of balanced loads is set to zero."""
         resultants = np.asarray(comm.allreduce(self.kernel.T @ self.torn.load))
-        resultants[np.abs(resultants) <= BALANCED * comm.allreduce(np.abs(self.torn.load).sum())] = 0.0
+        resultants[np.abs(resultants) <= LOAD_ROUNDING * comm.allreduce(np.abs(self.torn.load).sum())] = 0.0
         return resultants
 
     def _coarse_columns(self) -> sp.csr_matrix:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fenics_contact.checks import LARGEST, STEEPEST, check_count, check_row, shown
+from fenics_contact.checks import LARGEST, STEEPEST, brief, check_count, check_row
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery.memory import require_room
 from fenics_contact.gallery.structured import check_cell_type, split_hexahedra, structured_cells
@@ -65,8 +65,8 @@ def checked_corners(lower: ArrayLike, upper: ArrayLike, axes: str) -> tuple[np.n
     if not small or not np.all(high > low):
         given = [list(corner) if isinstance(corner, Sequence) else corner for corner in (lower, upper)]
         raise InvalidInputError(
-            f"upper must exceed lower in {_listed(axes)}, got lower {shown(given[0])} and upper "
-            f"{shown(given[1])}: swap or correct the corners"
+            f"upper must exceed lower in {_listed(axes)}, got lower {brief(given[0])} and upper "
+            f"{brief(given[1])}: swap or correct the corners"
         )
     return low, high
 
@@ -81,7 +81,7 @@ def checked_counts(counts: Sequence[int], axes: str) -> list[int]:
     if not known or len(counts) != len(axes):
         number = "three" if len(axes) == 3 else "two"
         raise InvalidInputError(
-            f"counts must be {number} integers, got {shown(counts)}: give one for each of {_listed(axes)}"
+            f"counts must be {number} integers, got {brief(counts)}: give one for each of {_listed(axes)}"
         )
     for direction, count in enumerate(counts):
         check_count(count, f"counts[{direction}]")
@@ -106,7 +106,7 @@ def checked_ticks(
     check_row(grading, "grading", len(axes))
     if max(map(abs, grading)) > STEEPEST:
         raise InvalidInputError(
-            f"grading must lie between {-STEEPEST:g} and {STEEPEST:g}, got {shown(grading)}: 0 gives equal "
+            f"grading must lie between {-STEEPEST:g} and {STEEPEST:g}, got {brief(grading)}: 0 gives equal "
             "cells, 3 makes the smallest 20 times smaller than the largest"
         )
     return [_ticks(*each) for each in zip(low, high, whole, grading, strict=True)]

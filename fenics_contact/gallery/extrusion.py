@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fenics_contact.checks import shown
+from fenics_contact.checks import brief
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery.memory import require_room
 from fenics_contact.mesh import BodyMesh, boundary_faces, match_faces
@@ -41,7 +41,7 @@ def extrude(section: BodyMesh, heights: ArrayLike, *, present: ArrayLike | None 
         z = np.zeros(0)
     if z.ndim != 1 or z.size < 2 or not np.all(np.diff(z) > 0):
         raise InvalidInputError(
-            f"heights must be at least two ascending numbers, got {shown(heights)}: give the z of every "
+            f"heights must be at least two ascending numbers, got {brief(heights)}: give the z of every "
             "plane between layers, and of both ends"
         )
     require_room(section.n_cells, z.size - 1, 1)

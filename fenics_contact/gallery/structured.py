@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.checks import shown
+from fenics_contact.checks import brief
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import CELL_TYPES, BodyMesh, boundary_faces, match_faces, orient
 
@@ -23,7 +23,7 @@ def check_cell_type(cell: str, dim: int = 3) -> None:
     """Refuse a cell type that the structured meshes do not offer."""
     known = tuple(name for name, kind in CELL_TYPES.items() if kind.dim == dim)
     if not isinstance(cell, str) or cell not in known:
-        raise InvalidInputError(f"cell must be one of {known}, got {shown(cell)}: choose one of them")
+        raise InvalidInputError(f"cell must be one of {known}, got {brief(cell)}: choose one of them")
 
 
 def structured_cells(counts: tuple[int, ...], closed: bool = False) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fenics_contact.checks import LARGEST, shown
+from fenics_contact.checks import LARGEST, brief
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.cell_types import cell_type_of
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces, start_at_smallest
@@ -24,7 +24,7 @@ def checked_points(points: ArrayLike, shape: tuple[int, ...] | None = None) -> n
         array = np.array(points, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise InvalidInputError(
-            f"points must be numbers, got {shown(points)} ({error}): give an array of coordinates"
+            f"points must be numbers, got {brief(points)} ({error}): give an array of coordinates"
         ) from error
     if array.ndim != 2 or array.shape[1] not in (2, 3) or (shape is not None and array.shape != shape):
         needed = "(n_nodes, 3) or (n_nodes, 2)" if shape is None else str(shape)

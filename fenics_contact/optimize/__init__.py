@@ -9,10 +9,10 @@ from fenics_contact.optimize.constraints import Bounds, LinearConstraints, neare
 from fenics_contact.optimize.for_scipy import ForScipy, Visit
 from fenics_contact.optimize.minimization import minimize
 from fenics_contact.optimize.objective import Inexact, Kinked
-from fenics_contact.optimize.problem import Problem, pose
+from fenics_contact.optimize.problem import PosedProblem, pose
 from fenics_contact.optimize.progress import Callback, Resumable
 from fenics_contact.optimize.quadratic_program import SubproblemError
-from fenics_contact.optimize.result import Kind, NotConvergedError, Reason, Record, Result
+from fenics_contact.optimize.result import NotConvergedError, Reason, Record, Result, StepKind
 
 __all__ = [
     "Bounds",
@@ -23,15 +23,15 @@ __all__ = [
     "ForScipy",
     "Inexact",
     "InvalidDesignError",
-    "Kind",
     "Kinked",
     "LinearConstraints",
     "NotConvergedError",
-    "Problem",
+    "PosedProblem",
     "Reason",
     "Record",
     "Result",
     "Resumable",
+    "StepKind",
     "SubproblemError",
     "Visit",
     "minimize",

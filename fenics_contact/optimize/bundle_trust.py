@@ -14,10 +14,10 @@ from fenics_contact.optimize.bundle import Bundle
 from fenics_contact.optimize.care import surely, without_doubt
 from fenics_contact.optimize.inexactness import Demand, again, demand
 from fenics_contact.optimize.objective import Accuracy, Evaluation, can_be_inexact, evaluate
-from fenics_contact.optimize.problem import Problem
+from fenics_contact.optimize.problem import PosedProblem
 from fenics_contact.optimize.progress import Callback, Progress
 from fenics_contact.optimize.quadratic_program import SubproblemError
-from fenics_contact.optimize.result import Kind, NotConvergedError, Reason, Record, Result
+from fenics_contact.optimize.result import NotConvergedError, Reason, Record, Result, StepKind
 from fenics_contact.optimize.state import MethodState
 from fenics_contact.optimize.stopping import StoppingTest, stopping_test
 from fenics_contact.optimize.subproblem import Step, solve_step
@@ -122,7 +122,7 @@ class BundleTrust:
             raise InvalidInputError(f"locality must not be negative (0 for a convex J), got {self.locality}")
 
     def minimize(
-        self, problem: Problem, callback: Callback | None = None, checkpoint: Checkpoint | None = None
+        self, problem: PosedProblem, callback: Callback | None = None, checkpoint: Checkpoint | None = None
     ) -> Result:
         """Run the method on a checked problem; `fenics_contact.optimize.minimize` is the usual way in.
 
@@ -145,7 +145,7 @@ class BundleTrust:
             task.outcome = reason.name.lower().replace("_", " ")
         return _finish(self, state, reason)
 
-    def _run(self, problem: Problem, progress: Progress) -> tuple[MethodState, Reason]:
+    def _run(self, problem: PosedProblem, progress: Progress) -> tuple[MethodState, Reason]:
         """Go on from where an earlier run was, or from the start, to the stop."""
         state = progress.recalled()
         if state is None:
@@ -164,7 +164,7 @@ class BundleTrust:
         return state, reason
 
 
-def _start(method: BundleTrust, problem: Problem) -> MethodState:
+def _start(method: BundleTrust, problem: PosedProblem) -> MethodState:
     try:
         centre = evaluate(problem.fun, problem.start, 1, Accuracy(np.inf, _FIRST_SUBGRADIENT))
     except InvalidDesignError as error:
@@ -176,11 +176,13 @@ def _start(method: BundleTrust, problem: Problem) -> MethodState:
     bundle = Bundle.of_centre(gradient, locality, centre.error, centre.doubtful)
     radius = _RADIUS * problem.length
     trust = Trust(t, radius, _T_LEAST * t, _T_MOST * t, _RADIUS_LEAST * problem.length)
-    record = Record(0, Kind.START, centre.value, centre.value, 0.0, t, 0.0, norm, 0.0, 1, 1, centre.error)
+    record = Record(0, StepKind.START, centre.value, centre.value, 0.0, t, 0.0, norm, 0.0, 1, 1, centre.error)
     return MethodState(centre, bundle, trust, t, (record,))
 
 
-def _iterated(method: BundleTrust, problem: Problem, state: MethodState) -> tuple[MethodState, Reason | None]:
+def _iterated(
+    method: BundleTrust, problem: PosedProblem, state: MethodState
+) -> tuple[MethodState, Reason | None]:
     step, trust = _guarded_step(problem, state)
     state = replace(state, trust=trust)
     test = stopping_test(
@@ -201,13 +203,13 @@ def _iterated(method: BundleTrust, problem: Problem, state: MethodState) -> tupl
     return _advanced(method, problem, state, step, _demand(method, state, step, test)), None
 
 
-def _evaluated(problem: Problem, state: MethodState, x: Array, accuracy: Accuracy) -> Evaluation:
+def _evaluated(problem: PosedProblem, state: MethodState, x: Array, accuracy: Accuracy) -> Evaluation:
     """Call the function, and once more beside x where that is called for."""
     found = evaluate(problem.fun, x, state.evaluations + 1, accuracy)
     return surely(problem, found, state.evaluations + 1) if state.careful else found
 
 
-def _guarded_step(problem: Problem, state: MethodState) -> tuple[Step, Trust]:
+def _guarded_step(problem: PosedProblem, state: MethodState) -> tuple[Step, Trust]:
     """Solve the step's programme, with t small enough to stay in the trust region."""
     near = problem.allowed.around(state.centre.x, problem.scale)
     trust = state.trust
@@ -230,7 +232,13 @@ def _demand(
 
 
 def _wanted(
-    method: BundleTrust, problem: Problem, state: MethodState, step: Step, test: StoppingTest, *, claim: bool
+    method: BundleTrust,
+    problem: PosedProblem,
+    state: MethodState,
+    step: Step,
+    test: StoppingTest,
+    *,
+    claim: bool,
 ) -> Accuracy | None:
     """Return the accuracy with which the centre must be evaluated again, None where it is good enough."""
     if not can_be_inexact(problem.fun):
@@ -241,17 +249,19 @@ def _wanted(
     return None
 
 
-def _refined(problem: Problem, state: MethodState, step: Step, accuracy: Accuracy) -> MethodState:
+def _refined(problem: PosedProblem, state: MethodState, step: Step, accuracy: Accuracy) -> MethodState:
     """Evaluate the centre again, more accurately."""
     centre = state.centre
     found = again(centre, _evaluated(problem, state, centre.x, accuracy))
     change = found.value - centre.value
     bundle = state.bundle.refined(found.subgradient * problem.scale, change, found.error, found.doubtful)
-    return replace(state, centre=found, bundle=bundle, history=_recorded(state, step, Kind.REFINED, found))
+    return replace(
+        state, centre=found, bundle=bundle, history=_recorded(state, step, StepKind.REFINED, found)
+    )
 
 
 def _reconsidered(
-    method: BundleTrust, problem: Problem, state: MethodState, step: Step
+    method: BundleTrust, problem: PosedProblem, state: MethodState, step: Step
 ) -> tuple[MethodState, Reason | None]:
     """Put aside the doubtful subgradients on which the method would stop, and look again."""
     if not state.centre.doubtful:
@@ -259,11 +269,11 @@ def _reconsidered(
     if state.evaluations >= method.max_evaluations:
         return state, Reason.EVALUATION_LIMIT
     sure = without_doubt(problem, state)
-    return replace(sure, history=_recorded(state, step, Kind.REFINED, sure.centre, _BESIDE)), None
+    return replace(sure, history=_recorded(state, step, StepKind.REFINED, sure.centre, _BESIDE)), None
 
 
 def _reason_to_stop(
-    method: BundleTrust, problem: Problem, state: MethodState, step: Step, test: StoppingTest
+    method: BundleTrust, problem: PosedProblem, state: MethodState, step: Step, test: StoppingTest
 ) -> Reason | None:
     """Return why the method must stop before trying the step, or None."""
     near = problem.allowed.around(state.centre.x, problem.scale)
@@ -280,7 +290,7 @@ def _reason_to_stop(
 
 
 def _advanced(
-    method: BundleTrust, problem: Problem, state: MethodState, step: Step, needed: Demand
+    method: BundleTrust, problem: PosedProblem, state: MethodState, step: Step, needed: Demand
 ) -> MethodState:
     """Try the step and return the state after its null, serious or rejected trial."""
     x = problem.allowed.project(state.centre.x + problem.scale * step.move)
@@ -290,14 +300,16 @@ def _advanced(
     except InvalidDesignError as error:
         tell(_LOG.info, "trial design %d is invalid: %s", state.evaluations + 1, error)
         trust = state.trust.after_rejection(step.length)
-        return replace(state, trust=trust, history=_recorded(state, step, Kind.REJECTED, None, str(error)))
+        return replace(
+            state, trust=trust, history=_recorded(state, step, StepKind.REJECTED, None, str(error))
+        )
     gradient = found.subgradient * problem.scale
     change, slope = found.value - state.centre.value, float(gradient @ step.move)
     bundle = state.bundle.reduced(step.weights, method.max_bundle - 1)
     bundle = bundle.with_cut(gradient, slope - change, step.length, found.error, found.doubtful)
     trial = Trial(step, change, slope, float(bundle.measures[-1]))
     if change > -method.descent * step.decrease:
-        history = _recorded(state, step, Kind.NULL, found)
+        history = _recorded(state, step, StepKind.NULL, found)
         return replace(state, bundle=bundle, trust=state.trust.after_null(trial), history=history)
     locality = method.locality * float(np.linalg.norm(gradient)) / problem.length
     return replace(
@@ -305,19 +317,19 @@ def _advanced(
         centre=found,
         bundle=bundle.moved(step.move, change, locality),
         trust=state.trust.after_serious(trial),
-        history=_recorded(state, step, Kind.SERIOUS, found),
+        history=_recorded(state, step, StepKind.SERIOUS, found),
     )
 
 
 def _recorded(
-    state: MethodState, step: Step, kind: Kind, found: Evaluation | None, note: str = ""
+    state: MethodState, step: Step, kind: StepKind, found: Evaluation | None, note: str = ""
 ) -> tuple[Record, ...]:
     value = np.nan if found is None else found.value
     record = Record(
-        iteration=state.iterations + (kind is Kind.SERIOUS),
+        iteration=state.iterations + (kind is StepKind.SERIOUS),
         kind=kind,
         value=value,
-        best=value if kind in (Kind.SERIOUS, Kind.REFINED) else state.centre.value,
+        best=value if kind in (StepKind.SERIOUS, StepKind.REFINED) else state.centre.value,
         predicted_decrease=step.decrease,
         t=step.t,
         step_length=step.length,
@@ -345,7 +357,7 @@ def _finish(method: BundleTrust, state: MethodState, reason: Reason) -> Result:
     )
     if reason.success or not method.raise_on_failure:
         return result
-    refusals = [record.note for record in state.history if record.kind is Kind.REJECTED]
+    refusals = [record.note for record in state.history if record.kind is StepKind.REJECTED]
     last = f"; the last trial: {refusals[-1]}" if reason is Reason.INVALID_DESIGNS else ""
     raise NotConvergedError(
         f"{reason.value} (after {result.iterations} serious steps and {result.evaluations} evaluations, "

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenics_contact.optimize.objective import Evaluation, beside
-from fenics_contact.optimize.problem import Problem
+from fenics_contact.optimize.problem import PosedProblem
 from fenics_contact.optimize.state import MethodState
 
 Array = NDArray[np.float64]
@@ -17,7 +17,7 @@ _NEAR = 1e-2  # distance to a neighbour, in lengths of the problem
 _ATTEMPTS = 8  # directions that are tried until one leads half as far
 
 
-def surely(problem: Problem, found: Evaluation, number: int) -> Evaluation:
+def surely(problem: PosedProblem, found: Evaluation, number: int) -> Evaluation:
     """Return an evaluation whose subgradient is one, as far as the function can tell.
 
     At almost every point a locally Lipschitz function has a gradient, and what such gradients tend to where
@@ -36,7 +36,7 @@ def surely(problem: Problem, found: Evaluation, number: int) -> Evaluation:
     return beside(problem.fun, found, neighbour(problem, found.x), number) if found.doubtful else found
 
 
-def without_doubt(problem: Problem, state: MethodState) -> MethodState:
+def without_doubt(problem: PosedProblem, state: MethodState) -> MethodState:
     """Return the state with a centre that was looked into, without doubtful planes, careful from now on.
 
     A proximal parameter that false promises have worn down begins anew.
@@ -48,7 +48,7 @@ def without_doubt(problem: Problem, state: MethodState) -> MethodState:
     return replace(state, centre=centre, bundle=kept, trust=trust, careful=True)
 
 
-def neighbour(problem: Problem, x: Array) -> Array:
+def neighbour(problem: PosedProblem, x: Array) -> Array:
     """Return a feasible point near x in a random direction, the same one for the same x.
 
     What leaves the box is turned back into it; of several points the one furthest from x is taken, x itself

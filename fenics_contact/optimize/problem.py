@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Problem:
+class PosedProblem:
     """min J(x) over a feasible set, checked.
 
     Attributes:
@@ -39,7 +39,7 @@ def pose(
     bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
     constraints: LinearConstraints | None = None,
     scale: ArrayLike | None = None,
-) -> Problem:
+) -> PosedProblem:
     """Check a problem and choose its scales.
 
     Args:
@@ -71,7 +71,7 @@ def pose(
         )
     start = allowed.clip(start)
     size = _scale(start.size, allowed, scale)
-    return Problem(fun, start, allowed, size, _length(start, allowed, size))
+    return PosedProblem(fun, start, allowed, size, _length(start, allowed, size))
 
 
 def _scale(n: int, allowed: FeasibleSet, scale: ArrayLike | None) -> Array:

@@ -18,7 +18,7 @@ from fenics_contact.checkpoint import (
 )
 from fenics_contact.errors import collective
 from fenics_contact.fingerprint import described
-from fenics_contact.optimize.problem import Problem
+from fenics_contact.optimize.problem import PosedProblem
 from fenics_contact.optimize.result import Record
 from fenics_contact.optimize.state import MethodState
 from fenics_contact.progress import Task
@@ -66,7 +66,7 @@ class Progress:
     """
 
     def __init__(
-        self, checkpoint: Checkpoint | None, method: Method, problem: Problem, callback: Callback | None
+        self, checkpoint: Checkpoint | None, method: Method, problem: PosedProblem, callback: Callback | None
     ) -> None:
         """Describe the problem; nothing is read or written yet.
 
@@ -181,7 +181,7 @@ def _evaluations(number: int) -> str:
     return f"{number} evaluation{'' if number == 1 else 's'}"
 
 
-def _fingerprint(method: Method, problem: Problem) -> dict[str, str]:
+def _fingerprint(method: Method, problem: PosedProblem) -> dict[str, str]:
     options = {
         field.name: getattr(method, field.name) for field in fields(method) if field.name not in LIMITS
     }

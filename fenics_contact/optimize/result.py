@@ -47,7 +47,7 @@ class Reason(Enum):
         return self in (Reason.CONVERGED, Reason.STATIONARY)
 
 
-class Kind(Enum):
+class StepKind(Enum):
     """What became of a trial point."""
 
     #: The first point.
@@ -83,7 +83,7 @@ class Record:
     """
 
     iteration: int
-    kind: Kind
+    kind: StepKind
     value: float
     best: float
     predicted_decrease: float

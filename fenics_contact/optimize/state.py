@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fenics_contact.optimize.bundle import Bundle
 from fenics_contact.optimize.objective import Evaluation
-from fenics_contact.optimize.result import Kind, Record
+from fenics_contact.optimize.result import Record, StepKind
 from fenics_contact.optimize.trust import Trust
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ class MethodState:
         for field in fields(Record):
             column = [getattr(record, field.name) for record in self.history]
             stored[f"history.{field.name}"] = np.array(
-                [entry.name if isinstance(entry, Kind) else entry for entry in column]
+                [entry.name if isinstance(entry, StepKind) else entry for entry in column]
             )
         return stored
 
@@ -73,7 +73,7 @@ class MethodState:
 
         columns = [stored[f"history.{field.name}"].tolist() for field in fields(Record)]
         kinds = [field.name for field in fields(Record)].index("kind")
-        columns[kinds] = [Kind[str(name)] for name in columns[kinds]]
+        columns[kinds] = [StepKind[str(name)] for name in columns[kinds]]
         return MethodState(
             centre=part(Evaluation, "centre"),
             bundle=part(Bundle, "bundle"),

@@ -19,7 +19,7 @@ from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.mpgp import Mpgp
 from fenics_contact.qp.problem import EVEN, CountedOperator, DualProblem, Scaling
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
-from fenics_contact.qp.slip_law import Coulomb, SlipLaw, Tresca
+from fenics_contact.qp.slip_law import CoulombLaw, SlipLaw, TrescaLaw
 from fenics_contact.qp.smalse import Smalse
 from fenics_contact.qp.solution import (
     DualSolution,
@@ -36,7 +36,7 @@ __all__ = [
     "STEEP",
     "CoarseSpace",
     "ContactLayout",
-    "Coulomb",
+    "CoulombLaw",
     "CountedOperator",
     "CoupledSystem",
     "DualProblem",
@@ -60,7 +60,7 @@ __all__ = [
     "SolverStep",
     "Start",
     "Stop",
-    "Tresca",
+    "TrescaLaw",
     "Vector",
     "apply_unless_zero",
     "classify",

@@ -14,7 +14,7 @@ from fenics_contact.qp.equilibrium import find_equilibrium
 from fenics_contact.qp.iterate import Start, apply_unless_zero, iterate_fitted
 from fenics_contact.qp.problem import CountedOperator, DualProblem
 from fenics_contact.qp.reductions import Vector, global_max
-from fenics_contact.qp.slip_law import Tresca
+from fenics_contact.qp.slip_law import TrescaLaw
 from fenics_contact.qp.solution import DualSolution, SolverStep
 
 #: Friction may press surfaces together itself, where they wedge: at most so many times what else does, and so
@@ -75,7 +75,7 @@ class FrictionAlone:
         if self._forces is None:
             return
         bound = wedged * self.problem.law.bound(self._forces)
-        equilibrium = find_equilibrium(self.problem.with_law(Tresca(self.problem.layout, bound)))
+        equilibrium = find_equilibrium(self.problem.with_law(TrescaLaw(self.problem.layout, bound)))
         if equilibrium.motion is not None:
             raise InfeasibleError(
                 "friction needs surfaces that are pressed together, but without it they are pressed so "
@@ -98,7 +98,7 @@ class FrictionAlone:
         pressing = coarse.restricted(sp.csr_matrix(entries, shape=(layout.size, len(rows))))
         unheld, _ = np.linalg.qr(pressing.gram.null_space)
         loaded = coarse.with_load(coarse.load - unheld @ (unheld.T @ coarse.load))
-        given = Tresca(layout, problem.law.bound(np.zeros(layout.size)))
+        given = TrescaLaw(layout, problem.law.bound(np.zeros(layout.size)))
         held = replace(problem, coarse=loaded, friction=given)
         multiplier, operator = held.coarse.particular(), CountedOperator(problem.operator)
         product = apply_unless_zero(held, operator, multiplier)

@@ -16,7 +16,7 @@ from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.face import Marks
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector, global_sum
-from fenics_contact.qp.slip_law import SlipLaw, Tresca
+from fenics_contact.qp.slip_law import SlipLaw, TrescaLaw
 
 Operator = Callable[[Vector], Vector]
 #: What is called with the number of F-products so far and, after a step of a solver, with its residual.
@@ -80,7 +80,7 @@ class DualProblem:
     @cached_property
     def law(self) -> SlipLaw:
         """The law of `friction`; without one all slip bounds are zero."""
-        return self.friction or Tresca(self.layout, np.zeros(self.layout.n_friction))
+        return self.friction or TrescaLaw(self.layout, np.zeros(self.layout.n_friction))
 
     def with_law(self, law: SlipLaw) -> DualProblem:
         """Return the same problem under another law of friction."""

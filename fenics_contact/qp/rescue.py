@@ -12,7 +12,7 @@ from fenics_contact.qp.iterate import Iterate, Start, certify, iterate_at, itera
 from fenics_contact.qp.newton_steps import Damped, NewtonState, NewtonSteps, Safeguards
 from fenics_contact.qp.problem import CountedOperator, DualProblem, ShiftedOperator
 from fenics_contact.qp.reductions import Vector, global_sum
-from fenics_contact.qp.slip_law import Tresca
+from fenics_contact.qp.slip_law import TrescaLaw
 from fenics_contact.qp.smalse import Smalse, outer_iterations
 from fenics_contact.qp.solution import Residuals, SmalseMemory, SolverStep, contact_step
 
@@ -87,7 +87,7 @@ class ProximalPoint:
     def centred(self, force: Vector) -> ProximalPoint:
         """Return the point with the centre and the slip bound of a force, owned."""
         original = self.original
-        frozen = Tresca(original.layout, original.law.bound(force))
+        frozen = TrescaLaw(original.layout, original.law.bound(force))
         rhs = original.rhs + self.shift * frozen.admit(force)
         return replace(self, problem=replace(self.problem, rhs=rhs, friction=frozen))
 
@@ -265,7 +265,7 @@ class Rescue:
     def _by_smalse(self, start: Start, limit: int) -> tuple[Iterate, SolverStep, SmalseMemory]:
         """Take SMALSE steps. Collective."""
         problem = self.problem
-        frozen = problem.with_law(Tresca(problem.layout, problem.law.bound(start.iterate.multiplier)))
+        frozen = problem.with_law(TrescaLaw(problem.layout, problem.law.bound(start.iterate.multiplier)))
         target = REDUCTION * start.iterate.residuals.worst
         settings = replace(self.smalse, tolerance=target, max_products=limit)
         for state in outer_iterations(frozen, start, settings):

@@ -34,7 +34,7 @@ class SlipLaw(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Tresca:
+class TrescaLaw:
     """Slip bounds that do not depend on the multiplier.
 
     Attributes:
@@ -62,13 +62,13 @@ class Tresca:
         """Return the projection on Λ(Ψ)."""
         return self.feasible(multiplier).project(multiplier)
 
-    def scaled(self, factor: Vector) -> Tresca:
+    def scaled(self, factor: Vector) -> TrescaLaw:
         """Return the law with the bounds Ψ / s."""
-        return Tresca(self.layout, self.slip_bound / factor)
+        return TrescaLaw(self.layout, self.slip_bound / factor)
 
 
 @dataclass(frozen=True, eq=False)
-class Coulomb:
+class CoulombLaw:
     """Slip bounds Ψ = Ψ₀ + μ max(λ_N, 0): a given part, zero by default, and one that follows λ_N.
 
     With both parts the law is Mohr's and Coulomb's, or Tresca's on some discs and Coulomb's on others.
@@ -133,6 +133,6 @@ class Coulomb:
         admitted[layout.tangential] = np.minimum(shrink, 1.0)[:, None] * tau
         return admitted
 
-    def scaled(self, factor: Vector) -> Coulomb:
+    def scaled(self, factor: Vector) -> CoulombLaw:
         """Return the law with the given part Ψ₀ / s; μ is the same, as s is that of the whole contact."""
-        return Coulomb(self.layout, self.friction_coefficient, self.given / factor)
+        return CoulombLaw(self.layout, self.friction_coefficient, np.asarray(self.given / factor))

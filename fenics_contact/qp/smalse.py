@@ -13,7 +13,7 @@ from fenics_contact.qp.iterate import Start, certify, count_status
 from fenics_contact.qp.mpgp import Mpgp, minimise
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector
-from fenics_contact.qp.slip_law import Tresca
+from fenics_contact.qp.slip_law import TrescaLaw
 from fenics_contact.qp.solution import DualSolution, Residuals, SmalseMemory, SolverStep, measure
 
 #: A lack in the rise of the Lagrangian below this fraction of it says nothing about M.
@@ -58,9 +58,9 @@ class Smalse:
             InvalidInputError: The slip bound follows the multiplier.
             ConvergenceError: The product budget was used up; carries the history.
         """
-        if not isinstance(problem.law, Tresca):
+        if not isinstance(problem.law, TrescaLaw):
             raise InvalidInputError(
-                f"SMALSE needs a given slip bound, got {type(problem.law).__name__}'s law: iterate on the "
+                f"SMALSE needs a given slip bound, got {type(problem.law).__name__}: iterate on the "
                 "bound around it, or use FaceNewton"
             )
         operator, history = start.operator, list[SolverStep]()

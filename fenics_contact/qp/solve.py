@@ -21,7 +21,7 @@ from fenics_contact.qp.iterate import (
 )
 from fenics_contact.qp.problem import CountedOperator, DualProblem
 from fenics_contact.qp.reductions import Vector
-from fenics_contact.qp.slip_law import Coulomb, SlipLaw, Tresca
+from fenics_contact.qp.slip_law import CoulombLaw, SlipLaw, TrescaLaw
 from fenics_contact.qp.solution import DualSolution, SolverStep
 
 #: How often a solution in scaled multipliers is made more accurate before it is given up.
@@ -162,14 +162,14 @@ def _slip_law(
     layout = problem.layout
     if friction_coefficient is not None:
         given = 0.0 if slip_bound is None else np.asarray(slip_bound, dtype=np.float64)
-        return Coulomb(layout, np.asarray(friction_coefficient, dtype=np.float64), given)
+        return CoulombLaw(layout, np.asarray(friction_coefficient, dtype=np.float64), given)
     if slip_bound is None:
         if layout.n_friction:
             raise InvalidInputError(
                 f"{layout.n_friction} friction discs need a slip_bound or a friction_coefficient, got neither"
             )
         slip_bound = np.zeros(0)
-    law = Tresca(layout, np.asarray(slip_bound, dtype=np.float64))
+    law = TrescaLaw(layout, np.asarray(slip_bound, dtype=np.float64))
     law.feasible(np.zeros(layout.size))
     return law
 

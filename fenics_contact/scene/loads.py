@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fenics_contact.checks import Vector, checked
+from fenics_contact.checks import GivenVector, checked
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene.values import ScalarValue, VectorValue, checked_scalar, checked_vector
 
@@ -54,7 +54,7 @@ class TotalForce:
 
     body: str
     surface: str
-    value: Vector
+    value: GivenVector
 
     def __post_init__(self) -> None:
         """Refuse what is no vector of numbers."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fenics_contact.study.errors import Errors
 from fenics_contact.study.overview import write_overview
-from fenics_contact.study.parameters import BALANCED, DISCRETISATIONS, Parameters, Sweep, Tolerance
+from fenics_contact.study.parameters import BALANCED, DISCRETISATIONS, Parameters, RunTolerance, Sweep
 from fenics_contact.study.protocol import Outcome, Problem, Quantity, StudyScene
 from fenics_contact.study.report import write_report
 from fenics_contact.study.results import Results, Run, read_study
@@ -26,11 +26,11 @@ __all__ = [
     "Quantity",
     "Results",
     "Run",
+    "RunTolerance",
     "Settings",
     "StudyPlan",
     "StudyScene",
     "Sweep",
-    "Tolerance",
     "collected",
     "find_study",
     "measure_all",

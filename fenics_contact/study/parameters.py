@@ -13,7 +13,7 @@ from fenics_contact.scene import Discretisation
 
 #: The tolerance that follows the discretisation estimate.
 BALANCED: Literal["balanced"] = "balanced"
-Tolerance: TypeAlias = float | Literal["balanced"]
+RunTolerance: TypeAlias = float | Literal["balanced"]
 
 DISCRETISATIONS = ("node", "mortar")
 #: How Coulomb's law is met: within every Newton step, or by a loop of Tresca problems around them.
@@ -36,7 +36,7 @@ class Parameters:
     size: int
     cell: str = "hexahedron"
     discretisation: Discretisation = "node"
-    tolerance: Tolerance = BALANCED
+    tolerance: RunTolerance = BALANCED
     solver: str = "newton"
     subdomains: int | None = None
 
@@ -98,7 +98,7 @@ class Sweep:
 
     base: Parameters
     sizes: tuple[int, ...]
-    tolerances: tuple[Tolerance, ...] = (BALANCED,)
+    tolerances: tuple[RunTolerance, ...] = (BALANCED,)
     cells: tuple[str, ...] = ()
     discretisations: tuple[Discretisation, ...] = ()
     fixed_points: tuple[float, ...] = ()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.checks import Vector, checked, unit_vector
+from fenics_contact.checks import GivenVector, checked, floats, unit_vector
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.surface_shapes.places import require_place, require_plane
 from fenics_contact.surface_shapes.protocol import SurfaceShape
@@ -36,9 +36,9 @@ class Extruded:
     """
 
     profile: SurfaceShape
-    point: Vector
-    axis: Vector
-    across: Vector
+    point: GivenVector
+    axis: GivenVector
+    across: GivenVector
 
     def __post_init__(self) -> None:
         """Make the directions perpendicular, refuse parallel ones and a profile that is not in the plane."""
@@ -53,8 +53,8 @@ class Extruded:
                 f"{name}.across must not be parallel to the axis, got {self.across!r} and {self.axis!r}: "
                 "give the direction of the profile's first coordinate"
             )
-        object.__setattr__(self, "axis", tuple(axis.tolist()))
-        object.__setattr__(self, "across", unit_vector(f"{name}.across", tuple(across.tolist()), 3))
+        object.__setattr__(self, "axis", floats(axis))
+        object.__setattr__(self, "across", unit_vector(f"{name}.across", floats(across), 3))
 
     @property
     def dim(self) -> int:

@@ -8,7 +8,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from fenics_contact.checks import Vector, checked
+from fenics_contact.checks import GivenVector, checked
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.surface_shapes.patch import Patch
 
@@ -42,8 +42,8 @@ class Parametric(Patch):
     """
 
     position: Map
-    lower: Vector
-    upper: Vector
+    lower: GivenVector
+    upper: GivenVector
     derivative: Map | None = None
     periodic: Sequence[bool] = ()
     flipped: bool = False

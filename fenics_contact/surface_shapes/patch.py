@@ -75,7 +75,8 @@ class Patch(ABC):
         points = np.asarray(points, dtype=np.float64)
         starts, tree = self._samples
         low, high, periodic = self._range
-        u, part = starts[tree.query(points)[1]], np.ones((len(points), 1))
+        u: np.ndarray = starts[tree.query(points)[1]]
+        part: np.ndarray = np.ones((len(points), 1))
         rounding = ROUNDING * np.linalg.norm(points, axis=1, keepdims=True)
         for _ in range(STEPS if len(points) else 0):
             feet = self._at(points, u)

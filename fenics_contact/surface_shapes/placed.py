@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.checks import Vector, checked
+from fenics_contact.checks import GivenVector, checked, floats
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.surface_shapes.joined import Joined
 from fenics_contact.surface_shapes.places import require_place
@@ -30,8 +30,8 @@ class Placed:
     """
 
     shape: SurfaceShape
-    rotation: Sequence[Vector]
-    translation: Vector
+    rotation: Sequence[GivenVector]
+    translation: GivenVector
     scale: float = 1.0
 
     def __post_init__(self) -> None:
@@ -98,7 +98,7 @@ def placed(
         InvalidInputError: If the matrix is not orthogonal, the scale not positive, or the dimensions differ.
     """
     turn = np.eye(len(translation)) if rotation is None else np.asarray(rotation, dtype=np.float64)
-    moved = Placed(shape, tuple(map(tuple, np.atleast_2d(turn).tolist())), tuple(translation), scale)
+    moved = Placed(shape, tuple(floats(row) for row in np.atleast_2d(turn)), tuple(translation), scale)
     if isinstance(shape, Joined):
         facets = [scale * part @ turn.T + np.asarray(translation) for part in shape.facets]
         return Joined([placed(part, rotation, translation, scale) for part in shape.shapes], facets)
@@ -106,5 +106,5 @@ def placed(
         return moved
     both, origin = turn @ np.asarray(shape.rotation), np.asarray(shape.translation)
     place = scale * turn @ origin + np.asarray(translation)
-    rows = tuple(map(tuple, both.tolist()))
-    return Placed(shape.shape, rows, tuple(place.tolist()), scale * shape.scale)
+    rows = tuple(floats(row) for row in both)
+    return Placed(shape.shape, rows, floats(place), scale * shape.scale)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.checks import Vector
+from fenics_contact.checks import GivenVector
 from fenics_contact.errors import InvalidInputError
 
 
-def require_place(shape: object, point: Vector, dims: tuple[int, ...] = (2, 3)) -> None:
+def require_place(shape: object, point: GivenVector, dims: tuple[int, ...] = (2, 3)) -> None:
     """Refuse a point without so many finite coordinates.
 
     Raises:

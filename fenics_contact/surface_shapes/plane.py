@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.checks import Vector, checked, unit_vector
+from fenics_contact.checks import GivenVector, checked, unit_vector
 from fenics_contact.surface_shapes.places import require_place
 
 
@@ -20,8 +20,8 @@ class Plane:
         normal: Direction from the body into the free side; scaled to unit length.
     """
 
-    point: Vector
-    normal: Vector
+    point: GivenVector
+    normal: GivenVector
 
     def __post_init__(self) -> None:
         """Scale the normal, refuse one without direction."""

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from fenics_contact.checks import Vector, checked
+from fenics_contact.checks import GivenVector, checked
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.surface_shapes.patch import Patch
 
@@ -38,7 +38,7 @@ class Profile(Patch):
         array([0.25])
     """
 
-    points: Sequence[Vector]
+    points: Sequence[GivenVector]
     closed: bool = False
     flipped: bool = False
 

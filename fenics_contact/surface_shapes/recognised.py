@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fenics_contact.checks import floats
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.surface_shapes.plane import Plane
 from fenics_contact.surface_shapes.protocol import SurfaceShape
@@ -39,7 +40,7 @@ def recognised(points: np.ndarray, normals: np.ndarray) -> SurfaceShape | None:
 def _plane(points: np.ndarray, normals: np.ndarray) -> SurfaceShape:
     middle = points.mean(axis=0)
     normal = np.linalg.svd(points - middle, full_matrices=False)[2][-1]
-    return Plane(tuple(middle.tolist()), tuple((normal * np.sign((normals @ normal).sum())).tolist()))
+    return Plane(floats(middle), floats(normal * np.sign((normals @ normal).sum())))
 
 
 def _sphere(points: np.ndarray, normals: np.ndarray) -> SurfaceShape:
@@ -50,7 +51,7 @@ def _sphere(points: np.ndarray, normals: np.ndarray) -> SurfaceShape:
     centre, rest = np.split(np.linalg.lstsq(linear, np.einsum("nd,nd->n", off, off), rcond=None)[0], [-1])
     radius = float(np.sqrt(max(rest[0] + centre @ centre, 0.0)))
     hollow = bool(np.einsum("nd,nd->n", off - centre, normals).sum() < 0)
-    return Sphere(tuple((middle + centre).tolist()), radius, hollow)
+    return Sphere(floats(middle + centre), radius, hollow)
 
 
 def _about_an_axis(points: np.ndarray, normals: np.ndarray) -> SurfaceShape | None:
@@ -65,10 +66,10 @@ def _about_an_axis(points: np.ndarray, normals: np.ndarray) -> SurfaceShape | No
     outward = np.einsum("nd,nd->n", arm, out) / np.maximum(radius, np.finfo(float).tiny)
     flat = np.column_stack([radius, along]), np.column_stack([outward, normals @ axis])
     profile = recognised(*flat)
-    place, direction = tuple(point.tolist()), tuple(axis.tolist())
+    place, direction = floats(point), floats(axis)
     if isinstance(profile, Sphere):
         ring, height = profile.centre
-        centre = tuple((point + height * axis).tolist())
+        centre = floats(point + height * axis)
         if ring > profile.radius:
             return Torus(centre, direction, ring, profile.radius, profile.hollow)
     if isinstance(profile, Plane) and abs(profile.normal[1]) < CLOSE:

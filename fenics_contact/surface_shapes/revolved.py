@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.checks import Vector, checked, unit_vector
+from fenics_contact.checks import GivenVector, checked, unit_vector
 from fenics_contact.surface_shapes.places import outer, require_place, require_plane
 from fenics_contact.surface_shapes.protocol import SurfaceShape
 
@@ -38,8 +38,8 @@ class Revolved:
     """
 
     profile: SurfaceShape
-    point: Vector
-    axis: Vector
+    point: GivenVector
+    axis: GivenVector
 
     def __post_init__(self) -> None:
         """Scale the axis, refuse a profile that is not in the plane."""

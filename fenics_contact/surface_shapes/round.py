@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.checks import Vector, checked, unit_vector
+from fenics_contact.checks import GivenVector, checked, unit_vector
 from fenics_contact.surface_shapes.places import outer, require_place, require_radius
 
 #: Arms shorter than this, relative to the radius, count as so long: in the middle all directions are normal.
@@ -67,7 +67,7 @@ class Sphere(_Round):
         hollow: Whether the body is all that lies outside the radius: a socket.
     """
 
-    centre: Vector
+    centre: GivenVector
     radius: float
     hollow: bool = False
 
@@ -97,8 +97,8 @@ class Cylinder(_Round):
         hollow: Whether the body is all that lies outside the radius: a hole.
     """
 
-    point: Vector
-    axis: Vector
+    point: GivenVector
+    axis: GivenVector
     radius: float
     hollow: bool = False
 

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fenics_contact.checks import Vector, checked, unit_vector
+from fenics_contact.checks import GivenVector, checked, unit_vector
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.surface_shapes.places import require_place, require_radius
 from fenics_contact.surface_shapes.revolved import Revolved
@@ -27,8 +27,8 @@ class Torus:
         hollow: Whether the body is all that lies outside the wire: a groove.
     """
 
-    centre: Vector
-    axis: Vector
+    centre: GivenVector
+    axis: GivenVector
     ring_radius: float
     tube_radius: float
     hollow: bool = False

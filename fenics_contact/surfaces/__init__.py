@@ -6,9 +6,9 @@ from fenics_contact.surfaces.facets import (
     Relief,
     corner_products,
     edge_distance,
+    facet_shape_values,
     faceted_surface,
     shape_functions,
-    shape_values,
 )
 from fenics_contact.surfaces.projection import Projection, interpolated_normal, join, newton_matrix, project
 from fenics_contact.surfaces.relief import corner_normals, edges_at_corners, heights, slopes
@@ -23,6 +23,7 @@ __all__ = [
     "corner_products",
     "edge_distance",
     "edges_at_corners",
+    "facet_shape_values",
     "faceted_surface",
     "heights",
     "interpolated_normal",
@@ -32,7 +33,6 @@ __all__ = [
     "project",
     "quadrature_areas",
     "shape_functions",
-    "shape_values",
     "slopes",
     "true_surface",
 ]

@@ -16,7 +16,7 @@ _S, _T = np.array([-1.0, 1.0, 1.0, -1.0]), np.array([-1.0, -1.0, 1.0, 1.0])
 CUT = 0.5
 
 
-def shape_values(local: np.ndarray, corners: int) -> np.ndarray:
+def facet_shape_values(local: np.ndarray, corners: int) -> np.ndarray:
     """Evaluate the shape functions alone, at points of any leading shape; see `shape_functions`.
 
     Args:
@@ -46,7 +46,7 @@ def shape_functions(local: np.ndarray, corners: int) -> tuple[np.ndarray, np.nda
     Returns:
         Values, shape (n, corners), and derivatives, shape (n, corners, dim − 1).
     """
-    values = shape_values(local, corners)
+    values = facet_shape_values(local, corners)
     if corners == 2:
         return values, np.broadcast_to(np.array([[-0.5], [0.5]]), (len(local), 2, 1))
     if corners == 3:

@@ -13,7 +13,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import BodyMesh, coordinate_rounding
 from fenics_contact.surface_shapes import Joined, SurfaceShape, asked
 from fenics_contact.surfaces.facet_areas import nodal_areas
-from fenics_contact.surfaces.facets import FacetedSurface, Relief, faceted_surface, shape_values
+from fenics_contact.surfaces.facets import FacetedSurface, Relief, facet_shape_values, faceted_surface
 from fenics_contact.surfaces.projection import interpolated_normal
 from fenics_contact.surfaces.reconstruction import reconstructed
 from fenics_contact.surfaces.relief import edges_at_corners, heights, slopes
@@ -155,7 +155,7 @@ def _fitted(
     # The middle last: what the midpoints of the edges leave there counts.
     for number, sample in enumerate(samples):
         local = np.broadcast_to(sample, (count, len(sample)))
-        values = shape_values(local, surface.corners)
+        values = facet_shape_values(local, surface.corners)
         place = np.einsum("nk,nkd->nd", values, surface.points[nodes])
         direction, _ = interpolated_normal(values, fitted.normals[nodes])
         missing = _height_over_parts(place, direction, parts) - np.einsum("nk,kn->n", values, off_nodes)

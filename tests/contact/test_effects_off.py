@@ -46,7 +46,7 @@ PARTS: dict[str, tuple[Any, str]] = {
     "projection on facets": (contact_search, "_by_projection"),
     "mortar": (mortar, "mortar_coupling"),
     "balance of floating bodies": (held, "_check_balance"),
-    "slip bounds that follow": (slip_law.Coulomb, "bound"),
+    "slip bounds that follow": (slip_law.CoulombLaw, "bound"),
     "friction that grows in a step": (face_system.CoupledSystem, "__init__"),
     "slip of earlier steps": (TornSystem, "with_slip_from"),
 }

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import State, Status
 from fenics_contact.errors import InvalidDesignError
-from fenics_contact.optimize import BundleTrust, Kind, Result, minimize
+from fenics_contact.optimize import BundleTrust, Result, StepKind, minimize
 from fenics_contact.qp import FaceNewton
 from fenics_contact.shape import AdaptiveTolerance, DesignPoint, ShapeProblem
 from tests.hard.conftest import Record
@@ -38,7 +38,7 @@ def noted(
     state: State = best.state
     wrong = violations(state)
     kinds = [] if result is None else [entry.kind for entry in result.history]
-    rejected = kinds.count(Kind.REJECTED)
+    rejected = kinds.count(StepKind.REJECTED)
     record(
         GROUP,
         case,
@@ -57,12 +57,12 @@ def noted(
 
 
 def rejected_notes(result: Result) -> list[str]:
-    return [entry.note for entry in result.history if entry.kind is Kind.REJECTED]
+    return [entry.note for entry in result.history if entry.kind is StepKind.REJECTED]
 
 
 def assert_steps_shrink_after_rejections(result: Result) -> None:
     for entry, following in zip(result.history, result.history[1:], strict=False):
-        if entry.kind is Kind.REJECTED:
+        if entry.kind is StepKind.REJECTED:
             assert np.isnan(entry.value)
             assert following.step_length <= 0.501 * entry.step_length
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from pathlib import Path
 
 import pytest
@@ -255,3 +256,14 @@ def test_contact_alone_loads_neither_sensitivity_nor_pictures() -> None:
     assert f"{PACKAGE}.contact" in loaded
     rooms = {f"{PACKAGE}.{room}" for room in ("shape", "viz", "optimize", "outer", "study")}
     assert loaded & (rooms | {"pyvista", "matplotlib"}) == set()
+
+
+def test_a_name_of_a_face_stands_for_one_thing() -> None:
+    rooms = sorted({module.room for module in modules()} - {"", "__main__"})
+    faces = {room: importlib.import_module(f"{PACKAGE}.{room}") for room in rooms if room[0] != "_"}
+    meanings: dict[str, dict[str, object]] = {}
+    for room, face in faces.items():
+        for name in getattr(face, "__all__", []):
+            meanings.setdefault(name, {})[room] = getattr(face, name)
+    assert len(meanings) > 300, "no names were found: nothing was tested"
+    assert {name: list(of) for name, of in meanings.items() if len(set(map(id, of.values()))) > 1} == {}

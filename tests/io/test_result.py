@@ -19,7 +19,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.io import read_result, write_optimisation_result, write_result
 from fenics_contact.io.described_scene import described_scene, readable
-from fenics_contact.optimize import Kind, Result
+from fenics_contact.optimize import Result, StepKind
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -137,7 +137,7 @@ def test_functions_are_told_by_their_names_and_regions_by_theirs() -> None:
 
 def test_anything_is_readable() -> None:
     assert readable(np.float64("nan")) is None
-    assert readable({1: (np.int64(2), Kind.NULL)}) == {"1": [2, "null"]}
+    assert readable({1: (np.int64(2), StepKind.NULL)}) == {"1": [2, "null"]}
     assert readable(partial(deeper)) == {"function": "deeper"}
     assert readable(object()) == {"type": "object"}
 

@@ -17,11 +17,11 @@ from fenics_contact.launching import finished
 from fenics_contact.optimize import (
     BundleTrust,
     InvalidDesignError,
-    Kind,
     LinearConstraints,
     NotConvergedError,
     Reason,
     Record,
+    StepKind,
     minimize,
     quadratic_program,
 )
@@ -132,13 +132,13 @@ def test_invalid_designs_shorten_the_step_and_are_recorded() -> None:
 
     start = np.array([0.0, 0.0])
     result = minimize(fun, start, replace(FINE, first_step=2.0))
-    rejected = [record for record in result.history if record.kind is Kind.REJECTED]
+    rejected = [record for record in result.history if record.kind is StepKind.REJECTED]
     assert len(rejected) > 0
     assert np.isnan([record.value for record in rejected]).all()
     assert result.evaluations == len(tried) == len(result.history)
     assert result.value == pytest.approx(-1.0, abs=1e-5)
     for record, following in pairwise(result.history):
-        if record.kind is Kind.REJECTED:
+        if record.kind is StepKind.REJECTED:
             assert following.step_length <= 0.501 * record.step_length
 
 
@@ -286,11 +286,11 @@ def test_arrays_of_the_caller_stay_as_they_are_and_its_function_may_write_on_its
 def test_history_tells_of_every_evaluation_in_order() -> None:
     result = minimize(cb2, BY_NAME["CB2"].start, FINE)
     assert [record.evaluations for record in result.history] == list(range(1, result.evaluations + 1))
-    assert result.history[0].kind is Kind.START
+    assert result.history[0].kind is StepKind.START
     assert result.history[-1].iteration == result.iterations
     assert result.history[-1].best == result.value == cb2(result.x)[0]
     assert (result.subgradient == cb2(result.x)[1]).all()
-    assert {record.kind for record in result.history} == {Kind.START, Kind.SERIOUS, Kind.NULL}
+    assert {record.kind for record in result.history} == {StepKind.START, StepKind.SERIOUS, StepKind.NULL}
 
 
 @pytest.mark.parametrize(

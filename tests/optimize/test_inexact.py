@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize import BundleTrust, Checkpoint, Kind, Result, minimize
+from fenics_contact.optimize import BundleTrust, Checkpoint, Result, StepKind, minimize
 from tests.optimize.cases import BY_NAME, Case
 from tests.optimize.functions import Array
 
@@ -70,7 +70,7 @@ def test_the_minimum_is_found_to_the_tolerance_of_the_optimiser(name: str, toler
 def test_accuracy_follows_the_predicted_decrease(name: str) -> None:
     rough, result = solved(name, 1e-6)
     assert rough.asked[0] == (np.inf, 0.01)
-    tried = [record for record in result.history if record.kind in (Kind.SERIOUS, Kind.NULL)]
+    tried = [record for record in result.history if record.kind in (StepKind.SERIOUS, StepKind.NULL)]
     assert all(record.error <= 0.02 * record.predicted_decrease for record in tried)
     assert all(2e-3 * record.predicted_decrease < record.error for record in tried[1:])
 
@@ -79,8 +79,8 @@ def test_accuracy_follows_the_predicted_decrease(name: str) -> None:
 def test_the_centre_is_confirmed_before_the_method_stops(name: str) -> None:
     _, result = solved(name, 1e-6)
     kinds = [record.kind for record in result.history]
-    assert kinds[-1] is Kind.REFINED
-    again = [k for k, record in enumerate(result.history) if record.kind is Kind.REFINED]
+    assert kinds[-1] is StepKind.REFINED
+    again = [k for k, record in enumerate(result.history) if record.kind is StepKind.REFINED]
     assert all(result.history[k].iteration == result.history[k - 1].iteration for k in again)
     assert all(result.history[k].value == result.history[k].best for k in again)
     assert len(again) < 0.4 * len(kinds)
@@ -89,7 +89,7 @@ def test_the_centre_is_confirmed_before_the_method_stops(name: str) -> None:
 def test_what_an_exact_function_costs_is_not_changed() -> None:
     case = BY_NAME["Shor"]
     exact = minimize(case.fun, case.start)
-    assert Kind.REFINED not in {record.kind for record in exact.history}
+    assert StepKind.REFINED not in {record.kind for record in exact.history}
     assert {record.error for record in exact.history} == {exact.error} == {0.0}
     method = BundleTrust(inexactness=1e-3)
     assert minimize(case.fun, case.start, method).history == exact.history

@@ -13,10 +13,10 @@ from fenics_contact.errors import InvalidDesignError
 from fenics_contact.optimize import (
     BundleTrust,
     Checkpoint,
-    Kind,
     Kinked,
     LinearConstraints,
     Reason,
+    StepKind,
     minimize,
     pose,
 )
@@ -80,7 +80,7 @@ def test_an_optimum_that_is_none_is_left(size: int) -> None:
     assert result.value == pytest.approx(fun.value(fun.minimiser), abs=1e-4)
     assert result.x == pytest.approx(fun.minimiser, abs=0.02)
     second = result.history[1]
-    assert (second.kind, second.value) == (Kind.REFINED, fun.value(np.zeros(size)))
+    assert (second.kind, second.value) == (StepKind.REFINED, fun.value(np.zeros(size)))
     assert "beside" in second.note
 
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fenics_contact.optimize import Bounds, BundleTrust, Kind, LinearConstraints, Result, minimize
+from fenics_contact.optimize import Bounds, BundleTrust, LinearConstraints, Result, StepKind, minimize
 from tests.optimize.cases import BY_NAME, CONSTRAINED, CONVEX, NONCONVEX, Case
 from tests.optimize.functions import cb3, hs86, maxq
 
@@ -98,9 +98,9 @@ def test_error_follows_the_tolerance(name: str, tolerance: float) -> None:
 def test_every_serious_step_descends_and_every_null_step_leaves_the_best_value(case: Case) -> None:
     history = solved(case).history
     kinds = {record.kind for record in history}
-    assert Kind.SERIOUS in kinds, "without a serious step this tests nothing"
+    assert StepKind.SERIOUS in kinds, "without a serious step this tests nothing"
     for before, after in pairwise(history):
-        if after.kind is Kind.SERIOUS:
+        if after.kind is StepKind.SERIOUS:
             assert after.best == after.value < before.best - 0.05 * after.predicted_decrease * (1 - 1e-9)
         else:
             assert after.best == before.best

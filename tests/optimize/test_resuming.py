@@ -17,12 +17,12 @@ from fenics_contact.optimize import (
     Checkpoint,
     CheckpointError,
     InvalidDesignError,
-    Kind,
     LinearConstraints,
     NotConvergedError,
     Reason,
     Record,
     Result,
+    StepKind,
     minimize,
 )
 from tests.optimize.cases import BY_NAME, Case
@@ -93,7 +93,7 @@ def test_rejected_designs_and_a_small_bundle_are_kept_too(tmp_path: Path) -> Non
     small, start = replace(FINE, max_bundle=4, first_step=2.0), np.zeros(2)
     whole = minimize(fun, start, small)
     kinds = {record.kind for record in whole.history}
-    assert kinds == {Kind.START, Kind.SERIOUS, Kind.NULL, Kind.REJECTED}
+    assert kinds == {StepKind.START, StepKind.SERIOUS, StepKind.NULL, StepKind.REJECTED}
     checkpoint = Checkpoint(tmp_path / "run.npz")
     for _ in range(3):
         with pytest.raises(Interrupted):
@@ -114,7 +114,7 @@ class Following:
         noise = 1e-6 * np.sin(1e5 * (x @ self.last))
         self.last = x.copy()
         value, gradient = self.case.fun(x)
-        return value + noise, gradient
+        return float(value + noise), gradient
 
     def fingerprint(self) -> Mapping[str, str]:
         return {"function": self.name}
@@ -177,7 +177,7 @@ def test_another_problem_is_refused_and_what_differs_is_named(name: str, tmp_pat
         minimize(fun, checkpoint=checkpoint, **{**problem, **changed})
     assert (tmp_path / "run.npz").read_bytes() == before
     fresh = replace(checkpoint, resume=False)
-    assert minimize(fun, checkpoint=fresh, **{**problem, **changed}).history[0].kind is Kind.START
+    assert minimize(fun, checkpoint=fresh, **{**problem, **changed}).history[0].kind is StepKind.START
 
 
 def test_a_run_that_writes_less_often_loses_less_than_an_interval_and_writes_its_end(tmp_path: Path) -> None:

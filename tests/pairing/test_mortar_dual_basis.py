@@ -11,14 +11,14 @@ from fenics_contact.pairing.mortar.cells import Cells
 from fenics_contact.pairing.mortar.dual_basis import CORNERS, dual_integrals
 from fenics_contact.pairing.mortar.local_coordinates import rule
 from fenics_contact.pairing.mortar.planes import measure
-from fenics_contact.surfaces.facets import shape_values
+from fenics_contact.surfaces.facets import facet_shape_values
 
 
 def covered(corners: int, parts: np.ndarray, share_of_pairs: np.ndarray) -> Cells:
     """Cells on one facet in its own local coordinates, coupled with the facet's own shape functions."""
     barycentric, weights = rule(parts.shape[1])
     local = barycentric @ parts
-    values = shape_values(local, corners)
+    values = facet_shape_values(local, corners)
     size = np.abs(measure(parts))[:, None] * weights
     return Cells(np.zeros(len(parts), dtype=np.int64), share_of_pairs, size, local, local, values, values)
 

@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import ConvergenceError, InvalidInputError
-from fenics_contact.qp import ContactLayout, Coulomb, FaceNewton, Smalse, Tresca, find_equilibrium, solve
+from fenics_contact.qp import (
+    ContactLayout,
+    CoulombLaw,
+    FaceNewton,
+    Smalse,
+    TrescaLaw,
+    find_equilibrium,
+    solve,
+)
 from tests.qp.random_problems import random_problem
 from tests.qp.torn_bricks import Bricks, torn_problem
 
@@ -63,7 +71,7 @@ def test_brick_held_by_next_to_nothing_converges(friction_coefficient):
 def test_one_loop_equals_the_fixed_point_of_tresca_problems():
     dual, _ = torn_problem(Bricks(crown=0.1, tilt=0.5))
     mu_f = np.linspace(0.25, 0.5, dual.layout.n_friction)
-    law = Coulomb(dual.layout, mu_f)
+    law = CoulombLaw(dual.layout, mu_f)
     one_loop = solve(dual, None, FaceNewton(tolerance=1e-10), friction_coefficient=mu_f)
     step, products = None, 0
     first = find_equilibrium(dual.with_law(law)).multiplier
@@ -133,7 +141,7 @@ def test_failure_carries_the_history():
 
 def test_smalse_refuses_a_bound_that_follows_the_multiplier():
     problem = random_problem(2)
-    with pytest.raises(InvalidInputError, match="SMALSE needs a given slip bound, got Coulomb's law"):
+    with pytest.raises(InvalidInputError, match="SMALSE needs a given slip bound, got CoulombLaw: iterate"):
         solve(problem.dual, None, Smalse(), friction_coefficient=np.full(12, 0.4))
 
 
@@ -152,7 +160,7 @@ def test_bad_friction_coefficient_is_refused(friction_coefficient, message):
 
 def test_friction_cone_projection_is_the_nearest_point():
     problem = random_problem(3, n_contact=9, n_friction=7)
-    law = Coulomb(problem.layout, np.array([0.0, 0.1, 0.3, 1.0, 2.0, 0.5, 0.7]))
+    law = CoulombLaw(problem.layout, np.array([0.0, 0.1, 0.3, 1.0, 2.0, 0.5, 0.7]))
     rng = np.random.default_rng(0)
     cases = 3.0 * rng.standard_normal((200, problem.layout.size))
     for x, y in zip(cases[::2], cases[1::2], strict=True):
@@ -164,12 +172,12 @@ def test_friction_cone_projection_is_the_nearest_point():
 
 def test_tresca_bound_does_not_depend_on_the_multiplier():
     problem = random_problem(3)
-    law = Tresca(problem.layout, problem.slip_bound)
+    law = TrescaLaw(problem.layout, problem.slip_bound)
     np.testing.assert_array_equal(law.bound(np.zeros(problem.layout.size)), problem.slip_bound)
 
 
 def test_forces_that_pull_without_any_friction_are_admitted_as_none() -> None:
     layout = ContactLayout.build(6, normal=[0, 3], tangential=[[1, 2], [4, 5]])
-    law = Coulomb(layout, np.array([0.3, 0.3]), 0.0)
+    law = CoulombLaw(layout, np.array([0.3, 0.3]), 0.0)
     admitted = law.admit(np.array([-1.0, 0.0, 0.0, 2.0, 0.0, 0.0]))
     np.testing.assert_array_equal(admitted, [0.0, 0.0, 0.0, 2.0, 0.0, 0.0])

@@ -13,11 +13,11 @@ from fenics_contact.errors import InfeasibleError
 from fenics_contact.qp import (
     CoarseSpace,
     ContactLayout,
-    Coulomb,
+    CoulombLaw,
     DualProblem,
     FaceNewton,
     Smalse,
-    Tresca,
+    TrescaLaw,
     find_equilibrium,
     solve,
 )
@@ -32,7 +32,7 @@ def no_product(x):
 def test_admissible_multiplier_is_found_without_a_product():
     problem = random_problem(5)
     dual = replace(problem.dual, operator=no_product)
-    law = Tresca(problem.layout, problem.slip_bound)
+    law = TrescaLaw(problem.layout, problem.slip_bound)
     found = find_equilibrium(dual.with_law(law))
     assert found.motion is None
     assert found.error <= 1e-4
@@ -44,14 +44,14 @@ def test_admissible_multiplier_is_found_without_a_product():
 def test_sliding_limit_of_a_pulled_brick_is_found(friction_coefficient, held):
     dual, _ = torn_problem(Bricks(n=3, cubes=(2, 2), press=0.01, shear=0.002))
     mu_f = np.full(dual.layout.n_friction, friction_coefficient)
-    found = find_equilibrium(dual.with_law(Coulomb(dual.layout, mu_f)))
+    found = find_equilibrium(dual.with_law(CoulombLaw(dual.layout, mu_f)))
     assert (found.motion is None) == held
 
 
 def test_unheld_motion_is_the_sliding_of_the_upper_brick():
     dual, torn = torn_problem(Bricks(n=3, shear=0.003))
     mu_f = np.full(dual.layout.n_friction, 0.2)
-    found = find_equilibrium(dual.with_law(Coulomb(dual.layout, mu_f)))
+    found = find_equilibrium(dual.with_law(CoulombLaw(dual.layout, mu_f)))
     motions = np.einsum("ij,sj->si", torn.kernel, found.motion.reshape(-1, 6))
     translation = motions.reshape(len(torn.places), -1, 3).mean(axis=1)
     upper = np.linalg.norm(translation[torn.body == 1], axis=1).min()
@@ -101,5 +101,5 @@ def test_loaded_motion_without_any_row_is_refused():
 
 def test_problem_without_floating_bodies_is_always_held():
     problem = random_problem(5, m=0)
-    law = Tresca(problem.layout, problem.slip_bound)
+    law = TrescaLaw(problem.layout, problem.slip_bound)
     assert find_equilibrium(problem.dual.with_law(law)).motion is None

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fenics_contact.qp import DualProblem, FaceNewton, Tresca, solve
+from fenics_contact.qp import DualProblem, FaceNewton, TrescaLaw, solve
 from fenics_contact.qp.iterate import Iterate, iterate_at
 from fenics_contact.qp.newton_steps import damp
 from fenics_contact.qp.problem import CountedOperator
@@ -21,7 +21,7 @@ def no_product(x):
 
 
 def with_bounds(problem: DenseProblem) -> DualProblem:
-    return problem.dual.with_law(Tresca(problem.layout, problem.slip_bound))
+    return problem.dual.with_law(TrescaLaw(problem.layout, problem.slip_bound))
 
 
 def iterate(problem: DenseProblem, multiplier: np.ndarray, alpha: np.ndarray) -> Iterate:

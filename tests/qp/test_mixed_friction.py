@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fenics_contact.qp import ContactLayout, Coulomb, FaceNewton, Scaling, Smalse, Tresca, solve
+from fenics_contact.qp import ContactLayout, CoulombLaw, FaceNewton, Scaling, Smalse, TrescaLaw, solve
 from tests.qp.random_problems import random_problem
 from tests.qp.torn_bricks import Bricks, torn_problem
 
@@ -23,20 +23,20 @@ def random_points(seed: int, size: float = 3.0) -> np.ndarray:
     return size * np.random.default_rng(seed).standard_normal((COUNT, 3))
 
 
-def random_law(seed: int) -> Coulomb:
+def random_law(seed: int) -> CoulombLaw:
     rng = np.random.default_rng(seed)
     coefficient, given = rng.uniform(0, 1.5, COUNT), rng.uniform(0, 1.5, COUNT)
     coefficient[::5], given[::7] = 0.0, 0.0
-    return Coulomb(layout(), coefficient, given)
+    return CoulombLaw(layout(), coefficient, given)
 
 
-def excess(law: Coulomb, points: np.ndarray) -> np.ndarray:
+def excess(law: CoulombLaw, points: np.ndarray) -> np.ndarray:
     """Return by how much points lie outside their cones."""
     bound = law.given + law.friction_coefficient * points[:, 0]
     return np.maximum(np.linalg.norm(points[:, 1:], axis=1) - bound, -points[:, 0])
 
 
-def admitted(law: Coulomb, points: np.ndarray) -> np.ndarray:
+def admitted(law: CoulombLaw, points: np.ndarray) -> np.ndarray:
     return law.admit(points.ravel()).reshape(COUNT, 3)
 
 
@@ -118,5 +118,5 @@ def test_a_law_in_scaled_multipliers_has_the_same_answer() -> None:
 @pytest.mark.parametrize("given", [-1.0, np.nan, np.full(COUNT, -1.0)])
 def test_a_given_bound_that_is_none_is_refused(given) -> None:
     with pytest.raises(ValueError, match="slip_bound must be finite and not negative"):
-        Coulomb(layout(), np.zeros(COUNT), given)
-    assert Tresca(layout(), np.zeros(COUNT)).growth.max() == 0
+        CoulombLaw(layout(), np.zeros(COUNT), given)
+    assert TrescaLaw(layout(), np.zeros(COUNT)).growth.max() == 0

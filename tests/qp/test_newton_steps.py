@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.qp import ContactLayout, Coulomb, CountedOperator, DualProblem, Face, classify
+from fenics_contact.qp import ContactLayout, CoulombLaw, CountedOperator, DualProblem, Face, classify
 from fenics_contact.qp.forcing import Forcing
 from fenics_contact.qp.iterate import iterate_fitted
 from fenics_contact.qp.newton_steps import NewtonState, NewtonSteps
@@ -17,7 +17,7 @@ from tests.qp.torn_bricks import Bricks, torn_problem
 
 def problem() -> DualProblem:
     dual, _ = torn_problem(Bricks(crown=0.1, tilt=0.5))
-    return dual.with_law(Coulomb(dual.layout, np.full(dual.layout.n_friction, 0.3)))
+    return dual.with_law(CoulombLaw(dual.layout, np.full(dual.layout.n_friction, 0.3)))
 
 
 def face(*closed: bool) -> Face:

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import ConvergenceError
-from fenics_contact.qp import FaceNewton, Smalse, Tresca, contact_step, measure, solve
+from fenics_contact.qp import FaceNewton, Smalse, TrescaLaw, contact_step, measure, solve
 from fenics_contact.qp.face_newton import slides
 from fenics_contact.qp.forcing import Forcing
 from fenics_contact.qp.iterate import Start, iterate_at
 from fenics_contact.qp.problem import CountedOperator
 from fenics_contact.qp.rescue import ProximalPoint, Rescue
-from fenics_contact.qp.slip_law import Coulomb
+from fenics_contact.qp.slip_law import CoulombLaw
 from fenics_contact.qp.solution import Residuals, SolverStep
 from tests.qp.test_coulomb import coulomb_violations
 from tests.qp.torn_bricks import Bricks, torn_problem
@@ -35,7 +35,7 @@ def test_an_almost_unloaded_brick_on_a_round_one_is_solved(load: float) -> None:
 @pytest.mark.parametrize("preconditioned", [True, False])
 def test_a_rescue_comes_nearer_from_anywhere(preconditioned: bool) -> None:
     dual, _ = torn_problem(Bricks(crown=0.1, tilt=0.5, preconditioned=preconditioned))
-    dual = dual.with_law(Coulomb(dual.layout, np.full(dual.layout.n_friction, 0.3)))
+    dual = dual.with_law(CoulombLaw(dual.layout, np.full(dual.layout.n_friction, 0.3)))
     far, operator = dual.coarse.particular(), CountedOperator(dual.operator)
     begin = iterate_at(dual, far, dual.operator(far), np.zeros(dual.coarse.m))
     rescue = Rescue(dual, Forcing(0.25, 0.1, 1e-6), 20_000, Smalse())
@@ -61,7 +61,7 @@ def test_at_the_solution_springs_at_rest_change_nothing() -> None:
     dual, _ = torn_problem(Bricks(crown=0.1, tilt=0.5))
     bound = np.full(dual.layout.n_friction, 1e-3)
     solution = solve(dual, bound, FaceNewton(tolerance=1e-10))
-    dual, operator = dual.with_law(Tresca(dual.layout, bound)), CountedOperator(dual.operator)
+    dual, operator = dual.with_law(TrescaLaw(dual.layout, bound)), CountedOperator(dual.operator)
     point = ProximalPoint.build(dual, operator, 10.0).centred(solution.multiplier)
     there = iterate_at(dual, solution.multiplier, solution.product, solution.alpha)
     inside = point.enter(there)
@@ -80,7 +80,7 @@ def test_at_the_solution_springs_at_rest_change_nothing() -> None:
 
 def test_forces_that_are_rounding_are_none() -> None:
     dual, _ = torn_problem(Bricks(crown=0.1))
-    dual = dual.with_law(Tresca(dual.layout, np.full(dual.layout.n_friction, 1e-3)))
+    dual = dual.with_law(TrescaLaw(dual.layout, np.full(dual.layout.n_friction, 1e-3)))
     rng, size = np.random.default_rng(0), dual.layout.size
     multiplier = np.where(np.isin(np.arange(size), dual.layout.equality), 1.0, 0.0)
     noise = np.zeros(size)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fenics_contact.qp import Coulomb, DualProblem, FaceNewton, Smalse, Tresca, contact_step, solve
+from fenics_contact.qp import CoulombLaw, DualProblem, FaceNewton, Smalse, TrescaLaw, contact_step, solve
 from fenics_contact.qp.rigid_motions import RigidMotionCorrection
 from tests.qp.test_coulomb import coulomb_violations
 from tests.qp.torn_bricks import Bricks, torn_problem
@@ -29,11 +29,11 @@ def gallery(**parameters) -> tuple[DualProblem, np.ndarray, np.ndarray]:
     return dual, multiplier, dual.operator(multiplier) - dual.rhs
 
 
-@pytest.mark.parametrize("kind", ["Tresca", "Coulomb"])
+@pytest.mark.parametrize("kind", ["TrescaLaw", "CoulombLaw"])
 def test_trial_forces_balance_the_load_of_the_floating_brick(kind: str):
     dual, multiplier, residual = gallery()
     ones = np.ones(dual.layout.n_friction)
-    law = Tresca(dual.layout, 1e-3 * ones) if kind == "Tresca" else Coulomb(dual.layout, 0.4 * ones)
+    law = TrescaLaw(dual.layout, 1e-3 * ones) if kind == "TrescaLaw" else CoulombLaw(dual.layout, 0.4 * ones)
     motions = RigidMotionCorrection.build(dual).motions
     assert motions.shape[1] == 6
     missing = []
@@ -48,7 +48,7 @@ def test_trial_forces_balance_the_load_of_the_floating_brick(kind: str):
 
 def test_the_motion_strains_no_glue_and_costs_no_product():
     dual, multiplier, residual = gallery()
-    law = Coulomb(dual.layout, np.full(dual.layout.n_friction, 0.4))
+    law = CoulombLaw(dual.layout, np.full(dual.layout.n_friction, 0.4))
 
     def no_product(x):
         raise AssertionError("rigid motions need no product")
@@ -60,7 +60,7 @@ def test_the_motion_strains_no_glue_and_costs_no_product():
 
 def test_without_a_floating_body_nothing_moves():
     dual, _ = torn_problem(Bricks(n=3, contact=False))
-    law = Tresca(dual.layout, np.zeros(0))
+    law = TrescaLaw(dual.layout, np.zeros(0))
     assert RigidMotionCorrection.build(dual).motions.shape[1] == 0
     motion, _ = settled(dual, law, dual.coarse.particular(), -dual.rhs)
     assert not motion.any()
@@ -68,7 +68,7 @@ def test_without_a_floating_body_nothing_moves():
 
 def test_a_load_that_the_bounds_cannot_hold_moves_the_brick_along_it():
     dual, multiplier, residual = gallery(shear=0.05)
-    law = Tresca(dual.layout, np.full(dual.layout.n_friction, 1e-6))
+    law = TrescaLaw(dual.layout, np.full(dual.layout.n_friction, 1e-6))
     motion, _ = settled(dual, law, multiplier, residual)
     assert np.isfinite(motion).all()
     assert dual.coarse.load @ motion > 0.0

@@ -15,7 +15,7 @@ from fenics_contact.qp import (
     ProjectedCG,
     Residuals,
     Smalse,
-    Tresca,
+    TrescaLaw,
     contact_step,
     measure,
     solve,
@@ -157,7 +157,7 @@ def measured(problem, lam, alpha):
     product = problem.F @ lam
     residual = product - problem.d - problem.G.T @ alpha
     feasible = FeasibleSet(problem.layout, problem.slip_bound)
-    dual = problem.dual.with_law(Tresca(problem.layout, problem.slip_bound))
+    dual = problem.dual.with_law(TrescaLaw(problem.layout, problem.slip_bound))
     return measure(dual, lam, product, residual), residual, feasible
 
 
@@ -205,7 +205,7 @@ def test_a_gap_between_supports_excuses_errors_of_its_own_point_alone():
 
     def natural(row, marks):
         """Return the natural residual and its force scale where a contact of force 1 lacks 1e-3 of it."""
-        law = Tresca(layout, problem.slip_bound)
+        law = TrescaLaw(layout, problem.slip_bound)
         beside = replace(dual, diagonal=stiff, rhs=gap, supported=marks, friction=law)
         force = np.where(np.arange(layout.size) == row, 1.0, 0.0)
         found = measure(beside, force, gap, -1e-3 * stiff * force)

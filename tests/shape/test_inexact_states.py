@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize import Kind, Result
+from fenics_contact.optimize import Result, StepKind
 from fenics_contact.shape import AdaptiveTolerance, DesignPoint, ShapeProblem, WeakChoice
 from tests.contact.gallery import partitions
 from tests.shape.objectives import objectives
@@ -88,10 +88,10 @@ def test_the_optimum_is_that_of_accurate_states_with_fewer_products(name: str) -
 @pytest.mark.parametrize("name", BOUND)
 def test_errors_follow_the_predicted_decrease(name: str) -> None:
     _, found = found_by(name, True)
-    tried = [record for record in found.history if record.kind in (Kind.SERIOUS, Kind.NULL)]
+    tried = [record for record in found.history if record.kind in (StepKind.SERIOUS, StepKind.NULL)]
     assert len(tried) > 1
     assert all(0.0 < record.error < 0.02 * record.predicted_decrease for record in tried)
-    assert found.history[-1].kind is Kind.REFINED
+    assert found.history[-1].kind is StepKind.REFINED
     assert 0.0 < found.error < 0.02 * STOPPING * (1 + abs(found.value))
 
 

@@ -11,7 +11,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem
-from fenics_contact.optimize import BundleTrust, Kind, LinearConstraints, Result, minimize
+from fenics_contact.optimize import BundleTrust, LinearConstraints, Result, StepKind, minimize
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import Coulomb
 from fenics_contact.shape import ContactForces, ShapeProblem, TotalPotential
@@ -117,8 +117,8 @@ def test_designs_that_invert_cells_are_stepped_back_from() -> None:
     method = BundleTrust(max_evaluations=8, raise_on_failure=False)
     result = minimize(problem, start, method, bounds=bounds)
     kinds = [record.kind for record in result.history]
-    assert Kind.REJECTED in kinds
-    assert Kind.SERIOUS in kinds
+    assert StepKind.REJECTED in kinds
+    assert StepKind.SERIOUS in kinds
     assert result.value < result.history[0].value
     assert problem.scene_of(result.x).bodies["block"].mesh.volume > 0.0
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.optimize import Checkpoint, Kind, Kinked, Reason
+from fenics_contact.optimize import Checkpoint, Kinked, Reason, StepKind
 from fenics_contact.scene import Coulomb
 from fenics_contact.shape import AdaptiveTolerance, ShapeProblem, WeakChoice
 from tests.conftest import run_on_ranks
@@ -62,7 +62,7 @@ def test_the_end_is_the_minimum(choice: WeakChoice, friction: str) -> None:
     assert result.x == pytest.approx([-BOUND])
     assert result.value == pytest.approx(problem.value_of(np.array([-BOUND])), rel=1e-5)
     if choice is WeakChoice.RELEASED:
-        assert result.history[1].kind is Kind.REFINED
+        assert result.history[1].kind is StepKind.REFINED
 
 
 @pytest.mark.parametrize("choice", CHOICES)

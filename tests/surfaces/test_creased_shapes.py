@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.surface_shapes import Cylinder, Joined, Plane, SurfaceShape, placed
-from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface, shape_values
+from fenics_contact.surfaces.facets import FacetedSurface, facet_shape_values, faceted_surface
 from fenics_contact.surfaces.projection import interpolated_normal
 from fenics_contact.surfaces.reconstruction import reconstructed
 from fenics_contact.surfaces.relief import corner_normals, heights
@@ -52,7 +52,7 @@ def misses(surface: FacetedSurface, shapes: tuple[SurfaceShape, ...], part: np.n
             local = rng.dirichlet([1, 1, 1], len(every))[:, 1:]
         else:
             local = rng.uniform(-1, 1, (len(every), 2))
-        values, nodes = shape_values(local, surface.corners), surface.facets
+        values, nodes = facet_shape_values(local, surface.corners), surface.facets
         place = np.einsum("nk,nkd->nd", values, surface.points[nodes])
         direction, _ = interpolated_normal(values, surface.normals[nodes])
         value = heights(surface, every, local).value

@@ -11,7 +11,7 @@ import pytest
 from fenics_contact.gallery import block, hemisphere
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.surface_shapes import Cylinder, Sphere, SurfaceShape, Torus
-from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface, shape_values
+from fenics_contact.surfaces.facets import FacetedSurface, facet_shape_values, faceted_surface
 from fenics_contact.surfaces.projection import interpolated_normal
 from fenics_contact.surfaces.reconstruction import reconstructed
 from fenics_contact.surfaces.relief import heights
@@ -55,7 +55,7 @@ def miss(surface: FacetedSurface, shape: SurfaceShape) -> float:
             local = rng.dirichlet([1, 1, 1], len(every))[:, 1:]
         else:
             local = rng.uniform(-1, 1, (len(every), surface.dim - 1))
-        values, nodes = shape_values(local, surface.corners), surface.facets
+        values, nodes = facet_shape_values(local, surface.corners), surface.facets
         place = np.einsum("nk,nkd->nd", values, surface.points[nodes])
         direction, _ = interpolated_normal(values, surface.normals[nodes])
         found.append(height_over(place, direction, shape) - heights(surface, every, local).value)

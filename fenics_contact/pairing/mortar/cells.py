@@ -10,7 +10,7 @@ from fenics_contact.pairing.mortar.clipping import clip, simplices
 from fenics_contact.pairing.mortar.layers import hidden
 from fenics_contact.pairing.mortar.local_coordinates import local_coordinates, rule
 from fenics_contact.pairing.mortar.planes import Planes, laid_flat, measure
-from fenics_contact.surfaces import FacetedSurface, shape_values
+from fenics_contact.surfaces import FacetedSurface, facet_shape_values
 
 #: Area, relative to the smaller of two facets, below which a piece of their intersection is rounding.
 NOTHING = 1e-14
@@ -74,6 +74,6 @@ def cells_of(
     facets, facet = np.unique(pair_slave[used], return_inverse=True)
     cells = Cells(
         facet.ravel()[pair.ravel()], pair.ravel(), size[:, None] * share, on_slave, on_master,
-        shape_values(on_slave, window.shape[1]), shape_values(on_master, subject.shape[1]),
+        facet_shape_values(on_slave, window.shape[1]), facet_shape_values(on_master, subject.shape[1]),
     )  # fmt: skip
     return cells, facets, pair_slave[used], pair_master[used]
