@@ -29,5 +29,5 @@ from fenics_contact import _requirements
 
 _requirements.check()  # that they are there; nothing is loaded or started before it is used
 
-__version__ = "0.1.0.dev0"
+__version__ = "0.2.0.dev0"
 __all__ = ["__version__"]
