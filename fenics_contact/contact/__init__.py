@@ -7,6 +7,7 @@ from fenics_contact.contact.equilibrium import default_solver
 from fenics_contact.contact.fields import body_mesh
 from fenics_contact.contact.gathered import GatheredFields, contact_fields, gathered_fields, in_space
 from fenics_contact.contact.held import check_held
+from fenics_contact.contact.multi_block import body_grid
 from fenics_contact.contact.problem import ContactProblem, solve_scene
 from fenics_contact.contact.result import ContactResult, Status
 from fenics_contact.contact.slip_bounds import Damping
@@ -28,6 +29,7 @@ __all__ = [
     "Status",
     "Tolerance",
     "UnheldMotion",
+    "body_grid",
     "body_mesh",
     "check_held",
     "contact_area",

@@ -11,6 +11,7 @@ from fenics_contact.errors import InvalidInputError, MissingRequirementError, to
 
 if TYPE_CHECKING:
     from fenics_contact.contact.state import State
+    from fenics_contact.mesh import BodyMesh
 
 #: What VTK calls the types of cells; their nodes are in VTK's order.
 _VTK_NAMES = {
@@ -24,7 +25,7 @@ _VTK_NAMES = {
 }
 
 
-def multi_block(state: State, deformed: float) -> Any:
+def multi_block(state: State, deformed: float, *, linear: bool) -> Any:
     """Return what `State.to_pyvista` promises. Collective."""
     with together(state.torn.decomposition.comm):
         pv = _pyvista()
@@ -36,14 +37,20 @@ def multi_block(state: State, deformed: float) -> Any:
     for name, body in state.scene.bodies.items():
         fields = gathered_fields(state, name)
         points = in_space(body.mesh.points + deformed * fields.points["displacement"])
-        cell_type = pv.CellType[_VTK_NAMES[body.mesh.cell_type]]
-        grid = pv.UnstructuredGrid({cell_type: body.mesh.cells}, points)
+        mesh = body.mesh.linear if linear else body.mesh
+        grid = body_grid(mesh, points)
         for key, values in fields.points.items():
             grid.point_data[key] = in_space(values)
         for key, values in fields.cells.items():
-            grid.cell_data[key] = values
+            grid.cell_data[key] = np.repeat(values, mesh.n_cells // body.mesh.n_cells)
         blocks[name] = grid
     return blocks
+
+
+def body_grid(mesh: BodyMesh, points: np.ndarray) -> Any:
+    """Return the cells of a body on points in space, (n_nodes, 3), as pyvista's UnstructuredGrid."""
+    pv = _pyvista()
+    return pv.UnstructuredGrid({pv.CellType[_VTK_NAMES[mesh.cell_type]]: mesh.cells}, points)
 
 
 def _pyvista() -> Any:

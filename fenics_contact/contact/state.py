@@ -205,11 +205,12 @@ class State:
         return cell_values(self.von_mises[body], self.scene.bodies[body].mesh.cells)
 
     @collectively("State.to_pyvista", _comm)
-    def to_pyvista(self, deformed: float = 0.0) -> Any:
+    def to_pyvista(self, deformed: float = 0.0, *, linear: bool = False) -> Any:
         """Return all bodies with their fields for pyvista, the same on every rank. Collective.
 
         Args:
             deformed: Factor of the displacement by which points are moved; 0 leaves them where they were.
+            linear: Cut quadratic cells into linear ones on the same nodes, as pictures of `viz` do.
 
         Returns:
             A ``pyvista.MultiBlock`` with an ``UnstructuredGrid`` for each body under its name, which holds
@@ -227,7 +228,7 @@ class State:
         """
         from fenics_contact.contact.multi_block import multi_block
 
-        return multi_block(self, deformed)
+        return multi_block(self, deformed, linear=linear)
 
     @property
     def counts(self) -> dict[str, int]:

@@ -128,7 +128,7 @@ def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> N
     tall = [0.4 * float((high - low)[1] / (high - low)[0]) + 0.08]
     tall.append(min(0.8 / sum(1 / _proportion(profile) for profile in found), 0.45) + 0.13)
     size = look.width, round((sum(tall) + 0.03) * look.width)
-    with sheet(paper, size, look.headline, "constrained") as figure:
+    with sheet(paper, size, look.headline) as figure:
         upper, lower = figure.subfigures(2, 1, height_ratios=tall)
         panels = upper.subplots(1, 2)
         for axes, patch, word in zip(panels, patches, ("before", "after"), strict=True):
@@ -153,7 +153,7 @@ def _draw_sections(figure: Any, found: list[Profile], units: Units) -> None:
 def _draw_in_plane(first: State, best: State, paper: BinaryIO, look: _Look) -> None:
     traces = [contact_trace(state, look.pair) for state in (first, best)]
     (profile,) = profiles(first, best, look.reach)
-    with sheet(paper, (look.width, round(0.5 * look.width)), look.headline, "constrained") as figure:
+    with sheet(paper, (look.width, round(0.5 * look.width)), look.headline) as figure:
         left, right = figure.subplots(1, 2)
         for trace, word, colour, line in zip(
             traces, ("before", "after"), (GREY, ORANGE), ("--", "-"), strict=True

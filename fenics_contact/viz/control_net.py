@@ -15,10 +15,10 @@ from fenics_contact.gallery import DesignSurface
 from fenics_contact.viz.colours import GREY, INK, ORANGE, SIGNED_MAP
 from fenics_contact.viz.curved_net import curved_net
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
-from fenics_contact.viz.sheet import TITLE, place_colour_bar, place_image, sheet
+from fenics_contact.viz.sheet import sheet, show_image
 from fenics_contact.viz.stage import Layer, balls, render, surface, tubes
 from fenics_contact.viz.units import Units
-from fenics_contact.viz.view import Frame, View, frame_around, looking_along
+from fenics_contact.viz.view import View, frame_around, looking_along
 from fenics_contact.viz.words import checked_range, headline, nice_number, written
 
 if TYPE_CHECKING:
@@ -137,25 +137,21 @@ def _draw(change: _Change, paper: BinaryIO, title: str, units: Units, width: int
     view = _view(change.start)
     everything = [change.start, change.end, change.net, change.end_net]
     frame = frame_around(view, np.concatenate([points.reshape(-1, 3) for points in everything]), 0.05)
-    size = round(PART * width)
-    net, end_net = (
-        _net_layers(change, change.net, ORANGE, 1.0),
-        _net_layers(change, change.end_net, ORANGE, 1.0),
-    )
+    net, end_net = (_net_layers(change, points, ORANGE, 1.0) for points in (change.net, change.end_net))
     ghost = _net_layers(change, change.net, GREY, 0.5)
     still = _surface_layer(change.start, np.zeros(len(change.outward)), change.clim)
     moved = _surface_layer(change.end, change.outward, change.clim)
-    before = _seen_through(still, net, view, frame, size)
-    after = _seen_through(moved, [*ghost, *end_net], view, frame, size)
     low, high = (written(float(value), 3) for value in (change.outward.min(), change.outward.max()))
     words = headline(title, f"surface moved by {low} to {high} {units.length} along its outward normal")
-    top = round((TITLE + 0.03) * width)
-    with sheet(paper, (width, top + before.shape[0] + round(0.01 * width)), words) as figure:
-        place_image(figure, before, 0, top, "before")
-        place_image(figure, after, size, top, f"after, movement × {change.factor:g}")
-        label = f"outward movement ({units.length})"
+    with sheet(paper, (width, round((0.09 + PART / frame.proportion) * width)), words) as figure:
+        panels = figure.subplots(1, 2)
+        titles = "before", f"after, movement × {change.factor:g}"
+        for axes, layers, name in zip(
+            panels, ([still, *net], [moved, *ghost, *end_net]), titles, strict=True
+        ):
+            show_image(axes, render(layers, view, frame, round(PART * width)), frame, name)
         key = ScalarMappable(Normalize(*change.clim), SIGNED_MAP)
-        place_colour_bar(figure, (2 * size, top, before.shape[0]), key, label)
+        figure.colorbar(key, ax=panels, label=f"outward movement ({units.length})", aspect=30, shrink=0.95)
 
 
 def _view(grid: np.ndarray) -> View:
@@ -166,20 +162,14 @@ def _view(grid: np.ndarray) -> View:
     return looking_along(np.cross(along, across) - 0.2 * along - 0.5 * across, along)
 
 
-def _seen_through(body: Layer, net: list[Layer], view: View, frame: Frame, width: int) -> np.ndarray:
-    """Draw a net on a surface that hides only part of what is behind it, without asking OpenGL to blend."""
-    full, net_only = render([body, *net], view, frame, width), render(net, view, frame, width)
-    return np.asarray((OPACITY * full + (1 - OPACITY) * net_only).round(), dtype=np.uint8)
-
-
 def _surface_layer(grid: np.ndarray, moved: np.ndarray, clim: tuple[float, float]) -> Layer:
     number = np.arange(len(moved)).reshape(grid.shape[:2])
     corners = (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:])
     mesh = surface(grid.reshape(-1, 3), np.stack(corners, axis=-1).reshape(-1, 4))
     mesh.point_data["moved"] = moved
-    look = {"scalars": "moved", "cmap": SIGNED_MAP, "clim": clim, "ambient": 0.55, "diffuse": 0.45}
+    look = {"scalars": "moved", "cmap": SIGNED_MAP, "clim": clim, "opacity": OPACITY}
     edges = {"show_edges": True, "edge_color": INK, "edge_opacity": 0.25, "line_width": 1}
-    return Layer(mesh, {**look, **edges, "smooth_shading": True})
+    return Layer(mesh, {**look, **edges, "ambient": 0.55, "diffuse": 0.45, "smooth_shading": True})
 
 
 def _net_layers(change: _Change, net: np.ndarray, colour: str, thickness: float) -> list[Layer]:

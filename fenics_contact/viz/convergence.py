@@ -95,7 +95,7 @@ def _draw(
     centre = np.isin(kind, ("start", "serious", "refined"))
     first, last = values[centre][0], values[centre][-1]
     words = headline(title, f"{label} {change(first, last)}")
-    with sheet(paper, (width, round(0.6 * width)), words, "constrained") as figure:
+    with sheet(paper, (width, round(0.6 * width)), words) as figure:
         axes = figure.subplots()
         axes.plot(
             number[centre], values[centre], "-o", color=BLUE, lw=2, ms=8, label="start and serious steps"

@@ -80,7 +80,7 @@ def plot_curves(
 
     def draw(paper: BinaryIO) -> None:
         size = (width, round(0.6 * width))
-        with sheet(paper, size, title, "constrained") as figure:
+        with sheet(paper, size, title) as figure:
             axes = figure.subplots()
             _draw_reference(axes, behind)
             _draw_series(axes, shown, connected)

@@ -9,19 +9,26 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from matplotlib.collections import PolyCollection
 
+from fenics_contact.contact import body_grid
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh import BodyMesh, boundary_faces
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import Scene
 from fenics_contact.viz.colours import INK, colour_subdomains, neighbours
+from fenics_contact.viz.fields import cells_of
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.plane import draw_cell_edges, draw_outline, window
-from fenics_contact.viz.sheet import TITLE, place_image, sheet
-from fenics_contact.viz.stage import Layer, render, segments, surface
+from fenics_contact.viz.sheet import sheet, show_image
+from fenics_contact.viz.stage import Layer, render
 from fenics_contact.viz.view import frame_around, oblique_view
 from fenics_contact.viz.words import written
 
 if TYPE_CHECKING:
     from mpi4py import MPI
+
+_LOOK = {
+    "show_edges": True, "edge_color": INK, "edge_opacity": 0.25, "line_width": 1, "ambient": 0.5,
+    "diffuse": 0.55,
+}  # fmt: skip
 
 
 def plot_decomposition(
@@ -84,13 +91,12 @@ def _draw(
         return
     layers = []
     for family, (mesh, partition) in enumerate(parts):
-        layers += _body_layers(mesh, partition, family, explode)
+        layers += subdomain_layers(body_grid(mesh, mesh.points), partition, family, explode)
     view = oblique_view(points)
     frame = frame_around(view, points)
     image = render(layers, view, frame, width)
-    band = round(TITLE * width)
-    with sheet(paper, (width, band + image.shape[0]), title) as figure:
-        place_image(figure, image, 0, band)
+    with sheet(paper, (width, round((0.05 + 1 / frame.proportion) * width)), title) as figure:
+        show_image(figure.subplots(), image, frame)
 
 
 def _linear(mesh: BodyMesh, partition: np.ndarray) -> tuple[BodyMesh, np.ndarray]:
@@ -112,7 +118,7 @@ def _draw_in_plane(
     border = 0.03 * float(np.ptp(points, axis=0).max())
     low, high = points.min(axis=0) - border, points.max(axis=0) + border
     height = float(np.clip(0.85 * (high - low)[1] / (high - low)[0] + 0.1, 0.3, 1.0))
-    with sheet(paper, (width, round(height * width)), title, "constrained") as figure:
+    with sheet(paper, (width, round(height * width)), title) as figure:
         axes = figure.subplots()
         for family, (mesh, partition) in enumerate(parts):
             _draw_plane_body(axes, mesh, partition, family, explode)
@@ -133,30 +139,26 @@ def _draw_plane_body(axes: Any, mesh: BodyMesh, partition: np.ndarray, family: i
         draw_outline(axes, points, cells, width=2.0)
 
 
-def _body_layers(mesh: BodyMesh, partition: np.ndarray, family: int, explode: float) -> list[Layer]:
-    colours = colour_subdomains(neighbours(mesh.cells, partition), family)
-    layers = []
+def subdomain_layers(grid: Any, partition: np.ndarray, family: int, explode: float = 0.0) -> list[Layer]:
+    """Draw the subdomains of a body in colours that tell neighbours apart, and the seams between them.
+
+    Args:
+        grid: The body's linear cells, pyvista's UnstructuredGrid.
+        partition: Subdomain of every cell, (n_cells,).
+        family: Which family of colours to prefer.
+        explode: How much each subdomain shrinks towards its centre.
+    """
+    colours = colour_subdomains(neighbours(cells_of(grid), partition), family)
+    labelled, layers = grid.copy(deep=False), []
+    labelled.cell_data["subdomain"] = partition
+    skin = labelled.extract_surface(algorithm=None)
     for number in np.unique(partition):
-        faces, _ = boundary_faces(mesh.cells[partition == number], mesh.dim)
-        piece = surface(mesh.points, faces)
+        piece = grid.extract_cells(partition == number).extract_surface(algorithm=None)
         centre = piece.points.mean(axis=0)
         piece.points = centre + (1.0 - explode) * (piece.points - centre)
-        look = {"color": colours[number], "show_edges": True, "edge_color": INK, "edge_opacity": 0.25}
-        layers.append(Layer(piece, {**look, "ambient": 0.5, "diffuse": 0.55, "line_width": 1}))
-    if not explode:
-        layers.append(Layer(segments(mesh.points, _seams(mesh, partition)), _SEAM))
+        layers.append(Layer(piece, {"color": colours[number], **_LOOK}))
+        seen = skin.extract_cells(skin["subdomain"] == number)
+        if not explode and 0 < seen.n_cells < skin.n_cells:
+            seam = seen.extract_feature_edges(feature_edges=False, manifold_edges=False)
+            layers.append(Layer(seam, {"color": INK, "line_width": 4, "lighting": False}))
     return layers
-
-
-_SEAM = {"color": INK, "line_width": 4, "lighting": False}
-
-
-def _seams(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
-    """Edges of the body's surface at which subdomains meet, (n, 2)."""
-    faces, cells = boundary_faces(mesh.cells, mesh.dim)
-    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    labels = np.repeat(partition[cells], faces.shape[1])
-    order = np.lexsort((edges[:, 1], edges[:, 0]))
-    edges, labels = edges[order], labels[order]
-    same = np.all(edges[1:] == edges[:-1], axis=1) & (labels[1:] != labels[:-1])
-    return edges[1:][same]

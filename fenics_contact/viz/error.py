@@ -12,7 +12,7 @@ from fenics_contact.accuracy import discretisation_error
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import ERROR_MAP
-from fenics_contact.viz.fields import moved
+from fenics_contact.viz.fields import drawn_bodies
 from fenics_contact.viz.painting import paint
 from fenics_contact.viz.paints import Paints
 from fenics_contact.viz.picture import Picture, png_path
@@ -72,8 +72,10 @@ def plot_error(
     facts = f"estimated discretisation error {written(100 * total, 3)} % in energy norm, by cell"
     norm = LogNorm(*(given or error_range(values)), clip=False)
     label, words = "part of a cell, relative to the energy norm of the displacement", headline(title, facts)
-    paints = Paints(values, ERROR_MAP, norm, label, words, 1.0, reach, units or Units(), width)
-    return paint(state, moved(state), paints, target, sections=sections)
+    bodies = drawn_bodies(state)
+    shown = {name: np.repeat(part, bodies[name].n_cells // len(part)) for name, part in values.items()}
+    paints = Paints(shown, ERROR_MAP, norm, label, words, 1.0, reach, units or Units(), width)
+    return paint(state, bodies, paints, target, sections=sections)
 
 
 def error_range(values: Mapping[str, np.ndarray]) -> tuple[float, float]:

@@ -1,63 +1,46 @@
-"""The fields of a state as plain arrays in the order of the bodies' meshes."""
+"""The bodies of a state as they are drawn: what `State.to_pyvista` returns, by name."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from fenics_contact.contact import State
-from fenics_contact.mesh import BodyMesh
 
 
-@dataclass(frozen=True)
-class Moved:
-    """One body and how it moves, replicated on all ranks.
-
-    Attributes:
-        mesh: The body's mesh in the state's geometry, quadratic cells cut into linear ones.
-        displacement: (n_nodes, dim), [length].
-    """
-
-    mesh: BodyMesh
-    displacement: np.ndarray
-
-    def deformed(self, scale: float) -> np.ndarray:
-        """Return the coordinates moved by ``scale`` times the displacement, (n_nodes, dim), [length]."""
-        return self.mesh.points + scale * self.displacement
+def drawn_bodies(state: State) -> dict[str, Any]:
+    """Return the bodies, not deformed and of linear cells, with all fields. Collective."""
+    blocks = state.to_pyvista(linear=True)
+    return {name: blocks[name] for name in blocks.keys()}
 
 
-@dataclass(frozen=True)
-class BodyFields(Moved):
-    """Displacement and stress of one body, replicated on all ranks.
-
-    Attributes:
-        von_mises: Constant on cells, (n_cells,), [force / length²].
-    """
-
-    von_mises: np.ndarray
-
-    @property
-    def nodal_von_mises(self) -> np.ndarray:
-        """Mean over the cells around each node, (n_nodes,), [force / length²]."""
-        cells, count = self.mesh.cells, self.mesh.n_nodes
-        spread = np.repeat(self.von_mises, cells.shape[1])
-        summed = np.bincount(cells.ravel(), weights=spread, minlength=count)
-        return np.asarray(summed / np.bincount(cells.ravel(), minlength=count))
+def moved(bodies: Mapping[str, Any], scale: float) -> dict[str, Any]:
+    """Return the bodies moved by ``scale`` times their displacement."""
+    return {name: body.warp_by_vector("displacement", factor=scale) for name, body in bodies.items()}
 
 
-def moved(state: State) -> dict[str, Moved]:
-    """Collect the displacement of all bodies on every rank. Collective."""
-    return {
-        name: Moved(body.mesh, state.gather_displacement(name)) for name, body in state.scene.bodies.items()
-    }
+def points_of(bodies: Mapping[str, Any]) -> np.ndarray:
+    """Return the nodes of all bodies, (n, 3), [length]."""
+    return np.concatenate([body.points for body in bodies.values()])
 
 
-def gather(state: State) -> dict[str, BodyFields]:
-    """Collect displacement and stress of all bodies on every rank. Collective."""
-    found = {}
-    for name, body in state.scene.bodies.items():
-        linear = body.mesh.linear
-        stress = np.repeat(state.gather_von_mises(name), linear.n_cells // body.mesh.n_cells)
-        found[name] = BodyFields(linear, state.gather_displacement(name), stress)
-    return found
+def contact_places(state: State, bodies: Mapping[str, Any]) -> np.ndarray:
+    """Return where the slave nodes of the contact points of drawn bodies are, (n, dim), [length]."""
+    return np.asarray(points_of(bodies)[state.contact.points.slave, : state.scene.dim])
+
+
+def cells_of(body: Any) -> np.ndarray:
+    """Return the nodes of a body's cells, which are of one type, (n_cells, nodes of a cell)."""
+    return np.asarray(body.cell_connectivity).reshape(body.n_cells, -1)
+
+
+def nodal(body: Any, name: str) -> np.ndarray:
+    """Return a field on cells as the mean over the cells around each node, (n_nodes,)."""
+    return np.asarray(body.cell_data_to_point_data()[name])
+
+
+def lengths(body: Any) -> np.ndarray:
+    """Return how far each node moves, (n_nodes,), [length]."""
+    return np.linalg.norm(body["displacement"], axis=1)

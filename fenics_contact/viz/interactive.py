@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 from matplotlib.colors import Normalize
@@ -14,7 +16,7 @@ from fenics_contact.errors import InvalidInputError, MissingRequirementError, te
 from fenics_contact.viz.browser import InteractiveScene, captioned, exported, html_path, see_in_perspective
 from fenics_contact.viz.colours import PRESSURE_MAP
 from fenics_contact.viz.decomposition import plot_decomposition
-from fenics_contact.viz.fields import gather
+from fenics_contact.viz.fields import drawn_bodies, lengths, moved, points_of
 from fenics_contact.viz.interactive_layers import CONTENTS, Subject
 from fenics_contact.viz.obstacles import obstacle_layers
 from fenics_contact.viz.painting import paint
@@ -24,7 +26,7 @@ from fenics_contact.viz.pressure import plot_contact_pressure
 from fenics_contact.viz.stage import staged
 from fenics_contact.viz.stress import plot_stress
 from fenics_contact.viz.units import Units
-from fenics_contact.viz.view import View, frame_around, oblique_view
+from fenics_contact.viz.view import IN_PLANE, frame_around, oblique_view
 from fenics_contact.viz.words import checked_range, headline
 
 logger = logging.getLogger(__name__)
@@ -33,6 +35,9 @@ logger = logging.getLogger(__name__)
 SIZE = (1000, 600)
 #: Room around the bodies for title and colour bar, relative to their size.
 MARGIN = 0.15
+
+#: Range of the colours, title, units.
+Look: TypeAlias = tuple[tuple[float, float] | None, str, Units]
 
 
 def interactive(
@@ -71,12 +76,13 @@ def interactive(
     target = html_path(path)
     _check(state, field, deformed)
     given = None if clim is None else checked_range(clim)
-    subject = Subject(state, gather(state), float(deformed), given, units or Units())
+    bodies = drawn_bodies(state)
+    subject = Subject(state, moved(bodies, float(deformed)), given, units or Units())
     comm = state.torn.decomposition.comm
     page, missing = None, None
     with together(comm):
         if comm.rank == 0:
-            page, missing = _page(subject, field, title)
+            page, missing = _page(subject, field, title, deformed)
             if page is not None and target is not None:
                 put_whole(target, page.encode())
     missing = comm.bcast(missing)
@@ -87,7 +93,7 @@ def interactive(
         raise MissingRequirementError(f"scenes for a browser need {missing}: {remedy}", name="trame")
     if comm.rank == 0:
         tell(logger.info, "the picture is static, turning it needs %s: %s", missing, remedy)
-    return _static(subject, field, title)
+    return _static(state, bodies, field, float(deformed), (given, title, subject.units))
 
 
 def _check(state: State, field: str, deformed: float) -> None:
@@ -106,19 +112,17 @@ def _check(state: State, field: str, deformed: float) -> None:
         )
 
 
-def _page(subject: Subject, field: str, title: str) -> tuple[str | None, str | None]:
+def _page(subject: Subject, field: str, title: str, deformed: float) -> tuple[str | None, str | None]:
     """Return the page, or what is missing to make it."""
-    content, points = (
-        CONTENTS[field](subject),
-        np.concatenate([subject.places(name) for name in subject.bodies]),
-    )
-    view = _view(subject.state.scene.dim, points)
+    content, points = CONTENTS[field](subject), points_of(subject.bodies)
+    space = subject.state.scene.dim == 3
+    view = oblique_view(points) if space else IN_PLANE
     layers, corners = content.layers, np.zeros((0, 3))
-    if subject.state.scene.dim == 3:
+    if space:
         obstacles, corners = obstacle_layers(subject.state.scene, points, view)
         layers = [*obstacles, *layers]
     frame = frame_around(view, np.concatenate([points, corners]), MARGIN)
-    words = f"{headline(title, content.facts)}; deformation × {subject.deformed:g}"
+    words = f"{headline(title, content.facts)}; deformation × {deformed:g}"
     with staged(layers, view, frame, SIZE) as plotter:
         see_in_perspective(plotter.camera, frame, SIZE)
         try:
@@ -127,23 +131,18 @@ def _page(subject: Subject, field: str, title: str) -> tuple[str | None, str | N
             return None, f"pyvista[jupyter], got {error}"
 
 
-def _view(dim: int, points: np.ndarray) -> View:
-    return oblique_view(points) if dim == 3 else View(np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]))
-
-
-def _static(subject: Subject, field: str, title: str) -> Picture:
+def _static(state: State, bodies: Mapping[str, Any], field: str, deformed: float, look: Look) -> Picture:
     """Draw the same field without a browser. Collective."""
-    state, units, clim = subject.state, subject.units, subject.clim
+    clim, title, units = look
     if field == "von_mises":
-        return plot_stress(state, clim=clim, scale=subject.deformed, title=title, units=units)
+        return plot_stress(state, clim=clim, scale=deformed, title=title, units=units)
     if field == "subdomain":
         decomposition = state.torn.decomposition
         return plot_decomposition(state.scene, decomposition.partitions, comm=decomposition.comm)
     if field.startswith("contact"):
         return plot_contact_pressure(state, clim=clim, title=title, units=units)
-    values = {name: np.linalg.norm(body.displacement, axis=1) for name, body in subject.bodies.items()}
+    values = {name: lengths(body) for name, body in bodies.items()}
     norm = Normalize(*(clim or (0.0, max(float(length.max()) for length in values.values()) or 1.0)))
-    label = f"displacement ({units.length})"
-    words = headline(title, f"displacement, × {subject.deformed:g}")
-    paints = Paints(values, PRESSURE_MAP, norm, label, words, subject.deformed, None, units, 1600)
-    return paint(state, subject.bodies, paints, None, sections=False)
+    label, words = f"displacement ({units.length})", headline(title, f"displacement, × {deformed:g}")
+    paints = Paints(values, PRESSURE_MAP, norm, label, words, deformed, None, units, 1600)
+    return paint(state, bodies, paints, None, sections=False)

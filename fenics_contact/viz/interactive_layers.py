@@ -9,21 +9,12 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from fenics_contact.contact import State, Status, contact_fields, in_space
-from fenics_contact.mesh import boundary_faces
+from fenics_contact.contact import State, Status, in_space
 from fenics_contact.scene import ContactPair
-from fenics_contact.viz.colours import (
-    GREY,
-    INK,
-    PALE,
-    PRESSURE_MAP,
-    STRESS_MAP,
-    colour_subdomains,
-    neighbours,
-)
-from fenics_contact.viz.fields import BodyFields
-from fenics_contact.viz.places import contact_places
-from fenics_contact.viz.stage import Layer, balls, segments, surface
+from fenics_contact.viz.colours import GREY, INK, PALE, PRESSURE_MAP, STRESS_MAP
+from fenics_contact.viz.decomposition import subdomain_layers
+from fenics_contact.viz.fields import contact_places, lengths, nodal
+from fenics_contact.viz.stage import Layer, balls
 from fenics_contact.viz.stress import stress_range
 from fenics_contact.viz.symbols import symbols_of
 from fenics_contact.viz.units import Units
@@ -58,61 +49,42 @@ class Subject:
 
     Attributes:
         state: The state.
-        bodies: Its bodies.
-        deformed: Factor of the displacement.
+        bodies: Its bodies as they are drawn, deformed.
         clim: Range of the colours, None to choose it.
         units: Names of the units.
     """
 
     state: State
-    bodies: Mapping[str, BodyFields]
-    deformed: float
+    bodies: Mapping[str, Any]
     clim: tuple[float, float] | None
     units: Units
-
-    def places(self, body: str) -> np.ndarray:
-        """Return the nodes of a body where they are drawn, (n_nodes, 3), [length]."""
-        return in_space(self.bodies[body].deformed(self.deformed))
-
-    def faces(self, body: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return the faces of a body that can be seen, and the cell of each."""
-        mesh = self.bodies[body].mesh
-        return (mesh.cells, np.arange(mesh.n_cells)) if mesh.dim == 2 else boundary_faces(mesh.cells, 3)
 
 
 def stress_content(subject: Subject) -> Content:
     """Von Mises stress on the bodies."""
-    values = {name: body.nodal_von_mises for name, body in subject.bodies.items()}
-    peak = max(float(body.von_mises.max()) for body in subject.bodies.values())
+    peak = max(float(body["von_mises"].max()) for body in subject.bodies.values())
     unit, clim = subject.units.stress, subject.clim or stress_range(subject.bodies)
-    look = {"cmap": STRESS_MAP, "clim": clim}
-    layers = _coloured(subject, values, look, f"von Mises stress ({unit})")
+    values = {name: nodal(body, "von_mises") for name, body in subject.bodies.items()}
+    layers = _coloured(subject, values, {"cmap": STRESS_MAP, "clim": clim}, f"von Mises stress ({unit})")
     return Content(layers, f"von Mises stress, largest {written(peak)} {unit}")
 
 
 def displacement_content(subject: Subject) -> Content:
     """Length of the displacement on the bodies."""
-    values = {name: np.linalg.norm(body.displacement, axis=1) for name, body in subject.bodies.items()}
-    peak = max(float(length.max()) for length in values.values())
+    values = {name: lengths(body) for name, body in subject.bodies.items()}
+    peak, unit = max(float(length.max()) for length in values.values()), subject.units.length
     look = {"cmap": PRESSURE_MAP, "clim": subject.clim or (0.0, peak or 1.0)}
-    layers = _coloured(subject, values, look, f"displacement ({subject.units.length})")
-    return Content(layers, f"displacement, largest {written(peak)} {subject.units.length}")
+    layers = _coloured(subject, values, look, f"displacement ({unit})")
+    return Content(layers, f"displacement, largest {written(peak)} {unit}")
 
 
 def subdomain_content(subject: Subject) -> Content:
     """Subdomains in colours that tell neighbours apart."""
     layers, count = [], 0
-    for family, (name, body) in enumerate(subject.bodies.items()):
-        part = np.asarray(subject.state.torn.decomposition.partitions[name])
-        part = np.repeat(part, body.mesh.n_cells // len(part))
-        colours = colour_subdomains(neighbours(body.mesh.cells, part), family)
-        faces, cells = subject.faces(name)
-        for number in np.unique(part):
-            mine = faces[part[cells] == number]
-            if len(mine):
-                look = {"color": colours[number], **_EDGES, **_LIGHT}
-                layers.append(Layer(surface(subject.places(name), mine), look))
-        count += np.unique(part).size
+    for family, body in enumerate(subject.bodies.values()):
+        _, part = np.unique(body["subdomain"], return_inverse=True)
+        layers += subdomain_layers(body, part, family)
+        count += int(part.max()) + 1
     return Content(layers, f"{count} subdomain{'s' if count != 1 else ''}")
 
 
@@ -120,20 +92,18 @@ def pressure_content(subject: Subject) -> Content:
     """Contact pressure on the slave surfaces, seen through the bodies."""
     peak = float(subject.state.contact.pressure.max())
     label = f"contact pressure ({subject.units.stress})"
-    look = {"cmap": PRESSURE_MAP, "clim": subject.clim or (0.0, peak or 1.0), "scalars": "shown"}
+    look = {"cmap": PRESSURE_MAP, "clim": subject.clim or (0.0, peak or 1.0), "scalars": "contact_pressure"}
     layers = _glass(subject)
     for number, pair in enumerate(subject.state.scene.contacts):
-        mesh = _slave_surface(subject, pair)
-        values = contact_fields(subject.state, pair.slave.body)["contact_pressure"]
-        mesh.point_data["shown"] = values[mesh.point_data["node"]]
-        layers.append(Layer(mesh, {**look, **_bar(label, number == 0), "lighting": False, "line_width": 8}))
+        options = {**look, **_bar(label, number == 0), "lighting": False, "line_width": 8}
+        layers.append(Layer(_slave_surface(subject, pair), options))
     return Content(layers, f"contact pressure, largest {written(peak)} {subject.units.stress}")
 
 
 def status_content(subject: Subject) -> Content:
     """What contact points do, seen through the bodies, with arrows where they slip."""
     contact, layers, legend = subject.state.contact, _glass(subject), {}
-    places = contact_places(subject.state, {name: subject.places(name) for name in subject.bodies})
+    places = in_space(contact_places(subject.state, subject.bodies))
     dim = contact.points.normal.shape[1]
     side = float(contact.points.area.mean()) ** (1 / (dim - 1))
     for pair in subject.state.scene.contacts:
@@ -172,11 +142,11 @@ def _coloured(
     subject: Subject, values: Mapping[str, np.ndarray], look: dict[str, Any], label: str
 ) -> list[Layer]:
     layers = []
-    for number, name in enumerate(subject.bodies):
-        mesh = surface(subject.places(name), subject.faces(name)[0])
-        mesh.point_data["shown"] = values[name][mesh.point_data["node"]]
+    for number, (name, body) in enumerate(subject.bodies.items()):
+        skin = body.copy(deep=False)
+        skin.point_data["shown"] = values[name]
         options = {"scalars": "shown", **look, **_EDGES, **_LIGHT, **_bar(label, number == 0)}
-        layers.append(Layer(mesh, options))
+        layers.append(Layer(skin.extract_surface(algorithm=None), options))
     return layers
 
 
@@ -187,13 +157,13 @@ def _bar(label: str, shown: bool) -> dict[str, Any]:
 
 def _glass(subject: Subject) -> list[Layer]:
     look = {"color": PALE, "opacity": 0.12, **_LIGHT}
-    return [Layer(surface(subject.places(name), subject.faces(name)[0]), look) for name in subject.bodies]
+    return [Layer(body.extract_surface(algorithm=None), look) for body in subject.bodies.values()]
 
 
 def _slave_surface(subject: Subject, pair: ContactPair) -> Any:
-    facets, places = subject.state.scene.facets(pair.slave), subject.places(pair.slave.body)
-    if facets.shape[1] > 2:
-        return surface(places, facets)
-    mesh = segments(places, facets)
-    mesh.point_data["node"] = np.arange(len(places))
-    return mesh
+    """Return the facets of a slave surface with the fields of its body's nodes."""
+    facets, body = subject.state.scene.facets(pair.slave), subject.bodies[pair.slave.body]
+    kind = {2: pv.CellType.LINE, 3: pv.CellType.TRIANGLE, 4: pv.CellType.QUAD}[facets.shape[1]]
+    surface = pv.UnstructuredGrid({kind: facets}, body.points)
+    surface.point_data.update(body.point_data)
+    return surface

@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pyvista as pv
 
 from fenics_contact.scene import RigidObstacle, Scene, Surface
 from fenics_contact.surface_shapes import Cylinder, Plane, Sphere
 from fenics_contact.viz.colours import GREY, PALE
-from fenics_contact.viz.stage import Layer, segments, surface
+from fenics_contact.viz.stage import Layer
 from fenics_contact.viz.view import View
 
 #: Samples along each side of a plane picture.
@@ -18,6 +19,7 @@ SAMPLES = 400
 PIECES = 180
 #: How far the shown part of a plane reaches beyond the bodies, relative to their size.
 BORDER = 0.06
+_LINE = {"color": GREY, "line_width": 3, "lighting": False}
 
 
 def obstacles_of(scene: Scene) -> list[RigidObstacle]:
@@ -66,17 +68,19 @@ def obstacle_layers(scene: Scene, points: np.ndarray, view: View) -> tuple[list[
                 corners = _sheet(obstacle, points)
                 layers += _plane_layers(corners, float(np.asarray(obstacle.normal) @ view.towards))
                 held.append(corners)
-            case Sphere():
-                layers.append(_lines(_circle(obstacle, view), closed=True))
+            case Sphere(centre, radius):
+                look = {"normal": view.towards, "n_sides": PIECES, "fill": False}
+                outline = pv.Polygon(center=centre, radius=radius, **look)
+                layers.append(Layer(outline, _LINE))
             case Cylinder():
-                layers += [_lines(edge, closed=False) for edge in _edges(obstacle, points, view)]
+                layers += [Layer(pv.Line(*edge), _LINE) for edge in _edges(obstacle, points, view)]
     return layers, np.concatenate(held)
 
 
 def _plane_layers(corners: np.ndarray, facing: float) -> list[Layer]:
     """A sheet seen from its free side lies behind all bodies; seen from behind it would hide them."""
-    sheet = Layer(surface(corners, np.arange(4)[None]), {"color": PALE, "lighting": False})
-    outline = _lines(corners, closed=True)
+    sheet = Layer(pv.Quadrilateral(corners), {"color": PALE, "lighting": False})
+    outline = Layer(pv.lines_from_points(corners, close=True), _LINE)
     return [sheet, outline] if facing > 0.05 else [outline]
 
 
@@ -92,14 +96,6 @@ def _sheet(plane: Plane, points: np.ndarray) -> np.ndarray:
     return np.asarray(plane.point) + np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]) @ axes
 
 
-def _circle(sphere: Sphere, view: View) -> np.ndarray:
-    """Return the outline of a sphere in parallel projection, (n, 3)."""
-    angle = np.linspace(0, 2 * np.pi, PIECES, endpoint=False)[:, None]
-    return np.asarray(
-        np.asarray(sphere.centre) + sphere.radius * (np.cos(angle) * view.right + np.sin(angle) * view.up)
-    )
-
-
 def _edges(cylinder: Cylinder, points: np.ndarray, view: View) -> list[np.ndarray]:
     """Return the edges of a cylinder's outline beside the bodies, (2, 3) each; none if it is seen end on."""
     axis = np.asarray(cylinder.axis)
@@ -110,11 +106,3 @@ def _edges(cylinder: Cylinder, points: np.ndarray, view: View) -> list[np.ndarra
     along = (points - np.asarray(cylinder.point)) @ axis
     line = np.asarray(cylinder.point) + np.array([along.min(), along.max()])[:, None] * axis
     return [line + side * cylinder.radius * across / length for side in (-1.0, 1.0)]
-
-
-def _lines(points: np.ndarray, *, closed: bool) -> Layer:
-    number = np.arange(len(points))
-    pairs = np.stack([number, np.roll(number, -1)], axis=1)
-    return Layer(
-        segments(points, pairs if closed else pairs[:-1]), {"color": GREY, "line_width": 3, "lighting": False}
-    )

@@ -1,44 +1,150 @@
-"""Drawing a field on the bodies of a state, in the plane or in space."""
+"""Drawing a field on the bodies of a state: all of them, and where they touch at a larger scale."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from fenics_contact.contact import State
-from fenics_contact.viz.fields import Moved
-from fenics_contact.viz.painting_in_plane import contact_window, draw_in_plane
-from fenics_contact.viz.painting_in_space import draw_in_space
+from fenics_contact.scene import Scene
+from fenics_contact.viz.colours import INK
+from fenics_contact.viz.fields import cells_of, contact_places, moved, points_of
+from fenics_contact.viz.obstacles import obstacle_layers, shade_obstacles
 from fenics_contact.viz.paints import Paints
 from fenics_contact.viz.picture import Picture, draw_picture
-from fenics_contact.viz.places import contact_places
-from fenics_contact.viz.section import strongest_contact
+from fenics_contact.viz.plane import draw_cell_edges, draw_field, draw_outline, window
+from fenics_contact.viz.section import Spot, section_frame, section_layers, section_views, strongest_contact
+from fenics_contact.viz.sheet import scale_bar, sheet, show_image
+from fenics_contact.viz.stage import Layer, render
+from fenics_contact.viz.view import IN_PLANE, Frame, View, axis_label, frame_around, oblique_view
+
+#: Half size of the detail of a plane picture, in half lengths of the closed part of the contact surface.
+REACH = 2.5
+#: A detail in the plane that shows more than this part of the bodies is left out.
+LARGEST_DETAIL = 0.4
+#: Part of the width that pictures take; the rest is the colour bar's.
+WIDE = 0.84
+
+_LOOK = {
+    "show_edges": True, "edge_color": INK, "edge_opacity": 0.12, "line_width": 1,
+    # So much light from all sides that colours of faces in shade can be found on the bar.
+    "ambient": 0.75, "diffuse": 0.28, "smooth_shading": True, "split_sharp_edges": True, "feature_angle": 50,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What a part of the picture shows, and what draws it on matplotlib's axes."""
+
+    frame: Frame
+    draw: Callable[[Any], None]
 
 
 def paint(
-    state: State, bodies: Mapping[str, Moved], paints: Paints, path: Path | None, *, sections: bool
+    state: State, bodies: Mapping[str, Any], paints: Paints, path: Path | None, *, sections: bool
 ) -> Picture:
-    """Draw a field on all bodies, with details of the strongest contact. Collective.
+    """Draw a field on all bodies, with details of the strongest contact in true deformation. Collective.
 
     Args:
         state: The state.
-        bodies: Its bodies.
+        bodies: Its bodies, not deformed, see `drawn_bodies`.
         paints: The field.
         path: PNG file to write, or None.
-        sections: Draw the details too, if a contact carries force.
+        sections: Draw the details too, if a contact carries force: in space two sections.
     """
-    places = contact_places(state, {name: body.deformed(1.0) for name, body in bodies.items()})
+    painted = paints.on(bodies)
     touching = sections and bool(np.any(state.contact.normal_force > 0))
+    places = contact_places(state, moved(bodies, 1.0))
+    spot = strongest_contact(state.contact, places) if touching else None
+    plane = state.scene.dim == 2
 
     def draw(paper: BinaryIO) -> None:
-        if state.scene.dim == 2:
-            window = contact_window(state.contact, places, paints.reach) if touching else None
-            draw_in_plane(state.scene, bodies, window, paper, paints)
-            return
-        spot = strongest_contact(state.contact, places) if touching else None
-        draw_in_space(state.scene, bodies, spot, paper, paints)
+        parts = (_in_plane if plane else _in_space)(state.scene, painted, spot, paints)
+        _draw(parts, paper, paints, below=not plane or parts[0].frame.proportion > 2.2)
 
     return draw_picture(state.torn.decomposition.comm, path, draw)
+
+
+def _draw(parts: Sequence[_Part], paper: BinaryIO, paints: Paints, *, below: bool) -> None:
+    """Put details below the main part or beside it, all as wide together as the picture, not too high."""
+    main, *details = parts
+    wide = [part.frame.proportion for part in details]
+    if below:
+        high = [min(WIDE / main.frame.proportion, 0.5), min(WIDE / sum(wide), 0.4) if wide else 0.0]
+        height = sum(high) + (0.14 if wide else 0.07)
+    else:
+        height = WIDE / (main.frame.proportion + sum(wide)) + 0.12
+    size = paints.width, round(float(np.clip(height, 0.3, 1.1)) * paints.width)
+    with sheet(paper, size, paints.headline) as figure:
+        if below and wide:
+            grid = figure.add_gridspec(2, len(wide), height_ratios=high, width_ratios=wide)
+            places = [grid[0, :], *(grid[1, column] for column in range(len(wide)))]
+        else:
+            places = list(figure.add_gridspec(1, len(parts), width_ratios=[main.frame.proportion, *wide]))
+        panels = [figure.add_subplot(place) for place in places]
+        for axes, part in zip(panels, parts, strict=True):
+            part.draw(axes)
+        paints.add_bar(figure, panels)
+
+
+def _in_plane(scene: Scene, bodies: Mapping[str, Any], spot: Spot | None, paints: Paints) -> list[_Part]:
+    """All bodies, and where they touch, if that is small."""
+    everything = moved(bodies, paints.scale)
+    frame = frame_around(IN_PLANE, points_of(everything), 0.04)
+    parts = [_Part(frame, partial(_draw_plane, scene, everything, frame, paints, ""))]
+    if spot is not None:
+        half = REACH * spot.radius if paints.reach is None else paints.reach
+        frame, size = Frame(spot.centre - half, spot.centre + half), float(np.max(frame.size))
+        if 2 * half < LARGEST_DETAIL * size / 1.08:
+            words = "where they touch; displacement × 1"
+            parts.append(_Part(frame, partial(_draw_plane, scene, moved(bodies, 1.0), frame, paints, words)))
+    return parts
+
+
+def _draw_plane(
+    scene: Scene, bodies: Mapping[str, Any], frame: Frame, paints: Paints, title: str, axes: Any
+) -> None:
+    shade_obstacles(axes, scene, frame.low, frame.high)
+    for body in bodies.values():
+        points, cells = np.asarray(body.points)[:, :2], cells_of(body)
+        draw_field(axes, points, cells, np.asarray(body["shown"]), paints.of_cells)
+        draw_cell_edges(axes, points, cells, frame.low, frame.high)
+        draw_outline(axes, points, cells)
+    axes.set_title(title)
+    window(axes, frame.low, frame.high, paints.units.length)
+
+
+def _in_space(scene: Scene, bodies: Mapping[str, Any], spot: Spot | None, paints: Paints) -> list[_Part]:
+    """All bodies, and two sections through the contact."""
+    everything = moved(bodies, paints.scale)
+    points = points_of(everything)
+    view = oblique_view(points)
+    layers, corners = obstacle_layers(scene, points, view)
+    for body in everything.values():
+        layers.append(Layer(body.extract_surface(algorithm=None), {**paints.of_surfaces, **_LOOK}))
+    parts = [_image(layers, view, frame_around(view, np.concatenate([points, corners])), paints)]
+    if spot is None:
+        return parts
+    for section in section_views(spot, view):
+        true, across = moved(bodies, 1.0), axis_label(section.towards).strip("−")
+        frame = section_frame(section, spot, points_of(true), paints.reach)
+        layers = section_layers(true, section, spot.centre, paints.of_surfaces)
+        title = f"section across {across}" if across else "section"
+        parts.append(_image(layers, section, frame, paints, f"{title}; displacement × 1"))
+    return parts
+
+
+def _image(layers: Sequence[Layer], view: View, frame: Frame, paints: Paints, title: str = "") -> _Part:
+    image = render(layers, view, frame, round(paints.width * (0.45 if title else WIDE)))
+
+    def draw(axes: Any) -> None:
+        show_image(axes, image, frame, title)
+        if title:
+            scale_bar(axes, frame, paints.units.length)
+
+    return _Part(frame, draw)

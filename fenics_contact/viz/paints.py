@@ -43,24 +43,29 @@ class Paints:
         """Return the values of a body from 0 to 1, the range of the colours; below and above outside it."""
         return np.ma.filled(self.norm(self.values[body], clip=False), 0.0)
 
-    @property
-    def extend(self) -> str:
-        """Which ends of the colour bar are open: there are values beyond."""
+    def on(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
+        """Return pyvista's data sets of the bodies with the field ``shown``."""
+        painted = {}
+        for name, body in bodies.items():
+            painted[name], shown = body.copy(deep=False), self.shown(name)
+            data = painted[name].point_data if len(shown) == body.n_points else painted[name].cell_data
+            data["shown"] = shown
+        return painted
+
+    def add_bar(self, figure: Any, panels: Any) -> None:
+        """Put a colour bar beside axes; an end beyond which there are values is open."""
         low = min(float(values.min()) for values in self.values.values()) < self.norm.vmin
         high = max(float(values.max()) for values in self.values.values()) > self.norm.vmax
-        return {(False, False): "neither", (True, False): "min", (False, True): "max"}.get(
+        extend = {(False, False): "neither", (True, False): "min", (False, True): "max"}.get(
             (low, high), "both"
         )
-
-    @property
-    def key(self) -> ScalarMappable:
-        """What matplotlib draws a colour bar of."""
-        return ScalarMappable(self.norm, self.colours)
+        key = ScalarMappable(self.norm, self.colours)
+        figure.colorbar(key, ax=panels, label=self.label, extend=extend, aspect=30, shrink=0.95)
 
     @property
     def of_surfaces(self) -> dict[str, Any]:
         """Keywords of pyvista's ``add_mesh`` for `shown`."""
-        return {"cmap": self.colours, "clim": (0.0, 1.0), "n_colors": 256}
+        return {"scalars": "shown", "cmap": self.colours, "clim": (0.0, 1.0), "n_colors": 256}
 
     @property
     def of_cells(self) -> dict[str, Any]:

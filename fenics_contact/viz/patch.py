@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.tri import Triangulation
 
 from fenics_contact.contact import State, Status
 from fenics_contact.viz.view import View, face_on
-
-#: Straight pieces by which the edge of a facet is cut to colour it.
-PIECES = 6
 
 
 @dataclass(frozen=True)
@@ -104,18 +100,3 @@ def _window(
     border = 0.1 * min(half, float(np.ptp(places, axis=0).max()) / 2)
     low, high = places.min(axis=0) - border, places.max(axis=0) + border
     return np.maximum(middle - half, low), np.minimum(middle + half, high)
-
-
-def refined(patch: ContactPatch) -> tuple[Triangulation, np.ndarray]:
-    """Cut quadrilaterals into triangles so small that colours are bilinear and favour no diagonal."""
-    facets = patch.facets
-    if facets.shape[1] == 3:
-        return Triangulation(*patch.places.T, facets), patch.pressure
-    s, t = np.meshgrid(np.linspace(0, 1, PIECES + 1), np.linspace(0, 1, PIECES + 1), indexing="ij")
-    shape = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1).reshape(-1, 4)
-    places = np.einsum("kc,fcd->fkd", shape, patch.places[facets]).reshape(-1, 2)
-    number = np.arange(len(shape)).reshape(s.shape)
-    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
-    small = np.concatenate([np.stack(corners, axis=-1).reshape(-1, 3) for corners in ((a, b, c), (a, c, d))])
-    triangles = (small + len(shape) * np.arange(len(facets))[:, None, None]).reshape(-1, 3)
-    return Triangulation(*places.T, triangles), (patch.pressure[facets] @ shape.T).ravel()

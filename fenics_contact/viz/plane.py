@@ -29,7 +29,7 @@ def draw_field(
         look: ``cmap``, ``vmin`` and ``vmax``.
     """
     if len(values) == len(points):
-        mesh, shown = centred(points, cells, values)
+        mesh, shown = refined(points, cells, values)
         axes.tripcolor(mesh, shown, shading="gouraud", rasterized=True, **look)
         return
     faces = PolyCollection(points[cells], array=values, edgecolors="face", linewidths=0.2, cmap=look["cmap"])
@@ -37,20 +37,25 @@ def draw_field(
     axes.add_collection(faces)
 
 
-def centred(points: np.ndarray, cells: np.ndarray, values: np.ndarray) -> tuple[Triangulation, np.ndarray]:
-    """Cut quadrilaterals into four triangles about their middles, which favours no diagonal.
+def refined(points: np.ndarray, cells: np.ndarray, values: np.ndarray) -> tuple[Triangulation, np.ndarray]:
+    """Cut quadrilaterals into triangles so small that colours are bilinear and favour no diagonal.
 
     Returns:
         The triangulation and the values on its nodes.
     """
     if cells.shape[1] == 3:
         return Triangulation(*points.T, cells), values
-    middle = len(points) + np.arange(len(cells))
-    sides = [np.column_stack([cells[:, k], cells[:, (k + 1) % 4], middle]) for k in range(4)]
-    places = np.concatenate([points, points[cells].mean(axis=1)])
-    return Triangulation(*places.T, np.concatenate(sides)), np.concatenate(
-        [values, values[cells].mean(axis=1)]
+    ticks = np.linspace(0.0, 1.0, int(np.clip(100 / np.sqrt(len(cells)), 2, 6)) + 1)
+    s, t = np.meshgrid(ticks, ticks, indexing="ij")
+    shape = np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=-1).reshape(-1, 4)
+    number = np.arange(s.size).reshape(s.shape)
+    a, b, c, d = (
+        part.ravel() for part in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:])
     )
+    small = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    triangles = (small + s.size * np.arange(len(cells))[:, None, None]).reshape(-1, 3)
+    places = np.einsum("kc,fcd->fkd", shape, points[cells]).reshape(-1, 2)
+    return Triangulation(*places.T, triangles), (values[cells] @ shape.T).ravel()
 
 
 def draw_outline(axes: Any, points: np.ndarray, cells: np.ndarray, *, width: float = 1.2) -> None:

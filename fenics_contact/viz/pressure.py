@@ -10,9 +10,10 @@ from matplotlib.collections import PolyCollection
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import GREY, PRESSURE_MAP
-from fenics_contact.viz.patch import ContactPatch, contact_patch, refined
+from fenics_contact.viz.patch import ContactPatch, contact_patch
 from fenics_contact.viz.patch_axes import label_axes, make_as_high, pressure_bar
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
+from fenics_contact.viz.plane import draw_field
 from fenics_contact.viz.sheet import sheet
 from fenics_contact.viz.status import draw_status
 from fenics_contact.viz.trace import contact_trace
@@ -90,7 +91,7 @@ def _draw(
     )
     proportion = float((patch.high - patch.low)[1] / (patch.high - patch.low)[0])
     height = round((0.19 + 0.38 * proportion) * width)
-    with sheet(paper, (width, height), headline(title, facts), "constrained") as figure:
+    with sheet(paper, (width, height), headline(title, facts)) as figure:
         left, right = figure.subplots(1, 2, sharex=True, sharey=True)
         draw_pressure(left, patch, shown)
         bar = pressure_bar(figure, [left], shown, "max" if peak > shown[1] else "neither", units)
@@ -105,8 +106,8 @@ def _draw(
 
 def draw_pressure(axes: Any, patch: ContactPatch, clim: tuple[float, float]) -> None:
     """Draw the pressure on facets laid flat."""
-    mesh, values = refined(patch)
-    axes.tripcolor(mesh, values, shading="gouraud", cmap=PRESSURE_MAP, vmin=clim[0], vmax=clim[1])
+    look = {"cmap": PRESSURE_MAP, "vmin": clim[0], "vmax": clim[1]}
+    draw_field(axes, patch.places, patch.facets, patch.pressure, look)
     outlines = {"facecolors": "none", "edgecolors": GREY, "linewidths": 0.5}
     axes.add_collection(PolyCollection(patch.places[patch.facets], **outlines))
     axes.set_title(f"pressure on {patch.name}")

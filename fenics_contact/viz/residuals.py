@@ -97,7 +97,7 @@ def _draw(
     facts += f"products with F in {count}"
     contacts = any(step.closed for step in steps)
     size = (width, round((0.66 if contacts else 0.5) * width))
-    with sheet(paper, size, headline(title, facts), "constrained") as figure:
+    with sheet(paper, size, headline(title, facts)) as figure:
         ratios = {"height_ratios": [3, 1]} if contacts else {}
         panels = figure.subplots(2 if contacts else 1, 1, sharex=True, squeeze=False, gridspec_kw=ratios)[
             :, 0

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pyvista as pv
 
 from fenics_contact.contact import ContactResult
 from fenics_contact.viz.colours import INK
-from fenics_contact.viz.fields import Moved
 from fenics_contact.viz.stage import Layer
 from fenics_contact.viz.view import Frame, View, frame_around, looking_along
 
-#: Half height of a section, in radii of a disc as large as the closed part of the contact surface.
+#: Half height of a section, in sizes of the contact.
 REACH = 5.0
 #: Width of a section by its height, unless the bodies end before.
 PROPORTION = 1.4
@@ -24,7 +22,6 @@ BORDER = 0.03
 
 #: Dark on a light border, to be seen on every colour.
 _OUTLINE = (("white", 6), (INK, 3))
-_CELL_TYPES = {"hexahedron": pv.CellType.HEXAHEDRON, "tetrahedron": pv.CellType.TETRA}
 
 
 @dataclass(frozen=True)
@@ -32,9 +29,9 @@ class Spot:
     """Where a pair of surfaces touches.
 
     Attributes:
-        centre: Force-weighted middle, (3,).
-        normal: Mean unit normal, from master to slave, (3,).
-        radius: Radius of a disc as large as the closed part of the surface, [length].
+        centre: Force-weighted middle, (dim,).
+        normal: Mean unit normal, from master to slave, (dim,).
+        radius: Of a disc, or half length of a line, as large as the closed part of the surface, [length].
     """
 
     centre: np.ndarray
@@ -47,7 +44,7 @@ def strongest_contact(contact: ContactResult, places: np.ndarray) -> Spot:
 
     Args:
         contact: What happens on the contact points; some force must act.
-        places: Places of the contact points, (n, 3), [length].
+        places: Places of the contact points, (n, dim), [length].
     """
     force, points = contact.normal_force, contact.points
     pair = int(np.argmax(np.bincount(points.pair, weights=force)))
@@ -57,7 +54,8 @@ def strongest_contact(contact: ContactResult, places: np.ndarray) -> Spot:
     if np.linalg.norm(normal) < 1e-3 * weight.sum():
         normal = points.normal[int(np.argmax(weight))]
     area = float(points.area[weight > 0].sum())
-    return Spot(weight @ places / weight.sum(), normal / np.linalg.norm(normal), float(np.sqrt(area / np.pi)))
+    radius = float(np.sqrt(area / np.pi)) if places.shape[1] == 3 else area / 2
+    return Spot(weight @ places / weight.sum(), normal / np.linalg.norm(normal), radius)
 
 
 def section_views(spot: Spot, main: View) -> list[View]:
@@ -90,40 +88,36 @@ def section_frame(view: View, spot: Spot, points: np.ndarray, reach: float | Non
     middle = view.project(spot.centre[None])[0]
     half = (REACH * spot.radius if reach is None else reach) * np.array([PROPORTION, 1.0])
     border = BORDER * min(float(half[1]), float(np.max(bodies.size)) / 2)
-    low, high = (
-        np.maximum(middle - half, bodies.low - border),
-        np.minimum(middle + half, bodies.high + border),
+    return Frame(
+        np.maximum(middle - half, bodies.low - border), np.minimum(middle + half, bodies.high + border)
     )
-    return Frame(low, high)
+
+
+def cut(body: Any, view: View, origin: np.ndarray) -> Any:
+    """Cut a body, or its surface, by the plane through a point that a view looks onto.
+
+    A hair beside it: where it runs along faces of cells, both neighbours would be cut or none.
+    """
+    beside = origin + 1e-6 * float(np.ptp(body.points)) * view.towards
+    return body.slice(normal=view.towards, origin=beside)
 
 
 def section_layers(
-    bodies: Mapping[str, Moved],
-    scalars: Mapping[str, np.ndarray],
-    view: View,
-    origin: np.ndarray,
-    colours: Mapping[str, Any],
+    bodies: Mapping[str, Any], view: View, origin: np.ndarray, look: Mapping[str, Any]
 ) -> list[Layer]:
-    """Cut all bodies, as they are after deformation, by a plane and draw the cut in colours.
+    """Cut all bodies by a plane through ``origin``, onto which the view looks, and draw the cut in colours.
 
     Args:
-        bodies: The bodies.
-        scalars: Body name -> values on nodes or cells.
+        bodies: The bodies, deformed, by name.
         view: Its direction is the plane's normal.
         origin: A point of the plane, (3,).
-        colours: Keywords of ``add_mesh`` that turn values into colours.
+        look: Keywords of ``add_mesh`` that turn values into colours.
     """
     layers = []
-    for name, body in bodies.items():
-        points = body.deformed(1.0)
-        grid = pv.UnstructuredGrid({_CELL_TYPES[body.mesh.cell_type]: body.mesh.cells}, points)
-        on_nodes = len(scalars[name]) == body.mesh.n_nodes
-        (grid.point_data if on_nodes else grid.cell_data)["shown"] = scalars[name]
-        # A hair beside the plane: where it runs along faces of cells, both neighbours would be cut or none.
-        beside = origin + 1e-6 * float(np.ptp(points)) * view.towards
-        cut = grid.slice(normal=view.towards, origin=beside)
-        if cut.n_points:
-            layers.append(Layer(cut, {"scalars": "shown", "lighting": False, **colours}))
-            edge = cut.extract_feature_edges(boundary_edges=True, feature_edges=False, manifold_edges=False)
+    for body in bodies.values():
+        face = cut(body, view, origin)
+        if face.n_points:
+            layers.append(Layer(face, {"lighting": False, **look}))
+            edge = face.extract_feature_edges(boundary_edges=True, feature_edges=False, manifold_edges=False)
             layers += [Layer(edge, {"color": c, "line_width": w, "lighting": False}) for c, w in _OUTLINE]
     return layers

@@ -81,7 +81,7 @@ def _draw(patches: Mapping[str, ContactPatch], paper: BinaryIO, title: str, unit
     size = next(iter(patches.values()))
     proportion = float((size.high - size.low)[1] / (size.high - size.low)[0])
     height = round((0.09 + rows * (0.09 + 0.9 * proportion / columns)) * width)
-    with sheet(paper, (width, height), title, "constrained") as figure:
+    with sheet(paper, (width, height), title) as figure:
         panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
         for axes, (name, patch) in zip(panels, patches.items(), strict=False):
             draw_status(axes, patch, counted=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.colors import Normalize
@@ -11,7 +12,7 @@ from matplotlib.colors import Normalize
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import STRESS_MAP
-from fenics_contact.viz.fields import BodyFields, gather
+from fenics_contact.viz.fields import drawn_bodies, lengths, nodal, points_of
 from fenics_contact.viz.obstacles import obstacles_of
 from fenics_contact.viz.painting import paint
 from fenics_contact.viz.paints import Paints
@@ -77,31 +78,32 @@ def plot_stress(
         )
     checked_reach(reach)
     given = None if clim is None else checked_range(clim)
-    bodies = gather(state)
+    bodies = drawn_bodies(state)
     # Exaggerated, bodies would enter rigid obstacles.
     chosen = 1.0 if obstacles_of(state.scene) else chosen_scale(bodies)
     factor = chosen if scale is None else float(scale)
     shown, named = given or stress_range(bodies), units or Units()
-    peak = max(float(body.von_mises.max()) for body in bodies.values())
+    peak = max(float(body["von_mises"].max()) for body in bodies.values())
     facts = f"von Mises stress, largest {written(peak)} {named.stress}; displacement × {factor:g}"
-    values = {name: body.nodal_von_mises if smooth else body.von_mises for name, body in bodies.items()}
+    values = {
+        name: nodal(body, "von_mises") if smooth else body["von_mises"] for name, body in bodies.items()
+    }
     label, words = f"von Mises stress ({named.stress})", headline(title, facts)
     norm = Normalize(*shown)
     paints = Paints(values, STRESS_MAP, norm, label, words, factor, reach, named, width)
     return paint(state, bodies, paints, target, sections=sections)
 
 
-def stress_range(bodies: Mapping[str, BodyFields]) -> tuple[float, float]:
+def stress_range(bodies: Mapping[str, Any]) -> tuple[float, float]:
     """Return the default range of the colours, from zero to a round number above a high quantile."""
-    top = float(np.quantile(np.concatenate([body.von_mises for body in bodies.values()]), QUANTILE))
+    top = float(np.quantile(np.concatenate([body["von_mises"] for body in bodies.values()]), QUANTILE))
     if top <= 0:
         return 0.0, 1.0
     step = 10.0 ** np.floor(np.log10(top)) / 2
     return 0.0, float(step * np.ceil(top / step))
 
 
-def chosen_scale(bodies: Mapping[str, BodyFields]) -> float:
+def chosen_scale(bodies: Mapping[str, Any]) -> float:
     """Return the round factor, at least 1, that makes the displacement visible."""
-    moved = max(float(np.linalg.norm(body.displacement, axis=1).max()) for body in bodies.values())
-    extent = np.ptp(np.concatenate([body.mesh.points for body in bodies.values()]), axis=0)
+    moved, extent = max(float(lengths(body).max()) for body in bodies.values()), np.ptp(points_of(bodies), 0)
     return max(1.0, nice_number(VISIBLE * float(extent.max()) / moved)) if moved > 0 else 1.0

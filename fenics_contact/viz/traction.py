@@ -40,7 +40,7 @@ def draw_traction(trace: ContactTrace, paper: BinaryIO, look: TractionLook) -> N
         facts += f", tangential force {written(trace.shear)} {units.force}/{units.length}"
     top = float(trace.pressure.max()) or 1.0
     height = round((0.62 if rubs else 0.4) * look.width)
-    with sheet(paper, (look.width, height), headline(look.title, facts), "constrained") as figure:
+    with sheet(paper, (look.width, height), headline(look.title, facts)) as figure:
         rows = figure.subplots(2 if rubs else 1, 1, sharex=True, squeeze=False)[:, 0]
         _curve(rows[0], trace, trace.pressure, BLUE)
         _symbols(rows[0], trace, trace.pressure)

@@ -29,6 +29,10 @@ class View:
         return points @ np.column_stack([self.right, self.up])
 
 
+#: Onto the plane of plane bodies.
+IN_PLANE = View(np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]))
+
+
 @dataclass(frozen=True)
 class Frame:
     """The rectangle of a view that a picture shows.
@@ -50,6 +54,11 @@ class Frame:
     def size(self) -> np.ndarray:
         """Width and height, (2,)."""
         return self.high - self.low
+
+    @property
+    def proportion(self) -> float:
+        """Width by height."""
+        return float(self.size[0] / self.size[1])
 
 
 def frame_around(view: View, points: np.ndarray, margin: float = 0.02) -> Frame:

@@ -95,9 +95,9 @@ def test_the_title_says_by_how_much_the_objective_fell(monkeypatch: pytest.Monke
     titles: list[str] = []
     draw = before_after.sheet  # type: ignore[attr-defined]
 
-    def noted(paper: Any, size: Any, title: str, layout: str) -> Any:
+    def noted(paper: Any, size: Any, title: str) -> Any:
         titles.append(title)
-        return draw(paper, size, title, layout)
+        return draw(paper, size, title)
 
     monkeypatch.setattr(before_after, "sheet", noted)
     monkeypatch.setattr(before_after, "DesignPoint", SimpleNamespace)

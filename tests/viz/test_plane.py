@@ -12,7 +12,7 @@ from fenics_contact.contact import Status
 from fenics_contact.gallery import rectangle
 from fenics_contact.scene import Body, PlaneStrain, Scene
 from fenics_contact.viz import plot_contact_pressure, plot_decomposition, plot_stress
-from fenics_contact.viz.plane import centred
+from fenics_contact.viz.plane import refined
 from fenics_contact.viz.trace import contact_trace, walk
 from tests.viz.plane_states import hung_block, pin_in_ring, plane_block
 from tests.viz.states import contains, painted, pixels
@@ -86,15 +86,15 @@ def test_a_surface_that_runs_against_x_is_shown_forwards() -> None:
     np.testing.assert_allclose(trace.places[trace.points], points[:, 0])
 
 
-def test_triangles_about_the_middles_keep_the_integral() -> None:
+def test_small_triangles_keep_the_integral() -> None:
     mesh = rectangle((0.0, 0.0), (2.0, 1.0), (3, 2))
     values = mesh.points[:, 0] * mesh.points[:, 1]
-    cut, shown = centred(mesh.points, mesh.cells, values)
+    cut, shown = refined(mesh.points, mesh.cells, values)
     corners = np.column_stack([cut.x, cut.y])[cut.triangles]
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
     assert area.min() > 0
-    assert area @ shown[cut.triangles].mean(axis=1) == pytest.approx(1.0)
+    assert area @ shown[cut.triangles].mean(axis=1) == pytest.approx(1.0, rel=0.003)
 
 
 @pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])

@@ -71,7 +71,7 @@ def test_without_a_display_pictures_are_drawn_without_complaints(monkeypatch: py
     done = subprocess.run(
         [sys.executable, "-c", DRAWN], env=clean_environment(), capture_output=True, text=True, timeout=120
     )
-    assert (done.returncode, done.stdout, done.stderr) == (0, "(20, 40, 3) False\n", "")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "(40, 80, 3) False\n", "")
 
 
 @pytest.mark.parametrize("missing", ["pyvista", "matplotlib"])

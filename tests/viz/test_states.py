@@ -11,9 +11,9 @@ import pytest
 from fenics_contact.contact import Status
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz import Units, plot_contact_pressure, plot_stress
-from fenics_contact.viz.fields import gather
-from fenics_contact.viz.patch import contact_patch, refined
-from fenics_contact.viz.places import contact_places
+from fenics_contact.viz.fields import contact_places, drawn_bodies
+from fenics_contact.viz.patch import contact_patch
+from fenics_contact.viz.plane import refined
 from fenics_contact.viz.section import section_frame, section_views, strongest_contact
 from fenics_contact.viz.stress import chosen_scale, stress_range
 from fenics_contact.viz.view import oblique_view
@@ -53,9 +53,9 @@ def test_cellwise_and_smooth_stress_differ(tmp_path: Path) -> None:
 
 
 def test_chosen_scale_and_range_are_round_and_fit() -> None:
-    bodies = gather(touching_blocks())
+    bodies = drawn_bodies(touching_blocks())
     low, high = stress_range(bodies)
-    stresses = np.concatenate([body.von_mises for body in bodies.values()])
+    stresses = np.concatenate([body["von_mises"] for body in bodies.values()])
     assert low == 0.0
     assert np.quantile(stresses, 0.99) < high < 2 * stresses.max()
     assert chosen_scale(bodies) >= 1.0
@@ -80,7 +80,7 @@ def test_stress_refuses_options_that_cannot_be_drawn(
 def test_sections_cut_through_the_middle_of_the_contact_along_its_normal() -> None:
     state = touching_blocks()
     points = {name: body.mesh.points for name, body in state.scene.bodies.items()}
-    spot = strongest_contact(state.contact, contact_places(state, points))
+    spot = strongest_contact(state.contact, contact_places(state, drawn_bodies(state)))
     np.testing.assert_allclose(spot.normal, [0, 0, 1], atol=0.1)
     assert 0.1 < spot.centre[0] < 1.9
     assert abs(spot.centre[2]) < 0.05
@@ -115,8 +115,8 @@ def test_patch_holds_the_points_of_the_pair_where_they_are() -> None:
     assert len(patch.points) == contact.points.count
     np.testing.assert_allclose(patch.pressure[patch.points], contact.pressure)
     np.testing.assert_array_equal(patch.status, contact.status)
-    points = {name: body.mesh.points for name, body in state.scene.bodies.items()}
-    np.testing.assert_allclose(patch.places[patch.points], patch.view.project(contact_places(state, points)))
+    places = contact_places(state, drawn_bodies(state))
+    np.testing.assert_allclose(patch.places[patch.points], patch.view.project(places))
     assert patch.force == pytest.approx(contact.normal_force.sum())
     slips = contact.status == Status.SLIP
     expected = np.linalg.norm(contact.slip[slips], axis=1)
@@ -127,7 +127,7 @@ def test_patch_holds_the_points_of_the_pair_where_they_are() -> None:
 @pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])
 def test_refined_patch_keeps_the_integral_of_the_pressure(cell: str) -> None:
     patch = contact_patch(touching_blocks(cell), 0, None)
-    mesh, values = refined(patch)
+    mesh, values = refined(patch.places, patch.facets, patch.pressure)
     corners = np.column_stack([mesh.x, mesh.y])[mesh.triangles]
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = 0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

@@ -29,7 +29,7 @@ def _draw_all(errors: Errors, paper: BinaryIO) -> None:
     quantities = _known(errors)
     scene, ranks = errors.results.scene, errors.results.ranks
     title = f"{scene.title}: error against time on {ranks} rank{'s' if ranks > 1 else ''}"
-    with sheet(paper, (WIDTH, height(len(quantities))), title, "constrained") as figure:
+    with sheet(paper, (WIDTH, height(len(quantities))), title) as figure:
         for axes, quantity in zip(panels(figure, len(quantities)), quantities, strict=True):
             _draw(axes, errors, quantity)
         handles = {

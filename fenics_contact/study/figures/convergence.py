@@ -49,7 +49,7 @@ def _draw_all(errors: Errors, paper: BinaryIO) -> None:
     ]
     count = len(quantities) + 1
     title = f"{errors.results.scene.title}: convergence"
-    with sheet(paper, (WIDTH, height(count) + LEGENDS * (1 + (count > 3))), title, "constrained") as figure:
+    with sheet(paper, (WIDTH, height(count) + LEGENDS * (1 + (count > 3))), title) as figure:
         drawn = panels(figure, count)
         for axes, quantity in zip(drawn, quantities, strict=False):
             _draw(axes, errors, quantity, ways)

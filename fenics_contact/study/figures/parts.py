@@ -42,7 +42,7 @@ def _draw_all(errors: Errors, paper: BinaryIO) -> None:
     ]
     sizes, names = [str(run.parameters.size) for run in meshes], [tolerance_words(run) for run in varied]
     title = f"{results.scene.title}: parts of the error"
-    with sheet(paper, (WIDTH, 1000), title, "constrained") as figure:
+    with sheet(paper, (WIDTH, 1000), title) as figure:
         axes = figure.subplots(2, 2, sharey="row")
         _draw_sizes(axes[0, 0], meshes, sizes)
         _draw_sizes(axes[0, 1], varied, names)

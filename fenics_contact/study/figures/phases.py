@@ -50,7 +50,7 @@ def _draw_all(errors: Errors, paper: BinaryIO) -> None:
     varied = [run for run in results.good if replace(run.parameters, tolerance=base.tolerance) == base]
     ranks = results.ranks
     title = f"{results.scene.title}: time by phase on {ranks} rank{'s' if ranks > 1 else ''}"
-    with sheet(paper, (WIDTH, 760), title, "constrained") as figure:
+    with sheet(paper, (WIDTH, 760), title) as figure:
         left, right = figure.subplots(1, 2)
         _draw(left, meshes, [f"{run.parameters.size}\n{_unknowns(run)}" for run in meshes])
         _draw(right, varied, [tolerance_words(run) for run in varied])
