@@ -18,7 +18,7 @@ from benchmarks.row import Summaries
 from benchmarks.running import OUTPUT, RunFailed, fingerprint, measure, raw_file, read
 from benchmarks.summary import summarise
 from fenics_contact.io import write_json
-from fenics_contact.progress import Task, shown
+from fenics_contact.progress import Task, show_progress
 
 #: Where the results of the full benchmark are kept.
 FOLDER = Path(__file__).parent
@@ -89,7 +89,7 @@ def _measure_all(runs: Sequence[Run], mark: str, settings: argparse.Namespace) -
         measure(run)
     # A run is repeated only after all others were measured: load that lasts a while then hits no run alone.
     ordered = sorted(wanted, key=lambda key: key[1])
-    with shown(), Task("benchmarks", unit="runs", total=len(ordered)) as task:
+    with show_progress(), Task("benchmarks", unit="runs", total=len(ordered)) as task:
         for number, (run, repeat) in enumerate(ordered):
             task.step(number, words=run.name)
             if run.name in failed:

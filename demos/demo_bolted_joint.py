@@ -22,7 +22,7 @@ from mpi4py import MPI
 from fenics_contact.contact import ContactProblem, LoadSequence, Status
 from fenics_contact.gallery import block, bolt, drilled_plate
 from fenics_contact.io import ResultSeries, write_result
-from fenics_contact.progress import shown
+from fenics_contact.progress import show_progress
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
     Body,
@@ -116,7 +116,7 @@ if comm.rank == 0:
 moved, pulled, clamped, counts = [0.0, 0.02, 0.04, 0.06, 0.08, 0.11], [], [], []
 steps = LoadSequence(ContactProblem(scene, comm, solver=FaceNewton(tolerance=1e-5)), count=len(moved))
 series = ResultSeries(output, "pulling", comm)
-with shown(comm):
+with show_progress(comm):
     for displacement in moved:
         state = steps.advance(LoadStep(f"end at {displacement} mm", supports=supports(displacement)))
         series.add(state, displacement)

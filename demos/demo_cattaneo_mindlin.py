@@ -22,7 +22,7 @@ from fenics_contact.contact import ContactProblem, Status, solve_steps
 from fenics_contact.gallery import rectangle_lattice
 from fenics_contact.io import ResultSeries, write_result
 from fenics_contact.mesh import BodyMesh
-from fenics_contact.progress import shown
+from fenics_contact.progress import show_progress
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -87,7 +87,7 @@ steps = [
     LoadStep(name, supports=[base, Support("upper", "y1", (shift, -0.00205))])
     for name, shift in shifts.items()
 ]
-with shown(comm):
+with show_progress(comm):
     states = dict(zip(shifts, solve_steps(ContactProblem(scene, comm, tolerance=1e-6), steps), strict=True))
 
 # ## Theory for measured forces

@@ -27,7 +27,7 @@ from fenics_contact.gallery import LinkShape, two_links
 from fenics_contact.io import ResultSeries, write_optimisation_result, write_vtu, write_xdmf
 from fenics_contact.optimize import BundleTrust, LinearConstraints, minimize
 from fenics_contact.partition import box_partition
-from fenics_contact.progress import shown
+from fenics_contact.progress import show_progress
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -125,7 +125,7 @@ keep_volume = LinearConstraints(-volume_gradient[None, :], [0.0])
 # Every better design becomes a member of a series: ParaView plays `designs.pvd` as a film.
 
 series = ResultSeries(output, "designs", comm)
-with shown(comm):
+with show_progress(comm):
     result = minimize(
         problem,
         start,
@@ -143,7 +143,7 @@ assert np.array_equal(after.alpha, result.x)
 
 points = {"before": before, "after": after}
 peak = max(float(point.state.contact.pressure.max()) for point in points.values())
-with shown(comm), timer.phase("pictures"):
+with show_progress(comm), timer.phase("pictures"):
     plot_decomposition(scene, partitions, output / "decomposition.png", comm=comm)
     for name, point in points.items():
         title = name.capitalize()
@@ -160,7 +160,7 @@ moved = problem.points_of(result.x)["link 1"]
 nets = tuple(design.control_points(mesh.points, alpha) for alpha in (start, result.x))
 values = [record.value for record in result.history]
 kinds = [record.kind.value for record in result.history]
-with shown(comm), timer.phase("pictures"):
+with show_progress(comm), timer.phase("pictures"):
     plot_control_net(links.first.crown, (mesh.points, moved), nets, output / "control_net.png", comm=comm)
     plot_convergence(values, kinds, output / "convergence.png", label="total potential (N mm)", comm=comm)
     plot_residuals(before.state.solution.history, output / "residuals.png", title="First state", comm=comm)

@@ -22,7 +22,7 @@ from mpi4py import MPI
 from fenics_contact.contact import Status, solve_scene
 from fenics_contact.gallery import LinkShape, chain
 from fenics_contact.io import write_result, write_vtu
-from fenics_contact.progress import shown
+from fenics_contact.progress import show_progress
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -77,7 +77,7 @@ if comm.rank == 0:
 # nothing resists.
 
 partitions = scene.partition(comm.size)
-with shown(comm):
+with show_progress(comm):
     state = solve_scene(scene, comm, partitions=partitions, tolerance=1e-6)
 
 # ## Result

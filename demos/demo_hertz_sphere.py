@@ -23,7 +23,7 @@ from mpi4py import MPI
 from fenics_contact.contact import solve_scene
 from fenics_contact.gallery import box_lattice, hemisphere
 from fenics_contact.io import write_result, write_vtu
-from fenics_contact.progress import shown
+from fenics_contact.progress import show_progress
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -84,7 +84,7 @@ def scene(discretisation):
 if comm.rank == 0:
     print(scene("mortar").plan(ranks=comm.size))
 
-with shown(comm):
+with show_progress(comm):
     states = {name: solve_scene(scene(name), comm, tolerance=1e-6) for name in ("mortar", "node")}
 
 # ## Result

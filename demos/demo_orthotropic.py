@@ -27,7 +27,7 @@ from mpi4py import MPI
 from fenics_contact.contact import solve_scene
 from fenics_contact.gallery import box_lattice
 from fenics_contact.io import write_result, write_vtu
-from fenics_contact.progress import shown
+from fenics_contact.progress import show_progress
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -116,7 +116,7 @@ def block_of(material):
 if comm.rank == 0:
     print(block_of(wood).plan(ranks=comm.size))
 
-with shown(comm):
+with show_progress(comm):
     state = solve_scene(block_of(wood), comm, tolerance=1e-6)
     compared = solve_scene(block_of(reference), comm, tolerance=1e-6)
 

@@ -20,7 +20,7 @@ from mpi4py import MPI
 from fenics_contact.contact import solve_scene
 from fenics_contact.gallery import half_disc, rectangle_lattice
 from fenics_contact.io import write_result, write_vtu, write_xdmf
-from fenics_contact.progress import shown
+from fenics_contact.progress import show_progress
 from fenics_contact.scene import Body, ContactPair, PlaneStrain, Scene, Support, Surface
 from fenics_contact.viz import plot_contact_pressure, plot_curves, plot_decomposition, plot_stress
 
@@ -54,7 +54,7 @@ scene = Scene(
     contacts=[ContactPair(Surface("block", "y1"), Surface("punch", "contact"), discretisation="mortar")],
 )
 partitions = scene.partition(comm.size)
-with shown(comm):
+with show_progress(comm):
     state = solve_scene(scene, comm, partitions=partitions, tolerance=1e-6)
 
 # ## Hertz

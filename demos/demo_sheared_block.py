@@ -23,7 +23,7 @@ from mpi4py import MPI
 from fenics_contact.contact import ContactProblem, Status, solve_steps
 from fenics_contact.gallery import block
 from fenics_contact.io import ResultSeries, write_result
-from fenics_contact.progress import shown
+from fenics_contact.progress import show_progress
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -62,7 +62,7 @@ path = np.concatenate([forth, back[1:], -back[1:]])  # mm
 steps = [
     LoadStep(f"{shift:+.2f} mm", supports=[Support("block", "z1", (shift, 0.0, -0.5))]) for shift in path
 ]
-with shown(comm):
+with show_progress(comm):
     states = solve_steps(ContactProblem(scene, comm, tolerance=1e-6), steps)
 
 # ## Shear force

@@ -24,7 +24,7 @@ from mpi4py import MPI
 from fenics_contact.contact import ContactProblem, solve_steps
 from fenics_contact.io import ResultSeries, write_result
 from fenics_contact.mesh import BodyMesh
-from fenics_contact.progress import shown
+from fenics_contact.progress import show_progress
 from fenics_contact.scene import (
     Body,
     ContactPair,
@@ -98,7 +98,7 @@ cooling = 60.0  # K
 angles = np.concatenate([np.linspace(0.0, 0.016, 9), np.linspace(0.016, -0.008, 13)[1:]])  # rad
 shrunk = [ThermalStrain("hub", -cooling)]
 steps = [LoadStep(f"{angle:g}", loads=shrunk, supports=held(angle)) for angle in angles]
-with shown(comm):
+with show_progress(comm):
     states = solve_steps(ContactProblem(scene, comm, tolerance=1e-6), steps)
 
 # ## Lamé

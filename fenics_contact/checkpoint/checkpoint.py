@@ -83,7 +83,7 @@ class Checkpoint:
             if comm.rank == 0:
                 write_archive(Path(self.path), kind, fingerprint, arrays)
 
-    def way_on(self, done: int, kept: str) -> str:
+    def resume_hint(self, done: int, kept: str) -> str:
         """Say what an interrupted run leaves in the file, and how the next one goes on.
 
         Args:

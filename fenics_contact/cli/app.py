@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 from fenics_contact.checkpoint import Interrupted
 from fenics_contact.cli import accuracy, demos, info, optimize, run, schema, view
 from fenics_contact.cli.desk import Desk
-from fenics_contact.cli.endings import EPILOG, terminable, told
+from fenics_contact.cli.endings import EPILOG, report_error, terminable
 from fenics_contact.cli.streams import complain, prepare_streams, say, unsaid
 from fenics_contact.io import versions
 from fenics_contact.progress import visible
@@ -45,7 +45,7 @@ class Program(TyperGroup):
         except BaseException as error:
             if isinstance(error, Interrupted):
                 raise
-            raise typer.Exit(int(told(error, ctx.obj.comm))) from None
+            raise typer.Exit(int(report_error(error, ctx.obj.comm))) from None
 
 
 #: The commands, a typer application.
@@ -120,7 +120,7 @@ def _run(arguments: Sequence[str], comm: MPI.Comm) -> int:
     except BrokenPipeError:
         return 0
     except OSError as error:  # of the library: what it writes itself, as help, may find no room
-        return int(told(unsaid(error), comm))
+        return int(report_error(unsaid(error), comm))
     return code if isinstance(code, int) else 0
 
 

@@ -84,7 +84,7 @@ def terminable() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
-def told(error: BaseException, comm: MPI.Comm) -> Ending:
+def report_error(error: BaseException, comm: MPI.Comm) -> Ending:
     """Say on rank 0 how a command ended, and return its exit code.
 
     Errors of this package are met by all ranks together. Any other may be met by one alone while others wait

@@ -10,7 +10,6 @@ import typer
 
 from fenics_contact.cli.desk import Desk, desk_of, facts
 from fenics_contact.cli.endings import Ending
-from fenics_contact.cli.going_on import going_on
 from fenics_contact.cli.options import (
     DryOption,
     OutputOption,
@@ -25,10 +24,11 @@ from fenics_contact.cli.options import (
 )
 from fenics_contact.cli.pictures import can_draw, draw_state
 from fenics_contact.cli.plans import show_outputs, show_plan
+from fenics_contact.cli.resumable import resumable
 from fenics_contact.cli.tables import pairs
 from fenics_contact.io import ResultSeries, only_run_in, write_optimisation_result
 from fenics_contact.optimize import Result
-from fenics_contact.progress import shown
+from fenics_contact.progress import show_progress
 from fenics_contact.scene_file import SceneFile, ShapeTask
 
 
@@ -50,7 +50,7 @@ def optimize(
 ) -> None:
     """Optimise the contact shape that the [design] of a scene file describes."""
     desk = desk_of(context)
-    with shown(desk.comm):
+    with show_progress(desk.comm):
         file = read(desk, scene, output, tolerance, settings, python)
         file.require_design()
         show_plan(desk, file, sensitivity=True)
@@ -81,7 +81,7 @@ def _minimised(desk: Desk, file: SceneFile, task: ShapeTask, resume: bool | None
     kinds = file.document.output.files
     series = ResultSeries(file.folder, "designs", desk.comm, formats=kinds) if kinds else None
     follow = None if series is None else series.follow(task.problem)
-    with going_on(desk, checkpoint):
+    with resumable(desk, checkpoint):
         result = task.minimize(callback=follow, checkpoint=checkpoint)
     more = {"scene_file": file.source.name, "title": file.title}
     write_optimisation_result(result, task.problem, file.folder, more=more)

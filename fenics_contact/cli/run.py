@@ -10,7 +10,6 @@ import typer
 
 from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.cli.desk import Desk, desk_of, facts
-from fenics_contact.cli.going_on import going_on
 from fenics_contact.cli.options import (
     DryOption,
     OutputOption,
@@ -25,10 +24,11 @@ from fenics_contact.cli.options import (
 )
 from fenics_contact.cli.pictures import can_draw, draw_state
 from fenics_contact.cli.plans import show_outputs, show_plan
+from fenics_contact.cli.resumable import resumable
 from fenics_contact.cli.tables import state_facts, step_row, step_table
 from fenics_contact.contact import State
 from fenics_contact.io import ResultSeries, only_run_in, write_result, write_vtu, write_vtx, write_xdmf
-from fenics_contact.progress import shown
+from fenics_contact.progress import show_progress
 from fenics_contact.scene_file import SceneFile
 
 #: Load steps of which maps of the status are drawn, at most.
@@ -53,7 +53,7 @@ def run(
 ) -> None:
     """Find the equilibrium of a scene file, or go through its load steps."""
     desk = desk_of(context)
-    with shown(desk.comm):
+    with show_progress(desk.comm):
         file = read(desk, scene, output, tolerance, settings, python)
         show_plan(desk, file)
         desk.say()
@@ -102,7 +102,7 @@ def _through_steps(desk: Desk, file: SceneFile, resume: bool | None) -> dict[str
     checkpoint = checkpoint_of(file, resume)
     rows, kept = [], {}
     chosen = set(np.unique(np.linspace(0, len(file.steps) - 1, MAPS).round().astype(int)))
-    with going_on(desk, checkpoint):
+    with resumable(desk, checkpoint):
         sequence = file.sequence(checkpoint)
         series = ResultSeries(file.folder, "history", desk.comm, formats=file.document.output.files)
         for number, step in enumerate(file.steps):

@@ -15,8 +15,8 @@ from fenics_contact.contact.equilibrium import (
     known_system,
     state_of,
 )
-from fenics_contact.contact.held import check_held
 from fenics_contact.contact.state import State
+from fenics_contact.contact.static_admissibility import check_held
 from fenics_contact.contact.stored import Stored, restored_solution, with_stored_slip
 from fenics_contact.contact.tolerance import Tolerance, checked_tolerance
 from fenics_contact.errors import collectively, together

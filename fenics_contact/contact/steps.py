@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fenics_contact.checkpoint import Checkpoint, safe_point, telling_what_is_kept
 from fenics_contact.contact.problem import ContactProblem
 from fenics_contact.contact.state import State
-from fenics_contact.contact.steps_done import StepsDone
+from fenics_contact.contact.step_checkpoint import StepCheckpoint
 from fenics_contact.errors import collectively, together
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.progress import Task
@@ -58,7 +58,7 @@ class LoadSequence:
         self.problem, self.scene, self._comm = problem, problem.scene, problem.comm
         kept = None if checkpoint is None else (checkpoint.every, checkpoint.resume)
         require_alike(self._comm, described({"count": count, "checkpoint (every, resume)": kept}, "steps"))
-        self._done = StepsDone(checkpoint, problem)
+        self._done = StepCheckpoint(checkpoint, problem)
         self._task, self._count, self._number = Task("load steps", unit="done", total=count), count, 0
 
     @property

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 from fenics_contact.errors import meeting
 from fenics_contact.errors.kinds import FenicsContactError, InvalidInputError, RemoteError
 from fenics_contact.errors.meeting import FAILED, exchanged, own_of
-from fenics_contact.errors.user_code import failure, told
+from fenics_contact.errors.user_code import described_error, failure
 
 if TYPE_CHECKING:  # these errors also report that mpi4py is missing
     from mpi4py import MPI
@@ -176,7 +176,7 @@ def _report(error: BaseException) -> Report:
         return SystemExit, str(error), error.code if isinstance(error.code, int | str) else 1
     if isinstance(error, KeyboardInterrupt):
         return KeyboardInterrupt, str(error), None
-    return RemoteError, told(error), None
+    return RemoteError, described_error(error), None
 
 
 def _named(error: BaseException | None, where: str) -> BaseException | None:

@@ -39,7 +39,7 @@ def calling(what: str) -> Iterator[None]:
 
 def failure(what: str, error: BaseException) -> UserCodeError:
     """Return what is raised when a user's code has met an error."""
-    return UserCodeError(f"{what} failed with {told(error)}: mend it, or catch the error there")
+    return UserCodeError(f"{what} failed with {described_error(error)}: mend it, or catch the error there")
 
 
 @contextmanager
@@ -59,7 +59,7 @@ def running(what: str) -> Iterator[None]:
         ) from error
 
 
-def told(error: BaseException) -> str:
+def described_error(error: BaseException) -> str:
     """Return class, message and place of an error in one line."""
     try:
         message = str(error)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fenics_contact.fem.composition import Composition, composition, integrate, possible
+from fenics_contact.fem.composition import Composition, composition, integrate, material_sets
 from fenics_contact.fem.forms import FormLibrary, Template, as_tractions, volume_measure
 from fenics_contact.fem.load_forms import Symbol, is_scalar, load_key, load_name, load_parameters, load_work
 from fenics_contact.fem.model_checks import check_kernel, kernel_of, stiffness_of_cell
@@ -29,7 +29,7 @@ __all__ = [
     "load_name",
     "load_parameters",
     "load_work",
-    "possible",
+    "material_sets",
     "scalar_constants",
     "stiffness_of_cell",
     "stress_in_space",

@@ -57,7 +57,7 @@ def composition(body: Body, cells: np.ndarray) -> Composition:
     return Composition(materials, {k + 1: np.flatnonzero(number == k) for k in range(len(materials))})
 
 
-def possible(body: Body) -> tuple[tuple[Material, ...], ...]:
+def material_sets(body: Body) -> tuple[tuple[Material, ...], ...]:
     """Return the materials of all compositions that parts of a body can have."""
     single = tuple((material,) for material in body.materials)
     return single if len(single) == 1 else (*single, body.materials)

@@ -10,7 +10,7 @@ import ufl
 from fenics_contact import _dolfinx
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import together
-from fenics_contact.fem.composition import Composition, integrate, possible
+from fenics_contact.fem.composition import Composition, integrate, material_sets
 from fenics_contact.fem.load_forms import Symbol, fields_of, load_key, load_name, load_parameters, load_work
 from fenics_contact.fem.model_checks import check_model, unit_cell_stiffness
 from fenics_contact.fem.templates import (
@@ -66,7 +66,7 @@ class FormLibrary:
         """
         for body in scene.bodies.values():
             cell_type = body.mesh.cell_type
-            for materials in possible(body):
+            for materials in material_sets(body):
                 self._prepare_stiffness(materials, cell_type)
         with together(self._comm):
             for body in scene.bodies.values():
@@ -74,7 +74,7 @@ class FormLibrary:
                     self._check(material, body.mesh.cell_type)
         for load in as_tractions(scene):
             body = scene.bodies[load.body]
-            for materials in possible(body):
+            for materials in material_sets(body):
                 self._prepare_load(load, materials, body.mesh.cell_type)
 
     def stiffness(self, parts: Composition, cell_type: str, space: Any) -> Any:

@@ -83,7 +83,7 @@ class Subdomain:
     load: np.ndarray
     kernel: np.ndarray
     typical_stiffness: float
-    matrix: Forgettable
+    matrix: CachedMatrix
 
     @property
     def stiffness(self) -> sp.csr_matrix:
@@ -91,7 +91,7 @@ class Subdomain:
         return self.matrix.get()
 
 
-class Forgettable:
+class CachedMatrix:
     """A matrix that can be made again, so that it need not be kept while nobody needs it."""
 
     def __init__(self, make: Callable[[], sp.csr_matrix]) -> None:
@@ -194,7 +194,7 @@ def _with_stiffness(
         indptr, indices, data = _dolfinx.assemble_csr(forms.stiffness(parts, cell_type, space))
         return sp.csr_matrix((data, indices, indptr), shape=(mesh.size, mesh.size))
 
-    matrix = Forgettable(stiffness)
+    matrix = CachedMatrix(stiffness)
     K = matrix.get()
     _check_finite(K.data, mesh)
     kernel = common_kernel(parts.materials, points).reshape(mesh.size, -1)

@@ -140,7 +140,7 @@ class BundleTrust:
             CheckpointError: If the checkpoint cannot be written.
         """
         progress = Progress(checkpoint, self, problem, callback)
-        with progress.told() as task:
+        with progress.reporting() as task:
             state, reason = self._run(problem, progress)
             task.outcome = reason.name.lower().replace("_", " ")
         return _finish(self, state, reason)

@@ -116,7 +116,7 @@ class Progress:
         return state
 
     @contextmanager
-    def told(self) -> Iterator[Task]:
+    def reporting(self) -> Iterator[Task]:
         """Tell that the minimisation is under way, and what it leaves where it is interrupted."""
         with self._task as task, telling_what_is_kept(self._kept, self.comm):
             yield task
@@ -170,7 +170,7 @@ class Progress:
         if self._checkpoint is None:
             return without_checkpoint(_evaluations(0 if self._state is None else self._state.evaluations))
         written = max(self._written, 0)
-        return self._checkpoint.way_on(written, _evaluations(written))
+        return self._checkpoint.resume_hint(written, _evaluations(written))
 
 
 def _asking(comm: MPI.Comm) -> AbstractContextManager[None]:

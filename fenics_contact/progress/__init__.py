@@ -2,16 +2,16 @@
 
 The package reports through the logger ``fenics_contact.progress``, at level DEBUG. Each record carries an
 `Event` in its attribute ``progress``: which work, how many of how many, residual and target. Nobody listens
-by default, and then a report costs less than a microsecond. `shown` listens and draws.
+by default, and then a report costs less than a microsecond. `show_progress` listens and draws.
 
 Example:
-    >>> with shown(comm):  # doctest: +SKIP
+    >>> with show_progress(comm):  # doctest: +SKIP
     ...     state = solve_scene(scene, comm)
 """
 
 from fenics_contact.progress.event import Event, Kind
 from fenics_contact.progress.places import at_terminal
-from fenics_contact.progress.shown import shown
+from fenics_contact.progress.show import show_progress
 from fenics_contact.progress.task import LOGGER_NAME, Task
 from fenics_contact.progress.words import duration, is_visible, visible
 
@@ -23,6 +23,6 @@ __all__ = [
     "at_terminal",
     "duration",
     "is_visible",
-    "shown",
+    "show_progress",
     "visible",
 ]

@@ -21,7 +21,7 @@ from fenics_contact.fem import (
     load_name,
     load_parameters,
     load_work,
-    possible,
+    material_sets,
     stress_left,
     volume_measure,
 )
@@ -136,7 +136,7 @@ def work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndar
     """
     loads = moving_loads(torn, forms.moving)
     for name, body in torn.scene.bodies.items():  # all ranks compile, also for bodies they hold no part of
-        for materials in possible(body):
+        for materials in material_sets(body):
             forms.virtual_work_by_shape(materials, body.mesh.cell_type)
             for load in loads:
                 if load.body == name:

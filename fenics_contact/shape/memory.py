@@ -68,11 +68,11 @@ class DesignMemory:
         self.state: State | None = None
         self.error_by_tolerance = 0.0
 
-    def passed(self, alpha: np.ndarray, state: State) -> None:
+    def record_state(self, alpha: np.ndarray, state: State) -> None:
         """Remember the state found last."""
         self._alpha, self.state = np.array(alpha, dtype=float), state
 
-    def judged(self, point: DesignPoint) -> None:
+    def record_point(self, point: DesignPoint) -> None:
         """Remember a design that was evaluated."""
         first, best = self._points.get("first"), self._points.get("best")
         if first is None or np.array_equal(point.alpha, _alpha(first)):
@@ -127,7 +127,7 @@ class DesignMemory:
         self._points = dict(points)
         if start is not None:
             alpha, self.error_by_tolerance = start.pop("alpha"), float(start.pop("error"))
-            self.passed(alpha, self._state(alpha, start))
+            self.record_state(alpha, self._state(alpha, start))
 
     def _built(self, stored: Stored) -> DesignPoint:
         parts = {part.removeprefix(_STATE): stored[part] for part in stored if part.startswith(_STATE)}

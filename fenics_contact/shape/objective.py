@@ -14,7 +14,7 @@ from fenics_contact import _dolfinx
 from fenics_contact._libraries import MPI
 from fenics_contact.contact import ContactResult, State
 from fenics_contact.errors import InvalidInputError, calling, collective, together
-from fenics_contact.fem import possible, temperature_of
+from fenics_contact.fem import material_sets, temperature_of
 from fenics_contact.feti import Subdomain
 from fenics_contact.scene import Body
 from fenics_contact.shape.forms import (
@@ -133,7 +133,7 @@ class VolumeIntegral:
         """Compile the integral or a derivative, return what binds it to a subdomain. Collective."""
         body = self._body(state)
         cell_type, temperature = body.mesh.cell_type, temperature_of(state.scene.loads, self.body)
-        for materials in possible(body):
+        for materials in material_sets(body):
             forms.functional(self.name, self.integrand, materials, cell_type, by, temperature)
 
         def bind(subdomain: Subdomain, functions: Sequence[Any], spaces: Sequence[Any]) -> Any:

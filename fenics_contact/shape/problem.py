@@ -231,7 +231,7 @@ class ShapeProblem:
         state = self._solved(alpha, self._tightest, known) if self.inexact else self.state_of(alpha)
         point = self._point_at(alpha, state, self._tightest, known)
         self.evaluations += 1
-        self._memory.judged(point)
+        self._memory.record_point(point)
         return point
 
     @collectively("ShapeProblem.differentiate", _comm)
@@ -271,7 +271,7 @@ class ShapeProblem:
             tolerance = policy.next(tolerance, point.error, value)
             point = self._point_at(alpha, self._solved(alpha, tolerance, point), tolerance, point)
         self.evaluations += 1
-        self._memory.judged(point)
+        self._memory.record_point(point)
         return point.value, point.gradient, point.error
 
     @collectively("ShapeProblem.doubtful", _comm)
@@ -315,7 +315,7 @@ class ShapeProblem:
                 raise
             tell(logger.warning, "a warm start led nowhere, a cold one follows: %s", error)
             state = self._solved_cold(scene, tolerance)
-        self._memory.passed(alpha, state)
+        self._memory.record_state(alpha, state)
         return state
 
     def _solved_cold(self, scene: Scene, tolerance: float) -> State:

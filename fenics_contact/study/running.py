@@ -12,7 +12,7 @@ from typing import Any, TextIO
 
 from fenics_contact.io import versions
 from fenics_contact.launching import launcher
-from fenics_contact.progress import shown
+from fenics_contact.progress import show_progress
 from fenics_contact.study.launching import Record, Task, measure
 from fenics_contact.study.parameters import Parameters, Sweep
 from fenics_contact.study.progress import Progress, described
@@ -142,7 +142,7 @@ def measure_all(plan: StudyPlan, stream: TextIO | None = None) -> None:
             _warm_up(wanted, min(task.parameters.size for task in plan.tasks))
         title = plan.study.title
         words = title if repeat == 0 else f"{title}, repeat {repeat + 1}"
-        with shown(stream=stream), Progress([task.parameters for task in wanted], words) as progress:
+        with show_progress(stream=stream), Progress([task.parameters for task in wanted], words) as progress:
             for task in wanted:
                 progress.begin(task.parameters)
                 _measure(task, plan.store, repeat, progress)

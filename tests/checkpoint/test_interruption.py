@@ -138,16 +138,18 @@ def test_another_thread_is_refused() -> None:
 
 
 def test_words_say_how_to_go_on() -> None:
-    assert Checkpoint("run.npz").way_on(3, "3 of 5 load steps") == (
+    assert Checkpoint("run.npz").resume_hint(3, "3 of 5 load steps") == (
         "3 of 5 load steps are kept in run.npz: run the same command again to go on"
     )
-    assert Checkpoint("run.npz").way_on(1, "1 evaluation").startswith("1 evaluation is kept in run.npz")
+    assert Checkpoint("run.npz").resume_hint(1, "1 evaluation").startswith("1 evaluation is kept in run.npz")
     assert (
         Checkpoint("run.npz", resume=False)
-        .way_on(3, "3 load steps")
+        .resume_hint(3, "3 load steps")
         .endswith("to go on run again without resume=False")
     )
-    assert "nothing was done yet that run.npz could keep" in Checkpoint("run.npz").way_on(0, "0 load steps")
+    assert "nothing was done yet that run.npz could keep" in Checkpoint("run.npz").resume_hint(
+        0, "0 load steps"
+    )
     assert without_checkpoint("3 load steps") == (
         'nothing is kept of 3 load steps: give checkpoint=Checkpoint("run.npz"), and the same command, run '
         "again, goes on from where it was stopped"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, LoadSequence, State, held, solve_scene
+from fenics_contact.contact import ContactProblem, LoadSequence, State, solve_scene, static_admissibility
 from fenics_contact.feti import TornSystem, dual, torn
 from fenics_contact.gallery import block
 from fenics_contact.pairing import contact_search, mortar
@@ -45,7 +45,7 @@ PARTS: dict[str, tuple[Any, str]] = {
     "search for ties": (torn, "find_tied_points"),
     "projection on facets": (contact_search, "_by_projection"),
     "mortar": (mortar, "mortar_coupling"),
-    "balance of floating bodies": (held, "_check_balance"),
+    "balance of floating bodies": (static_admissibility, "_check_balance"),
     "slip bounds that follow": (slip_law.CoulombLaw, "bound"),
     "friction that grows in a step": (face_system.CoupledSystem, "__init__"),
     "slip of earlier steps": (TornSystem, "with_slip_from"),

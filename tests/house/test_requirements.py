@@ -18,7 +18,7 @@ import pytest
 
 from fenics_contact import _requirements
 from fenics_contact.errors import MissingRequirementError
-from fenics_contact.progress.shown import _writer
+from fenics_contact.progress.show import _writer
 from fenics_contact.progress.works import Works
 from fenics_contact.progress.writers import Log
 from tests.conftest import ROOT, launch

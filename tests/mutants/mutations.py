@@ -46,7 +46,7 @@ MUTATIONS = (
     ),
     Mutation(
         "no body is ever too loose",
-        "contact/held.py",
+        "contact/static_admissibility.py",
         "LEFT = 1e-8",
         "LEFT = 1e3",
         ("tests/contact/test_held.py::test_a_body_pulled_off_its_floor_is_named_with_the_way_it_goes",),
@@ -175,7 +175,7 @@ MUTATIONS = (
     ),
     Mutation(
         "Tresca's bound and the load are in two units",
-        "contact/held.py",
+        "contact/static_admissibility.py",
         "bound = torn.tresca_bound / scale",
         "bound = torn.tresca_bound",
         ("tests/contact/test_held.py::test_the_limit_of_friction_does_not_depend_on_the_units",),

@@ -8,11 +8,11 @@ import time
 
 from mpi4py import MPI
 
-from fenics_contact.progress import Task, shown
+from fenics_contact.progress import Task, show_progress
 
 comm = MPI.COMM_WORLD
 logging.basicConfig(level=logging.WARNING, format="%(message)s")
-with shown(comm), Task(f"work of rank {comm.rank}", total=2) as work:
+with show_progress(comm), Task(f"work of rank {comm.rank}", total=2) as work:
     for number in (1, 2):
         with Task("solve", unit="products", target=1e-6) as solve:
             for product in range(1, 4):

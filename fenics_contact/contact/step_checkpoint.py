@@ -18,7 +18,7 @@ from fenics_contact.scene import LoadStep, Scene
 KIND = "load history"
 
 
-class StepsDone:
+class StepCheckpoint:
     """Reads the states of steps that were done before, and writes new ones; nothing without a checkpoint."""
 
     def __init__(self, checkpoint: Checkpoint | None, problem: ContactProblem) -> None:
@@ -120,7 +120,7 @@ class StepsDone:
         number = self._written
         words = f"{number} of {count}" if count is not None else f"{number}"
         steps = "load step" if (count or number) == 1 else "load steps"
-        return self._checkpoint.way_on(number, f"{words} {steps}")
+        return self._checkpoint.resume_hint(number, f"{words} {steps}")
 
     @property
     def _prefix(self) -> str:

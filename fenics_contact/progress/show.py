@@ -25,7 +25,7 @@ WORTH, SHARE = 1.0, 0.05
 
 
 @contextmanager
-def shown(
+def show_progress(
     comm: MPI.Comm | None = None, stream: TextIO | None = None, interval: float = 10.0
 ) -> Iterator[None]:
     """Show how far the work in the block is.
@@ -33,7 +33,7 @@ def shown(
     On a terminal there are bars, below what the program prints. In a notebook there is one output of the
     cell. Elsewhere, or without rich, a line is logged at level INFO now and then, by the logger
     ``fenics_contact.progress``: nobody sees it unless logging is configured. Only rank 0 shows anything, and
-    no rank waits for another. Within another `shown` the inner one does nothing.
+    no rank waits for another. Within another `show_progress` the inner one does nothing.
 
     Args:
         comm: Communicator of the work; None for a program that is not started by mpirun.
@@ -41,7 +41,7 @@ def shown(
         interval: Least time between two lines in the log, [s].
 
     Example:
-        >>> with shown(MPI.COMM_WORLD):  # doctest: +SKIP
+        >>> with show_progress(MPI.COMM_WORLD):  # doctest: +SKIP
         ...     state = solve_scene(scene, MPI.COMM_WORLD)
     """
     if LISTENERS or (comm is not None and comm.rank != 0):

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from fenics_contact.progress import LOGGER_NAME, Task, shown
+from fenics_contact.progress import LOGGER_NAME, Task, show_progress
 from fenics_contact.progress.places import LAUNCHERS, at_terminal
 from fenics_contact.progress.task import LISTENERS
 
@@ -58,7 +58,7 @@ def as_it_was() -> tuple[Any, ...]:
 
 
 def test_elsewhere_a_line_is_logged_now_and_then(clock: Clock, caplog: pytest.LogCaptureFixture) -> None:
-    with caplog.at_level(logging.INFO), shown(stream=io.StringIO(), interval=10.0):
+    with caplog.at_level(logging.INFO), show_progress(stream=io.StringIO(), interval=10.0):
         work(clock)
     assert [record.message for record in caplog.records] == [
         "load steps: 3 of 5, about 8 s left",
@@ -68,13 +68,13 @@ def test_elsewhere_a_line_is_logged_now_and_then(clock: Clock, caplog: pytest.Lo
 
 
 def test_work_of_no_time_leaves_no_line(clock: Clock, caplog: pytest.LogCaptureFixture) -> None:
-    with caplog.at_level(logging.INFO), shown(stream=io.StringIO()):
+    with caplog.at_level(logging.INFO), show_progress(stream=io.StringIO()):
         work(clock, pause=0.01)
     assert caplog.records == []
 
 
 def test_many_short_works_leave_few_lines(clock: Clock, caplog: pytest.LogCaptureFixture) -> None:
-    with caplog.at_level(logging.INFO), shown(stream=io.StringIO(), interval=1e9):
+    with caplog.at_level(logging.INFO), show_progress(stream=io.StringIO(), interval=1e9):
         for _ in range(200):
             work(clock, pause=0.3)
     assert 5 < len(caplog.records) < 30
@@ -83,14 +83,14 @@ def test_many_short_works_leave_few_lines(clock: Clock, caplog: pytest.LogCaptur
 def test_nobody_sees_anything_where_logging_is_not_configured(
     clock: Clock, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    with shown(stream=io.StringIO(), interval=0.0):
+    with show_progress(stream=io.StringIO(), interval=0.0):
         work(clock)
     assert caplog.records == []
     assert capfd.readouterr() == ("", "")
 
 
 def test_those_who_listen_to_everything_still_do(clock: Clock, caplog: pytest.LogCaptureFixture) -> None:
-    with caplog.at_level(logging.DEBUG), shown(stream=io.StringIO(), interval=1e9):
+    with caplog.at_level(logging.DEBUG), show_progress(stream=io.StringIO(), interval=1e9):
         work(clock, pause=0.0)
     assert [record.message for record in caplog.records][:2] == [
         "load steps: begins, 0 of 5",
@@ -103,7 +103,7 @@ def test_own_handlers_of_the_logger_hear_no_more_than_before(clock: Clock) -> No
     handler = logging.StreamHandler(stream)
     LOGGER.addHandler(handler)
     try:
-        with shown(stream=io.StringIO(), interval=1e9):
+        with show_progress(stream=io.StringIO(), interval=1e9):
             work(clock)
         assert LOGGER.handlers == [handler]
     finally:
@@ -114,7 +114,7 @@ def test_own_handlers_of_the_logger_hear_no_more_than_before(clock: Clock) -> No
 @pytest.mark.parametrize("stream", [io.StringIO(), Screen()], ids=["log", "terminal"])
 def test_all_is_as_it_was_also_after_a_failure(stream: io.StringIO) -> None:
     def fail() -> None:
-        with shown(stream=stream):
+        with show_progress(stream=stream):
             during.append(as_it_was())
             raise ZeroDivisionError
 
@@ -130,7 +130,7 @@ def test_what_is_logged_to_the_terminal_goes_above_the_bars() -> None:
     root = logging.getLogger()
     root.addHandler(handler)
     try:
-        with shown(stream=Screen()):
+        with show_progress(stream=Screen()):
             assert handler.stream is sys.stderr is not sys.__stderr__
             during = handler.stream
         assert handler.stream is sys.stderr is not during
@@ -139,9 +139,9 @@ def test_what_is_logged_to_the_terminal_goes_above_the_bars() -> None:
 
 
 def test_within_another_one_nothing_changes(clock: Clock, caplog: pytest.LogCaptureFixture) -> None:
-    with caplog.at_level(logging.INFO), shown(stream=io.StringIO()):
+    with caplog.at_level(logging.INFO), show_progress(stream=io.StringIO()):
         handlers = list(LOGGER.handlers)
-        with shown(stream=io.StringIO()):
+        with show_progress(stream=io.StringIO()):
             assert LOGGER.handlers == handlers
             work(clock)
         work(clock)
@@ -151,7 +151,7 @@ def test_within_another_one_nothing_changes(clock: Clock, caplog: pytest.LogCapt
 def test_other_ranks_show_nothing_and_do_not_listen() -> None:
     other: Any = types.SimpleNamespace(rank=1)
     before = as_it_was()
-    with shown(other, stream=Screen()):
+    with show_progress(other, stream=Screen()):
         assert as_it_was() == before
 
 
@@ -174,7 +174,7 @@ def test_a_notebook_gets_one_output_that_ends_with_what_came_out(
     monkeypatch.setattr(modules["IPython.display"], "display", display, raising=False)
     for name, module in modules.items():
         monkeypatch.setitem(sys.modules, name, module)
-    with shown():
+    with show_progress():
         work(clock)
     texts = [output["text/plain"] for output in outputs]
     assert "load steps: 2 of 5, about 12 s left" in texts

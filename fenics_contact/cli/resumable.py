@@ -13,7 +13,7 @@ from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInpu
 
 
 @contextmanager
-def going_on(desk: Desk, checkpoint: Checkpoint | None) -> Iterator[None]:
+def resumable(desk: Desk, checkpoint: Checkpoint | None) -> Iterator[None]:
     """Let signals stop the block where it can go on, and say how a run goes on that did not come to its end.
 
     Collective.
