@@ -13,8 +13,8 @@ from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.shape import DesignPoint
 from fenics_contact.viz.colours import BLUE, GREY, ORANGE
-from fenics_contact.viz.patch import contact_patch
-from fenics_contact.viz.patch_axes import label_axes, label_axis, make_as_high, pressure_bar
+from fenics_contact.viz.patch import checked_pair, contact_patch
+from fenics_contact.viz.patch_axes import label_axes, label_axis, pressure_bar
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.pressure import draw_pressure
 from fenics_contact.viz.profile import Profile, profiles
@@ -107,11 +107,7 @@ def _check(first: State, best: State, pair: int) -> None:
             f"before and after must have the same bodies and cells, got {cells[0]} and {cells[1]}: give two "
             "designs of one scene"
         )
-    if not 0 <= pair < len(first.scene.contacts):
-        raise InvalidInputError(
-            f"pair must number one of the scene's {len(first.scene.contacts)} contact pairs from 0, got "
-            f"{pair}: draw a scene with contact"
-        )
+    checked_pair(first, pair)
     if not np.any(first.contact.normal_force > 0):
         raise InvalidInputError(
             "a picture of before and after needs contact forces before, got none: draw with plot_stress"
@@ -136,9 +132,8 @@ def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> N
             axes.set_title(f"{word}: pressure on {patch.name}")
             label_axes(axes, replace(patch, low=low, high=high), look.units)
         extend = "max" if max(float(patch.pressure.max()) for patch in patches) > shown[1] else "neither"
-        bar = pressure_bar(upper, panels, shown, extend, look.units)
+        pressure_bar(panels[1], shown, extend, look.units)
         _draw_sections(lower, found, look.units)
-        make_as_high(figure, bar, panels[1])
 
 
 def _draw_sections(figure: Any, found: list[Profile], units: Units) -> None:

@@ -14,7 +14,6 @@ from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 
-from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.picture import written_path
 from fenics_contact.viz.view import Frame
 
@@ -62,18 +61,6 @@ class InteractiveScene:
             return {"text/plain": ""}
         page = html.escape(self.html, quote=True)
         return {"text/html": _FRAME.format(page=page, height=HEIGHT), "text/plain": str(self)}
-
-
-def html_path(path: str | Path | None) -> Path | None:
-    """Return the path, refuse one that names no HTML file."""
-    if path is None:
-        return None
-    target = Path(path)
-    if target.suffix != ".html":
-        raise InvalidInputError(
-            f"interactive scenes are HTML files, got the name {target.name!r}: let it end in '.html'"
-        )
-    return target
 
 
 def exported(plotter: Any) -> str:

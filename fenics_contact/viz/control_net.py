@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
+import pyvista as pv
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
@@ -16,7 +17,7 @@ from fenics_contact.viz.colours import GREY, INK, ORANGE, SIGNED_MAP
 from fenics_contact.viz.curved_net import curved_net
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.sheet import sheet, show_image
-from fenics_contact.viz.stage import Layer, balls, render, surface, tubes
+from fenics_contact.viz.stage import Layer, balls, render
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.view import View, frame_around, looking_along
 from fenics_contact.viz.words import checked_range, headline, nice_number, written
@@ -86,8 +87,9 @@ def plot_control_net(
     largest = float(np.abs(outward).max()) or 1.0
     factor = _chosen_factor(start, movement) if magnify is None else float(magnify)
     shown = (-largest, largest) if clim is None else checked_range(clim)
-    moves = (movement * factor, (nets[1] - nets[0]) * factor)
-    change = _Change(start.reshape(*design.counts, 3), nets[0], moves, outward, factor, shown)
+    surfaces = (x.reshape(*design.counts, 3) for x in (start, start + factor * movement))
+    ends = nets[0], nets[0] + factor * (nets[1] - nets[0])
+    change = _Change(tuple(surfaces), ends, outward, factor, shown)
     return draw_picture(comm, target, lambda paper: _draw(change, paper, title, units or Units(), width))
 
 
@@ -108,47 +110,30 @@ def _chosen_factor(start: np.ndarray, movement: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class _Change:
-    """What is drawn: the surface (m_s, m_t, 3) and net (n_s, n_t, 3) before, and how they move, magnified."""
+    """What is drawn: surface (m_s, m_t, 3) and net (n_s, n_t, 3) before and after, magnified."""
 
-    start: np.ndarray
-    net: np.ndarray
-    moves: tuple[np.ndarray, np.ndarray]
+    surfaces: tuple[np.ndarray, np.ndarray]
+    nets: tuple[np.ndarray, np.ndarray]
     outward: np.ndarray
     factor: float
     clim: tuple[float, float]
 
-    @property
-    def end(self) -> np.ndarray:
-        """Surface after, (m_s, m_t, 3)."""
-        return self.start + self.moves[0].reshape(self.start.shape)
-
-    @property
-    def end_net(self) -> np.ndarray:
-        """Net after, (n_s, n_t, 3)."""
-        return self.net + self.moves[1]
-
-    @property
-    def size(self) -> float:
-        """Largest extent of the surface, [length]."""
-        return float(np.ptp(self.start.reshape(-1, 3), axis=0).max())
-
 
 def _draw(change: _Change, paper: BinaryIO, title: str, units: Units, width: int) -> None:
-    view = _view(change.start)
-    everything = [change.start, change.end, change.net, change.end_net]
-    frame = frame_around(view, np.concatenate([points.reshape(-1, 3) for points in everything]), 0.05)
-    net, end_net = (_net_layers(change, points, ORANGE, 1.0) for points in (change.net, change.end_net))
-    ghost = _net_layers(change, change.net, GREY, 0.5)
-    still = _surface_layer(change.start, np.zeros(len(change.outward)), change.clim)
-    moved = _surface_layer(change.end, change.outward, change.clim)
+    (start, end), (net, end_net) = change.surfaces, change.nets
+    view = _view(start)
+    frame = frame_around(view, np.concatenate([x.reshape(-1, 3) for x in (start, end, net, end_net)]), 0.05)
+    before = [_surface_layer(start, 0.0 * change.outward, change.clim), *_net_layers(start, net, ORANGE, 1.0)]
+    ghost, after = _net_layers(start, net, GREY, 0.5), _surface_layer(end, change.outward, change.clim)
+    parts = {
+        "before": before,
+        f"after, movement × {change.factor:g}": [after, *ghost, *_net_layers(start, end_net, ORANGE, 1.0)],
+    }
     low, high = (written(float(value), 3) for value in (change.outward.min(), change.outward.max()))
     words = headline(title, f"surface moved by {low} to {high} {units.length} along its outward normal")
     with sheet(paper, (width, round((0.09 + PART / frame.proportion) * width)), words) as figure:
         panels = figure.subplots(1, 2)
-        titles = "before", f"after, movement × {change.factor:g}"
-        for axes, layers, name in zip(
-            panels, ([still, *net], [moved, *ghost, *end_net]), titles, strict=True
-        ):
+        for axes, (name, layers) in zip(panels, parts.items(), strict=True):
             show_image(axes, render(layers, view, frame, round(PART * width)), frame, name)
         key = ScalarMappable(Normalize(*change.clim), SIGNED_MAP)
         figure.colorbar(key, ax=panels, label=f"outward movement ({units.length})", aspect=30, shrink=0.95)
@@ -163,19 +148,21 @@ def _view(grid: np.ndarray) -> View:
 
 
 def _surface_layer(grid: np.ndarray, moved: np.ndarray, clim: tuple[float, float]) -> Layer:
-    number = np.arange(len(moved)).reshape(grid.shape[:2])
-    corners = (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:])
-    mesh = surface(grid.reshape(-1, 3), np.stack(corners, axis=-1).reshape(-1, 4))
-    mesh.point_data["moved"] = moved
+    mesh = pv.StructuredGrid(*np.moveaxis(grid, -1, 0)[..., None])
+    mesh.point_data["moved"] = moved.reshape(grid.shape[:2]).ravel(order="F")
     look = {"scalars": "moved", "cmap": SIGNED_MAP, "clim": clim, "opacity": OPACITY}
     edges = {"show_edges": True, "edge_color": INK, "edge_opacity": 0.25, "line_width": 1}
     return Layer(mesh, {**look, **edges, "ambient": 0.55, "diffuse": 0.45, "smooth_shading": True})
 
 
-def _net_layers(change: _Change, net: np.ndarray, colour: str, thickness: float) -> list[Layer]:
-    look = {"color": colour, "ambient": 0.5, "diffuse": 0.6}
-    points, edges = curved_net(change.start, net)
+def _net_layers(grid: np.ndarray, net: np.ndarray, colour: str, thickness: float) -> list[Layer]:
+    look, size = (
+        {"color": colour, "ambient": 0.5, "diffuse": 0.6},
+        float(np.ptp(grid.reshape(-1, 3), axis=0).max()),
+    )
+    points, edges = curved_net(grid, net)
+    bars = pv.PolyData(points, lines=np.insert(edges, 0, 2, axis=1).ravel())
     return [
-        Layer(tubes(points, edges, 0.005 * thickness * change.size), look),
-        Layer(balls(net.reshape(-1, 3), 0.014 * thickness * change.size), look),
+        Layer(bars.tube(radius=0.005 * thickness * size), look),
+        Layer(balls(net.reshape(-1, 3), 0.014 * thickness * size), look),
     ]

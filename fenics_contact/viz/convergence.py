@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
@@ -100,39 +100,17 @@ def _draw(
         axes.plot(
             number[centre], values[centre], "-o", color=BLUE, lw=2, ms=8, label="start and serious steps"
         )
-        _mark(axes, number[kind == "null"], values[kind == "null"])
-        _mark_rejected(axes, number[kind == "rejected"])
+        null, rejected = kind == "null", number[kind == "rejected"]
+        white = {"marker": "o", "facecolors": "white", "edgecolors": ORANGE, "linewidths": 1.8, "zorder": 3}
+        if np.any(null):
+            axes.scatter(number[null], values[null], label="null steps", s=64, **white)
+        if len(rejected):  # on the lower edge: such a point has no value
+            low, places = np.full(len(rejected), 0.03), axes.get_xaxis_transform()
+            crosses = {"marker": "x", "color": GREY, "transform": places}
+            axes.scatter(rejected, low, label="rejected points", s=64, **crosses)
         axes.set_xlabel("evaluation")
         axes.set_ylabel(label)
         axes.set_yscale(scale)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.grid(axis="y", color=GREY, alpha=0.3)
         axes.legend(loc="best")
-
-
-def _mark(axes: Any, number: np.ndarray, values: np.ndarray) -> None:
-    if len(number):
-        style = {
-            "marker": "o",
-            "facecolors": "white",
-            "edgecolors": ORANGE,
-            "linewidths": 1.8,
-            "s": 64,
-            "zorder": 3,
-        }
-        axes.scatter(number, values, label="null steps", **style)
-
-
-def _mark_rejected(axes: Any, number: np.ndarray) -> None:
-    """Put crosses on the lower edge: a rejected point has no value."""
-    if len(number):
-        places = axes.get_xaxis_transform()
-        axes.scatter(
-            number,
-            np.full(len(number), 0.03),
-            transform=places,
-            marker="x",
-            color=GREY,
-            s=64,
-            label="rejected points",
-        )

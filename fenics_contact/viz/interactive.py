@@ -4,27 +4,21 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
-from typing import Any, TypeAlias
 
 import numpy as np
-from matplotlib.colors import Normalize
 
 from fenics_contact.checkpoint import put_whole
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError, MissingRequirementError, tell, together
-from fenics_contact.viz.browser import InteractiveScene, captioned, exported, html_path, see_in_perspective
-from fenics_contact.viz.colours import PRESSURE_MAP
-from fenics_contact.viz.decomposition import plot_decomposition
-from fenics_contact.viz.fields import drawn_bodies, lengths, moved, points_of
+from fenics_contact.viz.browser import InteractiveScene, captioned, exported, see_in_perspective
+from fenics_contact.viz.fields import drawn_bodies, moved, points_of
 from fenics_contact.viz.interactive_layers import CONTENTS, Subject
 from fenics_contact.viz.obstacles import obstacle_layers
-from fenics_contact.viz.painting import paint
-from fenics_contact.viz.paints import Paints
-from fenics_contact.viz.picture import Picture
-from fenics_contact.viz.pressure import plot_contact_pressure
+from fenics_contact.viz.picture import Picture, file_path
+from fenics_contact.viz.sheet import sheet
 from fenics_contact.viz.stage import staged
-from fenics_contact.viz.stress import plot_stress
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.view import IN_PLANE, frame_around, oblique_view
 from fenics_contact.viz.words import checked_range, headline
@@ -35,9 +29,6 @@ logger = logging.getLogger(__name__)
 SIZE = (1000, 600)
 #: Room around the bodies for title and colour bar, relative to their size.
 MARGIN = 0.15
-
-#: Range of the colours, title, units.
-Look: TypeAlias = tuple[tuple[float, float] | None, str, Units]
 
 
 def interactive(
@@ -73,16 +64,15 @@ def interactive(
         MissingRequirementError: If this machine cannot render, or a file is asked for and the libraries are
             missing.
     """
-    target = html_path(path)
+    target = file_path(path, ".html", "interactive scenes are HTML files")
     _check(state, field, deformed)
     given = None if clim is None else checked_range(clim)
-    bodies = drawn_bodies(state)
-    subject = Subject(state, moved(bodies, float(deformed)), given, units or Units())
+    subject = Subject(state, moved(drawn_bodies(state), float(deformed)), given, units or Units())
     comm = state.torn.decomposition.comm
-    page, missing = None, None
+    page, png, missing = None, None, None
     with together(comm):
         if comm.rank == 0:
-            page, missing = _page(subject, field, title, deformed)
+            page, png, missing = _drawn(subject, field, title, deformed)
             if page is not None and target is not None:
                 put_whole(target, page.encode())
     missing = comm.bcast(missing)
@@ -93,7 +83,7 @@ def interactive(
         raise MissingRequirementError(f"scenes for a browser need {missing}: {remedy}", name="trame")
     if comm.rank == 0:
         tell(logger.info, "the picture is static, turning it needs %s: %s", missing, remedy)
-    return _static(state, bodies, field, float(deformed), (given, title, subject.units))
+    return Picture(png)
 
 
 def _check(state: State, field: str, deformed: float) -> None:
@@ -112,8 +102,10 @@ def _check(state: State, field: str, deformed: float) -> None:
         )
 
 
-def _page(subject: Subject, field: str, title: str, deformed: float) -> tuple[str | None, str | None]:
-    """Return the page, or what is missing to make it."""
+def _drawn(
+    subject: Subject, field: str, title: str, deformed: float
+) -> tuple[str | None, bytes | None, str | None]:
+    """Return the page, or a picture instead of it and what is missing to make it."""
     content, points = CONTENTS[field](subject), points_of(subject.bodies)
     space = subject.state.scene.dim == 3
     view = oblique_view(points) if space else IN_PLANE
@@ -126,23 +118,21 @@ def _page(subject: Subject, field: str, title: str, deformed: float) -> tuple[st
     with staged(layers, view, frame, SIZE) as plotter:
         see_in_perspective(plotter.camera, frame, SIZE)
         try:
-            return captioned(exported(plotter), words, content.legend), None
+            return captioned(exported(plotter), words, content.legend), None, None
         except ImportError as error:
-            return None, f"pyvista[jupyter], got {error}"
+            image = np.asarray(plotter.screenshot(None, return_img=True, scale=2))
+            return None, _still(image, words, content.legend), f"pyvista[jupyter], got {error}"
 
 
-def _static(state: State, bodies: Mapping[str, Any], field: str, deformed: float, look: Look) -> Picture:
-    """Draw the same field without a browser. Collective."""
-    clim, title, units = look
-    if field == "von_mises":
-        return plot_stress(state, clim=clim, scale=deformed, title=title, units=units)
-    if field == "subdomain":
-        decomposition = state.torn.decomposition
-        return plot_decomposition(state.scene, decomposition.partitions, comm=decomposition.comm)
-    if field.startswith("contact"):
-        return plot_contact_pressure(state, clim=clim, title=title, units=units)
-    values = {name: lengths(body) for name, body in bodies.items()}
-    norm = Normalize(*(clim or (0.0, max(float(length.max()) for length in values.values()) or 1.0)))
-    label, words = f"displacement ({units.length})", headline(title, f"displacement, × {deformed:g}")
-    paints = Paints(values, PRESSURE_MAP, norm, label, words, deformed, None, units, 1600)
-    return paint(state, bodies, paints, None, sections=False)
+def _still(image: np.ndarray, title: str, legend: Mapping[str, str]) -> bytes:
+    """Return the PNG file of a picture with a legend: names and their colours."""
+    paper = BytesIO()
+    with sheet(paper, (1600, 1060), title) as figure:
+        axes = figure.subplots()
+        axes.imshow(image)
+        axes.set_axis_off()
+        for name, colour in legend.items():
+            axes.scatter([], [], color=colour, label=name)
+        if legend:
+            figure.legend(loc="outside lower center", ncols=len(legend))
+    return paper.getvalue()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.contact import State, Status
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.view import View, face_on
 
 
@@ -51,6 +52,15 @@ class ContactPatch:
     def largest_slip(self) -> float:
         """By how much they do at most, [length]."""
         return float(np.linalg.norm(self.slip[self.slips], axis=1).max(initial=0.0))
+
+
+def checked_pair(state: State, pair: int) -> None:
+    """Refuse a number that no contact pair of the scene has."""
+    if not 0 <= pair < len(state.scene.contacts):
+        raise InvalidInputError(
+            f"pair must number one of the scene's {len(state.scene.contacts)} contact pairs from 0, got "
+            f"{pair}: draw a scene with contact"
+        )
 
 
 def contact_patch(state: State, pair: int, reach: float | None) -> ContactPatch:

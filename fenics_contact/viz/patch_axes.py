@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 from matplotlib.cm import ScalarMappable
@@ -34,21 +33,11 @@ def label_axes(axes: Any, patch: ContactPatch, units: Units, *, from_slave: bool
             axes.set_xlim(patch.high[0], patch.low[0])
 
 
-def pressure_bar(
-    figure: Any, panels: Sequence[Any], clim: tuple[float, float], extend: str, units: Units
-) -> Any:
-    """Put a colour bar beside axes and return its axes."""
+def pressure_bar(axes: Any, clim: tuple[float, float], extend: str, units: Units) -> None:
+    """Put a colour bar beside axes, as high as they are."""
     key, label = ScalarMappable(Normalize(*clim), PRESSURE_MAP), f"contact pressure ({units.stress})"
-    return figure.colorbar(key, ax=list(panels), label=label, extend=extend).ax
-
-
-def make_as_high(figure: Any, bar: Any, axes: Any) -> None:
-    """Give a colour bar the height of axes with equal scales, which is known when all else is placed."""
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
-    place, beside = bar.get_position(), axes.get_position()
-    bar.set_box_aspect(None)
-    bar.set_position((place.x0, beside.y0, place.width, beside.height))
+    place = axes.inset_axes((1.03, 0.0, 0.04, 1.0))
+    axes.figure.colorbar(key, cax=place, label=label, extend=extend)
 
 
 def label_axis(axis: Any, name: str, word: str, units: Units) -> None:

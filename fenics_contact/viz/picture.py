@@ -67,11 +67,14 @@ class Picture:
 
 def png_path(path: str | Path | None) -> Path | None:
     """Return the path, refuse one that names no PNG file."""
-    if path is None:
-        return None
-    target = Path(path)
-    if target.suffix != ".png":
-        raise InvalidInputError(f"pictures are PNG files, got the name {target.name!r}: let it end in '.png'")
+    return file_path(path, ".png", "pictures are PNG files")
+
+
+def file_path(path: str | Path | None, suffix: str, what: str) -> Path | None:
+    """Return the path, refuse one that does not end as it must."""
+    target = None if path is None else Path(path)
+    if target is not None and target.suffix != suffix:
+        raise InvalidInputError(f"{what}, got the name {target.name!r}: let it end in {suffix!r}")
     return target
 
 

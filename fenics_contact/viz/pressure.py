@@ -8,16 +8,15 @@ from typing import Any, BinaryIO
 from matplotlib.collections import PolyCollection
 
 from fenics_contact.contact import State
-from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import GREY, PRESSURE_MAP
-from fenics_contact.viz.patch import ContactPatch, contact_patch
-from fenics_contact.viz.patch_axes import label_axes, make_as_high, pressure_bar
+from fenics_contact.viz.patch import ContactPatch, checked_pair, contact_patch
+from fenics_contact.viz.patch_axes import label_axes, pressure_bar
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.plane import draw_field
 from fenics_contact.viz.sheet import sheet
 from fenics_contact.viz.status import draw_status
 from fenics_contact.viz.trace import contact_trace
-from fenics_contact.viz.traction import TractionLook, draw_traction
+from fenics_contact.viz.traction import draw_traction
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.words import checked_range, checked_reach, headline, written
 
@@ -57,19 +56,14 @@ def plot_contact_pressure(
         InvalidInputError: If the scene has no such pair, or a range or the name of the file cannot be used.
     """
     target = png_path(path)
-    if not 0 <= pair < len(state.scene.contacts):
-        raise InvalidInputError(
-            f"pair must number one of the scene's {len(state.scene.contacts)} contact pairs from 0, got "
-            f"{pair}: draw a scene with contact"
-        )
+    checked_pair(state, pair)
     checked_reach(reach)
     given = None if clim is None else checked_range(clim)
     named = units or Units()
 
     def draw(paper: BinaryIO) -> None:
         if state.scene.dim == 2:
-            look = TractionLook(given, reach, title, named, width)
-            draw_traction(contact_trace(state, pair), paper, look)
+            draw_traction(contact_trace(state, pair), paper, (given, reach), title, named, width)
         else:
             _draw(contact_patch(state, pair, reach), paper, given, title, named, width)
 
@@ -94,14 +88,16 @@ def _draw(
     with sheet(paper, (width, height), headline(title, facts)) as figure:
         left, right = figure.subplots(1, 2, sharex=True, sharey=True)
         draw_pressure(left, patch, shown)
-        bar = pressure_bar(figure, [left], shown, "max" if peak > shown[1] else "neither", units)
-        _draw_status(right, patch, units)
+        pressure_bar(left, shown, "max" if peak > shown[1] else "neither", units)
+        draw_status(right, patch)
+        longest = f"{written(patch.largest_slip, 2)} {units.length}"
+        slip = f"largest slip {longest}" if patch.largest_slip > 0 else "no slip"
+        right.set_title(f"status, {slip if patch.rubs else 'no friction'}")
         for axes in (left, right):
             label_axes(axes, patch, units)
         right.set_ylabel("")
         handles, labels = right.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower right", ncols=3, handletextpad=0.2)
-        make_as_high(figure, bar, left)
 
 
 def draw_pressure(axes: Any, patch: ContactPatch, clim: tuple[float, float]) -> None:
@@ -111,14 +107,3 @@ def draw_pressure(axes: Any, patch: ContactPatch, clim: tuple[float, float]) -> 
     outlines = {"facecolors": "none", "edgecolors": GREY, "linewidths": 0.5}
     axes.add_collection(PolyCollection(patch.places[patch.facets], **outlines))
     axes.set_title(f"pressure on {patch.name}")
-
-
-def _draw_status(axes: Any, patch: ContactPatch, units: Units) -> None:
-    draw_status(axes, patch)
-    if not patch.rubs:
-        axes.set_title("status, no friction")
-        return
-    longest = patch.largest_slip
-    axes.set_title(
-        f"status, largest slip {written(longest, 2)} {units.length}" if longest > 0 else "status, no slip"
-    )

@@ -30,25 +30,6 @@ class Layer:
     options: Mapping[str, Any] = field(default_factory=dict)
 
 
-def surface(points: np.ndarray, faces: np.ndarray) -> Any:
-    """Return faces (n, 3 | 4) as a pyvista surface that holds only the points it uses."""
-    used, local = np.unique(faces, return_inverse=True)
-    mesh = pv.PolyData.from_regular_faces(points[used], local.reshape(faces.shape))
-    mesh.point_data["node"] = used
-    return mesh
-
-
-def segments(points: np.ndarray, edges: np.ndarray) -> Any:
-    """Return edges (n, 2) as pyvista lines."""
-    lines = np.column_stack([np.full(len(edges), 2), edges])
-    return pv.PolyData(np.asarray(points), lines=lines.ravel())
-
-
-def tubes(points: np.ndarray, edges: np.ndarray, radius: float) -> Any:
-    """Return edges (n, 2) as round bars."""
-    return segments(points, edges).tube(radius=radius)
-
-
 def balls(points: np.ndarray, radius: float) -> Any:
     """Return points (n, 3) as spheres."""
     return pv.PolyData(np.asarray(points)).glyph(geom=pv.Sphere(radius=radius), scale=False, orient=False)

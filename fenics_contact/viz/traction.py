@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -20,40 +19,36 @@ from fenics_contact.viz.words import headline, written
 ARROW, MOST_ARROWS = 0.03, 40
 
 
-@dataclass(frozen=True)
-class TractionLook:
-    """How the picture is made; as the arguments of `plot_contact_pressure`."""
+def draw_traction(
+    trace: ContactTrace,
+    paper: BinaryIO,
+    window: tuple[tuple[float, float] | None, float | None],
+    title: str,
+    units: Units,
+    width: int,
+) -> None:
+    """Draw the pressure above and, where friction acts, the tangential traction on the slave below.
 
-    clim: tuple[float, float] | None
-    reach: float | None
-    title: str
-    units: Units
-    width: int
-
-
-def draw_traction(trace: ContactTrace, paper: BinaryIO, look: TractionLook) -> None:
-    """Draw the pressure above and, where friction acts, the tangential traction on the slave below."""
-    units, rubs = look.units, trace.rubs
+    ``window`` holds the range of the pressure and how far the picture reaches, None where they are chosen.
+    """
+    (clim, reach), rubs = window, trace.rubs
     facts = f"largest pressure {written(float(trace.pressure.max()))} {units.stress}, "
     facts += f"normal force {written(trace.force)} {units.force}/{units.length}"
     if rubs:
         facts += f", tangential force {written(trace.shear)} {units.force}/{units.length}"
     top = float(trace.pressure.max()) or 1.0
-    height = round((0.62 if rubs else 0.4) * look.width)
-    with sheet(paper, (look.width, height), headline(look.title, facts)) as figure:
+    height = round((0.62 if rubs else 0.4) * width)
+    with sheet(paper, (width, height), headline(title, facts)) as figure:
         rows = figure.subplots(2 if rubs else 1, 1, sharex=True, squeeze=False)[:, 0]
         _curve(rows[0], trace, trace.pressure, BLUE)
         _symbols(rows[0], trace, trace.pressure)
         rows[0].set_ylabel(f"contact pressure ({units.stress})")
         rows[0].set_title(f"pressure on {trace.name}")
-        if look.clim:
-            rows[0].set_ylim(*look.clim)
-        else:
-            rows[0].set_ylim(-0.05 * top, 1.08 * top)
+        rows[0].set_ylim(*(clim or (-0.05 * top, 1.08 * top)))
         if rubs:
             _draw_friction(rows[1], trace, units)
         rows[-1].set_xlabel(f"{trace.axis} ({units.length})")
-        rows[-1].set_xlim(*trace.window(look.reach))
+        rows[-1].set_xlim(*trace.window(reach))
         for axes in rows:
             axes.grid(color=GREY, alpha=0.25)
             axes.yaxis.set_major_locator(MaxNLocator(6))
