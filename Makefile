@@ -66,13 +66,13 @@ docs: $(prepare) ## Build the documentation; output/docs/index.html
 	@echo "Open output/docs/index.html in a browser"
 
 study-optimisation: $(prepare) ## Measure what state tolerances do to an optimisation; docs/studies/
-	$(python) -m benchmarks.optimisation_tolerance $(if $(filter quick,$(BENCH)),--quick)
+	$(python) -m benchmarks optimisation_tolerance $(if $(filter quick,$(BENCH)),--quick)
 
 study-optimisers: $(prepare) ## Compare SciPy's optimisers with the bundle method; docs/studies/
-	$(python) -m benchmarks.optimisers $(if $(filter quick,$(BENCH)),--quick)
+	$(python) -m benchmarks optimisers $(if $(filter quick,$(BENCH)),--quick)
 
 study-surfaces: $(prepare) ## Compare facets, reconstructed and true surfaces with theory; docs/studies/
-	$(python) -m benchmarks.true_surfaces
+	$(python) -m benchmarks true_surfaces $(if $(filter quick,$(BENCH)),--quick)
 
 benchmark: $(prepare) ## Measure time, memory and products; results in benchmarks/
 	$(python) -m benchmarks $(if $(filter quick,$(BENCH)),--quick)

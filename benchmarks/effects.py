@@ -1,22 +1,44 @@
-"""What each effect costs in time and memory: `python -m benchmarks.effects`; the table goes to effects.md."""
+"""What each effect costs in time and memory; the table goes to effects.md."""
 
 from __future__ import annotations
 
+import json
 import statistics
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.cases.scene_data import LEVELS  # not from the case: its MPI would end the ranks
-from benchmarks.plan import Run
-from benchmarks.running import ROOT, measure
-from fenics_contact.io import write_json
-from fenics_contact.io.replacing import write_text
-from fenics_contact.study.words import table
+from benchmarks.cases.scene_data import LEVELS
+from benchmarks.plan import run
+from benchmarks.study import ROOT, Records, Study
+from fenics_contact.io import write_json, write_text
+from fenics_contact.study.runner import Job
+from fenics_contact.study.tables import table
 
-REPEATS = 5
+HOME, REPEATS = ROOT / "benchmarks", 5
 
 
-def row(level: str, records: list[dict[str, Any]], before: dict[str, float]) -> tuple[str, ...]:
+def page(records: Records) -> str:
+    """Return the page of Markdown."""
+    before: dict[str, float] = {}
+    head = (
+        "effect", "equality + contact rows", "cone", "forms", "F-products", "seconds", "added", "MB", "added",
+        "MB planned",
+    )  # fmt: skip
+    unknowns = records["none"][0]["counts"]["torn_unknowns"]
+    load = max(record["load_average"] for found in records.values() for record in found)
+    return (
+        "# What each effect adds\n\n"
+        f"Two cubes upon each other, {unknowns} torn unknowns in 128 subdomains, two ranks, cold, compiled "
+        f"forms at hand; medians of {REPEATS}, load at most {load:.1f}. Each line has the effects of those "
+        "above; friction laws replace each other. MB are those of both ranks beyond their libraries. "
+        "Written by `python -m benchmarks effects`.\n\n"
+        + table(head, [_row(level, found, before) for level, found in records.items()])
+        + "\n"
+    )
+
+
+def _row(level: str, records: Sequence[dict[str, Any]], before: dict[str, float]) -> tuple[str, ...]:
     """Return one line of the table and note seconds and memory for the next one."""
     counts, first = records[0]["counts"], records[0]
     seconds = statistics.median(record["seconds"] for record in records)
@@ -32,35 +54,21 @@ def row(level: str, records: list[dict[str, Any]], before: dict[str, float]) -> 
     return line
 
 
-def main() -> None:
-    """Measure every level and write the table."""
-    measure(Run("warm-up", "effects", options=("--level", "sensitivity")))
-    records: dict[str, list[dict[str, Any]]] = {level: [] for level in LEVELS}
-    for _ in range(REPEATS):
-        for level in LEVELS:
-            records[level].append(measure(Run(level, "effects", options=("--level", level))))
-            print(f"{level}: {records[level][-1]['seconds']:.2f} s", flush=True)
-    before: dict[str, float] = {}
-    head = (
-        "effect", "equality + contact rows", "cone", "forms", "F-products", "seconds", "added", "MB", "added",
-        "MB planned",
-    )  # fmt: skip
-    unknowns = records["none"][0]["counts"]["torn_unknowns"]
-    load = max(record["load_average"] for found in records.values() for record in found)
-    text = (
-        "# What each effect adds\n\n"
-        f"Two cubes upon each other, {unknowns} torn unknowns in 128 subdomains, two ranks, cold, compiled "
-        f"forms at hand; medians of {REPEATS}, load at most {load:.1f}. Each line has the effects of those "
-        "above; friction laws replace each other. MB are those of both ranks beyond their libraries. "
-        "Written by `python -m benchmarks.effects`.\n\n"
-        + table(head, [row(level, found, before) for level, found in records.items()])
-        + "\n"
-    )
-    folder = Path(__file__).parent
-    write_text(folder / "effects.md", text)
-    write_json(folder / "effects.json", records)
-    print(f"table in {(folder / 'effects.md').relative_to(ROOT)}")
+def jobs(quick: bool) -> list[Job]:
+    """Return a job for each level."""
+    return [run(level, "effects", {"level": level}, repeats=1 if quick else REPEATS) for level in LEVELS]
 
 
-if __name__ == "__main__":
-    main()
+def write(folder: Path, records: Records, _: bool) -> None:
+    """Write numbers and page; where a level was not measured, the page of the numbers that are there."""
+    if set(records) == set(LEVELS):
+        write_json(folder / "effects.json", records)
+    else:
+        records = json.loads((HOME / "effects.json").read_text())
+    write_text(folder / "effects.md", page(records))
+
+
+study = Study(
+    jobs, write, HOME, (ROOT / "benchmarks" / "cases",),
+    warm_up=(run("sensitivity", "effects", {"level": "sensitivity"}),),
+)  # fmt: skip

@@ -14,18 +14,7 @@ from benchmarks.plan import BLOCKS
 from benchmarks.report import chain_sizes
 from benchmarks.row import Summaries, unknowns
 from benchmarks.targets import newton_names
-
-#: Phases from the bottom of a bar to its top, with colours that differ also in grey.
-COLOURS = {
-    "mesh": "#bab0ac",
-    "decompose": "#9ecae9",
-    "assemble": "#4c78a8",
-    "factor": "#54a24b",
-    "preconditioner": "#b6d77b",
-    "coarse space": "#b279a2",
-    "solve": "#f58518",
-    "state": "#e45756",
-}
+from fenics_contact.study.figures.phases import draw_stacked
 
 
 def plot_results(path: Path, summaries: Summaries) -> None:
@@ -39,17 +28,10 @@ def plot_results(path: Path, summaries: Summaries) -> None:
 
 def _plot_phases(axes: Any, summaries: Summaries) -> None:
     runs = chain_sizes(summaries)
-    bottom = [0.0] * len(runs)
     labels = [f"{unknowns(run) / 1e3:,.0f} k".replace(",", " ") for run in runs.values()]
-    known = {phase: None for phase in COLOURS} | {p: None for run in runs.values() for p in run["phases"]}
-    for phase in known:
-        heights = [1e6 * run["phases"].get(phase, 0.0) / unknowns(run) for run in runs.values()]
-        axes.bar(labels, heights, 0.6, bottom=bottom, label=phase, color=COLOURS.get(phase))
-        bottom = [b + h for b, h in zip(bottom, heights, strict=True)]
-    for place, top in enumerate(bottom):
-        axes.annotate(f"{top:.0f} µs", (place, top), (0, 3), textcoords="offset points", ha="center")
+    bars = [{p: 1e6 * s / unknowns(run) for p, s in run["phases"].items()} for run in runs.values()]
+    draw_stacked(axes, bars, labels, " µs")
     axes.set_xlim(-0.6, len(runs) + 0.5)
-    axes.set_ylim(0, 1.15 * max(bottom, default=1.0))
     axes.set_xlabel("torn unknowns of the chain")
     axes.set_ylabel("wall time an unknown [µs]")
     axes.set_title("Chain with friction, gmsh to state, 2 ranks")

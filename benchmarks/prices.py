@@ -1,4 +1,7 @@
-"""The prices a cost model needs: a subdomain by its size, the coarse problem by the number of subdomains."""
+"""The prices a cost model needs: a subdomain by its size, the coarse problem by the number of subdomains.
+
+`python -m benchmarks.prices` prints them; run it alone on the machine.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ from fenics_contact.feti.implicit import ImplicitOperator
 from fenics_contact.feti.subdomain import Subdomain
 from fenics_contact.linalg.cost_model import explicit_cost, implicit_cost, prefers_explicit
 from fenics_contact.qp import CoarseSpace
-from fenics_contact.study.words import table
+from fenics_contact.study.tables import table
 
 #: Elements along an edge of a cubic subdomain.
 EDGES = (4, 5, 6, 7, 8, 10, 12)
@@ -128,3 +131,8 @@ def coarse_prices(counts: Sequence[int] = SUBDOMAINS) -> str:
         solving = seconds_of(partial(coarse.solve, load), 20)
         body.append((str(count), str(G.shape[0]), f"{1e3 * building:.1f}", f"{1e3 * solving:.3f}"))
     return table(("subdomains", "rigid motions", "assemble and factor [ms]", "solve [ms]"), body)
+
+
+if __name__ == "__main__":
+    print(f"One subdomain on one core\n\n{subdomain_prices()}\n", flush=True)
+    print(f"Coarse problem on one core\n\n{coarse_prices()}")

@@ -10,7 +10,7 @@ from benchmarks.held import work
 from benchmarks.plan import LINEAR
 from benchmarks.row import NoValue, Record, Row, Summaries, unknowns
 from benchmarks.targets import ROWS, newton_names
-from fenics_contact.study.words import table
+from fenics_contact.study.tables import table
 
 #: What the steps of a solver are called in its counts.
 STEPS = ("newton_steps", "solver_steps", "iterations")

@@ -125,18 +125,23 @@ print(f"certificate over true error: {min(ratios):.2f} to {max(ratios):.2f} in {
 assert min(ratios) >= 1.0 - 1e-2  # the exact solution is known to some digits only
 
 # %% [markdown]
-# ## Advice
+# ## Answers
 #
-# What the runs say, in words. A run is recommended only if all runs that are finer and stricter reach the
-# accuracy, too: an error that passes through zero is no merit.
+# What an accuracy takes: the fastest run that reaches it. A run counts only if all runs that are finer and
+# stricter reach the accuracy, too: an error that passes through zero is no merit.
 
 # %%
-from textwrap import fill
+from fenics_contact.study import accuracy_table, cost_table
 
-from fenics_contact.study.advice import advice
+print(accuracy_table(errors, targets=(0.05, 0.01)))
 
-for sentence in advice(errors, targets=(0.05, 0.01)):
-    print(fill(f"- {sentence}", 100, subsequent_indent="  "))
+# %% [markdown]
+# What a setting costs, beside a run that differs from it in this setting alone, on the finest mesh that both
+# have. Ratios above one are dearer:
+
+# %%
+for line in cost_table(errors).splitlines():
+    print("|".join(line.split("|")[:9]))
 
 # %% [markdown]
 # ## A study of one's own
@@ -185,8 +190,7 @@ output = Path("output/notebooks/plate")
 output.mkdir(parents=True, exist_ok=True)
 (output / "plate.py").write_text(BUILD + STUDY)
 plate = run_study(str(output / "plate.py"), output / "runs", settings=Settings(repeats=1))
-for sentence in write_report(output, plate):
-    print(fill(f"- {sentence}", 100, subsequent_indent="  "))
+print(write_report(output, plate).split("\n\n")[1])
 
 # %% [markdown]
 # The mesh represents this solution exactly: only the tolerance is left to err.

@@ -1,1 +1,1 @@
-"""What is measured: one module a case, run in a process of its own, with one JSON object on its last line."""
+"""What is measured: one module a case, whose `measure` is called in a process of its own."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 from time import perf_counter
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from benchmarks.cases.measuring import nodal_forces, run_case, state_record
+from benchmarks.cases.measuring import nodal_forces, state_record
 from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, PAPER_BOXES, PAPER_CELLS, Counts
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.errors import FenicsContactError
@@ -78,20 +77,3 @@ def measure(comm: MPI.Comm, *, forces: bool = False, **setting: Any) -> dict[str
         "phases": slowest(comm, state.seconds),
     }
     return {**record, "forces": nodal_forces(state)} if forces else record
-
-
-def settings() -> argparse.ArgumentParser:
-    """Return the parser of the command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cells", type=int, nargs=3, default=PAPER_CELLS)
-    parser.add_argument("--boxes", type=int, nargs=3, default=PAPER_BOXES)
-    parser.add_argument("--parts", type=int)
-    parser.add_argument("--default-partition", action="store_true")
-    parser.add_argument("--friction-coefficient", type=float, default=FRICTION_COEFFICIENT)
-    parser.add_argument("--tolerance", type=float, default=1e-6)
-    parser.add_argument("--forces", action="store_true")
-    return parser
-
-
-if __name__ == "__main__":
-    run_case(measure, settings())

@@ -1,23 +1,50 @@
-"""The shape problem of the demo: crown of link 1 on a net of 7 x 4 control points."""
+"""The shape problem of the demo: the crown of link 1 on a net of 7 x 4 control points."""
 
 from __future__ import annotations
 
 from mpi4py import MPI
 
-from benchmarks.cases.scene_data import PAPER_BOXES, PAPER_CELLS
+from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, PAPER_BOXES, PAPER_CELLS, Counts
 from fenics_contact.contact import ContactProblem
+from fenics_contact.gallery import TwoLinks
 from fenics_contact.partition import box_partition
-from fenics_contact.shape import ShapeProblem, SurfaceDesign, TotalPotential
+from fenics_contact.shape import AdaptiveTolerance, Objective, ShapeProblem, SurfaceDesign, TotalPotential
 from fenics_contact.study.scenes.chain_links import chain, graded_links
 
 #: Largest displacement of a control point, [mm].
 BOUND = 0.25
+#: Cells around, through and across each link, and its boxes.
+SIZES: dict[str, tuple[Counts, Counts]] = {
+    "coarse": ((30, 4, 10), (4, 1, 1)),
+    "small": ((36, 6, 14), PAPER_BOXES),
+    "paper": (PAPER_CELLS, PAPER_BOXES),
+}
+_links: dict[Counts, TwoLinks] = {}
 
 
-def chain_shape_problem(comm: MPI.Comm) -> ShapeProblem:
-    """Mesh the chain of the published experiment and make its crown designable. Collective."""
-    links = graded_links(PAPER_CELLS, comm)
-    scene = chain(links)
-    partitions = {name: box_partition(body.mesh, PAPER_BOXES) for name, body in scene.bodies.items()}
+def chain_shape_problem(
+    comm: MPI.Comm,
+    size: str = "paper",
+    *,
+    objective: Objective | None = None,
+    friction: float = FRICTION_COEFFICIENT,
+    tolerance: float | AdaptiveTolerance | None = None,
+) -> ShapeProblem:
+    """Make the crown of a chain designable. Collective.
+
+    Args:
+        comm: Communicator; meshes are made once for all problems of a process.
+        size: One of `SIZES`.
+        objective: What is minimised; the total potential by default.
+        friction: Coefficient of friction.
+        tolerance: Of the states, as `ShapeProblem` takes it.
+    """
+    cells, boxes = SIZES[size]
+    if cells not in _links:
+        _links[cells] = graded_links(cells, comm)
+    links = _links[cells]
+    scene = chain(links, friction)
+    partitions = {name: box_partition(body.mesh, boxes) for name, body in scene.bodies.items()}
     design = SurfaceDesign("link 1", links.first.crown, net=(7, 4))
-    return ShapeProblem(ContactProblem(scene, comm, partitions=partitions), design, TotalPotential())
+    problem = ContactProblem(scene, comm, partitions=partitions)
+    return ShapeProblem(problem, design, objective or TotalPotential(), tolerance=tolerance)

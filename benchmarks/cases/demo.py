@@ -11,8 +11,6 @@ from time import perf_counter
 
 from mpi4py import MPI
 
-from benchmarks.cases.measuring import run_case
-
 DEMO = Path(__file__).parents[2] / "demos" / "demo_chain_links.py"
 
 
@@ -28,7 +26,3 @@ def measure(comm: MPI.Comm) -> dict[str, float]:
         seconds = comm.allreduce(perf_counter() - start, op=MPI.MAX)
         os.chdir(mine)
     return {"seconds": seconds}
-
-
-if __name__ == "__main__":
-    run_case(measure)

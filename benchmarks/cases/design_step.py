@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
 from time import perf_counter
 from typing import Any
@@ -12,7 +11,6 @@ from mpi4py import MPI
 
 from benchmarks.cases.chain import cold_state
 from benchmarks.cases.chain_design import BOUND, chain_shape_problem
-from benchmarks.cases.measuring import run_case
 from fenics_contact.shape import ShapeProblem
 from fenics_contact.study.solving import slowest
 
@@ -40,7 +38,7 @@ def seconds_of(comm: MPI.Comm, problem: ShapeProblem, alpha: np.ndarray) -> floa
     return comm.allreduce(perf_counter() - start, op=MPI.MAX)
 
 
-def measure(comm: MPI.Comm, steps: int) -> dict[str, Any]:
+def measure(comm: MPI.Comm, steps: int = 8) -> dict[str, Any]:
     """Return the seconds of a cold state, of the first design and of each later one. Collective."""
     state, cold = cold_state(comm)
     torn_unknowns = state.counts["torn_unknowns"]
@@ -62,14 +60,3 @@ def measure(comm: MPI.Comm, steps: int) -> dict[str, Any]:
         "ratio": float(np.median(later)) / cold,
         "phases": slowest(comm, phases),
     }
-
-
-def settings() -> argparse.ArgumentParser:
-    """Return the parser of the command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--steps", type=int, default=8)
-    return parser
-
-
-if __name__ == "__main__":
-    run_case(measure, settings())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 from time import perf_counter
 from typing import Any
@@ -10,8 +9,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from benchmarks.cases.measuring import run_case, state_record
-from benchmarks.cases.scene_data import LEVELS
+from benchmarks.cases.measuring import state_record
 from fenics_contact.contact import ContactProblem, State, solve_scene
 from fenics_contact.gallery import DesignSurface, block
 from fenics_contact.mesh import BodyMesh
@@ -101,14 +99,3 @@ def measure(comm: MPI.Comm, level: str) -> dict[str, Any]:
         "solver": plan.solver.value,
         "cone": plan.cone.value,
     }
-
-
-def settings() -> argparse.ArgumentParser:
-    """Return the parser of the command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--level", choices=LEVELS, default="Coulomb")
-    return parser
-
-
-if __name__ == "__main__":
-    run_case(measure, settings())

@@ -7,7 +7,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from benchmarks.cases.measuring import run_case, state_record
+from benchmarks.cases.measuring import state_record
 from benchmarks.cases.scenes import block_mesh, block_on_plane
 from fenics_contact.contact import solve_scene
 from fenics_contact.partition import box_partition
@@ -35,7 +35,3 @@ def measure(comm: MPI.Comm) -> dict[str, Any]:
             f"{record['counts']['closed']} and {record['total_potential']}: the solver is wrong"
         )
     return {**record, "potential_error": error}
-
-
-if __name__ == "__main__":
-    run_case(measure)

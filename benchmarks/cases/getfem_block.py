@@ -6,14 +6,11 @@ brings a MUMPS without MPI, so nothing that uses PETSc may be imported here.
 
 from __future__ import annotations
 
-import argparse
-import json
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from benchmarks.cases.memory import peak_memory
 from benchmarks.cases.scene_data import (
     FRICTION_COEFFICIENT,
     LOWER,
@@ -24,6 +21,7 @@ from benchmarks.cases.scene_data import (
     YOUNG_MODULUS,
     Counts,
 )
+from fenics_contact.study.worker import peak_memory
 
 #: Numbers of the three sides of the mesh.
 CLAMPED, LOADED, CONTACT = 1, 2, 3
@@ -70,7 +68,7 @@ def pressed_block(gf: Any, counts: Counts) -> tuple[Any, Any]:
     return elements, model
 
 
-def measure(counts: Counts) -> dict[str, Any]:
+def measure(comm: None, counts: Counts) -> dict[str, Any]:
     """Return the record of the block's state, or a note where GetFEM is missing."""
     try:
         import getfem as gf
@@ -94,18 +92,5 @@ def measure(counts: Counts) -> dict[str, Any]:
         "normal_force": float(normal.sum()),
         "friction_force": friction.sum(axis=0).tolist(),
         "seconds": seconds,
-        "ranks": 1,
-        "peak_memory": peak_memory(),
         "import_memory": imports,
     }
-
-
-def main() -> None:
-    """Run the case with the settings of the command line and print its record as the last line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--counts", type=int, nargs=3, required=True)
-    print(json.dumps(measure(**vars(parser.parse_args()))), flush=True)
-
-
-if __name__ == "__main__":
-    main()

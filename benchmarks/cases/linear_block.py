@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 from time import perf_counter
 from typing import Any
 
 from mpi4py import MPI
 
-from benchmarks.cases.measuring import run_case
 from benchmarks.cases.monolithic.elasticity import assemble_block
 from benchmarks.cases.monolithic.linear import solve_linear
 from benchmarks.cases.scene_data import Counts
@@ -35,15 +33,3 @@ def measure(comm: MPI.Comm, counts: Counts, solver: str) -> dict[str, Any]:
         "seconds": comm.allreduce(end - start, op=MPI.MAX),
         "phases": slowest(comm, {"assemble": assembled - start, "solve": end - assembled}),
     }
-
-
-def settings() -> argparse.ArgumentParser:
-    """Return the parser of the command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--counts", type=int, nargs=3, required=True)
-    parser.add_argument("--solver", choices=("gamg", "cholesky"), required=True)
-    return parser
-
-
-if __name__ == "__main__":
-    run_case(measure, settings())

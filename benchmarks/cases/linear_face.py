@@ -11,7 +11,7 @@ from typing import Any
 from mpi4py import MPI
 
 from benchmarks.cases.chain import cold_state
-from benchmarks.cases.measuring import run_case, state_record
+from benchmarks.cases.measuring import state_record
 from fenics_contact.contact import State
 from fenics_contact.qp import CountedOperator, FaceSystems, Stop, classify, contact_step, projected_cg
 from fenics_contact.qp.forcing import residual_weights
@@ -65,7 +65,3 @@ def measure(comm: MPI.Comm) -> dict[str, Any]:
         "counts": {**state_record(state)["counts"], "linear_products": linear.products},
         "linear_residual": linear.measure,
     }
-
-
-if __name__ == "__main__":
-    run_case(measure)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
-from benchmarks.cases.measuring import run_case
 from benchmarks.cases.monolithic.elasticity import assemble_block
 from benchmarks.cases.monolithic.newton import solve_newton
 from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, Counts
@@ -58,15 +56,3 @@ def measure(
         "phases": {"assemble": assembled - start, "solve": seconds - (assembled - start)},
         "forces": forces[order],
     }
-
-
-def settings() -> argparse.ArgumentParser:
-    """Return the parser of the command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--counts", type=int, nargs=3, required=True)
-    parser.add_argument("--friction-coefficient", type=float, default=FRICTION_COEFFICIENT)
-    return parser
-
-
-if __name__ == "__main__":
-    run_case(measure, settings())

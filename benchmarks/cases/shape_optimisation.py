@@ -9,7 +9,6 @@ import numpy as np
 from mpi4py import MPI
 
 from benchmarks.cases.chain_design import BOUND, chain_shape_problem
-from benchmarks.cases.measuring import run_case
 from fenics_contact.optimize import BundleTrust, LinearConstraints, minimize
 from fenics_contact.study.solving import slowest
 
@@ -45,7 +44,3 @@ def measure(comm: MPI.Comm) -> dict[str, Any]:
         "seconds": seconds,
         "phases": slowest(comm, problem.seconds),
     }
-
-
-if __name__ == "__main__":
-    run_case(measure)

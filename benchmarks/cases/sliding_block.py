@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 from time import perf_counter
 from typing import Any
 
 from mpi4py import MPI
 
-from benchmarks.cases.measuring import nodal_forces, run_case, state_record
+from benchmarks.cases.measuring import nodal_forces, state_record
 from benchmarks.cases.scene_data import FRICTION_COEFFICIENT, Counts
 from benchmarks.cases.scenes import block_mesh, block_on_plane
 from fenics_contact.contact import solve_scene
@@ -20,7 +19,7 @@ from fenics_contact.study.solving import slowest
 def measure(
     comm: MPI.Comm,
     counts: Counts,
-    boxes: Counts | None,
+    boxes: Counts | None = None,
     friction_coefficient: float = FRICTION_COEFFICIENT,
     tolerance: float = 1e-6,
 ) -> dict[str, Any]:
@@ -49,16 +48,3 @@ def measure(
         "phases": slowest(comm, state.seconds),
         "forces": nodal_forces(state),
     }
-
-
-def settings() -> argparse.ArgumentParser:
-    """Return the parser of the command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--counts", type=int, nargs=3, required=True)
-    parser.add_argument("--boxes", type=int, nargs=3)
-    parser.add_argument("--friction-coefficient", type=float, default=FRICTION_COEFFICIENT)
-    return parser
-
-
-if __name__ == "__main__":
-    run_case(measure, settings())

@@ -7,9 +7,11 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
-from benchmarks.optimisation_tolerance.chain import BOUND, Chain
-from fenics_contact.shape import AdaptiveTolerance, DesignPoint
+from benchmarks.cases.chain_design import BOUND, chain_shape_problem
+from fenics_contact.optimize import BundleTrust, LinearConstraints, Result, minimize
+from fenics_contact.shape import AdaptiveTolerance, DesignPoint, ShapeProblem
 from fenics_contact.study.scenes.chain_links import GRADING
 
 #: What everything is compared with.
@@ -22,7 +24,7 @@ STOPPING = (1e-4, 1e-6)
 FEW_FIXED, FEW_ADAPTIVE, FEW_STOPPING = (1e-3, 1e-6, 1e-8), ("adaptive",), (1e-4,)
 
 
-def designs(chain: Chain, best: np.ndarray, count: int) -> dict[str, np.ndarray]:
+def designs(best: np.ndarray, count: int) -> dict[str, np.ndarray]:
     """Return the start, a design on the way, the optimum, and random ones."""
     rng = np.random.default_rng(1)
     named = {"start": np.zeros_like(best), "half way": 0.5 * best, "optimum": best}
@@ -46,26 +48,39 @@ def compared(point: DesignPoint, exact: DesignPoint) -> dict[str, Any]:
     }
 
 
-def errors(chain: Chain, best: np.ndarray, count: int) -> list[dict[str, Any]]:
+def errors(comm: MPI.Comm, size: str, best: np.ndarray, count: int) -> list[dict[str, Any]]:
     """Return the errors at some designs, each solved from a cold start."""
     found = []
-    for name, alpha in designs(chain, best, count).items():
-        exact = chain.problem(REFERENCE).evaluate(alpha)
+    for name, alpha in designs(best, count).items():
+        exact = chain_shape_problem(comm, size, tolerance=REFERENCE).evaluate(alpha)
         for tolerance in TOLERANCES:
-            problem = chain.problem(AdaptiveTolerance(loosest=tolerance, tightest=tolerance))
+            adaptive = AdaptiveTolerance(loosest=tolerance, tightest=tolerance)
+            problem = chain_shape_problem(comm, size, tolerance=adaptive)
             found.append({"design": name, **compared(problem.evaluate(alpha), exact)})
-        print(f"{chain.size}: errors at the design {name!r} are known", flush=True)
     return found
 
 
-def optimum(chain: Chain, name: str, stopping: float) -> dict[str, Any]:
+def minimised(problem: ShapeProblem, tolerance: float) -> Result:
+    """Minimise within the box, without losing volume."""
+    start = np.zeros(problem.size)
+    _, by_volume = problem.volume(start)
+    return minimize(
+        problem,
+        start,
+        BundleTrust(tolerance=tolerance, raise_on_failure=False),
+        bounds=(start - BOUND, start + BOUND),
+        constraints=LinearConstraints(-by_volume[None, :], [0.0]),
+    )
+
+
+def optimum(comm: MPI.Comm, size: str, name: str, stopping: float) -> dict[str, Any]:
     """Minimise once and evaluate the design that was found accurately."""
-    problem = chain.problem(ADAPTIVE[name] if name in ADAPTIVE else float(name))
+    tolerance = ADAPTIVE[name] if name in ADAPTIVE else float(name)
+    problem = chain_shape_problem(comm, size, tolerance=tolerance)
     began = perf_counter()
-    result = chain.minimised(problem, stopping)
+    result = minimised(problem, stopping)
     seconds = perf_counter() - began
-    exact = chain.problem(REFERENCE).evaluate(result.x)
-    print(f"{chain.size}: minimised to {stopping:g} with {name}: {problem.products} products", flush=True)
+    exact = chain_shape_problem(comm, size, tolerance=REFERENCE).evaluate(result.x)
     return {
         "states": name,
         "stopping": stopping,
@@ -80,13 +95,19 @@ def optimum(chain: Chain, name: str, stopping: float) -> dict[str, Any]:
     }
 
 
-def study(size: str, random_designs: int, *, few: bool) -> dict[str, Any]:
-    """Return all measurements of one size, or few of them."""
-    chain = Chain(size)
+def study(comm: MPI.Comm, size: str, random_designs: int, *, few: bool) -> dict[str, Any]:
+    """Return all measurements of one size, or few of them.
+
+    Args:
+        comm: Communicator of one rank.
+        size: One of `benchmarks.cases.chain_design.SIZES`.
+        random_designs: Random designs beside the start, the optimum and one between them.
+        few: Whether only few tolerances are tried.
+    """
     fixed, adaptive = (FEW_FIXED, FEW_ADAPTIVE) if few else (FIXED, tuple(ADAPTIVE))
     names = [*(f"{tolerance:.0e}" for tolerance in fixed), *adaptive]
     stopping = FEW_STOPPING if few else STOPPING
-    optima = [optimum(chain, name, limit) for limit in stopping for name in names]
+    optima = [optimum(comm, size, name, limit) for limit in stopping for name in names]
     best = min(optima, key=lambda run: run["value"])["design"]
-    found = errors(chain, best, random_designs)
+    found = errors(comm, size, best, random_designs)
     return {"size": size, "grading": GRADING, "optima": optima, "errors": found}

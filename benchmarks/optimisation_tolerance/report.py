@@ -1,7 +1,8 @@
-"""The page and the picture of the study."""
+"""The study: its jobs, its page and its picture."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,10 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
-from fenics_contact.study.words import table
+from benchmarks.study import ROOT, Records, Study, found
+from fenics_contact.io import versions, write_json, write_text
+from fenics_contact.study.runner import Job
+from fenics_contact.study.tables import table
 
 ORANGE, BLUE, GREEN = "#f58518", "#4c78a8", "#54a24b"
 #: What the adaptive runs are compared with.
@@ -22,7 +26,7 @@ INTRODUCTION = """\
 
 The chain of `demos/demo_chain_links.py`: total potential energy, 28 variables, friction coefficient 0.3.
 Errors are relative and against states of tolerance 1e-11. Written by
-`python -m benchmarks.optimisation_tolerance`.
+`python -m benchmarks optimisation_tolerance`.
 
 ![Errors and products](optimisation_tolerance.png)
 
@@ -169,3 +173,36 @@ def _plot_products(axes: Any, optima: list[dict[str, Any]]) -> None:
     axes.set_ylabel("products of the minimisation")
     axes.set_title("stopping tolerance 1e-4 (full) and 1e-6 (pale)", fontsize="medium")
     axes.spines[["top", "right"]].set_visible(False)
+
+
+HOME = ROOT / "docs" / "studies" / "optimisation_tolerance"
+#: Size of the chain -> random designs beside the start, the optimum and one between them.
+RANDOM = {"small": 20, "paper": 0}
+
+
+def jobs(quick: bool) -> list[Job]:
+    """Return a job for each size."""
+    return [
+        Job(
+            size, "benchmarks.optimisation_tolerance.measuring:study",
+            {"size": size, "random_designs": count, "few": quick or size == "paper"}, limit=4 * 3600.0,
+        )
+        for size, count in RANDOM.items()
+        if size == "small" or not quick
+    ]  # fmt: skip
+
+
+def write(folder: Path, records: Records, quick: bool) -> None:
+    """Write numbers, page and picture; sizes that were not measured keep their numbers."""
+    before = [] if quick else json.loads((HOME / "results.json").read_text())["studies"]
+    studies = {each["size"]: each for each in before}
+    studies |= {size: found(measured[0]) for size, measured in records.items()}
+    known = [studies[size] for size in RANDOM if size in studies]
+    if records:
+        write_json(folder / "results.json", {"studies": known, "versions": versions()})
+    write_text(folder / "README.md", page(known))
+    plot(folder / "optimisation_tolerance.png", known[0])
+
+
+CODE = (ROOT / "benchmarks" / "cases", Path(__file__).parent)
+study = Study(jobs, write, HOME, CODE)

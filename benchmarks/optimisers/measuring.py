@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any
 
 import numpy as np
 import scipy.optimize
+from mpi4py import MPI
 
-from benchmarks.optimisers.chain import Book, Case, Spent
+from benchmarks.optimisers.book import STATES, Book, Case, Spent
 from fenics_contact.optimize import BundleTrust, ForScipy, minimize, nearest_feasible
 from fenics_contact.shape import AdaptiveTolerance
+from fenics_contact.study.scenes.chain_links import GRADING
 
 #: Violation of the volume or of a bound that a method may leave, in widths of the box.
 ALLOWED = 1e-4
@@ -46,19 +48,21 @@ def budget_of(case: Case, method: str, quick: bool) -> int:
     return (WITHOUT_DERIVATIVE if method == "COBYLA" else BUDGET)[case.size]
 
 
-def run(case: Case, method: str, budget: int) -> dict[str, Any]:
+def run(comm: MPI.Comm, case: Mapping[str, Any], method: str, budget: int) -> dict[str, Any]:
     """Minimise once.
 
     Args:
-        case: The problem.
+        comm: Communicator of one rank.
+        case: The problem, the fields of a `Case`.
         method: One of `METHODS`.
         budget: Most evaluations.
 
     Returns:
         What it found, why it stopped, and a row for every evaluation.
     """
+    posed = Case(**case)
     adaptive = method == "bundle, adaptive states"
-    book = Book(case, budget, AdaptiveTolerance()) if adaptive else Book(case, budget)
+    book = Book(comm, posed, budget, AdaptiveTolerance() if adaptive else STATES)
     stop = "budget spent"
     with suppress(Spent), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of trust-constr, about steps without curvature
@@ -67,9 +71,9 @@ def run(case: Case, method: str, budget: int) -> dict[str, Any]:
     best = _best(book)
     # What is compared keeps every constraint: the smallest violation would pay.
     design = nearest_feasible(book.designs[best], book.bounds, book.constraints)
-    value = Book(case, 1).value(design)
+    value = Book(comm, posed, 1).value(design)
     return {
-        "case": case.name, "objective": case.objective, "method": method, "stop": stop,
+        "case": posed.name, "objective": posed.objective, "method": method, "stop": stop, "grading": GRADING,
         "evaluations": len(book.rows), "best_evaluation": best + 1,
         "invalid": int(sum(np.isnan(row[0]) for row in book.rows)),
         "value_claimed": book.rows[best][0], "value": value, "violation": book.rows[best][1],

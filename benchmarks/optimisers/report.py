@@ -1,7 +1,9 @@
-"""The page and the picture of the study."""
+"""The study: its jobs, its page and its picture."""
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +13,11 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
-from benchmarks.optimisers.measuring import ALLOWED
-from fenics_contact.study.words import table
+from benchmarks.optimisers.measuring import ALLOWED, FULL, METHODS, QUICK, budget_of
+from benchmarks.study import ROOT, Records, Study, found
+from fenics_contact.io import versions, write_json, write_text
+from fenics_contact.study.runner import Job
+from fenics_contact.study.tables import table
 
 LOOKS = {
     "bundle": ("#0072b2", "o", "-"),
@@ -32,7 +37,7 @@ INTRODUCTION = """\
 The shape of a chain link's crown: 28 control points, the volume may not fall, friction between the links.
 All methods get the same function, the same start, the same box and the same row for the volume; SciPy's get
 them from `fenics_contact.optimize.ForScipy`, which scales variables and values. Written by
-`python -m benchmarks.optimisers`.
+`python -m benchmarks optimisers`.
 
 ![How close to the best, by evaluations and by products](optimisers.png)
 
@@ -54,8 +59,9 @@ with every value, COBYLA takes values alone, without adjoints. States are solved
 
 def page(study: dict[str, Any]) -> str:
     """Return the page of Markdown."""
-    parts = [INTRODUCTION] if "grading" in study else [INTRODUCTION, EQUAL_CELLS]
-    parts.append(QUICK if study["quick"] else CONCLUSIONS)
+    graded = all("grading" in run for run in study["runs"])
+    parts = [INTRODUCTION] if graded else [INTRODUCTION, EQUAL_CELLS]
+    parts.append(FEW if study["quick"] else CONCLUSIONS)
     for case in dict.fromkeys(run["case"] for run in study["runs"]):
         runs = [run for run in study["runs"] if run["case"] == case]
         first = runs[0]
@@ -68,7 +74,7 @@ def page(study: dict[str, Any]) -> str:
 
 #: Of records that do not tell how far cells are graded.
 EQUAL_CELLS = "Measured on links of equal cells and flat facets; those of the demo are graded since.\n"
-QUICK = "A quick run: the budget is a dozen evaluations, and nothing follows from it.\n"
+FEW = "A quick run: the budget is a dozen evaluations, and nothing follows from it.\n"
 
 CONCLUSIONS = """\
 ## What follows
@@ -167,3 +173,39 @@ def _curve(axes: Any, run: dict[str, Any], runs: list[dict[str, Any]]) -> None:
         axis.set_xscale("log")
         axis.grid(True, alpha=0.3)
         axis.spines[["top", "right"]].set_visible(False)
+
+
+HOME = ROOT / "docs" / "studies" / "optimisers"
+
+
+def jobs(quick: bool) -> list[Job]:
+    """Return a job for every problem and method."""
+    return [
+        Job(
+            f"{case.name}, {method}", "benchmarks.optimisers.measuring:run",
+            {"case": asdict(case), "method": method, "budget": budget}, limit=4 * 3600.0,
+        )
+        for case in (QUICK if quick else FULL)
+        for method in METHODS
+        if (budget := budget_of(case, method, quick))
+    ]  # fmt: skip
+
+
+def write(folder: Path, records: Records, quick: bool) -> None:
+    """Write numbers, page and picture; problems of which a method was not measured keep their numbers."""
+    study = {"runs": []} if quick else json.loads((HOME / "results.json").read_text())
+    measured = [found(each[0]) for each in records.values()]
+    runs: list[dict[str, Any]] = []
+    for case in QUICK if quick else FULL:
+        mine = [run for run in measured if run["case"] == case.name]
+        whole = len(mine) == sum(budget_of(case, method, quick) > 0 for method in METHODS)
+        runs += mine if whole else [run for run in study["runs"] if run["case"] == case.name]
+    if records:
+        study = {"runs": runs, "quick": quick, "versions": versions()}
+        write_json(folder / "results.json", study)
+    write_text(folder / "README.md", page(study))
+    plot(folder / "optimisers.png", study["runs"])
+
+
+CODE = (ROOT / "benchmarks" / "cases", Path(__file__).parent)
+study = Study(jobs, write, HOME, CODE)

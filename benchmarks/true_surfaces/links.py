@@ -30,16 +30,16 @@ RUNS: list[tuple[float, float, Discretisation, Geometry]] = [
 
 
 def measured(
-    size: float, grading: float, discretisation: Discretisation, geometry: Geometry
+    comm: MPI.Comm, size: float, grading: float, discretisation: Discretisation, geometry: Geometry
 ) -> dict[str, Any]:
-    """Solve the chain on one mesh."""
+    """Solve the chain on one mesh. Collective."""
     shape = LinkShape(n_around=round(48 * size), n_a=round(8 * size), n_b=round(20 * size), grading=grading)
-    scene = chain(two_links(shape))
+    scene = chain(two_links(shape, comm=comm))
     pairs = [replace(pair, geometry=geometry, discretisation=discretisation) for pair in scene.contacts]
     scene = replace(scene, contacts=pairs)
     boxes = (8, 1, 2) if size < 2 else (16, 2, 4)
     parts = {name: box_partition(body.mesh, boxes) for name, body in scene.bodies.items()}
-    state = solve_scene(scene, MPI.COMM_SELF, partitions=parts, solver=FaceNewton(tolerance=1e-6))
+    state = solve_scene(scene, comm, partitions=parts, solver=FaceNewton(tolerance=1e-6))
     return {
         "size": size,
         "grading": grading,
@@ -52,12 +52,3 @@ def measured(
         "closed": int((state.contact.status > 0).sum()),
         "products": state.solution.products,
     }
-
-
-def links() -> list[dict[str, Any]]:
-    """Return all runs."""
-    found = []
-    for run in RUNS:
-        found.append(measured(*run))
-        print(f"two links, size {run[0]:g}, {run[2]}, {run[3]}: measured", flush=True)
-    return found

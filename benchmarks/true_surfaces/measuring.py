@@ -61,14 +61,14 @@ def errors(
     }
 
 
-def study(name: str, discretisation: Discretisation) -> dict[str, Any]:
-    """Return all measurements of a case."""
+def study(_: MPI.Comm, name: str, discretisation: Discretisation) -> dict[str, Any]:
+    """Return all measurements of a case, by one process."""
     exact = known(name)
     runs = [errors(name, facets, discretisation, exact) for facets in FACETS]
     return {"case": name, "discretisation": discretisation, "exact": exact, "runs": runs}
 
 
-def refined() -> list[dict[str, Any]]:
-    """Return the errors of a plane case for finer and finer slaves."""
+def refined(_: MPI.Comm) -> dict[str, Any]:
+    """Return the errors of a plane case for finer and finer slaves, by one process."""
     name = "disc on a block"
-    return [errors(name, 16, "node", known(name), fineness) for fineness in (1, 2, 4)]
+    return {"runs": [errors(name, 16, "node", known(name), fineness) for fineness in (1, 2, 4)]}

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 from scipy.spatial import cKDTree
 
 from benchmarks.true_surfaces.bodies import seat
@@ -41,8 +42,11 @@ SURFACES: dict[str, Callable[[int], BodyMesh]] = {
 }
 
 
-def gap_errors(name: str) -> dict[str, Any]:
-    """Return errors of gaps on all meshes of a surface, root mean squares, and their order, by way."""
+def gap_errors(_: MPI.Comm, name: str) -> dict[str, Any]:
+    """Return errors of gaps on all meshes of a surface, root mean squares, and their order, by way.
+
+    By one process.
+    """
     build = SURFACES[name]
     meshes = [build(cells) for cells in CELLS]
     points, normals, gaps = _near(build(NOT_NESTED))

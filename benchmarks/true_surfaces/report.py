@@ -1,12 +1,19 @@
-"""The page of the study."""
+"""The study: its jobs and its page."""
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
-from benchmarks.true_surfaces.measuring import WAYS
-from benchmarks.true_surfaces.orders import CELLS
-from fenics_contact.study.words import table
+from benchmarks.study import ROOT, Records, Study, found
+from benchmarks.true_surfaces.cases import CASES
+from benchmarks.true_surfaces.links import RUNS
+from benchmarks.true_surfaces.measuring import BY_MORTAR, WAYS
+from benchmarks.true_surfaces.orders import CELLS, SURFACES
+from fenics_contact.io import write_json, write_text
+from fenics_contact.study.runner import Job
+from fenics_contact.study.tables import table
 
 NAMES = {"faceted": "facets", "reconstructed": "reconstructed", "best": "true"}
 
@@ -17,7 +24,7 @@ A mesh knows a round surface by flat facets, which lie up to h²/8R inside it. B
 not small beside what closes. Here the same meshes, points and multipliers are solved with gaps measured
 between the flat facets (`ContactPair(geometry="faceted")`), between surfaces reconstructed from the nodes
 (`"reconstructed"`), and between the true surfaces that the meshes carry (`"best"`). Written by
-`make study-surfaces`, which runs `python -m benchmarks.true_surfaces`.
+`make study-surfaces`, which runs `python -m benchmarks true_surfaces`.
 
 - *facets*: equal ones around a quarter of the circle of the master, a round body; *on the contact*: how many
   of them lie between its middle and its rim.
@@ -121,3 +128,59 @@ def _links(runs: list[dict[str, Any]]) -> str:
         for run in runs
     ]  # fmt: skip
     return table((*head, "area [mm²]", "closed points", "F-products"), rows) + "\n"
+
+
+HOME, NAME = ROOT / "docs" / "studies", "true_surfaces"
+#: Of the jobs of the links, by which the record knows them, too.
+_LINK = ("size", "grading", "discretisation", "geometry")
+#: Most seconds that a job may take.
+LIMIT = 7200.0
+
+
+def jobs(quick: bool) -> list[Job]:
+    """Return a job for every case, every chain and every surface; the quick study has plane cases alone."""
+    room = "benchmarks.true_surfaces"
+    cases = [
+        Job(
+            f"case {name}, {way}", f"{room}.measuring:study", {"name": name, "discretisation": way},
+            limit=LIMIT,
+        )
+        for name in CASES
+        for way in (("node", "mortar") if name in BY_MORTAR else ("node",))
+    ]  # fmt: skip
+    if quick:
+        return [job for job in cases if "disc" in job.name or "shaft" in job.name]
+    links = [
+        Job(
+            f"link {', '.join(map(str, run))}", f"{room}.links:measured", dict(zip(_LINK, run, strict=True)),
+            limit=LIMIT,
+        )
+        for run in RUNS
+    ]  # fmt: skip
+    gaps = [Job(f"gap {name}", f"{room}.orders:gap_errors", {"name": name}) for name in SURFACES]
+    return [*cases, Job("refined", f"{room}.measuring:refined", limit=LIMIT), *gaps, *links]
+
+
+def write(folder: Path, records: Records, quick: bool) -> None:
+    """Write numbers and page; what was not measured keeps its numbers. Only the full study has a page."""
+    new = {name: found(measured[0]) for name, measured in records.items()}
+    if quick:
+        write_json(folder / f"{NAME}.json", new)
+        return
+    before = json.loads((HOME / f"{NAME}.json").read_text())
+    parts: dict[str, list[Any]] = {"cases": [], "refined": [], "gaps": [], "links": []}
+    known = {f"case {case['case']}, {case['discretisation']}": case for case in before["cases"]}
+    known |= {f"gap {each['surface']}": each for each in before["gaps"]}
+    known |= {f"link {', '.join(str(each[name]) for name in _LINK)}": each for each in before["links"]}
+    known |= new
+    for job in jobs(quick):
+        kind = job.name.partition(" ")[0]
+        if job.name in known and kind != "refined":
+            parts[f"{kind}s"].append(known[job.name])
+    parts["refined"] = known.get("refined", {"runs": before["refined"]})["runs"]
+    if records:
+        write_json(folder / f"{NAME}.json", parts)
+    write_text(folder / f"{NAME}.md", page(parts))
+
+
+study = Study(jobs, write, HOME, (Path(__file__).parent,))

@@ -23,9 +23,7 @@ from fenics_contact.study import (
     Settings,
     StudyPlan,
     Sweep,
-    collected,
     find_study,
-    measure_all,
     prepare,
     write_overview,
     write_report,
@@ -33,7 +31,7 @@ from fenics_contact.study import (
 
 ABOUT = (
     f"Measure what accuracy costs in time. SCENE is one of {options.NAMES}, or a Python file that defines "
-    "`study`, a fenics_contact.study.StudyScene. Results, table, figures and advice are written to a folder; "
+    "`study`, a fenics_contact.study.StudyScene. Results, tables and figures are written to a folder; "
     "what was measured already is not measured again. Runs have processes of their own: ask for ranks with "
     "--ranks."
 )
@@ -125,7 +123,7 @@ def accuracy(
         words = _report(plan, folder, figures=not no_figures)
     if page:
         write_overview(folder.parent)
-    desk.say("\n".join([*words, f"results in {folder}/"]))
+    desk.say(f"{words}\nresults in {folder}/")
     if status:
         raise typer.Exit(status)
 
@@ -137,8 +135,8 @@ def _given(values: Sequence[Any] | None) -> Any:
     return tuple(value for value in values if value not in (None, options.NOTHING))
 
 
-def _report(plan: StudyPlan, folder: Path, *, figures: bool) -> Sequence[str]:
-    results = collected(plan)
+def _report(plan: StudyPlan, folder: Path, *, figures: bool) -> str:
+    results = plan.collected()
     if not results.good:
         reasons = "".join(f"\n  {run.failed}" for run in results.runs[:3])
         raise InvalidInputError(
@@ -151,7 +149,7 @@ def _report(plan: StudyPlan, folder: Path, *, figures: bool) -> Sequence[str]:
 def _measure(plan: StudyPlan) -> int:
     """Measure; return 0, or the exit code of an interrupted program."""
     try:
-        measure_all(plan)
+        plan.measure()
     except (KeyboardInterrupt, Terminated) as stop:
         complain("interrupted: what is done is kept, and the same command goes on from there\n")
         return 143 if isinstance(stop, Terminated) else 130

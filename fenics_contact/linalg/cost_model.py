@@ -1,7 +1,7 @@
 """Sparse factors or dense matrices for a subdomain? What either costs, from measured rates.
 
 The choice depends on sizes alone, never on a clock, so that a run can be repeated. `python -m
-benchmarks.profile --prices` measures anew and compares with the predictions.
+benchmarks.prices` measures anew and compares with the predictions.
 """
 
 from __future__ import annotations

@@ -7,13 +7,13 @@ of one's own is a Python file that defines ``study``, a `StudyScene`.
 from __future__ import annotations
 
 from fenics_contact.study.errors import Errors
-from fenics_contact.study.overview import write_overview
 from fenics_contact.study.parameters import BALANCED, DISCRETISATIONS, Parameters, RunTolerance, Sweep
 from fenics_contact.study.protocol import Outcome, Problem, Quantity, StudyScene
-from fenics_contact.study.report import write_report
+from fenics_contact.study.report import write_overview, write_report
 from fenics_contact.study.results import Results, Run, read_study
-from fenics_contact.study.running import Settings, StudyPlan, collected, measure_all, prepare, run_study
+from fenics_contact.study.running import Settings, StudyPlan, prepare, run_study
 from fenics_contact.study.scenes import BUILT_IN, find_study
+from fenics_contact.study.tables import accuracy_table, cost_table
 
 __all__ = [
     "BALANCED",
@@ -31,9 +31,9 @@ __all__ = [
     "StudyPlan",
     "StudyScene",
     "Sweep",
-    "collected",
+    "accuracy_table",
+    "cost_table",
     "find_study",
-    "measure_all",
     "prepare",
     "read_study",
     "run_study",

@@ -62,6 +62,18 @@ class Parameters:
         """Return the settings by name, as JSON knows them."""
         return asdict(self)
 
+    def __str__(self) -> str:
+        """Return the settings in a few words."""
+        words = [f"size {self.size}", self.cell, self.discretisation, self.tolerance_words]
+        words += [] if self.solver == "newton" else [self.solver]
+        words += [] if self.subdomains is None else [f"{self.subdomains} subdomains"]
+        return ", ".join(words)
+
+    @property
+    def tolerance_words(self) -> str:
+        """The tolerance as tables and axes show it."""
+        return str(self.tolerance) if isinstance(self.tolerance, str) else f"{self.tolerance:.0e}"
+
     def differences(self, other: Parameters) -> tuple[str, ...]:
         """Name the settings in which two runs differ."""
         mine, theirs = self.as_dict(), other.as_dict()

@@ -1,18 +1,54 @@
-"""Everything that a study leaves: results, table, figures."""
+"""Everything that a study leaves: results, table, figures; and the page of all studies."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from fenics_contact.study.advice import advice
-from fenics_contact.study.certificates import check_certificates
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.io import write_text
+from fenics_contact.study.certificates import CertificateCheck, check_certificates
 from fenics_contact.study.errors import Errors
-from fenics_contact.study.results import Results, write_results
-from fenics_contact.study.table import write_table
-from fenics_contact.study.waste import waste
+from fenics_contact.study.results import Results, Run, read_study, write_results
+from fenics_contact.study.tables import SETTINGS, accuracy_table, cost_table, settings, table
+
+PICTURES = ("accuracy", "convergence", "parts", "phases")
+
+GUIDE = """\
+# What accuracy costs in time
+
+Written by `make studies`, which runs `python -m fenics_contact accuracy SCENE` for every scene; all numbers
+are from the `study.json` beside the figures. Every run is a process of its own; a time is that from the
+mesh to the state.
+
+## How to read the figures and tables
+
+**`accuracy.png`**: error against time, both logarithmic, for every quantity; further left is faster,
+further down is better. Along a line only the mesh becomes finer. The dashed line with rings is the Pareto
+front: for everything above it some other run is both faster and more accurate. Two lines on top of each
+other say that the setting in which they differ does not matter; a line far above the others, that it does.
+
+**`convergence.png`**: the same errors against the mesh size, with the slope that theory gives as a dashed
+line. The last panel shows the estimate that every state carries of its own error in energy norm. A quantity
+is compared with theory or with far finer meshes where there are such, else with the limit of the meshes
+(Richardson's extrapolation of the three finest), and where they do not converge monotonically with the last.
+
+**`parts.png`**: what the error consists of: mesh (an estimate), solver (a certificate; with Coulomb's law
+for the slip bounds of the state; true errors are marked by crosses), and law of friction (an estimate).
+Left, at the balanced tolerance, the solver's part must stay below a tenth of that of the mesh; right it is
+seen how a tolerance changes the solver's part alone.
+
+**`phases.png`**: where the time goes.
+
+**What an accuracy takes**: the fastest run that reaches it and whose finer and stricter companions all reach
+it, too: an error that passes through zero is no merit. Times that differ by less than a tenth count as
+equal. Where no run reaches it, the finest one is shown.
+
+**What a setting costs**: runs that differ from each other in one setting alone, on the finest mesh that both
+have; ratios above one are dearer.
+"""
 
 
-def write_report(folder: str | Path, results: Results, *, figures: bool = True) -> list[str]:
+def write_report(folder: str | Path, results: Results, *, figures: bool = True) -> str:
     """Write ``study.json``, ``table.md`` and the figures of a study, also of one that is not complete.
 
     Args:
@@ -21,18 +57,133 @@ def write_report(folder: str | Path, results: Results, *, figures: bool = True) 
         figures: Whether to draw; needs matplotlib.
 
     Returns:
-        The advice, one sentence each.
+        What an accuracy takes and what a setting costs, as Markdown.
     """
     target, errors = Path(folder), Errors(results)
-    words, check = [*advice(errors), *waste(errors)], check_certificates(results)
-    findings = {"references": errors.references, "advice": words, "certificates": check}
+    findings = {"references": errors.references, "certificates": check_certificates(results)}
     write_results(target / "study.json", results, findings)
-    write_table(target / "table.md", errors, words, check)
+    write_text(target / "table.md", table_page(errors))
     if figures and results.good:
         from fenics_contact.study import figures as drawing  # needs matplotlib
 
-        drawing.plot_accuracy(errors, target / "accuracy.png")
-        drawing.plot_convergence(errors, target / "convergence.png")
-        drawing.plot_parts(errors, target / "parts.png")
-        drawing.plot_phases(errors, target / "phases.png")
-    return words
+        for picture in PICTURES:
+            getattr(drawing, f"plot_{picture}")(errors, target / f"{picture}.png")
+    return _answers(errors)
+
+
+def write_overview(folder: str | Path) -> Path:
+    """Write `README.md` of a folder that holds studies, each in a folder of its own.
+
+    Args:
+        folder: The folder.
+
+    Raises:
+        InvalidInputError: If it holds no study.
+    """
+    target = Path(folder) / "README.md"
+    write_text(target, overview_page(Path(folder)))
+    return target
+
+
+def overview_page(folder: Path) -> str:
+    """Return the page of all studies in a folder; raises as `write_overview` does."""
+    found = sorted(folder.glob("*/study.json"))
+    if not found:
+        raise InvalidInputError(
+            f"a page of studies needs some, {folder} holds none: run a study into it first"
+        )
+    parts = [GUIDE]
+    for file in found:
+        errors, name = Errors(read_study(file)), file.parent.name
+        pictures = "\n".join(f"![{picture}]({name}/{picture}.png)" for picture in PICTURES)
+        more = f"[All {len(errors.results.runs)} runs]({name}/table.md).\n"
+        parts += [_title(errors, 2), pictures + "\n", _answers(errors), rates_table(errors)]
+        parts += [_certificates(check_certificates(errors.results)), more]
+    return "\n".join(parts)
+
+
+def table_page(errors: Errors) -> str:
+    """Return ``table.md``: what was found, and every run."""
+    check = check_certificates(errors.results)
+    parts = [_title(errors, 1), _measured(errors.results), _answers(errors), "## Rates\n"]
+    parts += [rates_table(errors), "## Certificates\n", _certificates(check), "## Runs\n", _runs(errors)]
+    failed = [f"- {run.parameters}: {_short(run.failed)}" for run in errors.results.runs if run.failed]
+    return "\n".join([*parts, "## Failed runs\n", *failed, ""] if failed else parts)
+
+
+def _title(errors: Errors, level: int) -> str:
+    return f"{'#' * level} {errors.results.scene.title}\n\n{errors.results.scene.about}\n"
+
+
+def _measured(results: Results) -> str:
+    """Say how it was measured."""
+    repeats = sorted({run.repeats for run in results.good}) or [0]
+    load = max((run.load_average for run in results.good), default=0.0)
+    between = f"{repeats[0]} to {repeats[-1]}" if len(repeats) > 1 else f"{repeats[0]}"
+    return (
+        f"{len(results.good)} runs of {len(results.runs)} have an answer, each on {results.ranks} "
+        f"rank{'s' if results.ranks > 1 else ''} in a process of its own. Times are from the mesh to the "
+        f"state, the median of {between} repeats; the machine's load over the minute before a run was "
+        f"{load:.1f} at most.\n"
+    )
+
+
+def _answers(errors: Errors) -> str:
+    """Return what an accuracy takes and what a setting costs."""
+    return (
+        f"**What an accuracy takes** (size: {errors.results.scene.size_name})\n\n{accuracy_table(errors)}\n\n"
+        f"**What a setting costs**\n\n{cost_table(errors)}\n"
+    )
+
+
+def rates_table(errors: Errors) -> str:
+    """Tell, for each quantity, what it is compared with and how fast its error falls, beside theory."""
+    strict = errors.strictest(errors.results.base)
+    head, body = ("quantity", "compared with", "value", "rate found", "rate of theory"), []
+    for quantity in errors.results.scene.quantities:
+        reference = errors.references[quantity.name]
+        kind = reference.kind + (f": {reference.note}" if reference.note else "")
+        value = f"{reference.value:.6g} {quantity.unit}" if isinstance(reference.value, float) else ""
+        found, theory = errors.rate(strict, quantity.name), quantity.rate
+        body.append((quantity.name, kind, value, _number(found), _number(theory)))
+    found, theory = errors.estimate_rate(strict), errors.results.scene.energy_rate
+    body.append(("error of the displacement", "its own estimate", "", _number(found), _number(theory)))
+    return f'{table(head, body)}\n\nOf the runs that differ from "{strict}" in size alone.\n'
+
+
+def _certificates(check: CertificateCheck) -> str:
+    if check.smallest_factor is None or check.largest_factor is None:
+        return f"The certificate of the solver's error is not known in {check.unknown} runs.\n"
+    words = (
+        f"The certificate of the solver's error lies between {check.smallest_factor:.2f} and "
+        f"{check.largest_factor:.2f} times the true error in {check.checked} runs; "
+    )
+    words += f"of {check.unknown} runs it is not known.\n" if check.unknown else "it is known of every run.\n"
+    return words + "".join(f"- Broken: {line}.\n" for line in check.broken)
+
+
+def _runs(errors: Errors) -> str:
+    names = [quantity.name for quantity in errors.results.scene.quantities]
+    head = (*SETTINGS, "unknowns", "products", "s", "MiB", *(f"{name}, error" for name in names))
+    head = (*head, "solver's error ≤", "true", "friction", "mesh")
+    return table(head, [_row(errors, run, names) for run in errors.results.good]) + "\n"
+
+
+def _row(errors: Errors, run: Run, names: list[str]) -> tuple[str, ...]:
+    counts, parts = run.counts or {}, run.parts or {}
+    true = (run.true_errors or {}).get("algebraic")
+    relative = [errors.of(run, name) for name in names]
+    relative += [parts.get("algebraic"), true, parts.get("friction"), parts.get("discretisation")]
+    return (
+        *settings(run), *(str(counts.get(name, "")) for name in ("torn_unknowns", "f_products")),
+        f"{run.seconds:.2f}", "" if run.memory is None else f"{run.memory / 2**20:.0f}",
+        *("" if value is None else f"{value:.1e}" for value in relative),
+    )  # fmt: skip
+
+
+def _short(reason: str) -> str:
+    return " ".join(reason.split())[:300]
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.2f}"

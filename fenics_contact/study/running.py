@@ -1,30 +1,24 @@
-"""Run a study: every run that is not there yet, repeated, kept as soon as it is done."""
+"""Run a study: every set of parameters that is not measured yet, in a process of its own."""
 
 from __future__ import annotations
 
-import logging
-import statistics
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from time import perf_counter
-from typing import Any, TextIO
+from typing import TextIO
 
 from fenics_contact.io import versions
-from fenics_contact.launching import launcher
-from fenics_contact.progress import show_progress
-from fenics_contact.study.launching import Record, Task, measure
 from fenics_contact.study.parameters import Parameters, Sweep
-from fenics_contact.study.progress import Progress, described
 from fenics_contact.study.protocol import StudyScene
 from fenics_contact.study.results import Results, Run
-from fenics_contact.study.scenes import find_study
-from fenics_contact.study.store import Store, fingerprint
+from fenics_contact.study.runner import Job, Record, Store, fingerprint, measure_all, summarised
+from fenics_contact.study.scenes import find_study, scene_file
 
-#: A run that takes longer is measured once: what disturbs short ones matters little to it.
+#: A run that takes longer, [s], is measured once.
 SHORT = 10.0
-
-logger = logging.getLogger(__name__)
+_PACKAGE = Path(__file__).resolve().parents[1]
+#: Modules of this part that change numbers of a run.
+_MEASURING = {"measuring.py", "parameters.py", "solving.py", "true_error.py", "worker.py"}
 
 
 @dataclass(frozen=True)
@@ -73,8 +67,8 @@ def run_study(
         MissingRequirementError: If several ranks are asked for and there is no mpirun.
     """
     plan = prepare(scene, runs, sweep=sweep, settings=settings)
-    measure_all(plan, stream)
-    return collected(plan)
+    plan.measure(stream)
+    return plan.collected()
 
 
 @dataclass(frozen=True)
@@ -84,16 +78,40 @@ class StudyPlan:
     Attributes:
         study: The scene.
         base: Settings around which one at a time is varied.
-        tasks: All runs, coarse ones first.
+        jobs: All runs, coarse ones first.
         store: Where measurements are kept, marked with the code as it was at the start.
-        settings: Ranks, repeats, limits.
+        ranks: MPI ranks of every run.
     """
 
     study: StudyScene
     base: Parameters
-    tasks: tuple[Task, ...]
+    jobs: Mapping[Parameters, Job]
     store: Store
-    settings: Settings
+    ranks: int
+
+    def measure(self, stream: TextIO | None = None) -> None:
+        """Measure what is missing; progress is told on a stream, stderr by default."""
+        jobs, title = tuple(self.jobs.values()), self.study.title
+        measure_all(jobs, self.store, title=title, warm_up=self._warm_up(), stream=stream)
+
+    def collected(self) -> Results:
+        """Return what has been measured so far."""
+        found = {parameters: self.store.records(job) for parameters, job in self.jobs.items()}
+        runs = tuple(_joined(parameters, records) for parameters, records in found.items() if records)
+        what = {**versions(), "code": self.store.mark}
+        return Results(self.study.facts, self.ranks, runs, self.base, what)
+
+    def _warm_up(self) -> Sequence[Job]:
+        """Return one run of each kind of those that are missing, on the smallest mesh."""
+        smallest = min(parameters.size for parameters in self.jobs)
+        kinds = {
+            (parameters.cell, parameters.balanced): replace(
+                job, arguments=_arguments(job, replace(parameters, size=smallest, subdomains=None))
+            )
+            for parameters, job in self.jobs.items()
+            if self.store.missing(job, 0)
+        }
+        return tuple(kinds.values())
 
 
 def prepare(
@@ -106,99 +124,38 @@ def prepare(
     """
     study, settings = find_study(scene), settings or Settings()
     chosen = sweep or study.sweep
-    tasks = [Task(scene, run, settings.ranks, settings.verify, settings.limit) for run in chosen.runs()]
-    store = Store(Path(runs), fingerprint(scene))
-    return StudyPlan(study, chosen.base, tuple(tasks), store, settings)
-
-
-def collected(plan: StudyPlan) -> Results:
-    """Return what has been measured of a study so far."""
-    found = [(task, _repeats(task, plan.store, plan.settings.repeats)) for task in plan.tasks]
-    runs = tuple(_joined(task.parameters, repeats) for task, repeats in found if repeats)
-    what = {**versions(), "code": plan.store.mark}
-    return Results(plan.study.facts, plan.settings.ranks, runs, plan.base, what)
-
-
-def _repeats(task: Task, store: Store, most: int) -> list[Record]:
-    """Return the measurements of a run, also a failure that may not happen again."""
-    found = [store.read(task, repeat, transient=repeat == 0) for repeat in range(most)]
-    return [record for record in found if record is not None] if found[0] is not None else []
-
-
-def measure_all(plan: StudyPlan, stream: TextIO | None = None) -> None:
-    """Measure what is missing.
-
-    Args:
-        plan: The study.
-        stream: Where progress is told; stderr by default.
-    """
-    launcher(plan.settings.ranks)  # refuses ranks that cannot be started
-    # A run is repeated only after all others were measured: load that lasts a while hits no run alone.
-    for repeat in range(plan.settings.repeats):
-        wanted = [task for task in plan.tasks if _wanted(task, plan.store, repeat)]
-        if not wanted:
-            continue
-        if repeat == 0:
-            _warm_up(wanted, min(task.parameters.size for task in plan.tasks))
-        title = plan.study.title
-        words = title if repeat == 0 else f"{title}, repeat {repeat + 1}"
-        with show_progress(stream=stream), Progress([task.parameters for task in wanted], words) as progress:
-            for task in wanted:
-                progress.begin(task.parameters)
-                _measure(task, plan.store, repeat, progress)
-
-
-def _measure(task: Task, store: Store, repeat: int, progress: Progress) -> None:
-    start = perf_counter()
-    record = measure(replace(task, verify=task.verify and repeat == 0))
-    store.write(task, repeat, record)
-    failed = record.get("failed")
-    words = f"failed: {failed['message']}" if failed else f"{record['seconds']:.2f} s"
-    progress.done(task.parameters, perf_counter() - start, words)
-
-
-def _wanted(task: Task, store: Store, repeat: int) -> bool:
-    """Tell whether a measurement is missing and makes sense."""
-    if store.read(task, repeat) is not None:
-        return False
-    if repeat == 0:
-        return True
-    first = store.read(task, 0)
-    return first is not None and "failed" not in first and first["seconds"] < SHORT
-
-
-def _warm_up(tasks: Sequence[Task], size: int) -> None:
-    """Compile the forms of all kinds of runs on the smallest mesh: measured runs find them on the disk."""
-    smallest = {
-        (task.parameters.cell, task.parameters.balanced): replace(
-            task, parameters=replace(task.parameters, size=size, subdomains=None)
-        )
-        for task in tasks
+    common = Job(
+        "", f"{__package__}.measuring:measured", {"scene": scene}, {"verify": settings.verify},
+        ranks=settings.ranks, repeats=settings.repeats, short=SHORT, limit=settings.limit,
+    )  # fmt: skip
+    jobs = {
+        run: replace(common, name=str(run), arguments=_arguments(common, run), weight=float(run.size**2))
+        for run in chosen.runs()
     }
-    for task in smallest.values():
-        logger.info("warm-up: %s", described(task.parameters))
-        measure(task)
+    return StudyPlan(study, chosen.base, jobs, Store(Path(runs), fingerprint(_code(scene))), settings.ranks)
 
 
-def _joined(parameters: Parameters, repeats: Sequence[Record]) -> Run:
+def _arguments(job: Job, parameters: Parameters) -> dict[str, object]:
+    return {**job.arguments, "parameters": parameters.as_dict()}
+
+
+def _code(scene: str) -> list[Path]:
+    """Return the files that a run executes: pictures change no number of it."""
+    rooms = [room for room in _PACKAGE.iterdir() if room.is_dir() and room.name not in ("study", "viz")]
+    executed = [path for room in rooms for path in room.rglob("*.py")]
+    executed += [_PACKAGE / "study" / name for name in _MEASURING]
+    return [*executed, scene_file(scene) or _PACKAGE / "study" / "scenes" / f"{scene}.py"]
+
+
+def _joined(parameters: Parameters, records: Sequence[Record]) -> Run:
     """Return what is known of a run from all its measurements."""
-    first = repeats[0]
-    if "failed" in first:
-        return Run(parameters, failed=f"{first['failed']['kind']}: {first['failed']['message']}")
-    good = [record for record in repeats if "failed" not in record]
-    middle = sorted(good, key=lambda record: float(record["seconds"]))[(len(good) - 1) // 2]
-    known: dict[str, Any] = {
-        name: first.get(name) for name in ("counts", "residual", "quantities", "parts", "true_errors")
-    }
-    memory = [record["memory"] for record in good if record["memory"]]
-    return Run(
-        parameters,
-        seconds=float(statistics.median(record["seconds"] for record in good)),
-        spread=(min(record["seconds"] for record in good), max(record["seconds"] for record in good)),
-        repeats=len(good),
-        phases=middle["phases"],
-        phases_after=middle["phases_after"],
-        memory=max(memory) if memory else None,
-        load_average=max(record["load_average"] for record in good),
-        **known,
-    )
+    if "failed" in records[0]:
+        failed = records[0]["failed"]
+        return Run(parameters, failed=f"{failed['kind']}: {failed['message']}")
+    good = [record for record in records if "failed" not in record]
+    seconds = [record["seconds"] for record in good]
+    one = summarised(str(parameters), good) | {"parameters": parameters}
+    one["spread"] = (min(seconds), max(seconds))
+    one["memory"] = max(record["memory"] or 0 for record in good) or None
+    one["load_average"] = max(record["load_average"] for record in good)
+    return Run(**{each.name: one[each.name] for each in fields(Run) if each.name in one})

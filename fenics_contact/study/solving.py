@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,6 @@ from fenics_contact.scene import Scene
 from fenics_contact.shape import ShapeProblem, TotalPotential
 from fenics_contact.study.parameters import Parameters
 from fenics_contact.study.protocol import Problem
-from fenics_contact.timing import PhaseTimer
 
 
 def solve_problem(problem: Problem, parameters: Parameters, comm: MPI.Comm) -> tuple[State, ...]:
@@ -81,11 +79,3 @@ def slowest(comm: MPI.Comm, timer_seconds: Mapping[str, float]) -> dict[str, flo
     spent = np.array([timer_seconds.get(name, 0.0) for name in names])
     comm.Allreduce(MPI.IN_PLACE, spent, op=MPI.MAX)
     return dict(zip(names, spent.tolist(), strict=True))
-
-
-def build_problem(build: Any, parameters: Parameters, comm: MPI.Comm, timer: PhaseTimer) -> Problem:
-    """Build the problem and note how long that took. Collective."""
-    with timer.phase("mesh"):
-        problem = build(parameters, comm)
-    assert isinstance(problem, Problem)
-    return problem

@@ -1,43 +1,33 @@
-"""One run in a process of its own: solve, measure, compare with the exact answer of the same mesh."""
+"""The program of one run: calls a function on all ranks and leaves its record."""
 
 from __future__ import annotations
 
+import importlib
 import json
 import sys
 import traceback
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
-import numpy as np
-
-from fenics_contact import _dolfinx
 from fenics_contact._libraries import MPI, start
-from fenics_contact.contact import State, Status
 from fenics_contact.errors import FenicsContactError
 from fenics_contact.io import write_json
-from fenics_contact.study.memory import peak_memory
-from fenics_contact.study.parameters import Parameters, parameters_from
-from fenics_contact.study.protocol import Outcome, Quantity, StudyScene, Value
-from fenics_contact.study.scenes import find_study
-from fenics_contact.study.solving import build_problem, gradient_of, reached, slowest, solve_problem
-from fenics_contact.study.true_error import true_errors
-from fenics_contact.timing import PhaseTimer
 
 
-def main(comm: MPI.Comm, arguments: list[str] | None = None) -> None:
+def main(comm: MPI.Comm | None, arguments: list[str] | None = None) -> None:
     """Do what the JSON object of the command line asks for and write the record. Collective.
 
-    Keys: ``scene`` (as for `find_study`), ``parameters``, ``file`` (of the record) and ``verify``.
+    Keys: ``function`` and ``arguments`` as in `runner.Job`, and ``file`` of the record. Loading libraries is
+    no part of what the function measures, and its memory is told apart.
     """
     task = json.loads((sys.argv[1:] if arguments is None else arguments)[0])
     try:
-        record = measured(
-            find_study(task["scene"]), parameters_from(task["parameters"]), comm, task["verify"]
-        )
+        record = _called(comm, task["function"], task["arguments"])
     except FenicsContactError as error:  # raised by all ranks together
         record = {"failed": {"kind": type(error).__name__, "message": str(error)}}
     except Exception:
+        if comm is None:
+            raise
         # Other ranks may wait in a collective call that this one will never reach.
         traceback.print_exc()
         sys.stderr.flush()
@@ -45,77 +35,24 @@ def main(comm: MPI.Comm, arguments: list[str] | None = None) -> None:
     write_json(Path(task["file"]), record, comm=comm)
 
 
-def measured(study: StudyScene, parameters: Parameters, comm: MPI.Comm, verify: bool) -> dict[str, Any]:
-    """Run once and return everything that is known of it. Collective.
+def _called(comm: MPI.Comm | None, function: str, arguments: dict[str, Any]) -> dict[str, Any]:
+    module, _, name = function.partition(":")
+    call = getattr(importlib.import_module(module), name)
+    if comm is not None:
+        start(comm)
+    imports = peak_memory()
+    record = {"ranks": 1 if comm is None else comm.size, **call(comm, **arguments)}
+    both = (peak_memory(), imports)
+    peak, imports = both if comm is None else (comm.allreduce(bytes_) for bytes_ in both)
+    return {**record, "peak_memory": peak, "import_memory": imports}
 
-    Args:
-        study: The scene.
-        parameters: The settings.
-        comm: Communicator.
-        verify: Whether to look for errors too, not only for seconds.
+
+def peak_memory() -> int:
+    """Return the largest resident memory of this process so far, [byte]; 0 where nobody keeps it.
+
+    Linux keeps it by address space; `resource.getrusage` would also count what the process was before it
+    became this program. Pages that ranks share are counted on each of them.
     """
-    start(comm)  # loading libraries is no part of a run
-    _dolfinx.release()
-    comm.Barrier()
-    began, timer = perf_counter(), PhaseTimer()
-    problem = build_problem(study.build, parameters, comm, timer)
-    states = solve_problem(problem, parameters, comm)
-    seconds = comm.allreduce(perf_counter() - began, op=MPI.MAX)
-    memory = comm.allreduce(peak_memory() or 0)
-    gradient, after, gradient_products = gradient_of(problem, states[-1])
-    record: dict[str, Any] = {
-        "seconds": seconds,
-        "phases": slowest(comm, {**timer.seconds, **states[-1].seconds}),
-        "phases_after": slowest(comm, after),
-        "memory": memory or None,
-    }
-    if not verify:
-        return record
-    outcome = Outcome(problem, states, parameters, gradient)
-    return record | {
-        "counts": _counts(states) | {"gradient_products": gradient_products},
-        "residual": reached(states[-1]),
-        "quantities": {quantity.name: _quantity(quantity, outcome) for quantity in study.quantities},
-        "parts": error_parts(states[-1]),
-        "true_errors": true_errors(states),
-    }
-
-
-def error_parts(state: State) -> dict[str, float | None]:
-    """Return the three parts of a state's error, relative to its energy norm. Collective."""
-    errors = state.errors
-    parts = {name: float(getattr(errors, name)) for name in ("algebraic", "friction", "discretisation")}
-    # Where no admissible pair was found the bound is infinite, which JSON does not know.
-    return {name: value if np.isfinite(value) else None for name, value in parts.items()}
-
-
-def _counts(states: tuple[State, ...]) -> dict[str, int]:
-    """Return sizes of the last state and the work of all."""
-    counts = dict(states[-1].counts)
-    for name in ("f_products", "solver_steps"):
-        counts[name] = sum(state.counts[name] for state in states)
-    return counts | {status.name.lower(): states[-1].contact.count(status) for status in Status}
-
-
-def _quantity(quantity: Quantity, outcome: Outcome) -> dict[str, Any] | None:
-    """Return a quantity with its exact value where there is one; None where the run does not know it.
-
-    Of several numbers with an exact answer only the norms and the norm of the difference are kept: their
-    places may differ from mesh to mesh.
-    """
-    value = np.asarray(quantity.value(outcome), dtype=np.float64)
-    if value.size == 0 or not np.all(np.isfinite(value)):
-        return None
-    if quantity.exact is None:
-        return {"value": value.tolist()}
-    known: Value = quantity.exact(outcome) if callable(quantity.exact) else quantity.exact
-    exact = np.asarray(known, dtype=np.float64)
-    scale = float(np.linalg.norm(exact))
-    difference = value - exact
-    error = float(difference) if difference.ndim == 0 else float(np.linalg.norm(difference))
-    measure = float(value) if value.ndim == 0 else float(np.linalg.norm(value))
-    return {
-        "value": measure,
-        "exact": float(exact) if exact.ndim == 0 else scale,
-        "error": error / scale if scale > 0.0 else None,
-    }
+    status = Path("/proc/self/status")
+    lines = status.read_text().splitlines() if status.exists() else []
+    return sum(1024 * int(line.split()[1]) for line in lines if line.startswith("VmHWM:"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from benchmarks.plan import all_runs
+from benchmarks.plan import runs
 from benchmarks.row import Summaries
 
 
@@ -28,7 +28,7 @@ def record(**changes: Any) -> dict[str, Any]:
 
 def all_summaries() -> Summaries:
     """Return a summary of every run."""
-    summaries = Summaries({run.name: record(ranks=run.ranks) for run in all_runs()})
+    summaries = Summaries({run.name: record(ranks=max(1, run.ranks)) for run in runs()})
     refused = record(refused="InfeasibleError", message="not held")
     for key in ("counts", "total_potential", "seconds", "phases", "forces"):
         refused.pop(key)

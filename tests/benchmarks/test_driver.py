@@ -3,40 +3,47 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import json
-import sys
+import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from mpi4py import MPI
 
-from benchmarks import __main__ as driver
-from benchmarks.__main__ import main
+from benchmarks import effects, speed
+from benchmarks.__main__ import STUDIES, main, set_environment
 from benchmarks.cases.chain import cold_state
 from benchmarks.cases.linear_face import solve_face
 from benchmarks.cases.monolithic.elasticity import assemble_block
 from benchmarks.cases.monolithic.linear import solve_linear
 from benchmarks.held import HELD
-from benchmarks.plan import Run, all_runs, chosen
-from benchmarks.running import RunFailed, fingerprint, measure, raw_file, read
-from fenics_contact.launching import finished
+from benchmarks.plan import run, runs
+from benchmarks.study import chosen
+from fenics_contact.study import runner
+from fenics_contact.study.runner import Job, measure
 from tests.benchmarks.small_records import all_summaries
-from tests.conftest import LAUNCH, ROOT
+from tests.conftest import ROOT, read_environment
 
-TINY = ("--counts", "4", "2", "2")
+TINY = {"counts": [4, 2, 2]}
 
 
-def test_every_run_belongs_to_a_case_and_has_a_name_of_its_own() -> None:
-    runs = all_runs()
-    assert len({run.name for run in runs}) == len(runs) > 20
-    cases = Path(__file__).parents[2] / "benchmarks" / "cases"
-    assert [run.case for run in runs if not (cases / f"{run.case}.py").exists()] == []
+def test_every_run_has_a_name_of_its_own_and_a_function_that_takes_its_arguments() -> None:
+    for study in STUDIES.values():
+        jobs = importlib.import_module(study).study.jobs(False)
+        assert len({job.name for job in jobs}) == len(jobs)
+        for job in jobs:
+            module, _, name = job.function.partition(":")
+            call = inspect.signature(getattr(importlib.import_module(module), name))
+            call.bind(None, **job.arguments)
+    assert len(runs()) > 20
 
 
 def test_a_name_chooses_its_run_and_a_beginning_all_runs_that_have_it() -> None:
-    assert [run.name for run in chosen(["chain"], quick=False)] == ["chain"]
-    assert [run.name for run in chosen(["block", "getfem"], quick=False)] == [
+    assert [job.name for job in chosen(runs(), ["chain"])] == ["chain"]
+    assert [job.name for job in chosen(runs(), ["block", "getfem"])] == [
         "block-28k",
         "block-28k-default",
         "block-92k",
@@ -45,13 +52,21 @@ def test_a_name_chooses_its_run_and_a_beginning_all_runs_that_have_it() -> None:
         "block-212k-default",
         "getfem-28k",
     ]
+    assert chosen(runs(), []) == runs()
 
 
 def test_the_quick_benchmark_is_a_part_of_the_full_one() -> None:
-    quick, full = chosen([], quick=True), chosen([], quick=False)
-    assert 0 < len(quick) < len(full) == len(all_runs())
-    assert {run.name for run in quick} < {run.name for run in full}
-    assert {run.repeats for run in quick} == {1} < {run.repeats for run in full}
+    quick, full = runs(quick=True), runs()
+    assert {job.name for job in quick} < {job.name for job in full}
+    assert {job.repeats for job in quick} == {1} < {job.repeats for job in full}
+
+
+def test_commands_have_the_environment_of_all_commands(monkeypatch: pytest.MonkeyPatch) -> None:
+    file = ROOT / "scripts" / "environment"
+    for name in read_environment(file):
+        monkeypatch.setenv(name, "other")
+    set_environment(file)
+    assert {name: os.environ[name] for name in read_environment(file)} == read_environment(file)
 
 
 def test_an_unknown_name_is_refused_with_those_there_are(capsys: pytest.CaptureFixture[str]) -> None:
@@ -61,23 +76,16 @@ def test_an_unknown_name_is_refused_with_those_there_are(capsys: pytest.CaptureF
 
 
 def test_a_run_leaves_its_record_with_the_load_of_the_machine() -> None:
-    record = measure(Run("tiny", "newton_block", 1, TINY))
+    record = measure(run("tiny", "newton_block", TINY, 1))
     assert record["counts"]["unknowns"] == 135
     assert record["peak_memory"] > record["import_memory"] > 0
     assert record["load_average"] >= 0
 
 
-def test_a_run_on_several_threads_has_them() -> None:
-    record = measure(Run("tiny", "linear_block", 1, (*TINY, "--solver", "gamg"), threads=2))
-    assert record["counts"]["unknowns"] == 135
-    script = "import os, sys; sys.stdout.write(os.environ['OPENBLAS_NUM_THREADS'])"
-    command = [str(LAUNCH), "1", "OPENBLAS_NUM_THREADS=2", sys.executable, "-c", script]
-    assert finished(command, 60.0).output == "2"
-
-
-def test_a_run_without_end_is_ended() -> None:
-    with pytest.raises(RunFailed, match=r"tiny must end within 0\.1 s, and did not"):
-        measure(Run("tiny", "newton_block", 1, TINY, seconds=0.1))
+def test_what_needs_another_program_runs_without_mpi() -> None:
+    record = measure(run("tiny", "getfem_block", TINY, 0))
+    assert record["ranks"] == 1
+    assert record.get("counts", {}).get("unknowns") == 135 or "GetFEM cannot be imported" in record["skipped"]
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "benchmarks").rglob("*.py")), ids=lambda path: path.stem)
@@ -102,55 +110,34 @@ def test_a_linear_solve_finds_the_same_by_either_solver() -> None:
     assert found[0].displacement.norm() < 1e-7 * largest
 
 
-def test_a_case_that_fails_is_reported_with_its_output() -> None:
-    with pytest.raises(RunFailed, match=r"tiny must print one JSON .* exit status 2 (?s:.*)--counts"):
-        measure(Run("tiny", "newton_block", 1))
-
-
 def test_a_case_that_fails_on_several_ranks_ends() -> None:
-    options = (*TINY, "--boxes", "9", "9", "9")
-    with pytest.raises(RunFailed, match="boxes"):
-        measure(Run("tiny", "sliding_block", 2, options, seconds=60.0))
-
-
-def test_raw_results_are_read_again_for_the_same_code_only(tmp_path: Path) -> None:
-    run = Run("tiny", "newton_block")
-    path = raw_file(run, "this", 1, tmp_path)
-    path.parent.mkdir(parents=True)
-    path.write_text(json.dumps({"seconds": 1.0}))
-    assert read(run, "this", tmp_path) == [{"seconds": 1.0}]
-    assert read(run, "other", tmp_path) == []
-
-
-def test_the_fingerprint_follows_the_code_that_is_measured(tmp_path: Path) -> None:
-    (tmp_path / "fenics_contact").mkdir()
-    (tmp_path / "fenics_contact" / "a.py").write_text("x = 1\n")
-    before = fingerprint(tmp_path)
-    (tmp_path / "README.md").write_text("words\n")
-    assert fingerprint(tmp_path) == before
-    (tmp_path / "fenics_contact" / "a.py").write_text("x = 2\n")
-    assert fingerprint(tmp_path) != before
+    record = measure(run("tiny", "sliding_block", {**TINY, "boxes": [9, 9, 9]}, limit=60.0))
+    assert "boxes" in record["failed"]["message"]
 
 
 @pytest.fixture
 def main_with(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
     """Return the driver with made-up measurements; names given fail. The full results are in ``full``."""
-    monkeypatch.setattr(driver, "FOLDER", tmp_path / "full")
+    monkeypatch.setattr(speed, "study", replace(speed.study, home=tmp_path / "full"))
 
-    def run(*arguments: str, failing: tuple[str, ...] = (), **changes: Any) -> None:
-        def measured(run: Run) -> dict[str, Any]:
-            if run.name in failing:
-                raise RunFailed(f"{run.name} must print one JSON object")
-            record: dict[str, Any] = dict(all_summaries().get(run.name, {}))
-            if run.name in HELD:
-                held = HELD[run.name]
+    def call(*arguments: str, failing: tuple[str, ...] = (), **changes: Any) -> list[str]:
+        asked = []
+
+        def measured(job: Job, *, first: bool = True) -> dict[str, Any]:
+            asked.append(job.name)
+            if job.name in failing:
+                return {"failed": {"kind": "crash", "message": "it ended"}, "load_average": 0.0}
+            record: dict[str, Any] = dict(all_summaries().get(job.name, {}))
+            if job.name in HELD:
+                held = HELD[job.name]
                 record["counts"] = {**record["counts"], "unknowns": held.unknowns, "f_products": held.work}
-            return {**record, **changes}
+            return {**record, "load_average": 0.5, **changes}
 
-        monkeypatch.setattr(driver, "measure", measured)
+        monkeypatch.setattr(runner, "measure", measured)
         main([*arguments, "--folder", str(tmp_path)])
+        return asked
 
-    return run
+    return call
 
 
 def test_a_complete_benchmark_replaces_results(main_with: Any, tmp_path: Path) -> None:
@@ -158,22 +145,24 @@ def test_a_complete_benchmark_replaces_results(main_with: Any, tmp_path: Path) -
     before = (tmp_path / "full" / "results.json").read_text()
     main_with("--again", seconds=3.0)
     assert (tmp_path / "full" / "results.json").read_text() != before
+    assert main_with() == [], "all is there"
     assert not (tmp_path / "partial").exists()
 
 
 @pytest.mark.parametrize("arguments", [["--quick"], []], ids=["quick", "full"])
 def test_a_failing_benchmark_leaves_good_results(
-    arguments: list[str], main_with: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    arguments: list[str], main_with: Any, tmp_path: Path
 ) -> None:
     main_with(*arguments)
     folder = tmp_path / ("quick" if arguments else "full")
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     assert len(before) == 3
-    with pytest.raises(SystemExit, match="failed: linear-face"):
+    with pytest.raises(SystemExit, match="failed: linear-face: it ended"):
         main_with(*arguments, "--again", failing=("linear-face",), seconds=5.0)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
     assert (tmp_path / "partial" / "results.json").exists()
-    assert "linear-face must print one JSON object" in capsys.readouterr().err
+    assert "linear-face" in main_with(*arguments), "a crash may pass"
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} != before
 
 
 def test_a_few_runs_leave_good_results(main_with: Any, tmp_path: Path) -> None:
@@ -187,3 +176,23 @@ def test_counts_that_are_not_kept_fail_the_benchmark(main_with: Any, tmp_path: P
     with pytest.raises(SystemExit, match="chain must have 66528 unknowns and take 90 products or steps, got"):
         main_with("--quick", counts=counts)
     assert not (tmp_path / "quick").exists()
+
+
+def test_a_report_without_measurements_of_the_present_code_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit, match="a report needs measurements of the present code, found none"):
+        main(["--report", "--folder", str(tmp_path)])
+
+
+def test_the_page_of_the_effects_is_its_record() -> None:
+    folder = ROOT / "benchmarks"
+    records = json.loads((folder / "effects.json").read_text())
+    assert effects.page(records) == (folder / "effects.md").read_text()
+
+
+def test_effects_are_replaced_when_all_are_measured(tmp_path: Path) -> None:
+    records = json.loads((ROOT / "benchmarks" / "effects.json").read_text())
+    effects.write(tmp_path, {"none": records["none"]}, False)
+    assert (tmp_path / "effects.md").read_text() == effects.page(records)
+    assert not (tmp_path / "effects.json").exists()
+    effects.write(tmp_path, records, False)
+    assert json.loads((tmp_path / "effects.json").read_text()) == records

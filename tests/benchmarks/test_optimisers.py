@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from benchmarks.optimisers.measuring import ALLOWED, FULL, METHODS, budget_of
-from benchmarks.optimisers.report import above_best, page, plot
+from benchmarks.optimisers.report import above_best, jobs, page, plot, write
 from fenics_contact.launching import finished
 from tests.conftest import ROOT
 
@@ -66,11 +67,29 @@ def test_the_stored_study_has_every_problem_and_designs_that_keep_the_constraint
     assert (folder / "README.md").read_text() == page(study)
 
 
+def test_a_problem_keeps_its_numbers_until_all_its_methods_are_measured_again(tmp_path: Path) -> None:
+    before = json.loads((ROOT / "docs" / "studies" / "optimisers" / "results.json").read_text())["runs"]
+    first = {job.name: job for job in jobs(False) if job.arguments["case"] == asdict(FULL[0])}
+    new = {name: [{**run, "value": 1.0, "ranks": 1}] for name, run in zip(first, before, strict=False)}
+    assert [run["case"] for run in before[: len(new)]] == [FULL[0].name] * len(METHODS)
+    some = dict(list(new.items())[1:])
+    for records, value in ((some, before[1]["value"]), (new, 1.0)):
+        write(tmp_path, records, False)
+        runs = json.loads((tmp_path / "results.json").read_text())["runs"]
+        assert [(run["case"], run["method"]) for run in runs] == [
+            (run["case"], run["method"]) for run in before
+        ]
+        assert runs[1]["value"] == value
+        assert "ranks" not in runs[1]
+        assert runs[len(new) :] == before[len(new) :]
+
+
 @pytest.mark.slow
 def test_the_quick_study_runs_from_its_first_line_to_its_last(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "benchmarks.optimisers", "--quick", "--folder", str(tmp_path)]
+    command = [sys.executable, "-m", "benchmarks", "optimisers", "--quick", "--folder", str(tmp_path)]
     ended = finished(command, 300.0, folder=ROOT)
     assert (ended.status, ended.errors) == (0, "")
+    tmp_path /= "quick"
     study = json.loads((tmp_path / "results.json").read_text())
     assert [run["method"] for run in study["runs"]] == list(METHODS)
     before = {round(run["history"][0][0], 1) for run in study["runs"]}

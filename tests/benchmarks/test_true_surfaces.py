@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
+from mpi4py import MPI
 
 from benchmarks.true_surfaces.cases import CASES
 from benchmarks.true_surfaces.links import FINEST, RUNS, measured
 from benchmarks.true_surfaces.measuring import BY_MORTAR, FACETS, errors, known
 from benchmarks.true_surfaces.orders import SURFACES, gap_errors
-from benchmarks.true_surfaces.report import page
+from benchmarks.true_surfaces.report import jobs, page, study
 from fenics_contact.study.scenes.chain_links import ENERGY, GRADING, PEAK
 from tests.conftest import ROOT
 
@@ -44,6 +46,18 @@ def test_the_page_is_its_record_and_complete(record: dict[str, Any]) -> None:
     assert [(case["case"], case["discretisation"]) for case in record["cases"]] == expected
     assert all(tuple(run["facets"] for run in case["runs"]) == FACETS for case in record["cases"])
     assert [each["surface"] for each in record["gaps"]] == list(SURFACES)
+
+
+def test_what_was_not_measured_keeps_its_numbers(record: dict[str, Any], tmp_path: Path) -> None:
+    disc, link = (next(job for job in jobs(False) if job.name.startswith(kind)) for kind in ("gap", "link"))
+    assert link.arguments == {"size": 1.0, "grading": 0.0, "discretisation": "node", "geometry": "faceted"}
+    measured = {**record["gaps"][0], "orders": record["gaps"][1]["orders"]}
+    study.write(tmp_path, {disc.name: [measured | {"ranks": 1, "load_average": 0.5}]}, False)
+    written = json.loads((tmp_path / "true_surfaces.json").read_text())
+    assert written["gaps"] == [measured, *record["gaps"][1:]]
+    assert {name: part for name, part in written.items() if name != "gaps"} == {
+        name: part for name, part in record.items() if name != "gaps"
+    }
 
 
 def test_true_surfaces_are_right_where_facets_are_far_off(record: dict[str, Any]) -> None:
@@ -87,7 +101,7 @@ def test_the_chain_is_right_on_true_crowns_alone(record: dict[str, Any]) -> None
 @pytest.mark.slow
 def test_a_chain_is_what_the_record_says(record: dict[str, Any]) -> None:
     stored = record["links"][RUNS.index((1.0, 0.0, "node", "best"))]
-    found = measured(1.0, 0.0, "node", "best")
+    found = measured(MPI.COMM_SELF, 1.0, 0.0, "node", "best")
     numbers = {name: value for name, value in stored.items() if not isinstance(value, str)}
     assert {name: found[name] for name in numbers} == pytest.approx(numbers, rel=1e-3)
     assert found == stored | {name: found[name] for name in numbers}
@@ -108,7 +122,7 @@ def test_mortar_is_as_wrong_by_facets_as_the_record_says(record: dict[str, Any])
 
 def test_gaps_of_a_disc_are_what_the_record_says(record: dict[str, Any]) -> None:
     (stored,) = (each for each in record["gaps"] if each["surface"] == "disc")
-    found = gap_errors("disc")
+    found = gap_errors(MPI.COMM_SELF, "disc")
     for way, misses in stored["errors"].items():
         assert found["errors"][way] == pytest.approx(misses, rel=1e-2, abs=1e-13)
 

@@ -13,7 +13,7 @@ import pytest
 
 from fenics_contact.__main__ import main
 from fenics_contact.launching import clean_environment
-from fenics_contact.study import read_study, running
+from fenics_contact.study import read_study, runner
 from tests.conftest import ROOT
 from tests.study.samples import BLOCK, Machine
 
@@ -82,7 +82,7 @@ def test_an_interrupt_from_the_keyboard_leaves_a_report_of_what_was_done(
     scene.write_text(BLOCK)
     machine = Machine()
     machine.answers[4] = KeyboardInterrupt()
-    monkeypatch.setattr(running, "measure", machine)
+    monkeypatch.setattr(runner, "measure", machine)
     assert main(["accuracy", str(scene), "--output", str(folder), "--quick", "--no-figures", "--page"]) == 130
     assert "interrupted: what is done is kept" in capsys.readouterr().err
     assert [run.parameters.size for run in read_study(folder).good] == [2, 3]
@@ -120,8 +120,9 @@ def test_a_study_of_ones_own_scene_that_was_stopped_goes_on_and_reports(tmp_path
     again = start(*arguments)
     words = again.communicate(timeout=120.0)
     assert again.returncode == 0, words
-    assert words[0].startswith("For 10 %, 5 %, 2 %, 1 %, 0.5 % in shortening: ")
-    assert "cells along an edge, quadrilaterals, contact by nodes, tolerance 1e-06: " in words[0]
+    assert words[0].startswith("**What an accuracy takes** (size: cells along an edge)")
+    assert "| shortening | 10 %, 5 %, 2 %, 1 %, 0.5 % | " in words[0]
+    assert " | quadrilateral | node | 1e-06 | newton | " in words[0]
     assert first.stat().st_mtime_ns == kept
     assert "1/2 size 3" in words[1], "one of three runs was there"
     found = read_study(folder)

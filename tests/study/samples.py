@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fenics_contact.study import BALANCED, Parameters, Results, Run
-from fenics_contact.study.launching import Record, Task
 from fenics_contact.study.protocol import QuantityFacts, SceneFacts
+from fenics_contact.study.runner import Job, Record
 
 SIZES = (2, 4, 8)
 BASE = Parameters(4, discretisation="mortar")
@@ -78,13 +78,16 @@ class Machine:
     """Stands in for processes: counts what it is asked for, and answers as it is told."""
 
     def __init__(self) -> None:
-        self.asked: list[Task] = []
+        self.asked: list[int] = []
+        self.verified: list[bool] = []
         self.answers: dict[int, Record | BaseException] = {}
         self.seconds = 2.0
 
-    def __call__(self, task: Task) -> Record:
-        self.asked.append(task)
-        answer = self.answers.get(task.parameters.size, GOOD)
+    def __call__(self, job: Job, *, first: bool = True) -> Record:
+        size = job.arguments["parameters"]["size"]
+        self.asked.append(size)
+        self.verified.append(first and job.first["verify"])
+        answer = self.answers.get(size, GOOD)
         if isinstance(answer, BaseException):
             raise answer
         seconds = self.seconds + 0.1 * len(self.asked)

@@ -12,10 +12,10 @@ from mpi4py import MPI
 from fenics_contact.study import Parameters, Settings, find_study, run_study
 from fenics_contact.study.certificates import check_certificates
 from fenics_contact.study.errors import Errors
-from fenics_contact.study.launching import Task, measure
+from fenics_contact.study.measuring import measured
+from fenics_contact.study.runner import Job, measure
 from fenics_contact.study.scenes import BUILT_IN
 from fenics_contact.study.scenes.nested_box import mirrored, nested_box, nested_half
-from fenics_contact.study.worker import measured
 
 
 @pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])
@@ -44,7 +44,8 @@ def test_a_nested_half_fills_its_rectangle_with_cells_that_are_not_slender(cell:
 
 def test_one_run_knows_its_errors_and_what_bounds_them() -> None:
     study = find_study("hertz")
-    record = measured(study, replace(study.sweep.base, size=2, tolerance=1e-3), MPI.COMM_SELF, verify=True)
+    parameters = replace(study.sweep.base, size=2, tolerance=1e-3)
+    record = measured(MPI.COMM_SELF, "hertz", parameters.as_dict(), verify=True)
     parts, true = record["parts"], record["true_errors"]
     assert 1e-8 < true.algebraic <= parts["algebraic"] <= 10 * true.algebraic
     assert true.uncertainty < 1e-3 * true.algebraic
@@ -58,7 +59,7 @@ def test_forces_that_balance_do_not_bridge_open_gaps() -> None:
     """Of four contacts that press three slip: what they lack once cost the gaps of the thirty open ones."""
     study = find_study("chain_links")
     parameters = replace(study.sweep.base, size=2, discretisation="mortar")
-    record = measured(study, parameters, MPI.COMM_SELF, verify=True)
+    record = measured(MPI.COMM_SELF, "chain_links", parameters.as_dict(), verify=True)
     true = record["true_errors"].algebraic
     assert true <= record["parts"]["algebraic"] <= 10 * true
 
@@ -90,8 +91,9 @@ def test_certificates_hold_in_every_run_of_a_quick_study(name: str, tmp_path: Pa
 
 @pytest.mark.slow
 def test_two_ranks_find_what_one_finds() -> None:
-    tasks = [Task("chain_links", Parameters(2, tolerance=1e-8), n, verify=True, limit=300.0) for n in (1, 2)]
-    one, two = map(measure, tasks)
+    what = {"scene": "chain_links", "parameters": Parameters(2, tolerance=1e-8).as_dict(), "verify": True}
+    function = "fenics_contact.study.measuring:measured"
+    one, two = (measure(Job("chain", function, what, ranks=n, limit=300.0)) for n in (1, 2))
     assert "failed" not in one, one
     assert "failed" not in two, two
     for quantity in find_study("chain_links").quantities:

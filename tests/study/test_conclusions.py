@@ -1,4 +1,4 @@
-"""What is concluded from runs: errors, rates, the Pareto front, advice, and whether certificates hold."""
+"""What is concluded from runs: errors, rates, what accuracies take, what settings cost, certificates."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from typing import Any
 import pytest
 
 from fenics_contact.study import BALANCED, Errors, Run
-from fenics_contact.study.advice import advice, reliable
 from fenics_contact.study.certificates import check_certificates
-from fenics_contact.study.pareto import pareto_front
-from fenics_contact.study.waste import waste
+from fenics_contact.study.figures.accuracy import pareto_front
+from fenics_contact.study.tables import accuracy_table, cost_table, reliable
 from tests.study.samples import BASE, results, run
 
 
@@ -54,16 +53,21 @@ def test_rates_are_those_of_the_strictest_tolerance() -> None:
     assert errors.rate(strict, "peak pressure") == pytest.approx(2.0)
 
 
-def test_advice_names_the_fastest_run_that_reaches_an_accuracy() -> None:
-    words = advice(Errors(results()), targets=(0.1, 0.05, 0.01, 0.001))
-    assert words[:3] == [
-        "For 10 %, 5 % in peak pressure: 2 cells on the radius, hexahedra, contact by mortar, balanced "
-        "tolerance: 0.4 s on 2 ranks; the error is 4 %.",
-        "For 1 % in peak pressure: 4 cells on the radius, hexahedra, contact by mortar, balanced tolerance: "
-        "1.6 s on 2 ranks; the error is 1 %.",
-        "For 0.1 % in peak pressure: not reached by this sweep; the finest mesh gives 0.25 % with 8 cells on "
-        "the radius, hexahedra, contact by mortar, tolerance 1e-08: 9.6 s on 2 ranks.",
+def test_an_accuracy_takes_the_fastest_run_that_reaches_it() -> None:
+    lines = accuracy_table(Errors(results()), targets=(0.1, 0.05, 0.01, 0.001)).splitlines()
+    assert lines[2:5] == [
+        "| peak pressure | 10 %, 5 % | 2 | hexahedron | mortar | balanced | newton | 2 | 0.4 | 4 % |",
+        "| peak pressure | 1 % | 4 | hexahedron | mortar | balanced | newton | 4 | 1.6 | 1 % |",
+        "| peak pressure | 0.1 % | 8 | hexahedron | mortar | 1e-08 | newton | 8 | 9.6 "
+        "| 0.25 %: not reached |",
     ]
+
+
+def test_an_accuracy_of_which_nothing_is_known_is_told() -> None:
+    alone = Errors(results([run(8)]))
+    lines = [line for line in accuracy_table(alone).splitlines() if line.startswith("| gradient |")]
+    assert len(lines) == 1
+    assert lines[0].endswith("| nothing to compare with |")
 
 
 def test_what_comes_after_the_state_counts_for_quantities_that_need_it() -> None:
@@ -73,13 +77,16 @@ def test_what_comes_after_the_state_counts_for_quantities_that_need_it() -> None
     assert coarse.seconds_of(gradient) == pytest.approx(coarse.seconds_of(energy) + 0.5)
 
 
+def cost_lines(*runs: Run) -> list[str]:
+    return cost_table(Errors(results(runs))).splitlines()[2:]
+
+
 def test_a_strict_tolerance_is_told_by_what_it_costs_and_changes() -> None:
     runs = [run(size, tolerance) for size in (2, 4, 8) for tolerance in (1e-8, BALANCED)]
     runs[-1] = run(8, error=0.0025 + 1e-5)
-    assert waste(Errors(results(runs)))[0] == (
-        "Tolerance 1e-08 instead of balanced, at 8 cells on the radius, costs 1.5 times the time and 1.6 "
-        "times the products and changes the peak pressure by 1e-05 and the energy by 0e+00."
-    )
+    assert cost_lines(*runs) == [
+        "| 1e-08 | balanced | 8 | 9.6 | 1.50 | 1.60 | 0.25 % | 0.25 % | 1e-05 | 0e+00 |  |"
+    ]
 
 
 def varied(seconds: float, error: float | None = None, **settings: Any) -> Run:
@@ -98,25 +105,24 @@ def test_other_settings_are_told_by_what_they_cost_and_give() -> None:
         varied(3.0, 0.05, cell="tetrahedron"),
         varied(1.0, 0.25, discretisation="node"),
     ]
-    assert waste(Errors(results(runs)))[1:] == [
-        "A fixed point instead of the law of friction in every Newton step, at tolerance 1e-06, costs 2 "
-        "times the time and 1 times the products.",
-        "Of 2, 4 and 16 subdomains 2 take the least time, 1 s, and 16 the most, 8 s; left open, 4 are taken: "
-        "2 s.",
-        "Tetrahedra instead of hexahedra, at 4 cells on the radius: 5 % error in peak pressure instead of "
-        "1 %, 1.5 times the time.",
-        "Contact by nodes instead of contact by mortar, at 4 cells on the radius: 25 % error in peak "
-        "pressure instead of 1 %, 0.5 times the time.",
+    lines = [" | ".join(line.split(" | ")[:8]) for line in cost_lines(*runs)]
+    assert lines == [
+        "| 1e-06 | balanced | 4 | 3 | 1.50 | 1.60 | 1 % | 1 %",
+        "| fixed point, 1e-06 | newton, 1e-06 | 4 | 6 | 2.00 | 1.00 | 1 % | 1 %",
+        "| 2 subdomains | 4 subdomains | 4 | 1 | 0.50 | 1.00 | 1 % | 1 %",
+        "| 16 subdomains | 4 subdomains | 4 | 8 | 4.00 | 1.00 | 1 % | 1 %",
+        "| tetrahedron | hexahedron | 4 | 3 | 1.50 | 1.00 | 5 % | 1 %",
+        "| node | mortar | 4 | 1 | 0.50 | 1.00 | 25 % | 1 %",
     ]
 
 
-def test_an_error_that_is_small_by_chance_is_no_advice() -> None:
+def test_an_error_that_is_small_by_chance_does_not_count() -> None:
     runs = [run(2), run(4, error=0.0), run(8, error=0.02)]
     errors = Errors(results(runs))
     assert not reliable(errors, runs[1], "peak pressure", 0.01)
     assert reliable(errors, runs[1], "peak pressure", 0.02)
-    (words,) = [words for words in advice(errors, targets=(0.01,)) if "peak pressure" in words]
-    assert "not reached by this sweep; the finest mesh gives 2 %" in words
+    (line,) = [line for line in accuracy_table(errors, (0.01,)).splitlines() if "peak pressure" in line]
+    assert line.endswith("| 2 %: not reached |")
 
 
 def test_certificates_are_compared_with_true_errors() -> None:

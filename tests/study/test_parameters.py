@@ -34,6 +34,12 @@ def test_settings_survive_json() -> None:
         assert parameters_from(json.loads(json.dumps(given.as_dict()))) == given
 
 
+def test_settings_are_told_in_a_few_words() -> None:
+    assert str(Parameters(2)) == "size 2, hexahedron, node, balanced"
+    other = Parameters(2, tolerance=1e-3, solver="fixed point", subdomains=8)
+    assert str(other) == "size 2, hexahedron, node, 1e-03, fixed point, 8 subdomains"
+
+
 def test_a_sweep_varies_one_setting_at_a_time_and_mesh_with_tolerance() -> None:
     sweep = Sweep(
         Parameters(4),

@@ -9,7 +9,8 @@ import pytest
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.study import Errors, read_study, write_report
-from fenics_contact.study.overview import write_overview
+from fenics_contact.study.report import overview_page, table_page, write_overview
+from tests.conftest import ROOT
 from tests.study.samples import results, run
 from tests.viz.states import contains, pixels
 
@@ -23,17 +24,19 @@ def test_results_survive_their_file(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["study.json", "table.md"]
 
 
-def test_the_table_has_advice_rates_certificates_runs_and_failures(tmp_path: Path) -> None:
+def test_the_table_has_answers_rates_certificates_runs_and_failures(tmp_path: Path) -> None:
     write_report(tmp_path, results(), figures=False)
     text = (tmp_path / "table.md").read_text()
-    assert "- For 2 %, 1 % in peak pressure: 4 cells on the radius" in text
+    assert "(size: cells on the radius)" in text
+    assert "| peak pressure | 2 %, 1 % | 4 | hexahedron |" in text
+    assert "| 1e-08 | balanced | 8 | 9.6 | 1.50 |" in text
     assert "| peak pressure | theory |  | 2.00 | 1.00 |" in text
     assert "| energy | extrapolated | -10 N mm | 2.00 | 2.00 |" in text
     assert "finest mesh: several numbers are not extrapolated" in text
     assert "between 2.00 and 2.00 times the true error in 6 runs" in text
     assert "- size 8, tetrahedron, node, balanced: ConvergenceError: it did not converge" in text
     (row,) = [line for line in text.splitlines() if line.startswith("| 4 | hexahedron | mortar | 1e-08 ")]
-    assert "| 6400 | 4 | 80 | 2.40 | 100 | 1.0e-02 |" in row
+    assert "| newton | 4 | 6400 | 80 | 2.40 | 100 | 1.0e-02 |" in row
 
 
 def test_figures_show_every_way_to_spend_time(tmp_path: Path) -> None:
@@ -65,10 +68,20 @@ def test_the_page_of_all_studies_takes_its_numbers_from_them(tmp_path: Path) -> 
     text = write_overview(tmp_path).read_text()
     assert text.count("## A sample") == 2
     assert "![accuracy](second/accuracy.png)" in text
-    assert "- For 2 %, 1 % in peak pressure: 4 cells on the radius" in text
+    assert "| peak pressure | 2 %, 1 % | 4 | hexahedron |" in text
+    assert "[All 7 runs](second/table.md)" in text
     assert "| energy | extrapolated | -10 N mm | 2.00 | 2.00 |" in text
     assert "| error of the displacement | its own estimate |  | 1.00 | 1.00 |" in text
-    assert "2.00 to 2.00 times the true error in 6 runs, 0 of them out of bounds" in text
+    assert text.count("lies between 2.00 and 2.00 times the true error in 6 runs") == 2
+
+
+def test_the_stored_pages_are_those_of_the_stored_results() -> None:
+    folder = ROOT / "docs" / "studies"
+    found = sorted(folder.glob("*/study.json"))
+    assert len(found) == 3
+    for file in found:
+        assert file.with_name("table.md").read_text() == table_page(Errors(read_study(file)))
+    assert (folder / "README.md").read_text() == overview_page(folder)
 
 
 def test_a_page_of_no_studies_is_refused(tmp_path: Path) -> None:

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from fenics_contact.study.errors import Errors
-from fenics_contact.study.figures.series import WIDTH, against, height, logarithmic, panels, series_of, style
-from fenics_contact.study.pareto import pareto_front
+from fenics_contact.study.figures.series import (
+    WIDTH,
+    against,
+    height,
+    panels,
+    picture,
+    scaled,
+    series_of,
+)
 from fenics_contact.study.protocol import QuantityFacts
-from fenics_contact.viz import INK, Picture, draw_picture, png_path, sheet
+from fenics_contact.viz import INK, Picture, sheet
 
 
 def plot_accuracy(errors: Errors, path: Path | None = None) -> Picture:
@@ -22,29 +30,34 @@ def plot_accuracy(errors: Errors, path: Path | None = None) -> Picture:
     Returns:
         The picture, which stands for its file where a path is needed.
     """
-    return draw_picture(None, png_path(path), lambda paper: _draw_all(errors, paper))
+    return picture(errors, path, _draw_all)
+
+
+def pareto_front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
+    """Return the numbers of the points that no other point beats in both, by rising cost.
+
+    Args:
+        costs: What each point costs, (n,).
+        errors: How wrong each point is, (n,).
+    """
+    front: list[int] = []
+    for number in sorted(range(len(costs)), key=lambda k: (costs[k], errors[k])):
+        if not front or errors[number] < errors[front[-1]]:
+            front.append(number)
+    return front
 
 
 def _draw_all(errors: Errors, paper: BinaryIO) -> None:
-    quantities = _known(errors)
-    scene, ranks = errors.results.scene, errors.results.ranks
+    scene, ranks, runs = errors.results.scene, errors.results.ranks, errors.results.good
+    quantities = [each for each in scene.quantities if any(errors.of(run, each.name) for run in runs)]
     title = f"{scene.title}: error against time on {ranks} rank{'s' if ranks > 1 else ''}"
     with sheet(paper, (WIDTH, height(len(quantities))), title) as figure:
+        handles: dict[str, Any] = {}
         for axes, quantity in zip(panels(figure, len(quantities)), quantities, strict=True):
             _draw(axes, errors, quantity)
-        handles = {
-            label: handle
-            for axes in figure.axes
-            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-        }
+            handles |= dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
         columns = len(handles) if len(handles) < 7 else -(-len(handles) // 2)
         figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns)
-
-
-def _known(errors: Errors) -> list[QuantityFacts]:
-    """Return the quantities of which some error is known."""
-    runs, quantities = errors.results.good, errors.results.scene.quantities
-    return [quantity for quantity in quantities if any(errors.of(run, quantity.name) for run in runs)]
 
 
 def _draw(axes: Any, errors: Errors, quantity: QuantityFacts) -> None:
@@ -61,11 +74,7 @@ def _draw(axes: Any, errors: Errors, quantity: QuantityFacts) -> None:
         [x[k] for k in front], [y[k] for k in front], color=INK, lw=1.4, ls="--", drawstyle="steps-post",
         marker="o", ms=15, markerfacecolor="none", markeredgewidth=1.3, zorder=2, label="Pareto front",
     )  # fmt: skip
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    logarithmic(axes.yaxis, 100.0, " %")
-    logarithmic(axes.xaxis)
+    scaled(axes)
     axes.set_xlabel("wall time (s)")
     axes.set_ylabel("relative error")
-    axes.set_title(f"{quantity.name} (against {against(errors.references[quantity.name].kind)})")
-    style(axes)
+    axes.set_title(f"{quantity.name} {against(errors, quantity.name)}")

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from pathlib import Path
+from typing import Any, BinaryIO
 
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from fenics_contact.mesh import CELL_TYPES
 from fenics_contact.study.errors import Errors
 from fenics_contact.study.parameters import BALANCED
 from fenics_contact.study.results import Run
-from fenics_contact.study.words import plural
-from fenics_contact.viz import BLUE, GREEN, GREY, ORANGE
+from fenics_contact.viz import BLUE, GREEN, GREY, ORANGE, Picture, draw_picture, png_path
 
 WIDTH = 1600
 #: Colours and symbols of cells and of discretisations of contact other than the base's, in turn.
-CELL_LOOKS = ((GREEN, "s"), ("#882255", "X"), ("#332288", "p"))
-CONTACT_LOOKS = (("#cc79a7", "D"),)
+LOOKS = {
+    "cell": ((GREEN, "s"), ("#882255", "X"), ("#332288", "p")),
+    "discretisation": (("#cc79a7", "D"),),
+}
 
 
 @dataclass(frozen=True)
@@ -47,16 +50,20 @@ class Series:
         )  # fmt: skip
 
 
+def picture(errors: Errors, path: Path | None, draw: Callable[[Errors, BinaryIO], None]) -> Picture:
+    """Return what a function draws of a study, and write it to a PNG file if there is a path."""
+    return draw_picture(None, png_path(path), lambda paper: draw(errors, paper))
+
+
 def series_of(errors: Errors) -> list[Series]:
     """Return the runs of a study sorted by what they vary; every run is in one series at most."""
     base, results = errors.results.base, errors.results
     strict = errors.strictest(base)
-    name = "" if strict.balanced else f"tolerance {strict.tolerance:.0e}"
+    name = "" if strict.balanced else f"tolerance {strict.tolerance_words}"
     found = [
         Series("balanced", errors.sequence(replace(base, tolerance=BALANCED)), BLUE, "o"),
         Series(name, () if strict.balanced else errors.sequence(strict), ORANGE, "^"),
-        *_others(errors, "cell", lambda run: run.parameters.cell, CELL_LOOKS),
-        *_others(errors, "discretisation", lambda run: run.parameters.discretisation, CONTACT_LOOKS),
+        *(series for setting in LOOKS for series in _others(errors, setting)),
         Series("fixed point", _varied(errors, "solver"), "#56b4e9", "v", False),
         Series("other subdomains", _varied(errors, "subdomains"), "#e69f00", "P", False),
     ]
@@ -66,16 +73,14 @@ def series_of(errors: Errors) -> list[Series]:
     return [series for series in found if series.runs]
 
 
-def _others(
-    errors: Errors, setting: str, of: Callable[[Run], str], looks: Sequence[tuple[str, str]]
-) -> list[Series]:
+def _others(errors: Errors, setting: str) -> list[Series]:
     """Return the series of every value of a setting other than the base's."""
-    base = errors.results.base
-    values = dict.fromkeys(of(run) for run in errors.results.good if of(run) != getattr(base, setting))
-    found = []
+    base, found = errors.results.base, []
+    values = dict.fromkeys(getattr(run.parameters, setting) for run in _varied(errors, setting))
     for number, value in enumerate(values):
-        runs = errors.sequence(replace(base, **{setting: value}))  # type: ignore[arg-type]
-        found.append(Series(plural(value), runs, *looks[number % len(looks)]))
+        name = CELL_TYPES[value].plural if value in CELL_TYPES else f"contact by {value}"
+        runs = errors.sequence(replace(base, **{setting: value}))
+        found.append(Series(name, runs, *LOOKS[setting][number % len(LOOKS[setting])]))
     return found
 
 
@@ -84,11 +89,17 @@ def _varied(errors: Errors, setting: str) -> tuple[Run, ...]:
     return tuple(run for run in errors.results.good if setting in run.parameters.differences(base))
 
 
+def by_mesh_and_tolerance(errors: Errors) -> tuple[Sequence[Run], Sequence[Run]]:
+    """Return the runs on all meshes, balanced, and those with all tolerances on the base's mesh."""
+    base = errors.results.base
+    varied = [run for run in errors.results.good if replace(run.parameters, tolerance=base.tolerance) == base]
+    return errors.sequence(replace(base, tolerance=BALANCED)), varied
+
+
 def panels(figure: Any, count: int) -> list[Any]:
     """Return axes for so many panels, two or three beside each other."""
     columns = count if count < 4 else (2 if count == 4 else 3)
-    rows = -(-count // columns)
-    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    axes = figure.subplots(-(-count // columns), columns, squeeze=False).ravel()
     for spare in axes[count:]:
         spare.set_axis_off()
     return list(axes[:count])
@@ -96,8 +107,7 @@ def panels(figure: Any, count: int) -> list[Any]:
 
 def height(count: int) -> int:
     """Return the height in pixels of a sheet with so many panels."""
-    rows = 1 if count < 4 else 2
-    return 160 + 560 * rows
+    return 160 + 560 * (1 if count < 4 else 2)
 
 
 def style(axes: Any) -> None:
@@ -106,20 +116,22 @@ def style(axes: Any) -> None:
     axes.set_axisbelow(True)
 
 
-def logarithmic(axis: Any, scale: float = 1.0, unit: str = "") -> None:
-    """Write the numbers of a logarithmic axis in full, and 2 and 5 between powers of ten if it spans few.
+def scaled(axes: Any) -> None:
+    """Make both axes logarithmic, the vertical one in percent, with numbers in full and a grid."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for axis, scale, unit in ((axes.xaxis, 1.0, ""), (axes.yaxis, 100.0, " %")):
+        low, high = axis.get_view_interval()
+        subs = (1.0, 2.0, 5.0) if high < 50.0 * low else (1.0,)  # 2 and 5 where it spans little
+        axis.set_major_locator(LogLocator(subs=subs, numticks=12))
+        written = lambda value, _, scale=scale, unit=unit: f"{scale * value:g}{unit}"  # noqa: E731
+        axis.set_major_formatter(FuncFormatter(written))
+        axis.set_minor_formatter(NullFormatter())
+    style(axes)
 
-    Args:
-        axis: Axis of axes whose data are drawn.
-        scale: What numbers are multiplied by, 100 for percent.
-        unit: What stands behind them.
-    """
-    low, high = axis.get_view_interval()
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 50.0 * low else (1.0,), numticks=12))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{scale * value:g}{unit}"))
-    axis.set_minor_formatter(NullFormatter())
 
-
-def against(kind: str) -> str:
-    """Return what errors are measured against, in words."""
-    return {"extrapolated": "the limit of the meshes", "finest mesh": "the finest mesh"}.get(kind, kind)
+def against(errors: Errors, quantity: str) -> str:
+    """Return a quantity and what its errors are measured against, in words."""
+    kind = errors.references[quantity].kind
+    words = {"extrapolated": "the limit of the meshes", "finest mesh": "the finest mesh"}
+    return f"(against {words.get(kind, kind)})"

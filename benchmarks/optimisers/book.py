@@ -4,32 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from time import perf_counter
 
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, ContactResult, State
+from benchmarks.cases.chain_design import chain_shape_problem
+from fenics_contact.contact import ContactResult, State
 from fenics_contact.errors import ConvergenceError, InvalidDesignError
-from fenics_contact.gallery import TwoLinks
 from fenics_contact.optimize import LinearConstraints, nearest_feasible
-from fenics_contact.partition import box_partition
-from fenics_contact.shape import (
-    AdaptiveTolerance,
-    ContactForces,
-    Objective,
-    ShapeProblem,
-    SurfaceDesign,
-    TotalPotential,
-)
-from fenics_contact.study.scenes.chain_links import chain, graded_links
+from fenics_contact.shape import AdaptiveTolerance, ContactForces, Objective, TotalPotential
 
-#: Cells around, through and across each link, boxes, control points.
-SIZES = {
-    "coarse": ((30, 4, 10), (4, 1, 1), (7, 4)),
-    "small": ((36, 6, 14), (8, 1, 2), (7, 4)),
-}
 #: Tolerance of all states; looser ones would blur differences that the methods look at.
 STATES = 1e-8
 
@@ -53,7 +38,7 @@ class Case:
     """One problem: a chain, what is minimised, its friction and where the search starts.
 
     Attributes:
-        size: One of `SIZES`.
+        size: One of `benchmarks.cases.chain_design.SIZES`.
         objective: One of `OBJECTIVES`.
         bound: Largest distance of a control point from its place, [mm].
         friction: Coefficient of friction.
@@ -87,19 +72,13 @@ class Book:
         notes: Why designs did not exist.
     """
 
-    def __init__(self, case: Case, budget: int, tolerance: float | AdaptiveTolerance = STATES) -> None:
+    def __init__(
+        self, comm: MPI.Comm, case: Case, budget: int, tolerance: float | AdaptiveTolerance = STATES
+    ) -> None:
         """Prepare the problem; no state is solved."""
-        cells, boxes, net = SIZES[case.size]
-        links = _links(cells)
-        scene = chain(links, case.friction)
-        partitions = {name: box_partition(body.mesh, boxes) for name, body in scene.bodies.items()}
-        design = SurfaceDesign("link 1", links.first.crown, net=net)
         objective, self._judge = OBJECTIVES[case.objective]
-        self.problem = ShapeProblem(
-            ContactProblem(scene, MPI.COMM_SELF, partitions=partitions),
-            design,
-            objective,
-            tolerance=tolerance,
+        self.problem = chain_shape_problem(
+            comm, case.size, objective=objective, friction=case.friction, tolerance=tolerance
         )
         size = self.problem.size
         self.bound = case.bound
@@ -166,8 +145,3 @@ class Book:
         products = self.problem.products + self._state_products
         self.rows.append((float(value), violation, products, perf_counter() - self._began))
         self.designs.append(np.array(alpha))
-
-
-@cache
-def _links(cells: tuple[int, int, int]) -> TwoLinks:
-    return graded_links(cells, MPI.COMM_SELF)
