@@ -30,8 +30,7 @@ from fenics_contact.scene import (
 from tests.accuracy.fields import estimated, quadratic, scene_of, torn_field, torn_up
 from tests.models.bodies import bent, box, in_halves
 from tests.models.elements import CELLS, PLANE
-from tests.models.test_element_matrices import LAME, EnergyByEntries, FromEnergy, FromStress
-from tests.models.test_model_checks import Foundation
+from tests.models.materials import LAME, EnergyByEntries, Foundation, FromEnergy, FromStress
 
 AXES = material_axes((1, 2, 0.5), (0, 1, 1))
 WOOD = OrthotropicElasticity((11.0, 0.9, 0.5), (0.37, 0.42, 0.6), (0.7, 0.6, 0.05), AXES)

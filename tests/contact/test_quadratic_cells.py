@@ -32,7 +32,7 @@ from fenics_contact.scene import (
     Traction,
 )
 from fenics_contact.viz import plot_contact_pressure, plot_decomposition, plot_stress
-from tests.contact import test_hertz as hertz
+from tests.contact import hertz
 
 SOLVER = FaceNewton(tolerance=1e-10)
 

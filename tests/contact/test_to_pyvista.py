@@ -9,33 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
-from mpi4py import MPI
 
-from fenics_contact.contact import State, solve_scene
 from fenics_contact.errors import InvalidInputError, MissingRequirementError
-from fenics_contact.gallery import block, rectangle
 from fenics_contact.io import write_vtu
-from fenics_contact.mesh import quadratic
-from fenics_contact.scene import Body, IsotropicElasticity, PlaneStrain, Scene, Support, Traction
 from tests.viz.plane_states import plane_block
-from tests.viz.states import touching_blocks
-
-
-def pulled(cell: str) -> State:
-    """A bar of quadratic cells pulled along x."""
-    if cell == "hexahedron27":
-        mesh = quadratic(block((0, 0, 0), (2, 1, 1), (2, 1, 1)))
-        material, load = IsotropicElasticity(100.0, 0.3), (1.0, 0.0, 0.0)
-    else:
-        plane = "triangle" if cell == "triangle6" else "quadrilateral"
-        mesh = quadratic(rectangle((0, 0), (2, 1), (2, 1), plane))
-        material, load = PlaneStrain(100.0, 0.3), (1.0, 0.0)
-    assert mesh.cell_type == cell
-    hold = Support("bar", "x0", (0.0,) * mesh.dim)
-    return solve_scene(
-        Scene({"bar": Body(mesh, material)}, [hold], [Traction("bar", "x1", load)]), MPI.COMM_SELF
-    )
-
+from tests.viz.states import pulled, touching_blocks
 
 STATES = {
     "hexahedron": lambda: touching_blocks("hexahedron"),

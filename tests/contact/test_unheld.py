@@ -7,19 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
-from scipy.spatial.transform import Rotation
 
 from fenics_contact.contact import FixedPoint, State, solve_scene
 from fenics_contact.errors import InfeasibleError
 from fenics_contact.feti import DualSystem, build_torn_system, decompose
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.partition import graph_partition
 from fenics_contact.qp import FaceNewton, Smalse
 from fenics_contact.scene import (
     Body,
     ContactPair,
     Coulomb,
-    IsotropicElasticity,
     PlaneStrain,
     RigidPlane,
     Scene,
@@ -29,11 +26,7 @@ from fenics_contact.scene import (
     Traction,
     Tresca,
 )
-
-RUBBER = IsotropicElasticity(100.0, 0.3)
-#: No axis of the turned bodies is one of the coordinates', no corner is exact in binary.
-TURN = Rotation.from_rotvec([0.3, -0.5, 0.7]).as_matrix()
-SHIFT = np.array([0.7, -1.1, 0.3])
+from tests.contact.stacks import RUBBER, TURN, cut, turned_stack
 
 
 def cube_on_floor(n: int) -> Scene:
@@ -42,24 +35,6 @@ def cube_on_floor(n: int) -> Scene:
     supports = [Support("cube", "x0", (0.0, None, None)), Support("cube", "z1", (None, None, -1e-3))]
     floor = RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     return Scene({"cube": cube}, supports, contacts=[ContactPair(Surface("cube", "z0"), floor)])
-
-
-def turned_stack(friction: Coulomb | Tresca | None = None, discretisation: str = "node") -> Scene:
-    """A block pressed on another one, both turned and shifted."""
-    lower = block((0.0, 0.0, 0.0), (1.3, 1.1, 0.7), (3, 5, 3))
-    upper = block((0.15, 0.1, 0.7), (1.15, 1.0, 1.3), (5, 3, 3))
-    meshes = {"lower": lower, "upper": upper}
-    return Scene(
-        {name: Body(mesh.moved(mesh.points @ TURN.T + SHIFT), RUBBER) for name, mesh in meshes.items()},
-        [Support("lower", "z0")],
-        [Traction("upper", "z1", tuple(TURN @ [0.0, 0.0, -0.01]))],
-        [ContactPair(Surface("upper", "z0"), Surface("lower", "z1"), friction, discretisation)],
-    )
-
-
-def cut(scene: Scene, parts: int) -> dict[str, np.ndarray]:
-    """Cut every body by METIS."""
-    return {name: graph_partition(body.mesh, parts) for name, body in scene.bodies.items()}
 
 
 def left_of(state: State, body: str, motion: np.ndarray) -> float:
@@ -178,7 +153,7 @@ def test_unheld_motions_are_the_same_on_any_number_of_ranks(mpirun) -> None:
         from mpi4py import MPI
         from fenics_contact.contact import solve_scene
         from fenics_contact.partition import graph_partition
-        from tests.contact.test_unheld import cut, turned_stack
+        from tests.contact.stacks import cut, turned_stack
         scene = turned_stack()
         state = solve_scene(scene, MPI.COMM_WORLD, partitions=cut(scene, 4), tolerance=1e-9)
         words, moved = [str(motion) for motion in state.unheld], state.gather_displacement("upper")

@@ -6,8 +6,8 @@ import runpy
 import xml.etree.ElementTree as ET
 
 from tests.docs.pages import DOCS, ROOT
+from tests.house.floors import FLOORS
 from tests.house.source import modules
-from tests.house.test_imports import FLOORS
 
 PICTURE = DOCS / "pictures" / "architecture.svg"
 

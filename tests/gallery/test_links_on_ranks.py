@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Callable
 
-from mpi4py import MPI
+from tests.gallery.links import digest
 
-from fenics_contact.gallery import LinkShape, two_links
-
-SMALL = LinkShape(n_around=12, n_a=2, n_b=4, cell="tetrahedron")
 CODE = """
     import sys
     from mpi4py import MPI
     from fenics_contact.gallery import link
-    from tests.gallery.test_links_on_ranks import SMALL, digest
+    from tests.gallery.links import SMALL, digest
 
     comm = MPI.COMM_WORLD
 
@@ -33,15 +29,6 @@ CODE = """
     lines = comm.gather(word, root=0) or []
     sys.stdout.write("".join(f"{line}\\n" for line in lines))
 """
-
-
-def digest(comm: MPI.Comm | None) -> str:
-    """Reduce two links to one word that changes with every bit of them."""
-    pair = two_links(SMALL, comm=comm)
-    meshes = (pair.first.mesh, pair.second.mesh)
-    arrays = [a for mesh in meshes for a in (mesh.points, mesh.cells, mesh.grid, *mesh.surfaces.values())]
-    arrays += [pair.first.crown.directions, pair.second.crown.directions]
-    return hashlib.sha256(b"".join(a.tobytes() for a in arrays if a is not None)).hexdigest()
 
 
 def test_all_ranks_hold_the_same_bits(mpirun: Callable[..., str]) -> None:

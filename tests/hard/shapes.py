@@ -23,8 +23,7 @@ from fenics_contact.shape import (
 from tests.contact.gallery import FLOOR, crowned, partitions
 from tests.shape.blocks import PLASTIC, RUBBER, designs_of, side
 from tests.shape.objectives import normal_forces
-from tests.shape.pressed import DESIGN
-from tests.shape.test_weak_points import SWITCHES
+from tests.shape.pressed import DESIGN, SWITCHES
 
 Array = np.ndarray
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -76,3 +77,18 @@ def test_files_are_short() -> None:
     lengths = {str(path.relative_to(ROOT)): len(path.read_text().splitlines()) for path in python_files()}
     assert len(lengths) > 10, "hardly any files were found: nothing was tested"
     assert {path: lines for path, lines in lengths.items() if lines > MOST_LINES} == {}
+
+
+def imported_tests(path: Path) -> list[str]:
+    """List the imports of what stands in a test file, also those in scripts for several ranks."""
+    line = r"^ *(?:from|import) +tests\.(?:[\w.]*\btest_\w+|[\w.]+ import test_\w+)"
+    return re.findall(line, path.read_text(), re.MULTILINE)
+
+
+def test_no_test_file_is_imported(tmp_path: Path) -> None:
+    files = [path for path in python_files() if "tests" in path.parts]
+    assert len(files) > 200, "no tests were found: nothing was tested"
+    assert [f"{path}: {line}" for path in files for line in imported_tests(path)] == []
+    script = tmp_path / "script.py"
+    script.write_text("CODE = '\n    from tests.qp import test_solve\n    import tests.qp.test_solve'\n")
+    assert len(imported_tests(script)) == 2

@@ -8,28 +8,9 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import launch
+from tests.house.floors import FLOORS
 from tests.house.source import PACKAGE, Module, modules, room_of
 
-#: From the ground up; rooms on one floor do not know each other.
-FLOORS = [
-    {"errors"},
-    {"progress", "fingerprint", "checks"},
-    {"_requirements", "launching", "timing", "checkpoint"},
-    {"_libraries"},
-    {"_dolfinx"},
-    {"surface_shapes", "linalg", "theory"},
-    {"mesh"},
-    {"mesh_io", "partition", "surfaces"},
-    {"gallery"},
-    {"scene", "qp"},
-    {"fem"},
-    {"pairing"},
-    {"feti"},
-    {"accuracy"},
-    {"contact"},
-    {"shape"},
-    {"optimize", "outer"},
-]
 FLOOR = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
 BESIDE = {"viz", "io", "study", "scene_file"}
 #: On top of everything: the study of accuracy draws and writes, the command line does all that there is.

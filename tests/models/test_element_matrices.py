@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
-import ufl
 
 from fenics_contact.scene import (
-    Elasticity,
-    EnergyModel,
     IsotropicElasticity,
     Material,
     OrthotropicElasticity,
@@ -19,7 +15,6 @@ from fenics_contact.scene import (
     PlaneStrain,
     PlaneStress,
     material_axes,
-    strain,
 )
 from tests.models.elements import (
     CELLS,
@@ -31,57 +26,9 @@ from tests.models.elements import (
     one_cell,
     skewed_cell,
 )
+from tests.models.materials import LAME, POISSON, YOUNG, EnergyByEntries, FromEnergy, FromStress
 
-YOUNG, POISSON = 210.0, 0.3
 WOOD = ((11.0, 0.9, 0.5), (0.37, 0.42, 0.6), (0.7, 0.6, 0.05))
-
-
-@dataclass(frozen=True)
-class FromEnergy(EnergyModel):
-    lame: float
-    shear: float
-
-    @property
-    def parameters(self) -> tuple[float, float]:
-        return self.lame, self.shear
-
-    def energy(self, strain: Any, parameters: Any) -> Any:
-        lame, shear = parameters
-        return lame / 2 * ufl.tr(strain) ** 2 + shear * ufl.inner(strain, strain)
-
-
-@dataclass(frozen=True)
-class FromStress(Elasticity):
-    lame: float
-    shear: float
-
-    @property
-    def parameters(self) -> tuple[float, float]:
-        return self.lame, self.shear
-
-    def stress(self, u: Any, parameters: Any) -> Any:
-        lame, shear = parameters
-        return lame * ufl.div(u) * ufl.Identity(len(u)) + 2 * shear * strain(u)
-
-
-@dataclass(frozen=True)
-class EnergyByEntries(EnergyModel):
-    """The same in the plane, written with single entries of the strain."""
-
-    lame: float
-    shear: float
-
-    @property
-    def parameters(self) -> tuple[float, float]:
-        return self.lame, self.shear
-
-    def energy(self, strain: Any, parameters: Any) -> Any:
-        lame, shear = parameters
-        x, y, xy = strain[0, 0], strain[1, 1], strain[0, 1]
-        return lame / 2 * (x + y) ** 2 + shear * (x * x + y * y + 2 * xy * xy)
-
-
-LAME = (YOUNG * POISSON / ((1 + POISSON) * (1 - 2 * POISSON)), YOUNG / (2 * (1 + POISSON)))
 
 
 def difference(material: Material, cell: str, C: np.ndarray) -> float:

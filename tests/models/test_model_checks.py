@@ -28,6 +28,7 @@ from fenics_contact.scene import (
     strain,
 )
 from tests.models.elements import CELLS, PLANE, by_node, element_stiffness, isotropic_matrix, one_cell, whole
+from tests.models.materials import Foundation
 
 Kernel = Callable[[np.ndarray], np.ndarray]
 
@@ -153,26 +154,6 @@ def test_an_infinite_stiffness_is_refused() -> None:
         InvalidInputError, match=r"NaN or infinity in the stiffness of IsotropicElasticity: check"
     ):
         prepare(IsotropicElasticity(1e308, 0.49), "hexahedron")
-
-
-@dataclass(frozen=True)
-class Foundation(Elasticity):
-    """Springs that hold every point of the body: no motion is free."""
-
-    stiffness_of_springs: float
-
-    @property
-    def parameters(self) -> tuple[float]:
-        return (self.stiffness_of_springs,)
-
-    def stress(self, u: Any, parameters: Any) -> Any:
-        return ufl.tr(strain(u)) * ufl.Identity(len(u)) + 2 * strain(u)
-
-    def stiffness(self, u: Any, v: Any, parameters: Any) -> Any:
-        return ufl.inner(self.stress(u, parameters), strain(v)) + parameters[0] * ufl.inner(u, v)
-
-    def kernel(self, points: np.ndarray) -> np.ndarray:
-        return np.zeros((*points.shape, 0))
 
 
 @pytest.mark.parametrize("cell", ["quadrilateral", "hexahedron"])

@@ -19,21 +19,7 @@ from fenics_contact.qp import (
 )
 from tests.qp.random_problems import random_problem
 from tests.qp.torn_bricks import Bricks, torn_problem
-
-
-def coulomb_violations(layout, lam, r, friction_coefficient):
-    """Violations of the law, written out point by point: gap, force, complementarity, disc, direction."""
-    normal, gap = lam[layout.tangential_frictional], r[layout.tangential_frictional]
-    tau, slip = lam[layout.tangential], -r[layout.tangential]
-    bound, speed = friction_coefficient * normal, np.linalg.norm(slip, axis=1)
-    return {
-        "penetration": max(-gap.min(), 0.0) / np.abs(gap).max(),
-        "tension": max(-normal.min(), 0.0) / normal.max(),
-        "complementarity": np.abs(gap * normal).max() / (np.abs(gap).max() * normal.max()),
-        "disc": max((np.linalg.norm(tau, axis=1) - bound).max(), 0.0) / normal.max(),
-        "dissipation": np.abs(np.einsum("ia,ia->i", tau, slip) - bound * speed).max()
-        / (normal.max() * speed.max()),
-    }
+from tests.qp.violations import coulomb_violations
 
 
 @pytest.mark.parametrize("friction_coefficient", [0.21, 0.3, 0.6, 2.0])

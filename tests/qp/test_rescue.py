@@ -17,8 +17,8 @@ from fenics_contact.qp.problem import CountedOperator
 from fenics_contact.qp.rescue import ProximalPoint, Rescue
 from fenics_contact.qp.slip_law import CoulombLaw
 from fenics_contact.qp.solution import Residuals, SolverStep
-from tests.qp.test_coulomb import coulomb_violations
 from tests.qp.torn_bricks import Bricks, torn_problem
+from tests.qp.violations import coulomb_violations
 
 
 @pytest.mark.parametrize("load", [1e-2, 1e-4, 1e-6, 1e-8])

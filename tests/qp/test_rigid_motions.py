@@ -9,8 +9,8 @@ import pytest
 
 from fenics_contact.qp import CoulombLaw, DualProblem, FaceNewton, Smalse, TrescaLaw, contact_step, solve
 from fenics_contact.qp.rigid_motions import RigidMotionCorrection
-from tests.qp.test_coulomb import coulomb_violations
 from tests.qp.torn_bricks import Bricks, torn_problem
+from tests.qp.violations import coulomb_violations
 
 
 def settled(problem: DualProblem, law, multiplier, residual):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -74,3 +75,10 @@ def about_to_slip() -> Pressed:
 
 def line(pressed: Pressed, choice: WeakChoice) -> Line:
     return Line(pressed.problem(choice), DESIGN, DIRECTION, 1e-5)
+
+
+SWITCHES: dict[str, Callable[[], Pressed]] = {
+    "closing, frictionless": lambda: about_to_close(None),
+    "closing with friction": lambda: about_to_close(Coulomb(0.3)),
+    "slipping": about_to_slip,
+}

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pytest
 
 from fenics_contact.contact import State, Status
 from fenics_contact.shape import DesignPoint, Objective, ShapeProblem
@@ -111,3 +113,16 @@ class Line:
     def counts(self) -> dict[str, int]:
         """How many points have each status."""
         return {status.name: self.state().contact.count(status) for status in Status}
+
+
+Patch = pytest.MonkeyPatch
+
+
+def miss_without(term: Callable[[Patch], None], here: Line, objective: Objective) -> float:
+    """Relative error of an adjoint that leaves a term out."""
+    quotient = here.quotient(objective)
+    with pytest.MonkeyPatch.context() as patch:
+        term(patch)
+        here.problem.objective = objective
+        slope = here.problem.evaluate(here.alpha).gradient @ here.direction
+    return float(abs(slope - quotient) / abs(quotient))

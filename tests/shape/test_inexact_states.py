@@ -14,9 +14,8 @@ from fenics_contact.optimize import Result, StepKind
 from fenics_contact.shape import AdaptiveTolerance, DesignPoint, ShapeProblem, WeakChoice
 from tests.contact.gallery import partitions
 from tests.shape.objectives import objectives
-from tests.shape.pressed import DESIGN
+from tests.shape.pressed import DESIGN, SWITCHES
 from tests.shape.resumed_cases import BOUND, minimised, posed
-from tests.shape.test_weak_points import SWITCHES
 
 JUDGES = tuple(objectives("block"))
 LOOSE = (1e-2, 1e-3, 1e-4)

@@ -10,15 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenics_contact.shape import Objective, contact_derivative, forms, problem, projection_derivative
+from fenics_contact.shape import contact_derivative, forms, problem, projection_derivative
 from fenics_contact.shape.linearised_face import LinearisedFace
-from tests.shape import test_block_sensitivity as blocks
+from tests.shape import moved_blocks as blocks
 from tests.shape.chains import line
 from tests.shape.objectives import objectives
-from tests.shape.quotients import Line
+from tests.shape.quotients import Line, Patch, miss_without
 
 OBJECTIVES = objectives("link1")
-Patch = pytest.MonkeyPatch
 
 
 def without(*terms: str) -> Callable[[Patch], None]:
@@ -102,16 +101,6 @@ def slanted(regime: str) -> Line:
     """Another way, along which all terms show in the energy."""
     here = line(regime)
     return replace(here, direction=np.random.default_rng(54).standard_normal(here.alpha.size))
-
-
-def miss_without(term: Callable[[Patch], None], here: Line, objective: Objective) -> float:
-    """Relative error of an adjoint that leaves a term out."""
-    quotient = here.quotient(objective)
-    with pytest.MonkeyPatch.context() as patch:
-        term(patch)
-        here.problem.objective = objective
-        slope = here.problem.evaluate(here.alpha).gradient @ here.direction
-    return float(abs(slope - quotient) / abs(quotient))
 
 
 @pytest.mark.parametrize("term", TERMS)

@@ -27,8 +27,7 @@ from fenics_contact.shape import Objective, forms
 from tests.contact.gallery import FLOOR, crowned
 from tests.shape.blocks import problem
 from tests.shape.objectives import objectives
-from tests.shape.quotients import Line
-from tests.shape.test_left_out_terms import miss_without
+from tests.shape.quotients import Line, miss_without
 
 WOOD = OrthotropicElasticity(
     (90.0, 60.0, 80.0), (0.2, 0.3, 0.25), (30.0, 35.0, 25.0), thermal_expansion=(1e-3, 2e-3, 0.0)

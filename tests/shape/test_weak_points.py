@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -17,14 +16,9 @@ from fenics_contact.scene import Body, ContactPair, Coulomb, IsotropicElasticity
 from fenics_contact.shape import ContactForces, Objective, WeakChoice, linearise_face
 from tests.contact.gallery import partitions, two_blocks
 from tests.shape.objectives import objectives
-from tests.shape.pressed import DESIGN, Pressed, about_to_close, about_to_slip, line
+from tests.shape.pressed import DESIGN, SWITCHES, Pressed, line
 from tests.shape.quotients import Line
 
-SWITCHES: dict[str, Callable[[], Pressed]] = {
-    "closing, frictionless": lambda: about_to_close(None),
-    "closing with friction": lambda: about_to_close(Coulomb(0.3)),
-    "slipping": about_to_slip,
-}
 #: Weak contacts, weak discs.
 COUNTS = {"closing, frictionless": (1, 0), "closing with friction": (1, 0), "slipping": (0, 1)}
 OBJECTIVES = objectives("block")

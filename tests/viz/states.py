@@ -11,7 +11,9 @@ from matplotlib.image import imread
 from mpi4py import MPI
 
 from fenics_contact.contact import State, Status, solve_scene
-from fenics_contact.scene import Coulomb
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.mesh import quadratic
+from fenics_contact.scene import Body, Coulomb, IsotropicElasticity, PlaneStrain, Scene, Support, Traction
 from fenics_contact.viz import Picture
 from tests.contact.gallery import partitions, two_blocks
 
@@ -40,3 +42,19 @@ def contains(image: np.ndarray, colour: str, tolerance: float = 0.02) -> bool:
     """Whether a colour "#rrggbb" is found in more than ten pixels."""
     wanted = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
     return int(np.sum(np.all(np.abs(image - wanted) < tolerance, axis=-1))) > 10
+
+
+def pulled(cell: str) -> State:
+    """A bar of quadratic cells pulled along x."""
+    if cell == "hexahedron27":
+        mesh = quadratic(block((0, 0, 0), (2, 1, 1), (2, 1, 1)))
+        material, load = IsotropicElasticity(100.0, 0.3), (1.0, 0.0, 0.0)
+    else:
+        plane = "triangle" if cell == "triangle6" else "quadrilateral"
+        mesh = quadratic(rectangle((0, 0), (2, 1), (2, 1), plane))
+        material, load = PlaneStrain(100.0, 0.3), (1.0, 0.0)
+    assert mesh.cell_type == cell
+    hold = Support("bar", "x0", (0.0,) * mesh.dim)
+    return solve_scene(
+        Scene({"bar": Body(mesh, material)}, [hold], [Traction("bar", "x1", load)]), MPI.COMM_SELF
+    )

@@ -18,9 +18,8 @@ from fenics_contact.viz import before_after, plot_before_after
 from fenics_contact.viz.colours import GREY, ORANGE
 from fenics_contact.viz.profile import profiles
 from tests.contact.gallery import partitions
-from tests.contact.test_to_pyvista import pulled
 from tests.viz.plane_states import plane_block
-from tests.viz.states import contains, painted, pixels, touching_blocks
+from tests.viz.states import contains, painted, pixels, pulled, touching_blocks
 
 WIDTH = 700
 RISE = 0.012

@@ -7,8 +7,7 @@ import numpy as np
 from fenics_contact.contact import body_grid
 from fenics_contact.gallery import block
 from fenics_contact.viz.fields import cells_of, drawn_bodies, lengths, moved, nodal
-from tests.contact.test_to_pyvista import pulled
-from tests.viz.states import touching_blocks
+from tests.viz.states import pulled, touching_blocks
 
 
 def test_nodal_stress_of_a_constant_is_the_constant_and_a_mean_else() -> None:

@@ -19,9 +19,8 @@ from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError, MissingRequirementError
 from fenics_contact.viz import InteractiveScene, Picture, interactive
 from fenics_contact.viz.interactive_layers import CONTENTS
-from tests.contact.test_to_pyvista import pulled
 from tests.viz.plane_states import plane_block
-from tests.viz.states import touching_blocks
+from tests.viz.states import pulled, touching_blocks
 
 
 def scene_in(page: str) -> dict[str, Any]:

@@ -17,8 +17,7 @@ from fenics_contact.scene import Coulomb
 from fenics_contact.viz import plot_residuals
 from fenics_contact.viz.colours import BLUE, GREEN, ORANGE
 from tests.contact.gallery import partitions, two_blocks
-from tests.contact.test_to_pyvista import pulled
-from tests.viz.states import contains, painted, pixels, touching_blocks
+from tests.viz.states import contains, painted, pixels, pulled, touching_blocks
 
 WIDTH = 600
 

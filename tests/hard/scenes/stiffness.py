@@ -25,9 +25,9 @@ from fenics_contact.scene import (
     TotalForce,
     Traction,
 )
+from tests.contact.contrast import FRICTION, Blocks, Regions
 from tests.contact.gallery import crowned
-from tests.contact.test_contrast import FRICTION, Blocks, Regions
-from tests.contact.test_hertz import Hertz, errors
+from tests.contact.hertz import Hertz, errors
 from tests.hard.scenes.parts import FLOOR
 from tests.hard.trial import Trial, bisected, boxes, cut_trial, failing_trial, ragged, trial
 

@@ -1,0 +1,34 @@
+"""A block with a designed surface, and how its states follow the design."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+
+from fenics_contact.scene import Coulomb, Scene, Tresca
+from tests.shape.blocks import block_on_block, block_on_floor, problem
+from tests.shape.objectives import objectives
+from tests.shape.quotients import Line
+
+PUSH, DRAG = (0.35, 0.1, -2.0), (0.6, 0.12, -2.0)
+
+SCENES: dict[str, Callable[[], Scene]] = {
+    "floor": lambda: block_on_floor(Coulomb(0.3), load=PUSH),
+    "floor, Tresca": lambda: block_on_floor(Tresca(0.6), load=PUSH),
+    "floor, Tresca, tetrahedra": lambda: block_on_floor(Tresca(0.6), "tetrahedron", load=PUSH),
+    "blocks, Tresca": lambda: block_on_block(Tresca(0.8), load=DRAG),
+    "blocks, tetrahedra": lambda: block_on_block(Coulomb(0.38), "tetrahedron", load=DRAG),
+    "weight alone": lambda: block_on_block(Coulomb(0.25), load=(0.0, 0.0, 0.0)),
+}
+
+
+OBJECTIVES = {scene: objectives("block" if scene.startswith("floor") else "upper") for scene in SCENES}
+
+
+@cache
+def line(name: str) -> Line:
+    blocks = problem(SCENES[name]())
+    alpha = 0.01 * np.random.default_rng(1).standard_normal(blocks.size)
+    return Line(blocks, alpha, np.random.default_rng(6).standard_normal(blocks.size), 1e-5)
