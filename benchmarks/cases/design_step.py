@@ -24,7 +24,7 @@ def walk(size: int, steps: int) -> Iterator[np.ndarray]:
     The net is smooth by itself: any control values give a smooth surface.
     """
     generator = np.random.default_rng(0)
-    alpha = np.zeros(size)
+    alpha: np.ndarray = np.zeros(size)
     for _ in range(steps):
         alpha = np.clip(alpha + generator.uniform(-STEP, STEP, size), -BOUND, BOUND)
         yield alpha

@@ -85,7 +85,7 @@ class Book:
         self.bounds = (np.full(size, -case.bound), np.full(size, case.bound))
         _, by_volume = self.problem.volume(np.zeros(size))
         self.constraints = LinearConstraints(-by_volume[None, :], [0.0])
-        self.start = np.zeros(size)
+        self.start: np.ndarray = np.zeros(size)
         if case.start:
             random = np.random.default_rng(case.start).uniform(-0.8, 0.8, size) * case.bound
             self.start = nearest_feasible(random, self.bounds, self.constraints)

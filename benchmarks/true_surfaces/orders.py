@@ -81,7 +81,7 @@ def _near(mesh: BodyMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _inside(mesh: BodyMesh, facets: np.ndarray) -> np.ndarray:
     """Tell which facets lie more than a coarse cell off the border of their surface."""
     if mesh.dim == 2:
-        sides = facets.ravel()
+        sides: np.ndarray = facets.ravel()
     else:
         sides = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     found, times = np.unique(sides, axis=0, return_counts=True)
