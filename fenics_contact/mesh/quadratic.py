@@ -67,7 +67,8 @@ def _with_more_nodes(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Add a node in the middle of all vertices that lie around it, once for all cells that share it."""
     # Those whose linear shape functions are not zero there.
-    parents = [np.flatnonzero(values) for values in shape_values(linear, kind.nodes[len(linear.nodes) :])]
+    weights = shape_values(linear, kind.nodes[len(linear.nodes) :])
+    parents = [np.flatnonzero(values > 0.1) for values in weights]
     result = np.concatenate([cells, np.empty((len(cells), len(parents)), dtype=np.int64)], axis=1)
     for count in sorted({len(around) for around in parents}):
         columns = [index for index, around in enumerate(parents) if len(around) == count]
