@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from benchmarks.row import Record, Summaries, unknowns
-
 
 @dataclass(frozen=True)
 class Held:
     """Size of a run, exactly, and the work that it may take.
 
     Attributes:
-        unknowns: Of the problem, see `unknowns`.
-        work: See `work`.
+        unknowns: Of the problem, see `targets.unknowns`.
+        work: See `report.work`.
         margin: Factor up to which more work is let pass: other versions of BLAS and PETSc round differently.
     """
 
@@ -37,26 +35,3 @@ HELD = {
     "cholesky-28k": Held(28611, 1),
     "newton-28k-threads": Held(28611, 9),
 }
-
-
-def work(run: Record) -> int | None:
-    """Return products with F, steps of Newton's method or iterations: what a run counts."""
-    counts = run.get("counts", {})
-    names = ("f_products", "products", "newton_steps", "iterations")
-    return next((counts[name] for name in names if name in counts), None)
-
-
-def broken(summaries: Summaries) -> list[str]:
-    """Return one sentence for each run whose counts are not those that are held."""
-    found = []
-    for name, held in HELD.items():
-        run = summaries.get(name, {})
-        spent = work(run)
-        if spent is None:  # not measured, or skipped
-            continue
-        if unknowns(run) != held.unknowns or spent > held.margin * held.work:
-            found.append(
-                f"{name} must have {held.unknowns} unknowns and take {held.work} products or steps, got "
-                f"{unknowns(run)} and {spent}: find out why, or hold the new counts in benchmarks/held.py"
-            )
-    return found

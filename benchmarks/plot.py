@@ -12,8 +12,7 @@ from matplotlib import pyplot as plt
 
 from benchmarks.plan import BLOCKS
 from benchmarks.report import chain_sizes
-from benchmarks.row import Summaries, unknowns
-from benchmarks.targets import newton_names
+from benchmarks.targets import Summaries, newton_names, unknowns
 from fenics_contact.study.figures.phases import draw_stacked
 
 

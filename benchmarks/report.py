@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from benchmarks.comparing import force_difference
-from benchmarks.held import work
-from benchmarks.plan import LINEAR
-from benchmarks.row import NoValue, Record, Row, Summaries, unknowns
-from benchmarks.targets import ROWS, newton_names
+from benchmarks.comparing import Record, force_difference
+from benchmarks.held import HELD
+from benchmarks.plan import BLOCKS, LINEAR
+from benchmarks.targets import ROWS, Row, Summaries, newton_names, unknowns
 from fenics_contact.study.tables import table
 
 #: What the steps of a solver are called in its counts.
@@ -25,7 +24,7 @@ def results(summaries: Summaries) -> tuple[list[Result], list[str]]:
     for row in ROWS:
         try:
             found.append((row, row.record(summaries)))
-        except NoValue:
+        except KeyError:
             missing.append(row.name)
     return found, missing
 
@@ -68,18 +67,8 @@ def targets_table(found: Sequence[Result]) -> str:
 
 def runs_table(summaries: Summaries) -> str:
     """Return seconds, memory and load of every run."""
-    head = (
-        "run",
-        "ranks",
-        "unknowns",
-        "products or steps",
-        "seconds",
-        "memory",
-        "above the imports",
-        "load",
-        "runs",
-    )
-    return table(head, [_run_line(name, run) for name, run in summaries.items()])
+    head = ("run", "ranks", "unknowns", "products or steps", "seconds", "memory", "above the imports")
+    return table((*head, "load", "runs"), [_run_line(name, run) for name, run in summaries.items()])
 
 
 def _run_line(name: str, run: Record) -> tuple[str, ...]:
@@ -113,19 +102,20 @@ def phases_table(summaries: Summaries) -> str:
     if not runs:
         return "Not measured."
     phases = list(next(iter(runs.values()))["phases"])
-    body = []
-    for phase in phases:
-        spent = {name: run["phases"][phase] for name, run in runs.items()}
-        body.append((phase, *(f"{s:.2f} s, {1e6 * s / unknowns(runs[n]):.1f} µs" for n, s in spent.items())))
-    spent = {name: run["seconds"] for name, run in runs.items()}
-    whole = (f"{s:.2f} s, {1e6 * s / unknowns(runs[n]):.1f} µs" for n, s in spent.items())
-    return table(("phase: seconds, microseconds an unknown", *runs), [*body, ("**whole**", *whole)])
+    spent = {phase: [run["phases"][phase] for run in runs.values()] for phase in phases}
+    spent["**whole**"] = [run["seconds"] for run in runs.values()]
+    sizes = [unknowns(run) for run in runs.values()]
+    body = [
+        (phase, *(f"{s:.2f} s, {1e6 * s / n:.1f} µs" for s, n in zip(seconds, sizes, strict=True)))
+        for phase, seconds in spent.items()
+    ]
+    return table(("phase: seconds, microseconds an unknown", *runs), body)
 
 
 def blocks_table(summaries: Summaries) -> str:
     """Return seconds and memory of each solver of the block, and how far forces differ."""
     body = []
-    for size in ("28k", "92k", "212k"):
+    for size in BLOCKS:
         ours = f"block-{size}"
         others = (*newton_names(size), f"getfem-{size}", *(f"{solver}-{size}" for solver in LINEAR))
         for name in (ours, f"{ours}-default", *others):
@@ -142,3 +132,26 @@ def blocks_table(summaries: Summaries) -> str:
             body.append((name, str(unknowns(run)), f"{run['seconds']:.2f} s in {steps} steps", memory, apart))
     head = ("run", "unknowns", "seconds", "memory", "forces differ by")
     return table(head, body) if body else "Not measured."
+
+
+def work(run: Record) -> int | None:
+    """Return products with F, steps of Newton's method or iterations: what a run counts."""
+    counts = run.get("counts", {})
+    names = ("f_products", "products", "newton_steps", "iterations")
+    return next((counts[name] for name in names if name in counts), None)
+
+
+def broken(summaries: Summaries) -> list[str]:
+    """Return one sentence for each run whose counts are not those that are held."""
+    found = []
+    for name, held in HELD.items():
+        run = summaries.get(name, {})
+        spent = work(run)
+        if spent is None:  # not measured, or skipped
+            continue
+        if unknowns(run) != held.unknowns or spent > held.margin * held.work:
+            found.append(
+                f"{name} must have {held.unknowns} unknowns and take {held.work} products or steps, got "
+                f"{unknowns(run)} and {spent}: find out why, or hold the new counts in benchmarks/held.py"
+            )
+    return found

@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from benchmarks.held import broken
 from benchmarks.plan import WARM_UP, runs
 from benchmarks.plot import plot_results
-from benchmarks.report import page, results
-from benchmarks.row import Summaries
+from benchmarks.report import broken, page, results
 from benchmarks.study import ROOT, Records, Study
+from benchmarks.targets import Summaries
 from fenics_contact.io.json_file import plain
 from fenics_contact.io.replacing import replacing
 from fenics_contact.study.runner import summarised
@@ -18,7 +17,7 @@ from fenics_contact.study.runner import summarised
 
 def summaries_of(records: Records) -> Summaries:
     """Return one record for each run."""
-    return Summaries({name: summarised(name, found) for name, found in records.items()})
+    return {name: summarised(name, found) for name, found in records.items()}
 
 
 def write_results(folder: Path, summaries: Summaries) -> None:

@@ -2,22 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
-from benchmarks.comparing import force_difference, potential_difference, require_agreement
+from benchmarks.comparing import Record, force_difference, potential_difference, require_agreement
 from benchmarks.plan import LINEAR
-from benchmarks.row import NoValue, Record, Row, Summaries, unknowns
+
+#: One record by the name of its run.
+Summaries = Mapping[str, Record]
 
 
-def monolithic(summaries: Summaries, size: str) -> tuple[Record, Record]:
-    """Return this package's and the faster Newton run of the block, which must agree."""
-    ours = summaries[f"block-{size}"]
-    newton = [summaries[name] for name in newton_names(size) if name in summaries]
-    if not newton:
-        raise NoValue(newton_names(size)[0])
-    fastest = min(newton, key=lambda run: run["seconds"])
-    require_agreement(f"block-{size}", ours, fastest)
-    return ours, fastest
+@dataclass(frozen=True)
+class Row:
+    """One figure with its target.
+
+    Attributes:
+        name: Short name.
+        quantity: What it is, in words.
+        unit: Of value and target.
+        target: What the value should reach.
+        better: ``"lower"`` or ``"higher"``.
+        value: Computes it from the records; a KeyError says that a run is missing or was refused.
+        of: Run that tells ranks and unknowns.
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    target: float
+    better: str
+    value: Callable[[Summaries], float]
+    of: str = "chain"
+
+    def met(self, value: float) -> bool:
+        """Tell whether a value reaches the target."""
+        return value <= self.target if self.better == "lower" else value >= self.target
+
+    def record(self, summaries: Summaries) -> dict[str, Any]:
+        """Return the row as `results.json` has it.
+
+        Raises:
+            KeyError: If a run that it needs is missing or was refused.
+        """
+        run = summaries[self.of]
+        return {
+            "name": self.name,
+            "quantity": self.quantity,
+            "value": self.value(summaries),
+            "unit": self.unit,
+            "target": self.target,
+            "better": self.better,
+            "ranks": run["ranks"],
+            "unknowns": unknowns(run if "counts" in run else summaries["chain"]),
+        }
+
+
+def unknowns(run: Record) -> int:
+    """Return the unknowns of a run: of the untorn problem where other solvers solve it too."""
+    counts = run["counts"]
+    return int(counts.get("unknowns") or counts["torn_unknowns"])
 
 
 def newton_names(size: str) -> tuple[str, str]:
@@ -26,12 +70,7 @@ def newton_names(size: str) -> tuple[str, str]:
 
 
 def _products(run: str) -> Callable[[Summaries], float]:
-    def value(summaries: Summaries) -> float:
-        if "refused" in summaries[run]:
-            raise NoValue(run)
-        return summaries[run]["counts"]["f_products"]
-
-    return value
+    return lambda summaries: summaries[run]["counts"]["f_products"]
 
 
 def _over_linear(summaries: Summaries) -> float:
@@ -40,11 +79,7 @@ def _over_linear(summaries: Summaries) -> float:
 
 
 def _converges_or_is_refused(run: str) -> Callable[[Summaries], float]:
-    def value(summaries: Summaries) -> float:
-        record = summaries[run]
-        return float("counts" in record or record["refused"] == "InfeasibleError")
-
-    return value
+    return lambda all_: float("counts" in all_[run] or all_[run]["refused"] == "InfeasibleError")
 
 
 def _ratio(one: str, other: str, figure: Callable[[Record], float]) -> Callable[[Summaries], float]:
@@ -52,14 +87,25 @@ def _ratio(one: str, other: str, figure: Callable[[Record], float]) -> Callable[
 
 
 def _against_newton(figure: Callable[[Record, Record], float]) -> Callable[[Summaries], float]:
-    return lambda summaries: figure(*monolithic(summaries, "92k"))
+    """Compare with the faster Newton run of the block, which must agree."""
+
+    def value(summaries: Summaries) -> float:
+        ours = summaries["block-92k"]
+        newton = [summaries[name] for name in newton_names("92k") if name in summaries]
+        if not newton:
+            raise KeyError(newton_names("92k")[0])
+        fastest = min(newton, key=_seconds)
+        require_agreement("block-92k", ours, fastest)
+        return figure(ours, fastest)
+
+    return value
 
 
 def _default_over_boxes(run: str) -> Callable[[Summaries], float]:
     def value(summaries: Summaries) -> float:
         by_hand, default = summaries[run], summaries[f"{run}-default"]
         require_agreement(f"{run}-default", by_hand, default)
-        return default["seconds"] / by_hand["seconds"]
+        return _seconds(default) / _seconds(by_hand)
 
     return value
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from benchmarks.plan import runs
-from benchmarks.row import Summaries
 
 
 def record(**changes: Any) -> dict[str, Any]:
@@ -26,9 +25,9 @@ def record(**changes: Any) -> dict[str, Any]:
     }
 
 
-def all_summaries() -> Summaries:
+def all_summaries() -> dict[str, Any]:
     """Return a summary of every run."""
-    summaries = Summaries({run.name: record(ranks=max(1, run.ranks)) for run in runs()})
+    summaries = {run.name: record(ranks=max(1, run.ranks)) for run in runs()}
     refused = record(refused="InfeasibleError", message="not held")
     for key in ("counts", "total_potential", "seconds", "phases", "forces"):
         refused.pop(key)

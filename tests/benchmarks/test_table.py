@@ -9,11 +9,10 @@ from pathlib import Path
 import pytest
 
 from benchmarks.comparing import force_difference, potential_difference, require_agreement
-from benchmarks.held import HELD, broken, work
+from benchmarks.held import HELD
 from benchmarks.plan import OPTIONAL, runs
 from benchmarks.plot import plot_results
-from benchmarks.report import results
-from benchmarks.row import Summaries
+from benchmarks.report import broken, results, work
 from benchmarks.speed import write_results
 from benchmarks.targets import ROWS
 from fenics_contact.errors import InvalidInputError
@@ -76,7 +75,7 @@ def test_a_row_is_met_on_the_right_side_of_its_target() -> None:
 
 def test_rows_whose_runs_are_missing_are_named_and_left_out(tmp_path: Path) -> None:
     every = all_summaries()
-    summaries = Summaries({name: every[name] for name in ("chain", "linear-face")})
+    summaries = {name: every[name] for name in ("chain", "linear-face")}
     found, missing = results(summaries)
     assert [row.name for row, _ in found] == ["products", "products-over-linear", "cold-state"]
     assert len(missing) == len(ROWS) - 3
@@ -150,13 +149,13 @@ def test_more_work_or_another_size_breaks_what_is_held() -> None:
 
     def found(unknowns: int, products: int) -> list[str]:
         counts = {"torn_unknowns": unknowns, "f_products": products}
-        return broken(Summaries({"chain": record(counts=counts)}))
+        return broken({"chain": record(counts=counts)})
 
     assert found(held.unknowns, held.work) == found(held.unknowns, held.work - 10) == []
     assert found(held.unknowns, held.work + 1) == [], "another BLAS rounds differently"
     assert "chain must have 66528 unknowns and take 90 products" in found(held.unknowns, 2 * held.work)[0]
     assert len(found(held.unknowns - 1, held.work)) == 1
-    assert broken(Summaries({"chain": {"skipped": "no gmsh"}})) == []
+    assert broken({"chain": {"skipped": "no gmsh"}}) == []
 
 
 @pytest.mark.parametrize("name", ["f_products", "products", "newton_steps", "iterations"])
@@ -180,7 +179,5 @@ def test_solvers_that_disagree_are_not_compared() -> None:
 @pytest.mark.parametrize("names", [None, ["chain", "block-28k"]])
 def test_the_picture_is_drawn_from_all_runs_and_from_few(tmp_path: Path, names: list[str] | None) -> None:
     every = all_summaries()
-    plot_results(
-        tmp_path / "results.png", every if names is None else Summaries({n: every[n] for n in names})
-    )
+    plot_results(tmp_path / "results.png", every if names is None else {n: every[n] for n in names})
     assert (tmp_path / "results.png").stat().st_size > 10_000
