@@ -67,3 +67,28 @@ def chosen(jobs: Sequence[Job], names: Sequence[str]) -> list[Job]:
             )
         wanted |= meant
     return [job for job in jobs if job.name in wanted or not names]
+
+
+def filled(page: str, tables: Mapping[str, str]) -> str:
+    """Return a page of Markdown with tables in their places, between ``<!-- table: NAME -->`` and an end.
+
+    What stands around them is written by hand.
+
+    Raises:
+        ValueError: If the page has no place for a table.
+    """
+    for name, text in tables.items():
+        before, start, rest = page.partition(f"<!-- table: {name} -->\n")
+        _, end, after = rest.partition("\n<!-- end -->")
+        if not end:
+            raise ValueError(
+                f"the page needs a place for {name!r}, got none: add the lines '<!-- table: {name} -->' and "
+                "'<!-- end -->'"
+            )
+        page = f"{before}{start}\n{text.strip()}\n{end}{after}"
+    return page
+
+
+def unfilled(tables: Mapping[str, str]) -> str:
+    """Return the tables alone: of a quick study nothing follows."""
+    return "\n\n".join(f"## {name}\n\n{text.strip()}" for name, text in tables.items()) + "\n"

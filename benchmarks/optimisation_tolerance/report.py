@@ -1,4 +1,4 @@
-"""The study: its jobs, its page and its picture."""
+"""The study: its jobs, the tables of its page and its picture."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
-from benchmarks.study import ROOT, Records, Study, found
+from benchmarks.study import ROOT, Records, Study, filled, found, unfilled
 from fenics_contact.io import versions, write_json, write_text
 from fenics_contact.study.runner import Job
 from fenics_contact.study.tables import table
@@ -21,43 +21,19 @@ ORANGE, BLUE, GREEN = "#f58518", "#4c78a8", "#54a24b"
 #: What the adaptive runs are compared with.
 USUAL = "1e-08"
 
-INTRODUCTION = """\
-# What a looser state tolerance does to the subgradient and to the optimum
-
-The chain of `demos/demo_chain_links.py`: total potential energy, 28 variables, friction coefficient 0.3.
-Errors are relative and against states of tolerance 1e-11. Written by
-`python -m benchmarks optimisation_tolerance`.
-
-![Errors and products](optimisation_tolerance.png)
-
-- *value*: error of J as the state gives it; *corrected*: with the adjoint-weighted residual added, which an
-  adaptive tolerance does; *estimate*: that residual itself, median of estimate over error in brackets.
-- *wrong status*: points whose open, stick or slip differs from the accurate state, over all designs.
-- *above the best*: J of the design that was found, evaluated accurately, over the best of all runs, in units
-  of ε (1 + |J|), where ε is the stopping tolerance of the optimiser.
-
-How to read it: subgradient and value are at most a quarter as wrong as the state is allowed to be; the
-adjoint knows that error of the value, so that the corrected one is better by two digits. A fixed tolerance
-that is too loose for ε is not noticed by the optimiser: it may stop above the optimum and say that it
-converged. The adaptive one asks for what each step needs and confirms the last design before it stops.
-
-A loose state may take a point that is about to close or to slip for one that does so already. Beside such a
-switch the subgradient is then off by the kink, not by the tolerance, but it is that of the other side or
-between both: an inexact Clarke subgradient, which is all that the bundle method needs
-(`tests/shape/test_inexact_states.py`). Points count as weakly active at the accuracy of the state.
-"""
-
 #: Of records that do not tell how far cells are graded.
 EQUAL_CELLS = "Measured on links of equal cells and flat facets; those of the demo are graded since.\n"
 
 
-def page(studies: list[dict[str, Any]]) -> str:
-    """Return the page of Markdown."""
+def tables(studies: list[dict[str, Any]]) -> dict[str, str]:
+    """Return the tables of the page by their names."""
     graded = all("grading" in study for study in studies)
-    parts = [INTRODUCTION] if graded else [INTRODUCTION, EQUAL_CELLS]
-    for study in studies:
-        parts += [f"## {study['size'].capitalize()} chain\n", _errors(study), _wrong(study), _optima(study)]
-    return "\n".join(parts)
+    return {
+        f"{study['size']} chain": "\n".join(
+            [*([] if graded else [EQUAL_CELLS]), _errors(study), _wrong(study), _optima(study)]
+        )
+        for study in studies
+    }
 
 
 def _errors(study: dict[str, Any]) -> str:
@@ -81,21 +57,17 @@ def _errors(study: dict[str, Any]) -> str:
 
 
 def _wrong(study: dict[str, Any]) -> str:
-    """Say what a wrong face does to the subgradient."""
-    lines = []
+    """Tell what a wrong face does to the subgradient."""
+    rows = []
     for tolerance in (1e-1, 1e-2, 1e-3):
         mine = [row for row in study["errors"] if row["tolerance"] == tolerance]
-        wrong = [row["subgradient_error"] for row in mine if row["wrong_status"]]
-        right = [row["subgradient_error"] for row in mine if not row["wrong_status"]]
-        words = [
-            f"{len(errors)} design{'s' if len(errors) > 1 else ''} with {kind} face, subgradient wrong by "
-            f"{np.median(errors):.1e} "
-            f"(median), {max(errors):.1e} (largest)"
-            for kind, errors in (("the right", right), ("a wrong", wrong))
-            if errors
-        ]
-        lines.append(f"- tolerance {tolerance:g}: {'; '.join(words)}.")
-    return "\n".join(lines) + "\n"
+        for face, wrong in (("right", False), ("wrong", True)):
+            errors = [row["subgradient_error"] for row in mine if bool(row["wrong_status"]) is wrong]
+            if errors:
+                median, largest = f"{np.median(errors):.1e}", f"{max(errors):.1e}"
+                rows.append((f"{tolerance:g}", face, str(len(errors)), median, largest))
+    head = ("tolerance", "face", "designs", "subgradient, median", "largest")
+    return table(head, rows) + "\n"
 
 
 def _optima(study: dict[str, Any]) -> str:
@@ -200,7 +172,9 @@ def write(folder: Path, records: Records, quick: bool) -> None:
     known = [studies[size] for size in RANDOM if size in studies]
     if records:
         write_json(folder / "results.json", {"studies": known, "versions": versions()})
-    write_text(folder / "README.md", page(known))
+    texts = tables(known)
+    page = unfilled(texts) if quick else filled((HOME / "README.md").read_text(encoding="utf-8"), texts)
+    write_text(folder / "README.md", page)
     plot(folder / "optimisation_tolerance.png", known[0])
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -111,29 +112,27 @@ class Book:
 
     def __call__(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
         """Return J and a subgradient."""
-        self._ask()
-        try:
-            value, gradient = self.problem(alpha)
-        except (InvalidDesignError, ConvergenceError) as error:
-            self._write(alpha, np.nan)
-            self.notes.append(str(error))
-            raise InvalidDesignError(str(error)) from error
+        value, gradient = self._told(alpha, self.problem)
         self._write(alpha, value)
         return value, gradient
 
     def value(self, alpha: np.ndarray) -> float:
         """Return J alone, without an adjoint."""
-        self._ask()
-        try:
-            state = self.problem.state_of(alpha)
-        except (InvalidDesignError, ConvergenceError) as error:
-            self._write(alpha, np.nan)
-            self.notes.append(str(error))
-            raise InvalidDesignError(str(error)) from error
+        state = self._told(alpha, self.problem.state_of)
         self._state_products += state.solution.products
         value = self._judge(state)
         self._write(alpha, value)
         return value
+
+    def _told(self, alpha: np.ndarray, solve: Callable[[np.ndarray], Any]) -> Any:
+        """Return what a function finds of a design, and write it down where the design does not exist."""
+        self._ask()
+        try:
+            return solve(alpha)
+        except (InvalidDesignError, ConvergenceError) as error:
+            self._write(alpha, np.nan)
+            self.notes.append(str(error))
+            raise InvalidDesignError(str(error)) from error
 
     def _ask(self) -> None:
         if len(self.rows) >= self.budget:

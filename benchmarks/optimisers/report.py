@@ -1,4 +1,4 @@
-"""The study: its jobs, its page and its picture."""
+"""The study: its jobs, the tables of its page and its picture."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 from benchmarks.optimisers.measuring import ALLOWED, FULL, METHODS, QUICK, budget_of
-from benchmarks.study import ROOT, Records, Study, found
+from benchmarks.study import ROOT, Records, Study, filled, found, unfilled
 from fenics_contact.io import versions, write_json, write_text
 from fenics_contact.study.runner import Job
 from fenics_contact.study.tables import table
@@ -31,80 +31,20 @@ USUAL = "bundle"
 #: Smallest distance to the best value that the picture tells apart from none.
 LEAST = 1e-6
 
-INTRODUCTION = """\
-# SciPy's optimisers beside the bundle method
-
-The shape of a chain link's crown: 28 control points, the volume may not fall, friction between the links.
-All methods get the same function, the same start, the same box and the same row for the volume; SciPy's get
-them from `fenics_contact.optimize.ForScipy`, which scales variables and values. Written by
-`python -m benchmarks optimisers`.
-
-![How close to the best, by evaluations and by products](optimisers.png)
-
-- *total potential*: the objective of the demo, within ±0.25 mm. It is almost linear in the design, and its
-  minimum lies in a corner of the box.
-- *largest force*: the largest nodal contact force, within ±1 mm: a maximum over the contact points, of forces
-  that have kinks themselves where points open, close, stick or slide. Its minimum has kinks through it.
-- *above the best*: J of the best design of the method, moved onto the constraints and evaluated again, over
-  the best of all methods on this problem; in the picture 1e-6 stands for the best itself.
-- *evaluations*: states that were solved, and after how many of them the best design was met; *products*: with
-  the dual operator, states and adjoints together, the measure of work that does not depend on the machine.
-- *time*: over that of the bundle method, measured one after the other on a machine with other work: a rough
-  figure.
-
-The bundle method ("adaptive states": with `AdaptiveTolerance`) and SLSQP and trust-constr take a subgradient
-with every value, COBYLA takes values alone, without adjoints. States are solved to 1e-8.
-"""
+#: Of records that do not tell how far cells are graded.
+EQUAL_CELLS = "Measured on links of equal cells and flat facets; those of the demo are graded since.\n"
 
 
-def page(study: dict[str, Any]) -> str:
-    """Return the page of Markdown."""
-    graded = all("grading" in run for run in study["runs"])
-    parts = [INTRODUCTION] if graded else [INTRODUCTION, EQUAL_CELLS]
-    parts.append(FEW if study["quick"] else CONCLUSIONS)
+def tables(study: dict[str, Any]) -> dict[str, str]:
+    """Return the tables of the page by their names, all problems in one."""
+    parts = [] if all("grading" in run for run in study["runs"]) else [EQUAL_CELLS]
     for case in dict.fromkeys(run["case"] for run in study["runs"]):
         runs = [run for run in study["runs"] if run["case"] == case]
         first = runs[0]
         parts.append(f"## {case[0].upper()}{case[1:]}\n")
         parts.append(f"{first['unknowns']} unknowns; J before: {first['history'][0][0]:.1f} {_unit(first)}\n")
         parts.append(_table(runs))
-    parts.append(SETTINGS)
-    return "\n".join(parts)
-
-
-#: Of records that do not tell how far cells are graded.
-EQUAL_CELLS = "Measured on links of equal cells and flat facets; those of the demo are graded since.\n"
-FEW = "A quick run: the budget is a dozen evaluations, and nothing follows from it.\n"
-
-CONCLUSIONS = """\
-## What follows
-
-- Where the objective is smooth, SciPy's SLSQP does as well: on the total potential it stops at the same value
-  as the bundle method, after 11 evaluations instead of 4, which are few in either case. COBYLA comes lower
-  still, by 3e-5, less than the tolerance of the others, for twenty times the products.
-- Where it has kinks, the bundle method goes on where the others stand still: on the coarse chain it ends
-  within 0.02 % of the best after 43 to 59 evaluations. SLSQP may be *faster to a rough answer* (5 % above
-  the best after two evaluations from the link as it is), but then it stops between 0.06 % and 2.5 % above the
-  best and says that it converged. trust-constr ends 0.2 % to 0.5 % above, not done after 150 evaluations.
-- COBYLA, without any derivative, beats SLSQP and trust-constr in one of three searches (0.07 %) and is the
-  worst in the others (0.5 %, 3 %). For 28 variables it is no bad choice where there is no adjoint.
-- On the finer chain the difference grows: with more contact points the maximum has more kinks, and after 80
-  evaluations SLSQP and trust-constr are a third above the bundle method, which has not converged either.
-- Adaptive states save the bundle method between 23 % and 48 % of the products on all problems; with the
-  budget spent, on the finer chain, it was 0.7 % behind.
-- SLSQP asked for designs with inverted cells in three searches; `ForScipy` turned it back each time.
-
-So: SLSQP by way of `ForScipy` for a smooth objective, or for a first look; the bundle method where contact
-forces or pressures are judged. Two objectives on one scene prove no more than that.
-"""
-
-SETTINGS = f"""\
-## Settings
-
-Bundle: tolerance 1e-4. In scaled values and variables: SLSQP ftol 1e-6; trust-constr xtol and gtol 1e-5,
-first radius 0.3; COBYLA rhobeg 0.1, tol 1e-4. A design counts if it violates no constraint by more than
-{ALLOWED:g} widths of the box. At most 150 evaluations (COBYLA 300), on the small chain 80 (COBYLA left out).
-"""
+    return {"problems": "\n".join(parts)}
 
 
 def above_best(run: dict[str, Any], runs: list[dict[str, Any]]) -> float:
@@ -203,7 +143,9 @@ def write(folder: Path, records: Records, quick: bool) -> None:
     if records:
         study = {"runs": runs, "quick": quick, "versions": versions()}
         write_json(folder / "results.json", study)
-    write_text(folder / "README.md", page(study))
+    texts = tables(study)
+    page = unfilled(texts) if quick else filled((HOME / "README.md").read_text(encoding="utf-8"), texts)
+    write_text(folder / "README.md", page)
     plot(folder / "optimisers.png", study["runs"])
 
 

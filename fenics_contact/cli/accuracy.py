@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,6 @@ from fenics_contact.cli.streams import complain
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.io import only_run_in
 from fenics_contact.study import (
-    RunTolerance,
     Settings,
     StudyPlan,
     Sweep,
@@ -70,18 +69,6 @@ def add_to(app: typer.Typer) -> None:
     app.command("accuracy", cls=_Lists, help=ABOUT, short_help=words)(accuracy)
 
 
-@dataclass(frozen=True)
-class Varied:
-    """What the options say about the runs; None where they say nothing."""
-
-    sizes: tuple[int, ...] | None
-    tolerances: tuple[RunTolerance, ...] | None
-    cells: tuple[str, ...] | None
-    discretisations: tuple[str, ...] | None
-    fixed_points: tuple[float, ...] | None
-    subdomains: tuple[int, ...] | None
-
-
 def accuracy(
     context: typer.Context,
     scene: options.SceneArgument,
@@ -110,8 +97,11 @@ def accuracy(
         )
     logging.getLogger("fenics_contact").setLevel(logging.INFO)
     study = find_study(scene)
-    given = (sizes, tolerances, cells, discretisations, fixed_points, subdomains)
-    sweep = sweep_from(Varied(*map(_given, given)), study.quick if quick else study.sweep)
+    given = {
+        "sizes": sizes, "tolerances": tolerances, "cells": cells, "discretisations": discretisations,
+        "fixed_points": fixed_points, "subdomains": subdomains,
+    }  # fmt: skip
+    sweep = _sweep(given, study.quick if quick else study.sweep)
     folder = output or Path("output") / "studies" / study.name
     settings = Settings(ranks, repeats or (1 if quick else 3), limit)
     plan = prepare(scene, runs or folder / "runs", sweep=sweep, settings=settings)
@@ -126,13 +116,6 @@ def accuracy(
     desk.say(f"{words}\nresults in {folder}/")
     if status:
         raise typer.Exit(status)
-
-
-def _given(values: Sequence[Any] | None) -> Any:
-    """Return the values of an option, nothing where it was given without one, None where it was not given."""
-    if not values:
-        return None
-    return tuple(value for value in values if value not in (None, options.NOTHING))
 
 
 def _report(plan: StudyPlan, folder: Path, *, figures: bool) -> str:
@@ -156,15 +139,20 @@ def _measure(plan: StudyPlan) -> int:
     return 0
 
 
-def sweep_from(varied: Varied, sweep: Sweep) -> Sweep:
+def _sweep(given: Mapping[str, Sequence[Any] | None], sweep: Sweep) -> Sweep:
     """Return the runs that the options ask for, the scene's where they say nothing.
 
     Raises:
         InvalidInputError: If a cell type is unknown.
     """
-    given: dict[str, Any] = {name: value for name, value in vars(varied).items() if value is not None}
-    chosen = replace(sweep, **given)
-    if varied.sizes and sweep.base.size not in chosen.sizes:
+    nothing = (None, options.NOTHING)  # of an option that was given without a value
+    known: dict[str, Any] = {
+        name: tuple(value for value in values if value not in nothing)
+        for name, values in given.items()
+        if values
+    }
+    chosen = replace(sweep, **known)
+    if known.get("sizes") and sweep.base.size not in chosen.sizes:
         # The base is one of the meshes: around it one setting at a time is varied.
         chosen = replace(chosen, base=replace(sweep.base, size=chosen.sizes[(len(chosen.sizes) - 1) // 2]))
     chosen.runs()  # refuses what no scene knows

@@ -130,8 +130,10 @@ def _measured(results: Results) -> str:
 
 def _answers(errors: Errors) -> str:
     """Return what an accuracy takes and what a setting costs."""
+    scene, ranks = errors.results.scene, errors.results.ranks
+    of = f"size: {scene.size_name}; on {ranks} rank{'s' if ranks > 1 else ''}"
     return (
-        f"**What an accuracy takes** (size: {errors.results.scene.size_name})\n\n{accuracy_table(errors)}\n\n"
+        f"**What an accuracy takes** ({of})\n\n{accuracy_table(errors)}\n\n"
         f"**What a setting costs**\n\n{cost_table(errors)}\n"
     )
 

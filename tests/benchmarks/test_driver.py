@@ -20,8 +20,9 @@ from benchmarks.cases.linear_face import solve_face
 from benchmarks.cases.monolithic.elasticity import assemble_block
 from benchmarks.cases.monolithic.linear import solve_linear
 from benchmarks.held import HELD
+from benchmarks.optimisation_tolerance import report as tolerance
 from benchmarks.plan import run, runs
-from benchmarks.study import chosen
+from benchmarks.study import chosen, filled
 from fenics_contact.study import runner
 from fenics_contact.study.runner import Job, measure
 from tests.benchmarks.small_records import all_summaries
@@ -196,3 +197,18 @@ def test_effects_are_replaced_when_all_are_measured(tmp_path: Path) -> None:
     assert not (tmp_path / "effects.json").exists()
     effects.write(tmp_path, records, False)
     assert json.loads((tmp_path / "effects.json").read_text()) == records
+
+
+def test_tables_take_their_places_in_a_page() -> None:
+    page = "# A\n\n<!-- table: one -->\n\nold\n\n<!-- end -->\n\nwords\n"
+    assert filled(page, {"one": "new\n"}) == page.replace("old", "new")
+    with pytest.raises(ValueError, match="the page needs a place for 'two', got none: add the lines"):
+        filled(page, {"two": ""})
+
+
+def test_the_page_of_the_tolerances_has_the_tables_of_its_record() -> None:
+    studies = json.loads((tolerance.HOME / "results.json").read_text())["studies"]
+    page = (tolerance.HOME / "README.md").read_text()
+    assert page == filled(page, tolerance.tables(studies))
+    studies[0]["optima"][0]["products"] += 1
+    assert page != filled(page, tolerance.tables(studies))

@@ -120,7 +120,7 @@ def test_a_study_of_ones_own_scene_that_was_stopped_goes_on_and_reports(tmp_path
     again = start(*arguments)
     words = again.communicate(timeout=120.0)
     assert again.returncode == 0, words
-    assert words[0].startswith("**What an accuracy takes** (size: cells along an edge)")
+    assert words[0].startswith("**What an accuracy takes** (size: cells along an edge; on 1 rank)")
     assert "| shortening | 10 %, 5 %, 2 %, 1 %, 0.5 % | " in words[0]
     assert " | quadrilateral | node | 1e-06 | newton | " in words[0]
     assert first.stat().st_mtime_ns == kept

@@ -27,7 +27,7 @@ def test_results_survive_their_file(tmp_path: Path) -> None:
 def test_the_table_has_answers_rates_certificates_runs_and_failures(tmp_path: Path) -> None:
     write_report(tmp_path, results(), figures=False)
     text = (tmp_path / "table.md").read_text()
-    assert "(size: cells on the radius)" in text
+    assert "(size: cells on the radius; on 2 ranks)" in text
     assert "| peak pressure | 2 %, 1 % | 4 | hexahedron |" in text
     assert "| 1e-08 | balanced | 8 | 9.6 | 1.50 |" in text
     assert "| peak pressure | theory |  | 2.00 | 1.00 |" in text
