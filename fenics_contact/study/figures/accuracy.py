@@ -77,4 +77,4 @@ def _draw(axes: Any, errors: Errors, quantity: QuantityFacts) -> None:
     scaled(axes)
     axes.set_xlabel("wall time (s)")
     axes.set_ylabel("relative error")
-    axes.set_title(f"{quantity.name} {against(errors, quantity.name)}")
+    axes.set_title(f"{quantity.name}\n{against(errors, quantity.name)}")

@@ -50,7 +50,7 @@ def _draw_all(errors: Errors, paper: BinaryIO) -> None:
             known |= dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
             style(axes)
             axes.grid(visible=False, axis="x")
-        figure.legend(known.values(), known.keys(), loc="outside lower center", ncols=10)
+        figure.legend(known.values(), known.keys(), loc="outside lower center", ncols=5)
 
 
 def _mesh(run: Run) -> str:
