@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from benchmarks.plan import WARM_UP, runs
@@ -10,7 +9,7 @@ from benchmarks.plot import plot_results
 from benchmarks.report import broken, page, results
 from benchmarks.study import ROOT, Records, Study
 from benchmarks.targets import Summaries
-from fenics_contact.io.json_file import plain
+from fenics_contact.io import json_text
 from fenics_contact.io.replacing import replacing
 from fenics_contact.study.runner import summarised
 
@@ -25,8 +24,7 @@ def write_results(folder: Path, summaries: Summaries) -> None:
     with replacing(*(folder / f"results.{kind}" for kind in ("md", "png", "json"))) as (text, picture, data):
         text.write_text(page(summaries), encoding="utf-8")
         plot_results(picture, summaries)
-        numbers = plain([record for _, record in results(summaries)[0]])
-        data.write_text(json.dumps(numbers, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+        data.write_text(json_text([record for _, record in results(summaries)[0]]), encoding="utf-8")
 
 
 study = Study(

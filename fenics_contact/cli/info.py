@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,7 +12,7 @@ from fenics_contact._libraries import MPI
 from fenics_contact.cli.blas import SLOW, loaded_blas, numpy_speed
 from fenics_contact.cli.desk import Desk, desk_of, facts
 from fenics_contact.errors import MissingRequirementError
-from fenics_contact.io import versions
+from fenics_contact.io import json_text, versions
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -34,7 +33,7 @@ def info(
     desk = desk_of(context)
     known = gathered(desk.comm)
     if as_json:
-        desk.say(json.dumps(known, indent=2, ensure_ascii=False))
+        desk.say(json_text(known).rstrip())
         return
     desk.show(facts(known["versions"], "versions"))
     desk.say()

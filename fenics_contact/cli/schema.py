@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from fenics_contact.cli.desk import desk_of
-from fenics_contact.io import write_json
+from fenics_contact.io import json_text, write_json
 from fenics_contact.scene_file import json_schema
 
 
@@ -32,7 +31,7 @@ def schema(
     """
     desk = desk_of(context)
     if file is None:
-        desk.say(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+        desk.say(json_text(json_schema()).rstrip())
         return
     write_json(file, json_schema(), comm=desk.comm)
     desk.say(f"schema of scene files in {file}")

@@ -46,9 +46,13 @@ def write_json(path: str | Path, data: Any, *, comm: MPI.Comm | None = None) -> 
     target = Path(path)
     with nullcontext() if comm is None else together(comm):
         if comm is None or comm.rank == 0:
-            text = json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-            write_text(target, text)
+            write_text(target, json_text(data))
     return target
+
+
+def json_text(data: Any) -> str:
+    """Return data as the text of a JSON file; see `write_json`."""
+    return json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def plain(data: Any, place: str = "data", *, lenient: bool = False) -> Any:

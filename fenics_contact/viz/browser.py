@@ -12,10 +12,7 @@ from pathlib import Path
 from typing import Any
 from zipfile import ZIP_DEFLATED, ZipFile
 
-import numpy as np
-
 from fenics_contact.viz.picture import written_path
-from fenics_contact.viz.view import Frame
 
 #: Height of the scene in a notebook, in units of its screen.
 HEIGHT = 520
@@ -92,21 +89,6 @@ def exported(plotter: Any) -> str:
         archive.writestr("index.json", json.dumps({"hashes": arrays, "scene": scene}))
     pages.write_html(packed.getvalue(), page)
     return page.getvalue()
-
-
-def see_in_perspective(camera: Any, frame: Frame, size: tuple[int, int]) -> None:
-    """Move a camera so far away that it sees a frame: the viewer knows no parallel projection.
-
-    Args:
-        camera: pyvista's Camera; it keeps its direction and what it looks at.
-        frame: What it should see.
-        size: Width and height of the window.
-    """
-    height = max(float(frame.size[1]), float(frame.size[0]) * size[1] / size[0])
-    distance = height / 2 / np.tan(np.radians(camera.view_angle / 2))
-    backwards = -np.asarray(camera.direction)
-    camera.parallel_projection = False
-    camera.position = np.asarray(camera.focal_point) + distance * backwards
 
 
 def captioned(page: str, title: str, entries: Mapping[str, str]) -> str:

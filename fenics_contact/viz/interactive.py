@@ -8,11 +8,12 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
+import pyvista as pv
 
 from fenics_contact.checkpoint import put_whole
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError, MissingRequirementError, tell, together
-from fenics_contact.viz.browser import InteractiveScene, captioned, exported, see_in_perspective
+from fenics_contact.viz.browser import InteractiveScene, captioned, exported
 from fenics_contact.viz.fields import drawn_bodies, moved, points_of
 from fenics_contact.viz.interactive_layers import CONTENTS, Subject
 from fenics_contact.viz.obstacles import obstacle_layers
@@ -27,8 +28,6 @@ logger = logging.getLogger(__name__)
 
 #: Pixels for which camera and colour bar are set up; a browser shows them larger or smaller.
 SIZE = (1000, 600)
-#: Room around the bodies for title and colour bar, relative to their size.
-MARGIN = 0.15
 
 
 def interactive(
@@ -109,14 +108,11 @@ def _drawn(
     content, points = CONTENTS[field](subject), points_of(subject.bodies)
     space = subject.state.scene.dim == 3
     view = oblique_view(points) if space else IN_PLANE
-    layers, corners = content.layers, np.zeros((0, 3))
-    if space:
-        obstacles, corners = obstacle_layers(subject.state.scene, points, view)
-        layers = [*obstacles, *layers]
-    frame = frame_around(view, np.concatenate([points, corners]), MARGIN)
+    obstacles = obstacle_layers(subject.state.scene, points, view)[0] if space else []
     words = f"{headline(title, content.facts)}; deformation × {deformed:g}"
-    with staged(layers, view, frame, SIZE) as plotter:
-        see_in_perspective(plotter.camera, frame, SIZE)
+    with staged([*obstacles, *content.layers], view, frame_around(view, points), SIZE) as plotter:
+        plotter.disable_parallel_projection()  # the viewer knows none
+        plotter.reset_camera(bounds=pv.PolyData(points).bounds)
         try:
             return captioned(exported(plotter), words, content.legend), None, None
         except ImportError as error:
