@@ -41,7 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except ValueError as error:
         parser.error(str(error))
     places = (ROOT / "fenics_contact", *study.code)
-    store = Store(folder / "raw", fingerprint(path for place in places for path in place.rglob("*.py")))
+    mark = fingerprint(path for place in places for path in place.rglob("*.py"))
+    # What a quick study has measured, beside whatever else, is no part of a full one.
+    store = Store(folder / "raw", f"{mark}-quick" if settings.quick else mark)
     for job in wanted if settings.again else ():
         store.forget(job)
     if not settings.report:

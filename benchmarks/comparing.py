@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
 
 Record = Mapping[str, Any]
 
@@ -28,8 +29,8 @@ def force_difference(one: Record, other: Record) -> float:
             f"runs to compare must have the same contact nodes, got {len(one['forces'])} and "
             f"{len(other['forces'])}: use the same mesh"
         )
-    size = _norm(one["forces"])
-    return _norm([_minus(a, b) for a, b in zip(one["forces"], other["forces"], strict=True)]) / size
+    forces = np.asarray(one["forces"])
+    return float(np.linalg.norm(forces - other["forces"]) / np.linalg.norm(forces))
 
 
 def require_agreement(name: str, one: Record, other: Record) -> tuple[float, float]:
@@ -45,11 +46,3 @@ def require_agreement(name: str, one: Record, other: Record) -> tuple[float, flo
             f"{differences[0]:.1e} (potential) and {differences[1]:.1e} (forces): the problems differ"
         )
     return differences
-
-
-def _minus(a: Sequence[float], b: Sequence[float]) -> list[float]:
-    return [x - y for x, y in zip(a, b, strict=True)]
-
-
-def _norm(vectors: Sequence[Sequence[float]]) -> float:
-    return math.sqrt(sum(x * x for vector in vectors for x in vector))

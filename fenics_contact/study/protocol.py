@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import TypeAlias
 
 import numpy as np
@@ -141,16 +141,8 @@ class StudyScene:
             for q in self.quantities
         )
         spacing = {run.size: float(self.spacing(run.size)) for run in runs}
-        return SceneFacts(
-            self.name,
-            self.title,
-            self.about,
-            self.size_name,
-            self.spacing_unit,
-            self.energy_rate,
-            spacing,
-            quantities,
-        )
+        known = {each.name: getattr(self, each.name) for each in fields(SceneFacts)}
+        return SceneFacts(**known | {"spacing": spacing, "quantities": quantities})
 
 
 @dataclass(frozen=True)

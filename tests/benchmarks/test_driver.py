@@ -166,6 +166,12 @@ def test_a_failing_benchmark_leaves_good_results(
     assert {path.name: path.read_bytes() for path in folder.iterdir()} != before
 
 
+def test_a_quick_benchmark_is_no_part_of_a_full_one(main_with: Any) -> None:
+    assert "chain" in main_with("--quick")
+    assert main_with("--quick") == []
+    assert "chain" in main_with()
+
+
 def test_a_few_runs_leave_good_results(main_with: Any, tmp_path: Path) -> None:
     main_with("--only", "chain", "block")
     assert (tmp_path / "partial" / "results.md").exists()
