@@ -45,7 +45,15 @@ def settings(run: Run) -> tuple[str, ...]:
 
 
 def accuracy_table(errors: Errors, targets: Sequence[float] = TARGETS) -> str:
-    """Tell for every quantity and accuracy the fastest run that reaches it, see `reliable`."""
+    """Tell for every quantity and accuracy the fastest run that reaches it, see `reliable`.
+
+    Args:
+        errors: Errors of a study's runs.
+        targets: Relative errors that are asked for.
+
+    Returns:
+        A table in Markdown.
+    """
     body = []
     for quantity in errors.results.scene.quantities:
         ways: dict[tuple[str, ...], list[str]] = {}
@@ -101,7 +109,14 @@ def _cheapest(
 
 
 def cost_table(errors: Errors) -> str:
-    """Tell what other values of settings cost and give beside the base's, on the finest common mesh."""
+    """Tell what other values of settings cost and give beside the base's, on the finest common mesh.
+
+    Args:
+        errors: Errors of a study's runs.
+
+    Returns:
+        A table in Markdown.
+    """
     quantities = [quantity.name for quantity in errors.results.scene.quantities]
     head, body = ["setting", "instead of", "size", "s", "time, ratio", "products, ratio"], []
     head += [f"error in {quantities[0]}", "instead of", *(f"{name} changes by" for name in quantities)]
