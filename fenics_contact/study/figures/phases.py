@@ -79,7 +79,7 @@ def draw_stacked(
         )  # fmt: skip
         below = [low + height for low, height in zip(below, heights, strict=True)]
     for place, top in enumerate(below):
-        words = f"{top:.2g}{unit}"
+        words = (f"{top:.0f}" if top >= 10.0 else f"{top:.2g}") + unit
         axes.annotate(words, (place, top), (0, 4), textcoords="offset points", ha="center")
     axes.set_xticks(range(len(bars)), names)
     axes.set_xlim(-0.6, len(bars) - 0.4)
