@@ -14,7 +14,7 @@ import numpy as np
 
 from fenics_contact.checks import check_count, check_grading, check_numbers
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery.ring_spacing import Spacing, drawn_together, ring_spacing
+from fenics_contact.gallery.ring_spacing import Spacing, drawn_together, strength_for
 from fenics_contact.gallery.section import WireSection
 from fenics_contact.gallery.structured import check_cell_type
 from fenics_contact.surface_shapes import Torus
@@ -102,7 +102,7 @@ class LinkShape:
     @property
     def spacing(self) -> Spacing:
         """How closely the nodes lie along the three directions of the lattice."""
-        return ring_spacing(self)
+        return _spacing(self)
 
     @property
     def centre_radius(self) -> float:
@@ -118,6 +118,35 @@ class LinkShape:
     def volume(self) -> float:
         """Volume of the smooth link, section times length of the centre line (Pappus)."""
         return self.section.area * (2.0 * np.pi * self.centre_radius + 2.0 * self.straight)
+
+
+def _spacing(shape: LinkShape) -> Spacing:
+    """Choose the spacing for a link's `grading`.
+
+    Legs hand cells over to graded crowns, those that make the cells on both sides of their border most alike
+    along the centre line.
+
+    Args:
+        shape: The link.
+
+    Returns:
+        The spacing; without grading a sixth of the ring for every quarter turn and leg.
+    """
+    n = shape.n_around // 6
+    if shape.grading == 0.0:
+        return Spacing(n, n)
+    along = float(np.arccosh(np.exp(shape.grading)))
+    quarters = np.arange(n, (3 * n + 1) // 2)
+    legs = 3 * n - 2 * quarters
+    last = 1.0 - np.sinh(along * (1.0 - 1.0 / quarters)) / np.sinh(along)  # part of the quarter turn
+    last = np.pi / 2.0 * shape.centre_radius * last
+    best = int(np.argmin(np.abs(np.log(last * legs / shape.straight))))
+    quarter, leg = int(quarters[best]), int(legs[best])
+    section = shape.section
+    smallest = np.pi / 2.0 * shape.inner_radius / quarter * along / np.sinh(along)
+    across = strength_for(smallest * shape.n_b / (2.0 * section.crown_radius * section.half_angle))
+    through = strength_for(smallest * shape.n_a / shape.thickness)
+    return Spacing(quarter, leg, along, across, through)
 
 
 def crown_start(shape: LinkShape) -> int:

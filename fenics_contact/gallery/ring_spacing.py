@@ -12,13 +12,9 @@ and through its thickness it is the one that makes the cell at the spot as small
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq
-
-if TYPE_CHECKING:
-    from fenics_contact.gallery.ring import LinkShape
 
 
 @dataclass(frozen=True)
@@ -45,35 +41,6 @@ class Spacing:
         return Spacing(self.quarter, self.leg)
 
 
-def ring_spacing(shape: LinkShape) -> Spacing:
-    """Choose the spacing for a link's `grading`.
-
-    Legs hand cells over to graded crowns, those that make the cells on both sides of their border most alike
-    along the centre line.
-
-    Args:
-        shape: The link.
-
-    Returns:
-        The spacing; without grading a sixth of the ring for every quarter turn and leg.
-    """
-    n = shape.n_around // 6
-    if shape.grading == 0.0:
-        return Spacing(n, n)
-    along = float(np.arccosh(np.exp(shape.grading)))
-    quarters = np.arange(n, (3 * n + 1) // 2)
-    legs = 3 * n - 2 * quarters
-    last = 1.0 - np.sinh(along * (1.0 - 1.0 / quarters)) / np.sinh(along)  # part of the quarter turn
-    last = np.pi / 2.0 * shape.centre_radius * last
-    best = int(np.argmin(np.abs(np.log(last * legs / shape.straight))))
-    quarter, leg = int(quarters[best]), int(legs[best])
-    section = shape.section
-    smallest = np.pi / 2.0 * shape.inner_radius / quarter * along / np.sinh(along)
-    across = _strength(smallest * shape.n_b / (2.0 * section.crown_radius * section.half_angle))
-    through = _strength(smallest * shape.n_a / shape.thickness)
-    return Spacing(quarter, leg, along, across, through)
-
-
 def drawn_together(places: np.ndarray, spot: float, strength: float) -> np.ndarray:
     """Move places on an interval towards the spot in its middle or at its start.
 
@@ -91,7 +58,7 @@ def drawn_together(places: np.ndarray, spot: float, strength: float) -> np.ndarr
     return np.asarray(spot + reach * np.sinh(strength * (places - spot) / reach) / np.sinh(strength))
 
 
-def _strength(smallest: float) -> float:
+def strength_for(smallest: float) -> float:
     """Find κ with κ / sinh κ = ``smallest``, the smallest cell over the mean; 0 where it is no smaller."""
     if smallest >= 1.0:
         return 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,8 +28,6 @@ Callback = Callable[[Record, Array], None]
 
 if TYPE_CHECKING:
     from mpi4py import MPI
-
-    from fenics_contact.optimize.bundle_trust import BundleTrust as Method
 
 KIND = "minimisation by the bundle trust method"
 #: Parameters that only say when to stop: a run may go on with others.
@@ -56,6 +54,24 @@ class Resumable(Protocol):
 
     def recall(self, memory: Mapping[str, NDArray[Any]]) -> None:
         """Go on from what `memory` returned, in another process maybe. Collective."""
+
+
+class Method(Protocol):
+    """Parameters of a method, a dataclass."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def max_evaluations(self) -> int:
+        """Evaluations after which it stops."""
+
+    @property
+    def tolerance(self) -> float:
+        """Predicted decrease at which it stops."""
+
+    @property
+    def value_scale(self) -> float:
+        """Size of values below which they count as zero."""
 
 
 class Progress:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field
@@ -11,8 +12,13 @@ from fenics_contact.scene_file.design import DesignPart
 from fenics_contact.scene_file.loads import AnyLoad, SupportPart
 from fenics_contact.scene_file.materials import AnyMaterial
 from fenics_contact.scene_file.meshes import Mesh
+from fenics_contact.scene_file.mistakes import Mistake
+from fenics_contact.scene_file.own_python import is_reference
 from fenics_contact.scene_file.part import Part
+from fenics_contact.scene_file.places import Path as Keys
+from fenics_contact.scene_file.places import as_toml, written
 from fenics_contact.scene_file.solver import SolverPart
+from fenics_contact.scene_file.source import Source
 from fenics_contact.scene_file.steps import StepPart
 from fenics_contact.scene_file.values import PlaceOfFile, Read, said
 
@@ -77,3 +83,24 @@ class Document(Part):
     solver: SolverPart = Field(SolverPart(), description="how it is solved")
     output: OutputPart = Field(OutputPart(), description="what is written, and where")
     design: DesignPart | None = Field(None, description="a shape optimisation, for `fenics-contact optimize`")
+
+
+def references(document: Document) -> Iterator[tuple[Keys, str]]:
+    """Yield what a scene file takes from Python files, with its keys: all of them are run."""
+    for name, material in document.materials.items():
+        if is_reference(material.model):
+            yield ("materials", name, "model"), material.model
+    if document.design is not None and is_reference(document.design.objective):
+        yield ("design", "objective"), document.design.objective
+
+
+def refused_python(source: Source, document: Document) -> list[Mistake]:
+    """Return a mistake for everything that a scene file takes from a Python file."""
+    return [
+        source.mistake(
+            path,
+            f"{written(path)} must not be Python code (--no-python), got {as_toml(reference)}: read that "
+            "file, and leave --no-python out if you trust it",
+        )
+        for path, reference in references(document)
+    ]

@@ -4,19 +4,11 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fenics_contact.checks import require_file
 from fenics_contact.errors import InvalidInputError, running
-from fenics_contact.scene_file.places import as_toml, written
-
-if TYPE_CHECKING:
-    from fenics_contact.scene_file.document import Document
-    from fenics_contact.scene_file.mistakes import Mistake
-    from fenics_contact.scene_file.places import Path as Keys
-    from fenics_contact.scene_file.source import Source
 
 _NOTHING = object()
 
@@ -55,24 +47,3 @@ def load(reference: str, folder: Path) -> Any:
         )
         raise InvalidInputError(f"'{path}' must define {name!r}, it defines {known}: use one of them")
     return found
-
-
-def references(document: Document) -> Iterator[tuple[Keys, str]]:
-    """Yield what a scene file takes from Python files, with its keys: all of them are run."""
-    for name, material in document.materials.items():
-        if is_reference(material.model):
-            yield ("materials", name, "model"), material.model
-    if document.design is not None and is_reference(document.design.objective):
-        yield ("design", "objective"), document.design.objective
-
-
-def refused_python(source: Source, document: Document) -> list[Mistake]:
-    """Return a mistake for everything that a scene file takes from a Python file."""
-    return [
-        source.mistake(
-            path,
-            f"{written(path)} must not be Python code (--no-python), got {as_toml(reference)}: read that "
-            "file, and leave --no-python out if you trust it",
-        )
-        for path, reference in references(document)
-    ]

@@ -17,10 +17,9 @@ from fenics_contact.contact import ContactProblem, LoadSequence, State
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.scene import LoadStep, Scene
 from fenics_contact.scene_file.building import Builder, located
-from fenics_contact.scene_file.document import Document
+from fenics_contact.scene_file.document import Document, refused_python
 from fenics_contact.scene_file.mistakes import SceneFileError
 from fenics_contact.scene_file.names import wrong_names
-from fenics_contact.scene_file.own_python import refused_python
 from fenics_contact.scene_file.placing import Shaped
 from fenics_contact.scene_file.source import Source, parse
 from fenics_contact.scene_file.steps import load_steps

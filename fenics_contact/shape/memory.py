@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fenics_contact.contact import State, stored_state
 from fenics_contact.shape.linearised_face import WeakChoice, WeakPoints
-
-if TYPE_CHECKING:
-    from fenics_contact.shape.problem import ShapeProblem
 
 Stored = dict[str, np.ndarray]
 
@@ -60,9 +56,13 @@ class DesignMemory:
         error_by_tolerance: Error of the last value divided by the tolerance of its state, 0 before the first.
     """
 
-    def __init__(self, problem: ShapeProblem) -> None:
-        """Remember nothing."""
-        self._problem = problem
+    def __init__(self, restore: Callable[[np.ndarray, Stored], State]) -> None:
+        """Remember nothing.
+
+        Args:
+            restore: Builds the state of a design from what `stored_state` returned. Collective.
+        """
+        self._restore = restore
         self._points: dict[str, DesignPoint | Stored] = {}
         self._alpha: np.ndarray = np.zeros(0)
         self.state: State | None = None
@@ -127,13 +127,13 @@ class DesignMemory:
         self._points = dict(points)
         if start is not None:
             alpha, self.error_by_tolerance = start.pop("alpha"), float(start.pop("error"))
-            self.record_state(alpha, self._state(alpha, start))
+            self.record_state(alpha, self._restore(alpha, start))
 
     def _built(self, stored: Stored) -> DesignPoint:
         parts = {part.removeprefix(_STATE): stored[part] for part in stored if part.startswith(_STATE)}
         contacts, discs, edges = (int(count) for count in stored["weak"])
         weak = WeakPoints(contacts, discs, edges, WeakChoice[str(stored["choice"])])
-        state = self._state(stored["alpha"], parts)
+        state = self._restore(stored["alpha"], parts)
         return DesignPoint(
             alpha=stored["alpha"],
             value=_value(stored),
@@ -146,13 +146,6 @@ class DesignMemory:
             error=float(stored["error"]),
             adjoint_multiplier=stored["adjoint"][state.torn.numbering.owned],
         )
-
-    def _state(self, alpha: np.ndarray, parts: Stored) -> State:
-        """Build a state; its one product counts among those of the problem. Collective."""
-        problem = self._problem
-        state = problem.contact.restore(parts, problem.scene_of(alpha))
-        problem.products += state.system.products
-        return state
 
 
 def _stored_point(point: DesignPoint) -> Stored:

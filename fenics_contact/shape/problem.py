@@ -26,7 +26,7 @@ from fenics_contact.shape.contact_derivative import bound_sensitivity, contact_b
 from fenics_contact.shape.design import SurfaceDesign, checked_variables
 from fenics_contact.shape.forms import ShapeForms, work_by_shape
 from fenics_contact.shape.linearised_face import WeakChoice, linearise_face
-from fenics_contact.shape.memory import DesignMemory, DesignPoint
+from fenics_contact.shape.memory import DesignMemory, DesignPoint, Stored
 from fenics_contact.shape.motion import motion_of, moving_nodes
 from fenics_contact.shape.objective import Objective, asking
 from fenics_contact.shape.pairs import check_pairs
@@ -81,9 +81,9 @@ class ShapeProblem:
             designs: What moves.
             objective: What is judged.
             choice: Branch for weakly active points.
-            tolerance: Relative residual of the states: a number for all of them, or `AdaptiveTolerance()`,
-                with which an optimiser asks for no more than it needs; None for that of ``contact``, or of
-                its solver: a balanced state leaves open what derivatives belong to.
+            tolerance: Relative residual of all states, or `AdaptiveTolerance()`, with which an optimiser asks
+                for what it needs; None for that of ``contact``, or of its solver, as a balanced state leaves
+                open what derivatives belong to.
         """
         self.contact, self.objective, self.choice = contact, objective, choice
         self.designs = (designs,) if isinstance(designs, SurfaceDesign) else tuple(designs)
@@ -91,13 +91,11 @@ class ShapeProblem:
         self._tightest = tightest_of(contact, tolerance)
         self._timer, scene = contact.timer, contact.scene
         self.evaluations, self.products = 0, 0
-        self._memory = DesignMemory(self)
+        self._memory = DesignMemory(self._restored)
         self._forms: ShapeForms | None = None
         if scene.dim != 3:
-            raise InvalidInputError(
-                "shape problems are three-dimensional, the scene is plane: give it the thickness of one "
-                "layer of cells between symmetry planes"
-            )
+            message = "shape problems need three dimensions, the scene has two: make it one layer thick"
+            raise InvalidInputError(message)
         decomposition = contact.decomposition
         with self._timer.phase("mesh motion"):
             self._motions = [motion_of(decomposition, scene, design) for design in self.designs]
@@ -387,12 +385,16 @@ class ShapeProblem:
     def _by_design(self, by_points: np.ndarray) -> np.ndarray:
         parts = []
         for design, motion in zip(self.designs, self._motions, strict=True):
-            mesh = self.scene.bodies[design.body].mesh
-            nodes = self.contact.decomposition.tearing.global_nodes(design.body, np.arange(mesh.n_nodes))
+            own = np.arange(self.scene.bodies[design.body].mesh.n_nodes)
+            nodes = self.contact.decomposition.tearing.global_nodes(design.body, own)
             parts.append(design.pull_back(motion.pull_back(by_points[nodes])))
         return np.concatenate(parts)
 
+    def _restored(self, alpha: np.ndarray, stored: Stored) -> State:
+        state = self.contact.restore(stored, self.scene_of(alpha))
+        self.products += state.system.products
+        return state
+
     def _shape_forms(self, state: State) -> ShapeForms:
-        if self._forms is None:
-            self._forms = ShapeForms(state.torn, np.concatenate(list(self._moving.values())))
+        self._forms = self._forms or ShapeForms(state.torn, np.concatenate(list(self._moving.values())))
         return self._forms

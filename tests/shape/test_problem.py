@@ -196,7 +196,7 @@ def test_a_tied_surface_may_not_move() -> None:
 
 def test_a_plane_scene_is_refused() -> None:
     plate = Scene({"plate": Body(rectangle((0, 0), (1, 1), (2, 2)), PlaneStrain(1.0, 0.3))})
-    with pytest.raises(InvalidInputError, match="shape problems are three-dimensional, the scene is plane"):
+    with pytest.raises(InvalidInputError, match="shape problems need three dimensions, the scene has two"):
         ShapeProblem(
             ContactProblem(plate, MPI.COMM_SELF, partitions={"plate": np.zeros(4, dtype=int)}),
             (),
