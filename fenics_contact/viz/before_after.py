@@ -21,6 +21,7 @@ from fenics_contact.viz.profile import Profile, profiles
 from fenics_contact.viz.sheet import sheet
 from fenics_contact.viz.trace import contact_trace
 from fenics_contact.viz.units import Units
+from fenics_contact.viz.view import Frame
 from fenics_contact.viz.words import change, checked_range, checked_reach, headline, written
 
 
@@ -116,13 +117,16 @@ def _check(first: State, best: State, pair: int) -> None:
 
 def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> None:
     patches = [contact_patch(state, look.pair, look.reach) for state in (first, best)]
-    low = np.minimum(patches[0].low, patches[1].low)
-    high = np.maximum(patches[0].high, patches[1].high)
-    shown = look.clim or (0.0, max(float(patch.pressure.max()) for patch in patches) or 1.0)
+    (one, other), peak = (
+        (patch.frame for patch in patches),
+        max(float(patch.pressure.max()) for patch in patches),
+    )
+    frame = Frame(np.minimum(one.low, other.low), np.maximum(one.high, other.high))
+    shown = look.clim or (0.0, peak or 1.0)
     found = profiles(first, best, look.reach)
     # Sections are equally high and together as wide as the picture, but not too high.
-    tall = [0.4 * float((high - low)[1] / (high - low)[0]) + 0.08]
-    tall.append(min(0.8 / sum(1 / _proportion(profile) for profile in found), 0.45) + 0.13)
+    wide = [profile.frame.proportion for profile in found]
+    tall = [0.4 / frame.proportion + 0.08, min(0.8 / sum(wide), 0.45) + 0.13]
     size = look.width, round((sum(tall) + 0.03) * look.width)
     with sheet(paper, size, look.headline) as figure:
         upper, lower = figure.subfigures(2, 1, height_ratios=tall)
@@ -130,19 +134,12 @@ def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> N
         for axes, patch, word in zip(panels, patches, ("before", "after"), strict=True):
             draw_pressure(axes, patch, shown)
             axes.set_title(f"{word}: pressure on {patch.name}")
-            label_axes(axes, replace(patch, low=low, high=high), look.units)
-        extend = "max" if max(float(patch.pressure.max()) for patch in patches) > shown[1] else "neither"
-        pressure_bar(panels[1], shown, extend, look.units)
-        _draw_sections(lower, found, look.units)
-
-
-def _draw_sections(figure: Any, found: list[Profile], units: Units) -> None:
-    ratios = {"width_ratios": [1 / _proportion(profile) for profile in found]}
-    panels = figure.subplots(1, len(found), gridspec_kw=ratios)
-    factor = min(profile.factor for profile in found)
-    for axes, profile in zip(panels, found, strict=True):
-        _draw_profile(axes, profile, factor, units)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+            label_axes(axes, replace(patch, frame=frame), look.units)
+        pressure_bar(panels[1], shown, "max" if peak > shown[1] else "neither", look.units)
+        sections = lower.subplots(1, len(found), width_ratios=wide)
+        for axes, profile in zip(sections, found, strict=True):
+            _draw_profile(axes, profile, min(profile.factor for profile in found), look.units)
+        lower.legend(*sections[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
 
 
 def _draw_in_plane(first: State, best: State, paper: BinaryIO, look: _Look) -> None:
@@ -153,26 +150,23 @@ def _draw_in_plane(first: State, best: State, paper: BinaryIO, look: _Look) -> N
         for trace, word, colour, line in zip(
             traces, ("before", "after"), (GREY, ORANGE), ("--", "-"), strict=True
         ):
-            places, pressure = (
-                np.insert(v, trace.breaks + 1, np.nan) for v in (trace.places, trace.pressure)
+            left.plot(
+                trace.broken(trace.places),
+                trace.broken(trace.pressure),
+                line,
+                color=colour,
+                lw=2.2,
+                label=word,
             )
-            left.plot(places, pressure, line, color=colour, lw=2.2, label=word)
-        windows = [trace.window(look.reach) for trace in traces]
-        left.set_xlim(min(window[0] for window in windows), max(window[1] for window in windows))
+        ends = [end for trace in traces for end in trace.window(look.reach)]
         top = max(float(trace.pressure.max()) for trace in traces) or 1.0
-        left.set_ylim(*(look.clim or (-0.03 * top, 1.08 * top)))
-        left.set_xlabel(f"{traces[0].axis} ({look.units.length})")
-        left.set_ylabel(f"contact pressure ({look.units.stress})")
-        left.set_title(f"pressure on {traces[0].name}")
+        left.set(xlim=(min(ends), max(ends)), ylim=look.clim or (-0.03 * top, 1.08 * top))
+        words = f"{traces[0].axis} ({look.units.length})", f"contact pressure ({look.units.stress})"
+        left.set(xlabel=words[0], ylabel=words[1], title=f"pressure on {traces[0].name}")
         left.grid(color=GREY, alpha=0.25)
         left.legend(loc="upper right")
         _draw_profile(right, profile, profile.factor, look.units)
         right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
-
-
-def _proportion(profile: Profile) -> float:
-    size = profile.high - profile.low
-    return float(size[1] / size[0])
 
 
 def _draw_profile(axes: Any, profile: Profile, factor: float, units: Units) -> None:
@@ -184,9 +178,7 @@ def _draw_profile(axes: Any, profile: Profile, factor: float, units: Units) -> N
         place = profile.place_in(name)
         if place is not None:
             axes.text(*place, name, color=BLUE, ha="center", va="center")
-    axes.set_aspect("equal")
-    axes.set_xlim(profile.low[0], profile.high[0])
-    axes.set_ylim(profile.low[1], profile.high[1])
+    profile.frame.fit(axes)
     for axis, label, word in zip((axes.xaxis, axes.yaxis), profile.axes, ("right", "up"), strict=True):
         label_axis(axis, label, word, units)
     largest = f"{written(profile.largest, 2)} {units.length}"

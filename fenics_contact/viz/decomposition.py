@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from matplotlib.collections import PolyCollection
 
-from fenics_contact.contact import body_grid
+from fenics_contact.contact import body_grid, in_space
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import Scene
 from fenics_contact.viz.colours import INK, colour_subdomains, neighbours
 from fenics_contact.viz.fields import cells_of
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
-from fenics_contact.viz.plane import draw_cell_edges, draw_outline, window
+from fenics_contact.viz.plane import draw_cell_edges, draw_outline
 from fenics_contact.viz.sheet import sheet, show_image
 from fenics_contact.viz.stage import Layer, render
-from fenics_contact.viz.view import frame_around, oblique_view
+from fenics_contact.viz.view import IN_PLANE, frame_around, oblique_view
 from fenics_contact.viz.words import written
 
 if TYPE_CHECKING:
@@ -115,16 +115,15 @@ def _draw_in_plane(
     look: tuple[float, str, int],
 ) -> None:
     explode, title, width = look
-    border = 0.03 * float(np.ptp(points, axis=0).max())
-    low, high = points.min(axis=0) - border, points.max(axis=0) + border
-    height = float(np.clip(0.85 * (high - low)[1] / (high - low)[0] + 0.1, 0.3, 1.0))
+    frame = frame_around(IN_PLANE, in_space(points), 0.03)
+    height = float(np.clip(0.85 / frame.proportion + 0.1, 0.3, 1.0))
     with sheet(paper, (width, round(height * width)), title) as figure:
         axes = figure.subplots()
         for family, (mesh, partition) in enumerate(parts):
             _draw_plane_body(axes, mesh, partition, family, explode)
             if not explode:
-                draw_cell_edges(axes, mesh.points, mesh.cells, low, high)
-        window(axes, low, high, "length")
+                draw_cell_edges(axes, mesh.points, mesh.cells, frame)
+        frame.fit(axes)
         axes.set_axis_off()
 
 

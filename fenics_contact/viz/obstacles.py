@@ -11,7 +11,7 @@ from fenics_contact.scene import RigidObstacle, Scene, Surface
 from fenics_contact.surface_shapes import Cylinder, Plane, Sphere
 from fenics_contact.viz.colours import GREY, PALE
 from fenics_contact.viz.stage import Layer
-from fenics_contact.viz.view import View
+from fenics_contact.viz.view import Frame, View
 
 #: Samples along each side of a plane picture.
 SAMPLES = 400
@@ -31,16 +31,15 @@ def obstacles_of(scene: Scene) -> list[RigidObstacle]:
     return found
 
 
-def shade_obstacles(axes: Any, scene: Scene, low: np.ndarray, high: np.ndarray) -> None:
+def shade_obstacles(axes: Any, scene: Scene, frame: Frame) -> None:
     """Shade what lies inside a plane scene's obstacles, whatever their shape: where the distance is negative.
 
     Args:
         axes: matplotlib Axes.
         scene: A scene in the plane.
-        low: Lower left corner of what is shown, (2,).
-        high: Upper right corner, (2,).
+        frame: What is shown.
     """
-    x, y = (np.linspace(a, b, SAMPLES) for a, b in zip(low, high, strict=True))
+    x, y = (np.linspace(a, b, SAMPLES) for a, b in zip(frame.low, frame.high, strict=True))
     grid = np.stack(np.meshgrid(x, y), axis=-1)
     for obstacle in obstacles_of(scene):
         distance = obstacle.distance(grid.reshape(-1, 2)).reshape(SAMPLES, SAMPLES)

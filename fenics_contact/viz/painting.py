@@ -17,7 +17,7 @@ from fenics_contact.viz.fields import cells_of, contact_places, moved, points_of
 from fenics_contact.viz.obstacles import obstacle_layers, shade_obstacles
 from fenics_contact.viz.paints import Paints
 from fenics_contact.viz.picture import Picture, draw_picture
-from fenics_contact.viz.plane import draw_cell_edges, draw_field, draw_outline, window
+from fenics_contact.viz.plane import draw_cell_edges, draw_field, draw_outline
 from fenics_contact.viz.section import Spot, section_frame, section_layers, section_views, strongest_contact
 from fenics_contact.viz.sheet import scale_bar, sheet, show_image
 from fenics_contact.viz.stage import Layer, render
@@ -109,14 +109,15 @@ def _in_plane(scene: Scene, bodies: Mapping[str, Any], spot: Spot | None, paints
 def _draw_plane(
     scene: Scene, bodies: Mapping[str, Any], frame: Frame, paints: Paints, title: str, axes: Any
 ) -> None:
-    shade_obstacles(axes, scene, frame.low, frame.high)
+    shade_obstacles(axes, scene, frame)
     for body in bodies.values():
         points, cells = np.asarray(body.points)[:, :2], cells_of(body)
         draw_field(axes, points, cells, np.asarray(body["shown"]), paints.of_cells)
-        draw_cell_edges(axes, points, cells, frame.low, frame.high)
+        draw_cell_edges(axes, points, cells, frame)
         draw_outline(axes, points, cells)
-    axes.set_title(title)
-    window(axes, frame.low, frame.high, paints.units.length)
+    unit = paints.units.length
+    axes.set(title=title, xlabel=f"x ({unit})", ylabel=f"y ({unit})")
+    frame.fit(axes)
 
 
 def _in_space(scene: Scene, bodies: Mapping[str, Any], spot: Spot | None, paints: Paints) -> list[_Part]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from fenics_contact.contact import State, Status
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.viz.view import View, face_on
+from fenics_contact.viz.view import Frame, View, face_on
 
 
 @dataclass(frozen=True)
@@ -26,8 +26,7 @@ class ContactPatch:
         slip: Of the contact points in the picture, (n_points, 2).
         force: Normal force of the pair.
         rubs: Whether the pair has friction.
-        low: Lower left corner of what is shown.
-        high: Upper right corner.
+        frame: What is shown.
     """
 
     view: View
@@ -40,8 +39,7 @@ class ContactPatch:
     slip: np.ndarray
     force: float
     rubs: bool
-    low: np.ndarray
-    high: np.ndarray
+    frame: Frame
 
     @property
     def slips(self) -> np.ndarray:
@@ -86,18 +84,18 @@ def contact_patch(state: State, pair: int, reach: float | None) -> ContactPatch:
     pressure = np.zeros(len(nodes))
     pressure[points] = contact.pressure[chosen]
     places = view.project(mesh.points[nodes])
-    window = _window(places, points, pressure[points], contact.points.area[chosen], reach)
+    frame = _frame(places, points, pressure[points], contact.points.area[chosen], reach)
     return ContactPatch(
         view, f"{slave.body}, {slave.name}", places, local.reshape(-1, facets.shape[1]), pressure, points,
         contact.status[chosen], view.project(contact.slip_in_space[chosen]), force,
-        state.scene.contacts[pair].has_friction, *window,
+        state.scene.contacts[pair].has_friction, frame,
     )  # fmt: skip
 
 
-def _window(
+def _frame(
     places: np.ndarray, points: np.ndarray, pressure: np.ndarray, area: np.ndarray, reach: float | None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners of a square around the closed points with room for two facets beside them.
+) -> Frame:
+    """Return a square around the closed points with room for two facets beside them.
 
     Unless its size is given, it ends a little beyond the surface.
     """
@@ -105,8 +103,8 @@ def _window(
     low, high = places[points[closed]].min(axis=0), places[points[closed]].max(axis=0)
     middle = (low + high) / 2
     if reach is not None:
-        return middle - reach, middle + reach
+        return Frame(middle - reach, middle + reach)
     half = float(np.max(high - low)) / 2 + 2.5 * float(np.sqrt(area[closed].mean()))
     border = 0.1 * min(half, float(np.ptp(places, axis=0).max()) / 2)
     low, high = places.min(axis=0) - border, places.max(axis=0) + border
-    return np.maximum(middle - half, low), np.minimum(middle + half, high)
+    return Frame(np.maximum(middle - half, low), np.minimum(middle + half, high))

@@ -23,14 +23,12 @@ def label_axes(axes: Any, patch: ContactPatch, units: Units, *, from_slave: bool
         units: Names of the units.
         from_slave: Mirror it, as it is seen from inside the slave, where that lets the axis run forwards.
     """
-    axes.set_aspect("equal")
-    axes.set_xlim(patch.low[0], patch.high[0])
-    axes.set_ylim(patch.low[1], patch.high[1])
+    patch.frame.fit(axes)
     for axis, direction, word in ((axes.xaxis, patch.view.right, "right"), (axes.yaxis, patch.view.up, "up")):
         name = axis_label(direction)
         label_axis(axis, name, word, units)
         if name.startswith("−") and from_slave and axis is axes.xaxis:
-            axes.set_xlim(patch.high[0], patch.low[0])
+            axes.invert_xaxis()
 
 
 def pressure_bar(axes: Any, clim: tuple[float, float], extend: str, units: Units) -> None:

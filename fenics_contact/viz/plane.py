@@ -11,6 +11,7 @@ from matplotlib.tri import Triangulation
 
 from fenics_contact.mesh import boundary_faces
 from fenics_contact.viz.colours import INK
+from fenics_contact.viz.view import Frame
 
 #: Edges closer than this, relative to the size of the picture, would blacken it, and fade.
 CLOSEST = 0.009
@@ -64,24 +65,13 @@ def draw_outline(axes: Any, points: np.ndarray, cells: np.ndarray, *, width: flo
     axes.add_collection(LineCollection(points[edges], colors=INK, linewidths=width, capstyle="round"))
 
 
-def draw_cell_edges(
-    axes: Any, points: np.ndarray, cells: np.ndarray, low: np.ndarray, high: np.ndarray
-) -> None:
-    """Draw the edges of cells inside a window faintly, and fainter the smaller the cells are."""
+def draw_cell_edges(axes: Any, points: np.ndarray, cells: np.ndarray, frame: Frame) -> None:
+    """Draw the edges of cells inside a frame faintly, and fainter the smaller the cells are."""
     corners = points[cells]
-    inside = np.all((corners.max(axis=1) > low) & (corners.min(axis=1) < high), axis=1)
+    inside = np.all((corners.max(axis=1) > frame.low) & (corners.min(axis=1) < frame.high), axis=1)
     length = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).min(axis=1)
-    strength = 0.25 * np.minimum(1.0, (length / (CLOSEST * float(np.max(high - low)))) ** 2)
+    strength = 0.25 * np.minimum(1.0, (length / (CLOSEST * float(np.max(frame.size)))) ** 2)
     seen = inside & (strength > 0.01)
     colours = np.column_stack([np.tile(to_rgb(INK), (np.count_nonzero(seen), 1)), strength[seen]])
     look = {"facecolors": "none", "edgecolors": colours, "linewidths": 0.4}
     axes.add_collection(PolyCollection(corners[seen], **look))
-
-
-def window(axes: Any, low: np.ndarray, high: np.ndarray, unit: str) -> None:
-    """Show a rectangle of the plane with equal scales and named axes."""
-    axes.set_aspect("equal")
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    axes.set_xlabel(f"x ({unit})")
-    axes.set_ylabel(f"y ({unit})")

@@ -83,8 +83,7 @@ def _draw(
     facts = (
         f"largest pressure {written(peak)} {units.stress}, normal force {written(patch.force)} {units.force}"
     )
-    proportion = float((patch.high - patch.low)[1] / (patch.high - patch.low)[0])
-    height = round((0.19 + 0.38 * proportion) * width)
+    height = round((0.19 + 0.38 / patch.frame.proportion) * width)
     with sheet(paper, (width, height), headline(title, facts)) as figure:
         left, right = figure.subplots(1, 2, sharex=True, sharey=True)
         draw_pressure(left, patch, shown)

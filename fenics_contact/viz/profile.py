@@ -32,8 +32,7 @@ class Profile:
         before: Body name -> lines before.
         moves: Body name -> how the ends of these lines move.
         inside: Body name -> places within it, (n, 2).
-        low: Lower left corner of what is shown, (2,).
-        high: Upper right corner, (2,).
+        frame: What is shown.
     """
 
     title: str
@@ -41,33 +40,31 @@ class Profile:
     before: dict[str, np.ndarray]
     moves: dict[str, np.ndarray]
     inside: dict[str, np.ndarray]
-    low: np.ndarray
-    high: np.ndarray
+    frame: Frame
 
     @property
     def largest(self) -> float:
         """Largest movement that is seen, [length]."""
         seen = 0.0
         for name, lines in self.before.items():
-            inside = np.all((lines > self.low) & (lines < self.high), axis=(1, 2))
+            inside = self.frame.holds(lines).all(axis=1)
             seen = max(seen, float(np.linalg.norm(self.moves[name][inside], axis=-1).max(initial=0.0)))
         return seen
 
     @property
     def factor(self) -> float:
         """Round factor, at least 1, that makes the movement visible."""
-        size = float(np.max(self.high - self.low))
+        size = float(np.max(self.frame.size))
         return max(1.0, nice_number(VISIBLE * size / self.largest)) if self.largest > 0 else 1.0
 
     def place_in(self, body: str) -> np.ndarray | None:
         """Return where in a body, far from all outlines, its name fits; None if it is not seen."""
-        places = self.inside[body]
-        places = places[np.all((places > self.low) & (places < self.high), axis=1)]
+        places = self.inside[body][self.frame.holds(self.inside[body])]
         if not len(places):
             return None
         lines = np.concatenate(list(self.before.values()))
         room = cKDTree(np.concatenate([lines.mean(axis=1), lines.reshape(-1, 2)])).query(places)[0]
-        border = np.minimum(places - self.low, self.high - places).min(axis=1)
+        border = np.minimum(places - self.frame.low, self.frame.high - places).min(axis=1)
         return np.asarray(places[np.argmax(np.minimum(room, border))])
 
 
@@ -108,4 +105,4 @@ def _profile(title: str, faces: Mapping[str, Any], view: View, frame: Frame) -> 
         moves[name] = view.project(np.asarray(edge["moves"]))[ends] if len(ends) else before[name]
         inside[name] = view.project(np.asarray(face.cell_centers().points))
     axes = axis_label(view.right), axis_label(view.up)
-    return Profile(title, axes, before, moves, inside, frame.low, frame.high)
+    return Profile(title, axes, before, moves, inside, frame)

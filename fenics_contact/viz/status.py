@@ -78,9 +78,8 @@ def plot_contact_status(
 def _draw(patches: Mapping[str, ContactPatch], paper: BinaryIO, title: str, units: Units, width: int) -> None:
     columns = min(COLUMNS, len(patches))
     rows = -(-len(patches) // columns)
-    size = next(iter(patches.values()))
-    proportion = float((size.high - size.low)[1] / (size.high - size.low)[0])
-    height = round((0.09 + rows * (0.09 + 0.9 * proportion / columns)) * width)
+    proportion = next(iter(patches.values())).frame.proportion
+    height = round((0.09 + rows * (0.09 + 0.9 / (proportion * columns))) * width)
     with sheet(paper, (width, height), title) as figure:
         panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
         for axes, (name, patch) in zip(panels, patches.items(), strict=False):
@@ -108,12 +107,11 @@ def draw_status(axes: Any, patch: ContactPatch, *, counted: bool = True) -> None
         label = f"{name} ({np.count_nonzero(chosen)})" if counted else name
         axes.scatter(*places[chosen].T, label=label, zorder=3, linewidths=1.0, **look)
     longest = patch.largest_slip
-    inside = np.all((places > patch.low) & (places < patch.high), axis=1)
     if longest > 0:
-        reach = ARROW * float(np.max(patch.high - patch.low)) / longest
+        reach = ARROW * float(np.max(patch.frame.size)) / longest
         arrows = {"angles": "xy", "scale_units": "xy", "scale": 1, "color": INK, "width": 0.004, "zorder": 4}
         # Short arrows stay arrows: dots would hide the symbols.
         arrows |= {"minlength": 0.0}
-        shown = patch.slips & inside
+        shown = patch.slips & patch.frame.holds(places)
         drawn = axes.quiver(*places[shown].T, *(reach * patch.slip[shown]).T, clip_on=False, **arrows)
         drawn.set_in_layout(False)  # its extent is not known before it is drawn

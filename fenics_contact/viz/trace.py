@@ -50,6 +50,10 @@ class ContactTrace:
     shear: float
     rubs: bool
 
+    def broken(self, values: np.ndarray) -> np.ndarray:
+        """Put a gap into values on all nodes where the surface is interrupted."""
+        return np.insert(values, self.breaks + 1, np.nan)
+
     def window(self, reach: float | None) -> tuple[float, float]:
         """Return the range of places to show: what is closed with room beside it, or as far as told."""
         closed = np.flatnonzero(self.pressure > 0)

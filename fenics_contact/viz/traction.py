@@ -57,7 +57,7 @@ def draw_traction(
 
 
 def _draw_friction(axes: Any, trace: ContactTrace, units: Units) -> None:
-    places, bound = _broken(trace, trace.places), _broken(trace, trace.bound)
+    places, bound = trace.broken(trace.places), trace.broken(trace.bound)
     axes.fill_between(places, -bound, bound, color=PALE, linewidth=0)
     for side in (-bound, bound):
         axes.plot(places, side, "--", color=INK, lw=1.2)
@@ -87,12 +87,7 @@ def _draw_slip(axes: Any, trace: ContactTrace, longest: float) -> None:
 
 
 def _curve(axes: Any, trace: ContactTrace, values: np.ndarray, colour: str) -> None:
-    axes.plot(_broken(trace, trace.places), _broken(trace, values), color=colour, lw=1.8, zorder=2.5)
-
-
-def _broken(trace: ContactTrace, values: np.ndarray) -> np.ndarray:
-    """Put a gap where the surface is interrupted."""
-    return np.insert(values, trace.breaks + 1, np.nan)
+    axes.plot(trace.broken(trace.places), trace.broken(values), color=colour, lw=1.8, zorder=2.5)
 
 
 def _symbols(axes: Any, trace: ContactTrace, values: np.ndarray) -> None:

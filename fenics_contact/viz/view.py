@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -54,6 +55,14 @@ class Frame:
     def size(self) -> np.ndarray:
         """Width and height, (2,)."""
         return self.high - self.low
+
+    def holds(self, places: np.ndarray) -> np.ndarray:
+        """Tell which places, (..., 2), are seen."""
+        return np.asarray(np.all((places > self.low) & (places < self.high), axis=-1))
+
+    def fit(self, axes: Any) -> None:
+        """Let matplotlib's axes show the rectangle with equal scales."""
+        axes.set(aspect="equal", xlim=(self.low[0], self.high[0]), ylim=(self.low[1], self.high[1]))
 
     @property
     def proportion(self) -> float:

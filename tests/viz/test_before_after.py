@@ -17,6 +17,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz import before_after, plot_before_after
 from fenics_contact.viz.colours import GREY, ORANGE
 from fenics_contact.viz.profile import profiles
+from fenics_contact.viz.view import Frame
 from tests.contact.gallery import partitions
 from tests.viz.plane_states import plane_block
 from tests.viz.states import contains, painted, pixels, pulled, touching_blocks
@@ -63,7 +64,7 @@ def test_outlines_move_as_the_design_does(dim: int) -> None:
         assert set(profile.before) == set(first.scene.bodies)
         assert profile.largest <= RISE + 1e-12
         largest = max(largest, profile.largest)
-        size = float(np.max(profile.high - profile.low))
+        size = float(np.max(profile.frame.size))
         assert profile.factor * profile.largest < 0.1 * size
     assert largest > 0.3 * RISE, "hardly anything moved: nothing was tested"
     still = profiles(first, first, None)
@@ -86,7 +87,7 @@ def test_names_stand_in_their_bodies() -> None:
             place, z = profile.place_in(name), body.mesh.points[:, 2]
             assert place is not None
             assert z.min() + 0.1 * np.ptp(z) < place[1] < z.max() - 0.1 * np.ptp(z)
-        gone = replace(profile, low=profile.high + 1.0, high=profile.high + 2.0)
+        gone = replace(profile, frame=Frame(profile.frame.high + 1.0, profile.frame.high + 2.0))
         assert gone.place_in("lower") is None
 
 
