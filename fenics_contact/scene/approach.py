@@ -16,7 +16,7 @@ from fenics_contact.theory import contact_modulus, hertz_line, hertz_point
 
 if TYPE_CHECKING:
     from fenics_contact.scene.body import Body
-    from fenics_contact.scene.scene import Scene
+    from fenics_contact.scene.parts import SceneParts
 
 #: Nodes around the smallest gap to which the gap is fitted.
 AROUND = 30
@@ -26,7 +26,7 @@ LINE = 1e-2
 FLAT = 1e-6
 
 
-def displacement_along(scene: Scene, normal: np.ndarray) -> float:
+def displacement_along(scene: SceneParts, normal: np.ndarray) -> float:
     """Return the largest displacement along a direction that a support prescribes as a number, [length]."""
     sizes = [0.0]
     for support in scene.supports:
@@ -35,7 +35,7 @@ def displacement_along(scene: Scene, normal: np.ndarray) -> float:
     return max(sizes)
 
 
-def force_along(scene: Scene, normal: np.ndarray) -> float | None:
+def force_along(scene: SceneParts, normal: np.ndarray) -> float | None:
     """Return the largest force along a direction that the loads on one body add up to, [force].
 
     None if a load is given as a function or in UFL.
@@ -49,7 +49,7 @@ def force_along(scene: Scene, normal: np.ndarray) -> float | None:
     return max(abs(float(force @ normal)) for force in total.values())
 
 
-def _resultant(scene: Scene, load: Load) -> np.ndarray | None:
+def _resultant(scene: SceneParts, load: Load) -> np.ndarray | None:
     """Return the resultant of a load that is given by numbers, shape (dim,), [force]."""
     if isinstance(load, ThermalStrain):
         return np.zeros(scene.dim)
@@ -66,7 +66,7 @@ def _resultant(scene: Scene, load: Load) -> np.ndarray | None:
     return value * float(quadrature_areas(mesh.points, facets).sum())
 
 
-def modulus_of(scene: Scene, pair: ContactPair) -> float | None:
+def modulus_of(scene: SceneParts, pair: ContactPair) -> float | None:
     """Return the contact modulus E* of a pair, of the softest materials of its bodies; None if not isotropic.
 
     Rigid obstacles count as infinitely stiff.
@@ -80,7 +80,7 @@ def modulus_of(scene: Scene, pair: ContactPair) -> float | None:
     return contact_modulus(young_1, poisson_1, young_2, poisson_2)
 
 
-def master_share(scene: Scene, pair: ContactPair | Tie) -> float:
+def master_share(scene: SceneParts, pair: ContactPair | Tie) -> float:
     """Return the master's share of the compliance 1/E* of two bodies; a half where one is not isotropic."""
     assert isinstance(pair.master, Surface)
     own, other = (_constants(scene.bodies[surface.body]) for surface in (pair.slave, pair.master))

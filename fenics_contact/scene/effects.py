@@ -11,7 +11,7 @@ from fenics_contact.scene.loads import BodyForce, ThermalStrain
 from fenics_contact.scene.pairs import Coulomb, Tresca
 
 if TYPE_CHECKING:
-    from fenics_contact.scene.scene import Scene
+    from fenics_contact.scene.parts import SceneParts
 
 
 class EffectName(StrEnum):
@@ -41,12 +41,12 @@ class Effect:
     reason: str
 
 
-def effects_of(scene: Scene) -> tuple[Effect, ...]:
+def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
     """List what a scene calls for, in the order of `EffectName`."""
     return tuple(_found(scene))
 
 
-def _found(scene: Scene) -> Iterator[Effect]:
+def _found(scene: SceneParts) -> Iterator[Effect]:
     names = EffectName
     yield Effect(names.ELASTICITY, _count(len(scene.bodies), "elastic body", "elastic bodies"))
     if scene.supports:

@@ -9,7 +9,7 @@ import numpy as np
 from fenics_contact.scene.kernels import rigid_body_modes
 
 if TYPE_CHECKING:
-    from fenics_contact.scene.scene import Scene
+    from fenics_contact.scene.parts import SceneParts
 
 #: A motion counts as not resisted if it moves supported nodes by less than this part of what others do.
 RANK_TOLERANCE = 1e-9
@@ -31,7 +31,7 @@ def resisted_motions(modes: np.ndarray, fixed: np.ndarray) -> np.ndarray:
     return np.asarray(motions[size > RANK_TOLERANCE * size.max(initial=0.0)].T)
 
 
-def held_by_supports(scene: Scene, body: str) -> bool:
+def held_by_supports(scene: SceneParts, body: str) -> bool:
     """Tell whether the supports of a body resist all its rigid motions."""
     modes = rigid_body_modes(scene.bodies[body].mesh.points)
     return resisted_motions(modes, scene.fixed(body)).shape[1] == modes.shape[2]

@@ -9,13 +9,13 @@ import numpy as np
 from fenics_contact.mesh import vector_areas
 
 if TYPE_CHECKING:
-    from fenics_contact.scene.scene import Scene
+    from fenics_contact.scene.parts import SceneParts
 
 #: A facet lies across an axis if the cosine of its normal misses one by no more.
 ACROSS = 1e-9
 
 
-def mirrored(scene: Scene, body: str) -> np.ndarray:
+def mirrored(scene: SceneParts, body: str) -> np.ndarray:
     """Return which nodes of a body lie on a plane of symmetry across each axis, shape (n_nodes, dim).
 
     A plane of symmetry is a flat side across an axis on which a support prescribes that component alone.

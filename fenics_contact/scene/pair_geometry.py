@@ -15,7 +15,7 @@ from fenics_contact.surface_shapes import Joined, Placed, SurfaceShape, asked
 from fenics_contact.surfaces import FacetedSurface, heights, project
 
 if TYPE_CHECKING:
-    from fenics_contact.scene.scene import Scene
+    from fenics_contact.scene.parts import SceneParts
 
 #: Nodes of a slave that are looked at, those nearest to the master.
 MOST = 2000
@@ -75,7 +75,7 @@ class _Meeting:
     facet: np.ndarray
 
 
-def pair_geometry(scene: Scene, pair: ContactPair) -> PairGeometry:
+def pair_geometry(scene: SceneParts, pair: ContactPair) -> PairGeometry:
     """Tell what the gaps of a pair are measured between."""
     geometry = "best" if pair.geometry == "faceted" else pair.geometry
     slave = surface_of(scene, pair.slave, geometry)
@@ -94,7 +94,7 @@ def pair_geometry(scene: Scene, pair: ContactPair) -> PairGeometry:
     return PairGeometry(name, _name(scene, pair, pair.master, master), height, approach)
 
 
-def _name(scene: Scene, pair: ContactPair, surface: Surface, found: FacetedSurface) -> str:
+def _name(scene: SceneParts, pair: ContactPair, surface: Surface, found: FacetedSurface) -> str:
     if pair.geometry == "faceted":
         return "facets"
     shape = scene.bodies[surface.body].mesh.origin.shapes.get(surface.name)
@@ -125,7 +125,7 @@ def _meeting_obstacle(slave: FacetedSurface, obstacle: SurfaceShape) -> _Meeting
     return _Meeting(facing, normal[facing], gap, np.zeros(len(facing), dtype=np.int64))
 
 
-def _approach(scene: Scene, pair: ContactPair, slave: FacetedSurface, met: _Meeting) -> float | None:
+def _approach(scene: SceneParts, pair: ContactPair, slave: FacetedSurface, met: _Meeting) -> float | None:
     """Return the estimate of `PairGeometry.approach`."""
     if len(met.node) == 0:
         return None

@@ -17,7 +17,7 @@ from fenics_contact.scene.pair_geometry import PairGeometry, pair_geometry
 from fenics_contact.scene.pairs import Surface
 
 if TYPE_CHECKING:
-    from fenics_contact.scene.scene import Scene
+    from fenics_contact.scene.parts import SceneParts
 
 #: Bytes for each torn unknown beside the factors: meshes, rows of B, vectors and their history.
 BYTES_PER_UNKNOWN = 1200
@@ -91,7 +91,7 @@ class Plan:
         return "\n".join(f"{name:15s} {value}" for name, value in lines.items())
 
 
-def make_plan(scene: Scene, partitions: Mapping[str, np.ndarray], *, sensitivity: bool = False) -> Plan:
+def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensitivity: bool = False) -> Plan:
     """Decide what a scene needs.
 
     Args:
@@ -124,7 +124,7 @@ def make_plan(scene: Scene, partitions: Mapping[str, np.ndarray], *, sensitivity
     )
 
 
-def choose_solver(scene: Scene, subdomains: int, *, sensitivity: bool = False) -> SolverKind:
+def choose_solver(scene: SceneParts, subdomains: int, *, sensitivity: bool = False) -> SolverKind:
     """Return how the equilibrium of a scene is found.
 
     Args:
@@ -148,7 +148,7 @@ def _cone(names: set[EffectName]) -> ConeKind:
     return ConeKind.BOUNDS if EffectName.CONTACT in names else ConeKind.NONE
 
 
-def _multipliers(scene: Scene, unknowns: int) -> dict[str, int]:
+def _multipliers(scene: SceneParts, unknowns: int) -> dict[str, int]:
     nodes = sum(body.mesh.n_nodes for body in scene.bodies.values())
     fixed = sum(int(np.count_nonzero(scene.fixed(name))) for name in scene.body_names)
     slaves = [_slave_nodes(scene, pair.slave) for pair in scene.contacts]
@@ -163,7 +163,7 @@ def _multipliers(scene: Scene, unknowns: int) -> dict[str, int]:
     }
 
 
-def _slave_nodes(scene: Scene, surface: Surface) -> int:
+def _slave_nodes(scene: SceneParts, surface: Surface) -> int:
     return len(np.unique(scene.facets(surface)))
 
 

@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.checks import checked
-from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh import BodyMesh
 from fenics_contact.partition import default_partition
-from fenics_contact.scene.body import Body
 from fenics_contact.scene.effects import Effect, effects_of
-from fenics_contact.scene.loads import Load, SurfaceLoad, ThermalStrain
-from fenics_contact.scene.materials import can_expand
-from fenics_contact.scene.obstacles import RigidObstacle
-from fenics_contact.scene.pairs import ContactPair, Surface, Tie
+from fenics_contact.scene.parts import SceneParts
 from fenics_contact.scene.plan import Plan, make_plan
-from fenics_contact.scene.supports import Support
 
 
 @dataclass(frozen=True)
-@checked()
-class Scene:
+class Scene(SceneParts):
     """Elastic bodies that may touch.
 
     Attributes:
@@ -51,140 +42,6 @@ class Scene:
         >>> [effect.name.value for effect in scene.effects()]
         ['elasticity', 'prescribed displacement', 'surface load', 'contact', 'Coulomb friction']
     """
-
-    bodies: Mapping[str, Body]
-    supports: Sequence[Support] = field(default=())
-    loads: Sequence[Load] = field(default=())
-    contacts: Sequence[ContactPair] = field(default=())
-    ties: Sequence[Tie] = field(default=())
-
-    def __post_init__(self) -> None:
-        """Refuse names that point to nothing, and loads and supports that do not suit their bodies."""
-        if not self.bodies:
-            raise InvalidInputError(
-                "a scene needs at least one body, got none: pass bodies={'name': Body(...)}"
-            )
-        for part in (*self.supports, *self.loads):
-            surface = part.surface if isinstance(part, SurfaceLoad | Support) else None
-            self._require(part.body, surface, type(part).__name__)
-            self._require_components(part)
-            if isinstance(part, ThermalStrain):
-                self._require_expansion(part)
-        pairs: list[ContactPair | Tie] = [*self.contacts, *self.ties]
-        for pair in pairs:
-            kind = type(pair).__name__
-            self._require(pair.slave.body, pair.slave.name, f"{kind}.slave")
-            if isinstance(pair.master, Surface):
-                self._require(pair.master.body, pair.master.name, f"{kind}.master")
-                self._require_linear(pair.slave, pair.master, pair.discretisation, kind)
-            else:
-                self._require_dimension(pair.master)
-
-    def _require(self, body: str, surface: str | None, user: str) -> None:
-        if body not in self.bodies:
-            raise InvalidInputError(
-                f"{user} names body {body!r}, the scene has {sorted(self.bodies)}: use one of them"
-            )
-        if surface is None:
-            return
-        surfaces = self.bodies[body].mesh.surfaces
-        if surface not in surfaces:
-            raise InvalidInputError(
-                f"{user} names surface {surface!r} of body {body!r}, which has {sorted(surfaces)}: "
-                "use one of them"
-            )
-
-    def _require_components(self, part: Load | Support) -> None:
-        """Refuse a vector of another dimension than its body's."""
-        dim = self.bodies[part.body].mesh.dim
-        if isinstance(part.value, tuple) and len(part.value) != dim:
-            needed = "two entries, for x and y, as the body is plane" if dim == 2 else "three, for x, y and z"
-            raise InvalidInputError(
-                f"{type(part).__name__}.value of body {part.body!r} must hold {needed}, got {part.value!r}: "
-                f"give {dim} of them"
-            )
-
-    def _require_dimension(self, obstacle: RigidObstacle) -> None:
-        """Refuse an obstacle of another dimension than the bodies'; one that does not tell may be of any."""
-        dim = getattr(obstacle, "dim", self.dim)
-        if dim != self.dim:
-            raise InvalidInputError(
-                f"an obstacle must lie in the space of the bodies, {type(obstacle).__name__} is for {dim} "
-                f"dimensions and the bodies have {self.dim}: give it {self.dim} coordinates, or in the plane "
-                "a RigidSphere for a round bar"
-            )
-
-    def _require_linear(self, slave: Surface, master: Surface, discretisation: str, kind: str) -> None:
-        """Refuse mortar coupling of quadratic facets."""
-        orders = {surface.name: self.bodies[surface.body].mesh.order for surface in (slave, master)}
-        if discretisation == "mortar" and max(orders.values()) > 1:
-            raise InvalidInputError(
-                f"{kind} with discretisation='mortar' needs linear cells on both sides, got cells of order "
-                f"{orders}: mean gaps of linear facets do not pass the patch test between quadratic cells; "
-                "use discretisation='node', or linear cells"
-            )
-
-    def _require_expansion(self, load: ThermalStrain) -> None:
-        stiff = [material for material in self.bodies[load.body].materials if not can_expand(material)]
-        if stiff:
-            raise InvalidInputError(
-                f"ThermalStrain needs a thermal expansion of every material of body {load.body!r}, got none "
-                f"for {stiff[0]!r}: give the material its thermal_expansion"
-            )
-
-    @property
-    def dim(self) -> int:
-        """Dimension of space, 2 or 3."""
-        return int(next(iter(self.bodies.values())).mesh.points.shape[1])
-
-    def fixed(self, body: str) -> np.ndarray:
-        """Return whether supports prescribe a component of a body's node, shape (n_nodes, dim)."""
-        mesh = self.bodies[body].mesh
-        marks = np.zeros(mesh.points.shape, dtype=bool)
-        for support in self.supports:
-            if support.body == body:
-                nodes = np.unique(mesh.surfaces[support.surface])
-                marks[nodes] |= ~np.isnan(support.values(mesh.points[nodes]))
-        return marks
-
-    @property
-    def body_names(self) -> tuple[str, ...]:
-        """Names of the bodies in the order in which everything is numbered."""
-        return tuple(self.bodies)
-
-    def facets(self, surface: Surface) -> np.ndarray:
-        """Return the linear facets through the nodes of a surface, rows of node numbers of its body."""
-        return self.bodies[surface.body].mesh.linear.surfaces[surface.name]
-
-    def moved(self, points: Mapping[str, np.ndarray]) -> Scene:
-        """Return the scene with new coordinates for some bodies; topology and names stay.
-
-        Args:
-            points: Body name -> coordinates, shape (n_nodes, dim), [length].
-
-        Raises:
-            InvalidInputError: If a body is unknown, a coordinate is not finite or a cell is inverted.
-        """
-        for name in points:
-            self._require(name, None, "moved")
-        return self._with_meshes({name: self.bodies[name].mesh.moved(x) for name, x in points.items()})
-
-    def reshaped(self, points: Mapping[str, np.ndarray]) -> Scene:
-        """Return the scene with slightly other coordinates, which surfaces follow, see `BodyMesh.reshaped`.
-
-        Args:
-            points: Body name -> coordinates, shape (n_nodes, dim), [length].
-
-        Raises:
-            InvalidInputError: As `moved`.
-        """
-        for name in points:
-            self._require(name, None, "reshaped")
-        return self._with_meshes({name: self.bodies[name].mesh.reshaped(x) for name, x in points.items()})
-
-    def _with_meshes(self, meshes: Mapping[str, BodyMesh]) -> Scene:
-        changed = {name: replace(self.bodies[name], mesh=mesh) for name, mesh in meshes.items()}
-        return replace(self, bodies={**self.bodies, **changed})
 
     def partition(self, ranks: int = 1) -> dict[str, np.ndarray]:
         """Cut every body into subdomains of a good size.

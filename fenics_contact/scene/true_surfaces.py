@@ -9,10 +9,12 @@ from fenics_contact.scene.pairs import Surface
 from fenics_contact.surfaces import FacetedSurface, Geometry, true_surface
 
 if TYPE_CHECKING:
-    from fenics_contact.scene.scene import Scene
+    from fenics_contact.scene.parts import SceneParts
 
 
-def surface_of(scene: Scene, surface: Surface, geometry: Geometry, *, finer: bool = False) -> FacetedSurface:
+def surface_of(
+    scene: SceneParts, surface: Surface, geometry: Geometry, *, finer: bool = False
+) -> FacetedSurface:
     """Return a named surface; its normals lie in the planes of symmetry that cut it.
 
     Args:
