@@ -5,7 +5,7 @@ from fenics_contact.contact.coulomb import FixedPoint
 from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.equilibrium import default_solver
 from fenics_contact.contact.fields import body_mesh
-from fenics_contact.contact.gathered import GatheredFields, contact_fields, gathered_fields, in_space
+from fenics_contact.contact.gathered import GatheredFields, in_space
 from fenics_contact.contact.multi_block import body_grid
 from fenics_contact.contact.problem import ContactProblem, solve_scene
 from fenics_contact.contact.result import ContactResult, Status
@@ -33,9 +33,7 @@ __all__ = [
     "body_mesh",
     "check_held",
     "contact_area",
-    "contact_fields",
     "default_solver",
-    "gathered_fields",
     "in_space",
     "solve_scene",
     "solve_steps",

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from fenics_contact.contact.state import State
+from fenics_contact.contact.result import ContactResult
+from fenics_contact.pairing import NodeNumbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,27 +25,12 @@ class GatheredFields:
     cells: dict[str, np.ndarray]
 
 
-def gathered_fields(state: State, body: str) -> GatheredFields:
-    """Collect the fields of a body on every rank. Collective.
-
-    Args:
-        state: The state.
-        body: Name of the body.
-    """
-    decomposition = state.torn.decomposition
-    first = int(decomposition.tearing.subdomain_offset[decomposition.tearing.body_names.index(body)])
-    subdomain = np.asarray(decomposition.partitions[body], dtype=np.int32) + np.int32(first)
-    return GatheredFields(
-        {"displacement": state.gather_displacement(body), **contact_fields(state, body)},
-        {"von_mises": state.gather_von_mises(body), "subdomain": subdomain},
-    )
-
-
-def contact_fields(state: State, body: str) -> dict[str, np.ndarray]:
+def contact_fields(contact: ContactResult, numbers: NodeNumbers, body: str) -> dict[str, np.ndarray]:
     """Return what happens on a body's contact surfaces as fields on all its nodes.
 
     Args:
-        state: The state.
+        contact: What happens on all contact surfaces.
+        numbers: Numbers of the nodes of all bodies.
         body: Name of the body.
 
     Returns:
@@ -55,9 +39,8 @@ def contact_fields(state: State, body: str) -> dict[str, np.ndarray]:
         slave and ``contact_slip``, (n_nodes, 3), [force] and [length]. A node that belongs to several pairs
         has their sum, and the status of the last.
     """
-    contact, tearing = state.contact, state.torn.decomposition.tearing
-    start = int(tearing.node_offset[tearing.body_names.index(body)])
-    count = state.scene.bodies[body].mesh.n_nodes
+    start, end = numbers.node_offset[numbers.body_names.index(body) :][:2]
+    count = int(end - start)
     nodes = contact.points.slave - start
     mine = np.flatnonzero((nodes >= 0) & (nodes < count))
 

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fenics_contact.contact.equilibrium import contact_result, solve_dual
-from fenics_contact.feti import DualSystem
+from fenics_contact.contact.dual_solve import contact_result, solve_dual
+from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem
 from fenics_contact.qp import DualSolution, FaceNewton
-
-if TYPE_CHECKING:
-    from fenics_contact.contact.state import State
 
 #: Relative residual of the state of the better geometry: differences between states are a few percent of them
 #: or not worth telling.
@@ -32,32 +28,34 @@ class GeometryError:
     peak_pressure: float = 0.0
 
 
-def geometry_error(state: State) -> GeometryError:
+def geometry_error(
+    system: DualSystem | DirectSystem, solution: DualSolution | DirectSolution
+) -> GeometryError:
     """Estimate the share of geometry in the error of a state. Collective.
 
     The contact problem is solved once more with the gaps between surfaces that are known better: the shapes
     that the meshes carry, where facets or reconstructed surfaces were used; where there are none,
     reconstructed surfaces of the next order. Factors, coarse problem and preconditioner are those of the
-    state. Zero where shapes are known and used, and between flat surfaces. It is no bound: what the normals
+    system. Zero where shapes are known and used, and between flat surfaces. It is no bound: what the normals
     of facets do is left out, which counts where their gaps happen to be right, as between mirrored bodies by
     mortar.
 
     Raises:
         ConvergenceError: If the problem of the better geometry is not solved.
     """
-    torn = state.torn
-    if torn.points.count == 0:
+    torn = system.torn
+    if not isinstance(system, DualSystem) or not isinstance(solution, DualSolution) or not torn.points.count:
         return GeometryError()
     gap = torn.finer_gap()
-    if np.array_equal(gap, torn.points.gap) or not isinstance(state.solution, DualSolution):
+    if np.array_equal(gap, torn.points.gap):
         return GeometryError()
     solver = FaceNewton(tolerance=TOLERANCE)
-    present = solve_dual(state.dual, solver, state.solution)
-    system = DualSystem(torn.with_gap(gap), previous=state.dual)
-    better = solve_dual(system, solver, present)
+    present = solve_dual(system, solver, solution)
+    finer = DualSystem(torn.with_gap(gap), previous=system)
+    better = solve_dual(finer, solver, present)
     way = better.multiplier - present.multiplier
-    square = float(system.problem.comm.allreduce(way @ system.apply(way)))
-    peaks = [_peak(state.dual, present), _peak(system, better)]
+    square = float(finer.problem.comm.allreduce(way @ finer.apply(way)))
+    peaks = [_peak(system, present), _peak(finer, better)]
     by_geometry = abs(peaks[0] - peaks[1]) / peaks[1] if peaks[1] > 0.0 else 0.0
     return GeometryError(float(np.sqrt(max(square, 0.0))), by_geometry)
 

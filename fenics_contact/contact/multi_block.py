@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fenics_contact.contact.gathered import gathered_fields, in_space
+from fenics_contact.contact.gathered import GatheredFields, in_space
 from fenics_contact.errors import InvalidInputError, MissingRequirementError, together
 
 if TYPE_CHECKING:
-    from fenics_contact.contact.state import State
+    from mpi4py import MPI
+
     from fenics_contact.mesh import BodyMesh
 
 #: What VTK calls the types of cells; their nodes are in VTK's order.
@@ -25,24 +27,31 @@ _VTK_NAMES = {
 }
 
 
-def multi_block(state: State, deformed: float, *, linear: bool) -> Any:
-    """Return what `State.to_pyvista` promises. Collective."""
-    with together(state.torn.decomposition.comm):
+def multi_block(
+    comm: MPI.Comm,
+    meshes: Mapping[str, BodyMesh],
+    gather: Callable[[str], GatheredFields],
+    deformed: float,
+    *,
+    linear: bool,
+) -> Any:
+    """Return what `State.to_pyvista` promises, of meshes and what gathers their fields. Collective."""
+    with together(comm):
         pv = _pyvista()
     if not np.isfinite(deformed):
         raise InvalidInputError(
             f"deformed must be finite, got {deformed}: give the factor of the displacement, such as 1"
         )
     blocks = pv.MultiBlock()
-    for name, body in state.scene.bodies.items():
-        fields = gathered_fields(state, name)
-        points = in_space(body.mesh.points + deformed * fields.points["displacement"])
-        mesh = body.mesh.linear if linear else body.mesh
+    for name, whole in meshes.items():
+        fields = gather(name)
+        points = in_space(whole.points + deformed * fields.points["displacement"])
+        mesh = whole.linear if linear else whole
         grid = body_grid(mesh, points)
         for key, values in fields.points.items():
             grid.point_data[key] = in_space(values)
         for key, values in fields.cells.items():
-            grid.cell_data[key] = np.repeat(values, mesh.n_cells // body.mesh.n_cells)
+            grid.cell_data[key] = np.repeat(values, mesh.n_cells // whole.n_cells)
         blocks[name] = grid
     return blocks
 

@@ -18,7 +18,7 @@ from fenics_contact.contact.fields import (
     nodal_function,
     von_mises,
 )
-from fenics_contact.contact.gathered import contact_fields
+from fenics_contact.contact.gathered import GatheredFields, contact_fields
 from fenics_contact.contact.result import ContactResult
 from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.contact.unheld import UnheldMotion, unheld_motions
@@ -120,7 +120,7 @@ class State:
                 solver = solver_errors(self.system, self.solution)
                 estimate = discretisation_error(self.torn, self.conforming_displacement)
                 found = state_errors(solver, estimate, self.energies.norm)
-            geometry = geometry_error(self)
+            geometry = geometry_error(self.system, self.solution)
         return found.with_geometry(geometry.energy, geometry.peak_pressure)
 
     @cached_property
@@ -176,7 +176,7 @@ class State:
         """
         key = "contact_pressure"
         return {
-            name: nodal_function(u.function_space.mesh, key, contact_fields(self, name)[key])
+            name: nodal_function(u.function_space.mesh, key, self._contact_fields(name)[key])
             for name, u in self.displacement.items()
         }
 
@@ -204,6 +204,20 @@ class State:
         """Return the von Mises stress of a body's cells on every rank, shape (n_cells,). Collective."""
         return cell_values(self.von_mises[body], self.scene.bodies[body].mesh.cells)
 
+    @collectively("State.gather_fields", _comm)
+    def gather_fields(self, body: str) -> GatheredFields:
+        """Return all fields of a body on every rank. Collective."""
+        decomposition = self.torn.decomposition
+        first = decomposition.tearing.subdomain_offset[decomposition.tearing.body_names.index(body)]
+        subdomain = np.asarray(decomposition.partitions[body], dtype=np.int32) + np.int32(first)
+        return GatheredFields(
+            {"displacement": self.gather_displacement(body), **self._contact_fields(body)},
+            {"von_mises": self.gather_von_mises(body), "subdomain": subdomain},
+        )
+
+    def _contact_fields(self, body: str) -> dict[str, np.ndarray]:
+        return contact_fields(self.contact, self.torn.decomposition.tearing, body)
+
     @collectively("State.to_pyvista", _comm)
     def to_pyvista(self, deformed: float = 0.0, *, linear: bool = False) -> Any:
         """Return all bodies with their fields for pyvista, the same on every rank. Collective.
@@ -228,7 +242,8 @@ class State:
         """
         from fenics_contact.contact.multi_block import multi_block
 
-        return multi_block(self, deformed, linear=linear)
+        meshes = {name: body.mesh for name, body in self.scene.bodies.items()}
+        return multi_block(_comm(self), meshes, self.gather_fields, deformed, linear=linear)
 
     @property
     def counts(self) -> dict[str, int]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fenics_contact.contact.equilibrium import friction_of
+from fenics_contact.contact.dual_solve import friction_of
 from fenics_contact.contact.state import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import DirectSystem, DualSystem, TornSystem

@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from fenics_contact.contact import State, gathered_fields, in_space
+from fenics_contact.contact import State, in_space
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.io.names import checked_name, file_of_each
 from fenics_contact.io.replacing import replacing
@@ -89,7 +89,7 @@ def _checked(
 
 def _gathered(state: State, body: str, more: Mapping[str, np.ndarray]) -> meshio.Mesh:
     mesh = state.scene.bodies[body].mesh
-    fields = gathered_fields(state, body)
+    fields = state.gather_fields(body)
     import meshio
 
     return meshio.Mesh(

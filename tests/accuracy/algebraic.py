@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from fenics_contact.accuracy import Certificate, certify, friction_error
 from fenics_contact.contact import ContactProblem, State, solve_scene
-from fenics_contact.contact.equilibrium import solve_dual
+from fenics_contact.contact.dual_solve import solve_dual
 from fenics_contact.gallery import block, hemisphere, rectangle
 from fenics_contact.mesh import quadratic
 from fenics_contact.partition import bisection_partition, box_partition, graph_partition

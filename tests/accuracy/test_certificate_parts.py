@@ -25,7 +25,7 @@ from fenics_contact.accuracy import (
     state_errors,
 )
 from fenics_contact.contact import FixedPoint, State, solve_scene
-from fenics_contact.contact.equilibrium import solve_dual
+from fenics_contact.contact.dual_solve import solve_dual
 from fenics_contact.gallery import rectangle
 from fenics_contact.partition import box_partition
 from fenics_contact.qp import DualSolution, FaceNewton, Smalse

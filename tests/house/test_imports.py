@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import graphlib
 import importlib
 from pathlib import Path
 
@@ -237,6 +238,36 @@ def test_contact_alone_loads_neither_sensitivity_nor_pictures() -> None:
     assert f"{PACKAGE}.contact" in loaded
     rooms = {f"{PACKAGE}.{room}" for room in ("shape", "viz", "optimize", "outer", "study")}
     assert loaded & (rooms | {"pyvista", "matplotlib"}) == set()
+
+
+def order(house: list[Module]) -> list[str]:
+    """Sort modules so that each comes after all that it imports, also for types alone.
+
+    Raises:
+        graphlib.CycleError: Modules import each other.
+    """
+    names = {module.name for module in house}
+    sorter: graphlib.TopologicalSorter[str] = graphlib.TopologicalSorter()
+    for module in house:
+        found = {each.target for each in module.imports()}
+        found |= {target.rpartition(".")[0] for target in found - names}
+        sorter.add(module.name, *(found & names - {module.name}))
+    return list(sorter.static_order())
+
+
+def test_no_modules_import_each_other() -> None:
+    house = modules()
+    assert len(order(house)) == len(house) > 100
+
+
+def test_modules_that_import_each_other_are_found(tmp_path: Path) -> None:
+    for name, other in (("first", "second"), ("second", "first")):
+        folder = tmp_path / PACKAGE / "qp"
+        folder.mkdir(parents=True, exist_ok=True)
+        line = f"from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from {PACKAGE}.qp.{other} import x"
+        (folder / f"{name}.py").write_text(line)
+    with pytest.raises(graphlib.CycleError, match=r"qp\.(first|second)"):
+        order(modules(tmp_path))
 
 
 def test_a_name_of_a_face_stands_for_one_thing() -> None:

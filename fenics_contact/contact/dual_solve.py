@@ -1,0 +1,74 @@
+"""Solve the dual system of a scene with its friction, and read off what happens on its contact surfaces."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.contact.coulomb import FixedPoint
+from fenics_contact.contact.result import ContactResult, Status
+from fenics_contact.feti import (
+    DualSystem,
+)
+from fenics_contact.qp import DualSolution, DualSolver, Smalse, contact_step, solve
+
+
+def solve_dual(
+    system: DualSystem, solver: DualSolver, start: DualSolution | np.ndarray | None = None
+) -> DualSolution:
+    """Solve the dual problem of a system with the friction laws of its scene. Collective.
+
+    Args:
+        system: The system.
+        solver: `FaceNewton` and `FixedPoint` know Coulomb's law; a `FixedPoint` is put around `Smalse`.
+        start: Earlier solution, or multiplier to start from, owned, or None.
+    """
+    tresca, coefficient = friction_of(system)
+    if coefficient is not None and isinstance(solver, Smalse):
+        solver = FixedPoint(solver)
+    return solve(system.problem, tresca, solver, start, friction_coefficient=coefficient)
+
+
+def friction_of(system: DualSystem) -> tuple[np.ndarray, np.ndarray | None]:
+    """Return what the friction law of a scene gives for this rank's discs.
+
+    Returns:
+        The part of the slip bound that is given, shape (n_friction,), [force], and the friction coefficient,
+        shape (n_friction,), None if it is zero everywhere.
+    """
+    discs, torn = system.owned_discs(), system.torn
+    coefficient = torn.friction_coefficient[discs] if np.any(torn.friction_coefficient > 0) else None
+    return torn.tresca_bound[discs], coefficient
+
+
+def contact_result(system: DualSystem, solution: DualSolution, displacement: np.ndarray) -> ContactResult:
+    """Gather forces, gaps and status of all contact points on every rank. Collective."""
+    torn, problem = system.torn, system.problem
+    rows = np.concatenate([torn.normal_rows, torn.tangential_rows.ravel()])
+    step = contact_step(problem.layout, problem.diagonal)
+    gathered = [torn.numbering.gather(x, rows) for x in (solution.multiplier, solution.residual, step)]
+    count, frictional = torn.points.count, torn.frictional
+    normal, gap, normal_step = (x[:count] for x in gathered)
+    tau, minus_slip, tangential_step = (x[count:].reshape(-1, torn.dim - 1) for x in gathered)
+    trial_normal = normal - normal_step * gap
+    trial_tangential = tau - tangential_step * minus_slip
+    bound = torn.tresca_bound + torn.friction_coefficient * np.maximum(normal[frictional], 0)
+    status = np.where(trial_normal > 0, Status.SLIP, Status.OPEN).astype(int)
+    sticks = (np.linalg.norm(trial_tangential, axis=1) < bound) & (trial_normal[frictional] > 0)
+    status[frictional[sticks]] = Status.STICK
+
+    def spread(values: np.ndarray, others: float | np.ndarray = 0.0) -> np.ndarray:
+        full = np.empty((count, *values.shape[1:]))
+        full[frictional], full[torn.frictionless] = values, others
+        return full
+
+    origin = torn.numbering.gather(torn.right + torn.supported, torn.tangential_rows.ravel())
+    return ContactResult(
+        torn.points,
+        normal,
+        spread(tau),
+        spread(bound),
+        gap,
+        spread(-minus_slip, torn.sliding(displacement) - torn.slid),
+        spread(origin.reshape(-1, torn.dim - 1), torn.slid),
+        status,
+    )
