@@ -8,6 +8,7 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 
+#: A vector as a user gives it.
 GivenVector: TypeAlias = tuple[float, ...]
 
 

@@ -24,6 +24,7 @@ from fenics_contact.optimize.state import MethodState
 from fenics_contact.progress import Task
 
 Array = NDArray[np.float64]
+#: What is called after every evaluation, with its record and the best point so far.
 Callback = Callable[[Record, Array], None]
 
 if TYPE_CHECKING:

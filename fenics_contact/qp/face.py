@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector
 
+#: A truth value for each multiplier.
 Marks = npt.NDArray[np.bool_]
 
 #: Overshoot beyond which a slipping disc keeps its direction: the stiffness κ against a turn would leave no

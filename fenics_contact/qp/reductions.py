@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from fenics_contact._libraries import MPI
 
+#: One number for each row, (n,).
 Vector = npt.NDArray[np.float64]
 
 

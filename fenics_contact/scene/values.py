@@ -36,7 +36,9 @@ class Ufl:
     function: Callable[[Any], Any]
 
 
+#: A vector: numbers, a function of positions, or UFL.
 VectorValue = Sequence[float] | OfPosition | Ufl
+#: A number, a function of positions, or UFL.
 ScalarValue = float | OfPosition | Ufl
 
 

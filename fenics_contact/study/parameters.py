@@ -13,8 +13,10 @@ from fenics_contact.scene import Discretisation
 
 #: The tolerance that follows the discretisation estimate.
 BALANCED: Literal["balanced"] = "balanced"
+#: A largest relative residual, or "balanced".
 RunTolerance: TypeAlias = float | Literal["balanced"]
 
+#: Discretisations of contact, see `scene.ContactPair`.
 DISCRETISATIONS = ("node", "mortar")
 #: How Coulomb's law is met: within every Newton step, or by a loop of Tresca problems around them.
 SOLVERS = ("newton", "fixed point")

@@ -72,7 +72,7 @@ def write_report(folder: str | Path, results: Results, *, figures: bool = True) 
 
 
 def write_overview(folder: str | Path) -> Path:
-    """Write `README.md` of a folder that holds studies, each in a folder of its own.
+    """Write ``README.md`` of a folder that holds studies, each in a folder of its own.
 
     Args:
         folder: The folder.

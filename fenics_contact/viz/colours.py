@@ -12,18 +12,19 @@ import scipy.sparse as sp
 from matplotlib import colormaps
 from matplotlib.colors import ListedColormap
 
-INK = "#222222"
-GREY = "#9a9a9a"
+INK = "#222222"  #: Words and axes.
+GREY = "#9a9a9a"  #: What stands back.
 PALE = "#e3e6e8"
-BLUE = "#0072b2"
-ORANGE = "#d55e00"
-GREEN = "#009e73"
+BLUE = "#0072b2"  #: The first line of a diagram.
+ORANGE = "#d55e00"  #: The second one.
+GREEN = "#009e73"  #: The third one.
 
 #: Cool and warm colours for areas: bodies take turns, so that those in contact are told apart.
 FAMILIES = (
     ("#77aadd", "#44bb99", "#4466aa", "#99ddff"),
     ("#ee8866", "#eedd88", "#ffaabb", "#bbcc33"),
 )
+#: An area that belongs to nothing else.
 SPARE = "#dddddd"
 
 #: Maps whose lightness only falls, readable in grey as well. The first stops short of black, on which no line

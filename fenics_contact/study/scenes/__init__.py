@@ -11,6 +11,7 @@ from fenics_contact.checks import require_file
 from fenics_contact.errors import InvalidInputError, running
 from fenics_contact.study.protocol import StudyScene
 
+#: Names of the studies that the package has.
 BUILT_IN = ("hertz", "cattaneo_mindlin", "chain_links")
 
 
