@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
@@ -98,3 +99,8 @@ copybutton_prompt_text = r">>> |\.\.\. |\$ "
 copybutton_prompt_is_regexp = True
 mathjax_path, mathjax2_config, mathjax3_config = equations.configuration()
 myst_update_mathjax = False
+
+
+def setup(app: Any) -> None:
+    """Tell where the sources of types are."""
+    app.connect("viewcode-follow-imported", reference.source_of)

@@ -11,7 +11,7 @@ from enum import Enum
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from types import ModuleType
+from types import GenericAlias, ModuleType
 from typing import Any
 
 from docutils import nodes
@@ -38,6 +38,7 @@ OUTSIDE = [
     ),
     ("py:.*", r"(abc|collections|enum|pathlib|typing)\..*|Path"),
     ("py:.*", "ArrayLike|Console|Table|FilePath|NDArray|ndarray|dtype|generic|bool_|float64|int64"),
+    ("py:.*", "ModuleType"),
 ]
 
 
@@ -69,9 +70,15 @@ def public_names(module: ModuleType) -> list[str]:
 
 def kind_of(value: Any) -> str:
     """Return autodoc's name of what ``value`` is."""
-    if inspect.isclass(value):
+    if inspect.isclass(value) and not isinstance(value, GenericAlias):  # tuple[int] passes for a class
         return "exception" if issubclass(value, BaseException) else "class"
     return "function" if inspect.isroutine(value) else "data"
+
+
+def source_of(_: Any, module: str, name: str) -> str | None:
+    """Return the module with the source of a type such as ``tuple[int]``, which passes for Python's own."""
+    value = getattr(importlib.import_module(module), name, None)
+    return module if isinstance(value, GenericAlias) else None
 
 
 #: A constant's value is shown if it is not longer, in characters.

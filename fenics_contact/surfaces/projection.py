@@ -96,9 +96,9 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
 
     x(ξ) is the (bi)linear facet, in the plane a straight edge, and n(ξ) the interpolated, normalised nodal
     normal; h is what the true surface stands over the facet. Because n is continuous, so are gap, normal and
-    weights while a point slides from facet to facet. Of several projections the one with the smallest |h + g|
-    counts; surfaces that face the same way do not touch. Points without any that lie beside the surface by no
-    more than a twentieth of a facet's width meet the facet's continuation.
+    weights while a point slides from facet to facet. Of several projections the one with the smallest
+    ``|h + g|`` counts; surfaces that face the same way do not touch. Points without any that lie beside the
+    surface by no more than a twentieth of a facet's width meet the facet's continuation.
 
     Args:
         points: Slave nodes, shape (n, dim), [length].
