@@ -25,7 +25,7 @@ HELD = {
     "chain-1-rank": Held(66528, 90),
     "chain-compared-1": Held(66528, 121),
     "chain-compared-2": Held(66528, 121),
-    "chain-default": Held(66528, 90),
+    "chain-default": Held(72576, 55),
     "linear-face": Held(66528, 90),
     "frictionless-block": Held(34992, 24),
     "block-28k": Held(28611, 37),

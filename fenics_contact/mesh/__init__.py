@@ -19,13 +19,14 @@ from fenics_contact.mesh.faces import (
     match_faces,
     neighbours,
     orient,
+    shared_faces,
     vector_areas,
 )
 from fenics_contact.mesh.near_surfaces import near_surfaces
 from fenics_contact.mesh.plane import flattened, turned_counter_clockwise, turned_right_handed
 from fenics_contact.mesh.quadratic import quadratic
 from fenics_contact.mesh.quadratic_nodes import in_vtk_order
-from fenics_contact.mesh.quality import determinants
+from fenics_contact.mesh.quality import cell_volumes, determinants
 from fenics_contact.mesh.rounding import coordinate_rounding
 from fenics_contact.mesh.shape_functions import quadrature, shape_gradients, shape_values
 
@@ -39,6 +40,7 @@ __all__ = [
     "boundary_faces",
     "cell_faces",
     "cell_type_of",
+    "cell_volumes",
     "coordinate_rounding",
     "corners_of",
     "determinants",
@@ -53,6 +55,7 @@ __all__ = [
     "quadrature",
     "shape_gradients",
     "shape_values",
+    "shared_faces",
     "turned_counter_clockwise",
     "turned_right_handed",
     "vector_areas",

@@ -86,15 +86,15 @@ def boundary_faces(cells: np.ndarray, dim: int = 3) -> tuple[np.ndarray, np.ndar
     return flat[single], single // faces.shape[1]
 
 
-def neighbours(cells: np.ndarray, dim: int = 3) -> np.ndarray:
-    """Find the pairs of cells that share a face.
+def shared_faces(cells: np.ndarray, dim: int = 3) -> tuple[np.ndarray, np.ndarray]:
+    """Find the faces that two cells share.
 
     Args:
         cells: Node numbers, as in `cell_faces`.
         dim: Dimension of the space, 2 or 3.
 
     Returns:
-        (n_pairs, 2) cell numbers.
+        The faces, outward of the first cell, (n, nodes of a face), and their two cells, (n, 2).
 
     Raises:
         InvalidInputError: If more than two cells share a face.
@@ -111,7 +111,12 @@ def neighbours(cells: np.ndarray, dim: int = 3) -> np.ndarray:
         )
     order = np.argsort(numbers, kind="stable")
     order = order[counts[numbers[order]] == 2]
-    return (order // faces.shape[1]).reshape(-1, 2)
+    return flat[order[::2]], (order // faces.shape[1]).reshape(-1, 2)
+
+
+def neighbours(cells: np.ndarray, dim: int = 3) -> np.ndarray:
+    """Find the pairs of cells that share a face, (n, 2); arguments and errors as in `shared_faces`."""
+    return shared_faces(cells, dim)[1]
 
 
 def match_faces(faces: np.ndarray, candidates: np.ndarray) -> np.ndarray:

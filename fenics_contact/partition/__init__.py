@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from fenics_contact.partition.bisection import bisection_partition
 from fenics_contact.partition.cutting import (
-    bisection_partition,
     box_partition,
     check_face_connected,
     check_one_piece,

@@ -15,10 +15,7 @@ from scipy.sparse.csgraph import connected_components
 
 from fenics_contact.checks import check_count
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh import BodyMesh, coordinate_rounding, neighbours
-
-LAYER = 1e-12
-"""Cells whose centres differ by less than this part of the body's extent lie in one layer."""
+from fenics_contact.mesh import BodyMesh, neighbours
 
 
 def box_partition(mesh: BodyMesh, boxes: tuple[int, ...]) -> np.ndarray:
@@ -57,46 +54,6 @@ def box_partition(mesh: BodyMesh, boxes: tuple[int, ...]) -> np.ndarray:
             )
     position = mesh.grid * np.asarray(boxes) // counts
     return np.ravel_multi_index(tuple(position.T), boxes).astype(np.int64)
-
-
-def bisection_partition(mesh: BodyMesh, parts: int) -> np.ndarray:
-    """Cut any mesh by recursive coordinate bisection of the cell centres.
-
-    Every cut is across the longest side of the piece's bounding box and shares the cells in proportion.
-    Pieces that a cut leaves hanging by an edge or a node are given to a neighbour, see `merge_pieces`.
-
-    Args:
-        mesh: Any mesh.
-        parts: Number of subdomains.
-
-    Returns:
-        (n_cells,) subdomain numbers.
-
-    Raises:
-        InvalidInputError: If there are fewer cells than parts.
-    """
-    check_count(parts, "parts")
-    if parts > mesh.n_cells:
-        raise InvalidInputError(
-            f"parts must be at most the {mesh.n_cells} cells, got {parts}: take fewer parts"
-        )
-    centres = mesh.points[mesh.cells].mean(axis=1)
-    # Counted in units that rounding does not reach: layers of cells are not split by the last bits.
-    unit = LAYER * float(np.ptp(mesh.points, axis=0).max()) + coordinate_rounding(mesh.points)
-    centres = np.round((centres - mesh.points.min(axis=0)) / unit)
-    partition = np.zeros(mesh.n_cells, dtype=np.int64)
-    pending: list[tuple[np.ndarray, int, int]] = [(np.arange(mesh.n_cells), 0, parts)]
-    while pending:
-        cells, first, count = pending.pop()
-        if count == 1:
-            partition[cells] = first
-            continue
-        extent = centres[cells].max(axis=0) - centres[cells].min(axis=0)
-        order = cells[np.argsort(centres[cells, np.argmax(extent)], kind="stable")]
-        left = count // 2
-        cut = cells.size * left // count
-        pending += [(order[:cut], first, left), (order[cut:], first + left, count - left)]
-    return merge_pieces(mesh, partition)
 
 
 def _face_pieces(mesh: BodyMesh, partition: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -7,8 +7,8 @@ import numpy as np
 from fenics_contact.checks import check_count
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition.cutting import box_partition, check_face_connected, check_one_piece
-from fenics_contact.partition.graph_partition import graph_partition
+from fenics_contact.partition.bisection import bisection_partition
+from fenics_contact.partition.cutting import check_one_piece
 
 TARGET_NODES = {3: 700, 2: 1000}
 """Nodes of a subdomain by dimension: about 2000 displacements in both.
@@ -18,10 +18,7 @@ along an edge in 2D: the matrices are as large, their factors sparser and the in
 condition number grows with the logarithm, squared, of the cells along an edge only."""
 
 NEAR = (0.8, 1.25)
-"""By which factors the number of boxes may miss the target."""
-
-COMPACT = 2.0
-"""Largest ratio of the sides of a box, in cells."""
+"""By which factors the number of subdomains may miss the target so that it can be halved more often."""
 
 _NODES_PER_CELL = {
     "hexahedron": 1.0,
@@ -66,9 +63,9 @@ def default_partition(
 ) -> np.ndarray:
     """Cut a body into as many subdomains as suit its size, and at least one for every rank.
 
-    A structured mesh is cut into boxes of about the size aimed at, where some are compact: they are all
-    alike then, so that their matrices have one pattern. Otherwise METIS cuts it. Only a body with fewer cells
-    than ranks gets fewer subdomains than there are ranks.
+    A number near the one aimed at that can be halved often is taken: halves are alike, so that their matrices
+    have one pattern. `bisection_partition` cuts. Only a body with fewer cells than ranks gets fewer
+    subdomains than there are ranks.
 
     Args:
         mesh: Any mesh that is connected through faces.
@@ -81,51 +78,14 @@ def default_partition(
 
     Raises:
         InvalidInputError: If the mesh consists of separate parts, or an argument cannot be used.
-        MissingRequirementError: If pymetis is missing, too old or cannot be loaded.
     """
     check_count(ranks, "ranks")
     check_one_piece(mesh, body)
     target, least = target_parts(mesh, nodes), min(ranks, mesh.n_cells)
-    boxes = _boxes(mesh, target, least)
-    return graph_partition(mesh, max(target, least), body) if boxes is None else boxes
+    return bisection_partition(mesh, _often_halved(target, least, mesh.n_cells))
 
 
-def _boxes(mesh: BodyMesh, target: int, least: int) -> np.ndarray | None:
-    """Cut a structured mesh into compact boxes; None where there are none of about the size aimed at."""
-    if mesh.grid is None:
-        return None
-    counts = mesh.grid.max(axis=0) + 1
-    first, last = (max(least, round(factor * target)) for factor in NEAR)
-    choices = [
-        boxes
-        for number in range(max(first, 1), last + 1)
-        for boxes in _factorisations(number, mesh.dim)
-        if np.all(np.array(boxes) <= counts) and _aspect(counts, boxes) <= COMPACT
-    ]
-    if not choices:
-        return None
-    best = min(choices, key=lambda boxes: (bool(np.any(counts % boxes)), _aspect(counts, boxes)))
-    try:
-        partition = box_partition(mesh, best)
-        check_face_connected(mesh, partition)
-    except InvalidInputError:  # the grid has holes
-        return None
-    return partition
-
-
-def _aspect(counts: np.ndarray, boxes: tuple[int, ...]) -> float:
-    """Return the longest over the shortest side of a box, in cells."""
-    sides = counts / np.array(boxes)
-    return float(sides.max() / sides.min())
-
-
-def _factorisations(number: int, factors: int) -> list[tuple[int, ...]]:
-    """All ways to write a number as an ordered product of so many factors."""
-    if factors == 1:
-        return [(number,)]
-    return [
-        (first, *rest)
-        for first in range(1, number + 1)
-        if number % first == 0
-        for rest in _factorisations(number // first, factors - 1)
-    ]
+def _often_halved(target: int, least: int, most: int) -> int:
+    """Return the number near the target that can be halved most often, of two the nearer one."""
+    first, last = (min(max(least, round(factor * target)), most) for factor in NEAR)
+    return min(range(first, last + 1), key=lambda number: (-(number & -number), abs(number - target)))

@@ -1,7 +1,8 @@
-"""Partition of any mesh by METIS: few faces between subdomains of like size.
+"""Partition of any mesh by METIS: little area between subdomains of like size.
 
-The graph is the dual one: a vertex for every cell, an edge for every face that two cells share. METIS may
-return a part in pieces, and, when parts are small, a part without cells; both are mended.
+The graph is the dual one: a vertex for every cell, an edge for every face that two cells share, which costs
+its area; see `partition.weights`. METIS may return a part in pieces, and, when parts are small, a part
+without cells; both are mended. It balances parts to the cell, which leaves jags; these are smoothed.
 
 References:
     G. Karypis, V. Kumar: A fast and high quality multilevel scheme for partitioning irregular graphs. SIAM J.
@@ -16,13 +17,18 @@ from scipy.sparse.csgraph import breadth_first_order
 
 from fenics_contact.checks import check_count
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh import BodyMesh, neighbours
+from fenics_contact.mesh import BodyMesh
 from fenics_contact.partition.cutting import check_one_piece, merge_pieces
 from fenics_contact.partition.metis import part_graph
+from fenics_contact.partition.smoothing import smoothed
+from fenics_contact.partition.weights import cell_weights, face_areas
+
+STEPS = 1000
+"""Into how many the largest weight is divided: METIS counts in integers."""
 
 
 def graph_partition(mesh: BodyMesh, parts: int, body: str = "") -> np.ndarray:
-    """Cut any mesh so that few faces lie between its subdomains.
+    """Cut any mesh so that little area lies between its subdomains.
 
     The same mesh gives the same subdomains on every call and every rank.
 
@@ -46,20 +52,24 @@ def graph_partition(mesh: BodyMesh, parts: int, body: str = "") -> np.ndarray:
     check_one_piece(mesh, body)
     if parts == 1:
         return np.zeros(mesh.n_cells, dtype=np.int64)
-    graph = _dual_graph(mesh)
-    partition = part_graph(graph.indptr, graph.indices, parts)
-    return merge_pieces(mesh, _without_empty_parts(graph, partition, parts), body)
+    pairs, areas = face_areas(mesh)
+    graph = _dual_graph(mesh.n_cells, pairs, areas)
+    partition = part_graph(graph, _integers(cell_weights(mesh)), parts)
+    partition = smoothed(_without_empty_parts(graph, partition, parts), pairs, areas)
+    return merge_pieces(mesh, partition, body)
 
 
-def _dual_graph(mesh: BodyMesh) -> csr_matrix:
-    """Return the adjacency of the cells through faces, (n_cells, n_cells)."""
-    one, other = neighbours(mesh.cells, mesh.dim).T
-    rows, columns = np.concatenate([one, other]), np.concatenate([other, one])
-    graph = coo_matrix(
-        (np.ones(rows.size, dtype=np.int8), (rows, columns)), shape=2 * (mesh.n_cells,)
-    ).tocsr()
+def _dual_graph(n_cells: int, pairs: np.ndarray, areas: np.ndarray) -> csr_matrix:
+    """Return the areas, in integers, of the faces between the cells, (n_cells, n_cells)."""
+    rows, columns = np.concatenate([pairs, pairs[:, ::-1]]).T
+    graph = coo_matrix((np.tile(_integers(areas), 2), (rows, columns)), shape=2 * (n_cells,)).tocsr()
     graph.sort_indices()
     return graph
+
+
+def _integers(weights: np.ndarray) -> np.ndarray:
+    """Return weights as integers from 1 to `STEPS`."""
+    return np.asarray(np.maximum(1, np.round(STEPS * weights / weights.max())), dtype=np.int64)
 
 
 def _without_empty_parts(graph: csr_matrix, partition: np.ndarray, parts: int) -> np.ndarray:

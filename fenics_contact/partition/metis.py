@@ -22,14 +22,23 @@ from contextlib import contextmanager
 from functools import cache
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from fenics_contact._requirements import load_pymetis, pymetis_error
 from fenics_contact.launching import clean_environment
 from fenics_contact.partition import metis_call
 
 
-def part_graph(indptr: np.ndarray, indices: np.ndarray, parts: int) -> np.ndarray:
-    """Return METIS's part of every vertex; arguments and answer as in `metis_call.part_graph`.
+def part_graph(graph: csr_matrix, vertices: np.ndarray, parts: int) -> np.ndarray:
+    """Return METIS's part of every vertex.
+
+    Args:
+        graph: Cost of cutting two vertices apart, integers of at least 1, (n, n), symmetric.
+        vertices: What each vertex counts, integers of at least 1, (n,).
+        parts: Number of parts, at least 2.
+
+    Returns:
+        (n,) part numbers; a part may be in pieces or have no vertices.
 
     Raises:
         MissingRequirementError: If pymetis is missing, too old, cannot be loaded or does not run.
@@ -38,8 +47,8 @@ def part_graph(indptr: np.ndarray, indices: np.ndarray, parts: int) -> np.ndarra
     with _own_functions_first():
         load_pymetis()
     if alone:
-        return _part_graph_elsewhere(indptr, indices, parts)
-    return metis_call.part_graph(indptr, indices, parts)
+        return _part_graph_elsewhere(graph, vertices, parts)
+    return metis_call.part_graph(graph.indptr, graph.indices, graph.data, vertices, parts)
 
 
 @cache  # of the first call, before which nothing of the package has loaded pymetis
@@ -59,10 +68,12 @@ def _own_functions_first() -> Iterator[None]:
         sys.setdlopenflags(flags)
 
 
-def _part_graph_elsewhere(indptr: np.ndarray, indices: np.ndarray, parts: int) -> np.ndarray:
+def _part_graph_elsewhere(graph: csr_matrix, vertices: np.ndarray, parts: int) -> np.ndarray:
     """Return METIS's part of every vertex, found by a new Python that loads nothing but pymetis."""
     given, path = io.BytesIO(), os.pathsep.join(filter(None, sys.path))
-    np.savez(given, indptr=indptr, indices=indices, parts=parts)
+    np.savez(
+        given, indptr=graph.indptr, indices=graph.indices, edges=graph.data, vertices=vertices, parts=parts
+    )
     done = subprocess.run(
         [sys.executable, "-P", metis_call.__file__],  # -P: modules beside the program are none of its imports
         input=given.getvalue(),

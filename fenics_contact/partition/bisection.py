@@ -1,0 +1,190 @@
+"""Partition of any mesh by recursive bisection with plane cuts of small area.
+
+References:
+    H. D. Simon: Partitioning of unstructured problems for parallel processing. Computing Systems in
+    Engineering 2 (1991) 135-148.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.checks import check_count
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.mesh import BodyMesh, coordinate_rounding
+from fenics_contact.partition.cutting import merge_pieces
+from fenics_contact.partition.weights import cell_weights, face_areas
+
+LAYER = 1e-12
+"""Cells whose centres differ by less than this part of the body's extent lie in one layer."""
+
+UNEVEN = 2.0
+"""Subdomains that are e^s times too large or too small pass for a cut that is e^(2 s) times as small."""
+
+APART = 0.5
+"""A cut at the end of the middle third passes for a cut in the middle that is larger by a twelfth."""
+
+ALIKE = 1e-6
+"""Cuts that differ by less are alike: rounding does not choose between them."""
+
+
+def bisection_partition(mesh: BodyMesh, parts: int) -> np.ndarray:
+    """Cut any mesh in two, and the halves again, each time where the cut has the least area.
+
+    Cuts run across the directions of the grid where there is one, else across the axes of coordinates and
+    the principal axes of the piece; they do not split layers of cells. Cells count by the root of their
+    volume, so that subdomains stay compact where cells are graded. Pieces that a cut leaves hanging by an
+    edge or a node are given to a neighbour, see `merge_pieces`.
+
+    Args:
+        mesh: Any mesh.
+        parts: Number of subdomains. The more often it can be halved, the more alike they are.
+
+    Returns:
+        (n_cells,) subdomain numbers, every subdomain connected through faces; the same on every rank.
+
+    Raises:
+        InvalidInputError: If there are fewer cells than parts, or the mesh consists of separate parts.
+    """
+    check_count(parts, "parts")
+    if parts > mesh.n_cells:
+        raise InvalidInputError(
+            f"parts must be at most the {mesh.n_cells} cells, got {parts}: take fewer parts"
+        )
+    partition = np.zeros(mesh.n_cells, dtype=np.int64)
+    if parts > 1:
+        pending = [_whole(mesh, parts)]
+        while pending:
+            piece = pending.pop()
+            if piece.parts == 1:
+                partition[piece.cells] = piece.first
+            else:
+                pending += piece.halves()
+    return merge_pieces(mesh, partition)
+
+
+@dataclass(frozen=True, eq=False)
+class _Cut:
+    """A cut of a piece across one direction.
+
+    Attributes:
+        order: Its cells along the direction, (n,).
+        cells: How many of them lie before the cut.
+        parts: How many subdomains they will become.
+        cost: Area, more where the cut is uneven.
+    """
+
+    order: np.ndarray
+    cells: int
+    parts: int
+    cost: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """A piece of a mesh that is to become several subdomains.
+
+    Attributes:
+        cells: Its cells, (n,).
+        places: Layers or coordinates of their centres, (n, 3 | 2).
+        turned: Whether it may be cut across its principal axes.
+        weights: What each cell counts, (n,), that of one subdomain being 1.
+        pairs: Pairs of cells that share a face, in its own numbering, (n_pairs, 2).
+        areas: Areas of these faces, (n_pairs,).
+        first: Number of its first subdomain.
+        parts: Number of its subdomains.
+    """
+
+    cells: np.ndarray
+    places: np.ndarray
+    turned: bool
+    weights: np.ndarray
+    pairs: np.ndarray
+    areas: np.ndarray
+    first: int
+    parts: int
+
+    def halves(self) -> tuple[_Piece, _Piece]:
+        """Cut it in two where that costs least."""
+        best = self._best(between_layers=True) or self._best(between_layers=False)
+        assert best is not None  # a piece has as many cells as subdomains
+        before = np.zeros(len(self.cells), dtype=bool)
+        before[best.order[: best.cells]] = True
+        return (
+            self._part(before, self.first, best.parts),
+            self._part(~before, self.first + best.parts, self.parts - best.parts),
+        )
+
+    def _best(self, between_layers: bool) -> _Cut | None:
+        """Return the cheapest cut, of two alike the first."""
+        best: _Cut | None = None
+        for place in self._directions():
+            cut = self._across(place, between_layers)
+            if cut is not None and (best is None or cut.cost < (1.0 - ALIKE) * best.cost):
+                best = cut
+        return best
+
+    def _directions(self) -> list[np.ndarray]:
+        """List where the cells lie along the directions, each (n,)."""
+        along = list(self.places.T)
+        if self.turned:
+            arms = self.places - self.weights @ self.places / self.weights.sum()
+            _, axes = np.linalg.eigh((arms * self.weights[:, None]).T @ arms)
+            along += list(np.round(arms @ axes).T)
+        return along
+
+    def _across(self, place: np.ndarray, between_layers: bool) -> _Cut | None:
+        """Return the cheapest cut across a direction, None if there is none between layers."""
+        order = np.argsort(place, kind="stable")
+        n, total = len(order), self.weights.sum()
+        cells, before = np.arange(1, n), np.cumsum(self.weights[order])[:-1]
+        least = min(-(-self.parts // 3), self.parts // 2)
+        parts = np.clip(np.round(self.parts * before / total), least, self.parts - least)
+        possible = (cells >= parts) & (n - cells >= self.parts - parts)
+        if between_layers:
+            possible &= np.diff(place[order]) > 0
+        if not possible.any():
+            return None
+        sizes = np.array([before / parts, (total - before) / (self.parts - parts)])
+        uneven = UNEVEN * np.abs(np.log(sizes)).max(axis=0) + APART * np.abs(cells / n - 0.5)
+        cost = np.where(possible, self._cut_areas(order) * np.exp(uneven), np.inf)
+        chosen = int(np.argmax(cost <= (1.0 + ALIKE) * cost.min()))
+        return _Cut(order, chosen + 1, int(parts[chosen]), float(cost[chosen]))
+
+    def _cut_areas(self, order: np.ndarray) -> np.ndarray:
+        """Return the area of the faces between the first k cells and the others, k = 1 ... n - 1."""
+        rank = np.empty_like(order)
+        rank[order] = np.arange(len(order))
+        ends = np.sort(rank[self.pairs], axis=1)
+        begins, stops = (np.bincount(end, self.areas, minlength=len(order)) for end in ends.T)
+        return np.asarray(np.cumsum(begins - stops)[:-1])
+
+    def _part(self, chosen: np.ndarray, first: int, parts: int) -> _Piece:
+        """Return some of its cells as a piece, (n,) bool."""
+        inside = chosen[self.pairs].all(axis=1)
+        number = np.cumsum(chosen) - 1
+        return _Piece(
+            self.cells[chosen],
+            self.places[chosen],
+            self.turned,
+            self.weights[chosen],
+            number[self.pairs[inside]],
+            self.areas[inside],
+            first,
+            parts,
+        )
+
+
+def _whole(mesh: BodyMesh, parts: int) -> _Piece:
+    """Return the whole mesh as a piece."""
+    if mesh.grid is None:
+        # Counted in units that rounding does not reach: layers of cells are not split by the last bits.
+        unit = LAYER * float(np.ptp(mesh.points, axis=0).max()) + coordinate_rounding(mesh.points)
+        centres = mesh.points[mesh.cells].mean(axis=1)
+        places = np.round((centres - mesh.points.min(axis=0)) / unit)
+    else:
+        places = mesh.grid
+    cells, weights = np.arange(mesh.n_cells), parts * cell_weights(mesh)
+    return _Piece(cells, places, mesh.grid is None, weights, *face_areas(mesh), 0, parts)
