@@ -221,6 +221,7 @@ def test_an_optimisation_writes_its_designs_and_says_when_it_stopped_early(
     small = (
         "meshes.links.n_around=36", "meshes.links.n_a=4", "meshes.links.n_b=10",
         "solver.subdomains=[4, 1, 1]", "design.surfaces.0.net=[5, 3]", "output.pictures=[]",
+        "design.tolerance=1e-8",
     )  # fmt: skip
     settings = [part for value in small for part in ("--set", value)]
     arguments = ("optimize", SCENES / "chain_links.toml", "-o", tmp_path, *settings)
