@@ -63,6 +63,12 @@ def clamped_block(cell: str, boxes: tuple[int, int, int] = (2, 2, 2), layers: in
     )
 
 
+def three_that_meet(mesh: BodyMesh, x: float, y: float) -> np.ndarray:
+    """Cut a mesh into three subdomains that meet along a line upright."""
+    east, north = (mesh.points[mesh.cells].mean(axis=1)[:, :2] > (x, y)).T
+    return np.where(east, 1 + north, 0)
+
+
 def touching_blocks() -> Cut:
     """Three blocks: tetrahedra upon hexahedra with meshes that do not match, and hexahedra on a floor.
 
@@ -84,6 +90,6 @@ def touching_blocks() -> Cut:
         ],
     ), {
         "lower": box_partition(lower, (2, 2, 1)),
-        "upper": bisection_partition(upper, 3),
+        "upper": three_that_meet(upper, 0.64, 0.85),
         "third": box_partition(third, (2, 1, 1)),
     }
