@@ -27,14 +27,14 @@ FLOORS = [
     [Room("errors", "what is needed, given, to do; on all ranks", "ground")],
     [
         Room("progress", "how far work is", "ground"),
-        Room("fingerprint", "what was given, in words; the same on all ranks", "ground"),
-        Room("checks", "types and numbers of arguments", "ground"),
+        Room("fingerprint", "what was given, in words", "ground"),
+        Room("checks", "types of arguments", "ground"),
     ],
     [
         Room("_requirements", "libraries", "ground"),
         Room("launching", "processes on ranks", "ground"),
         Room("timing", "seconds by phase", "ground"),
-        Room("checkpoint", "whole files to go on from", "ground"),
+        Room("checkpoint", "files to go on", "ground"),
     ],
     [Room("_libraries", "MPI and PETSc, loaded when they are used", "ground")],
     [Room("_dolfinx", "the one room that knows the version of dolfinx", "ground")],
@@ -47,7 +47,7 @@ FLOORS = [
     [
         Room("mesh_io", "gmsh, CAD, dolfinx, files", "model"),
         Room("partition", "cuts into subdomains", "model"),
-        Room("surfaces", "heights, normals, projection", "model"),
+        Room("surfaces", "heights, projection", "model"),
     ],
     [Room("gallery", "blocks, links, rings, Hertz bodies", "model")],
     [
