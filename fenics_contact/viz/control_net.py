@@ -136,7 +136,9 @@ def _draw(change: _Change, paper: BinaryIO, title: str, units: Units, width: int
         for axes, (name, layers) in zip(panels, parts.items(), strict=True):
             show_image(axes, render(layers, view, frame, round(PART * width)), frame, name)
         key = ScalarMappable(Normalize(*change.clim), SIGNED_MAP)
-        figure.colorbar(key, ax=panels, label=f"outward movement ({units.length})", aspect=30, shrink=0.95)
+        figure.colorbar(
+            key, ax=panels, label=f"outward movement ({units.length})", aspect=30, shrink=0.95, panchor=False
+        )
 
 
 def _view(grid: np.ndarray) -> View:

@@ -60,7 +60,9 @@ class Paints:
             (low, high), "both"
         )
         key = ScalarMappable(self.norm, self.colours)
-        figure.colorbar(key, ax=panels, label=self.label, extend=extend, aspect=30, shrink=0.95)
+        figure.colorbar(
+            key, ax=panels, label=self.label, extend=extend, aspect=30, shrink=0.95, panchor=False
+        )
 
     @property
     def of_surfaces(self) -> dict[str, Any]:
