@@ -11,10 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenics_contact.checks import check_count
-from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import BodyMesh, coordinate_rounding
-from fenics_contact.partition.cutting import merge_pieces
+from fenics_contact.partition.cutting import check_parts, merge_pieces
 from fenics_contact.partition.weights import cell_weights, face_areas
 
 LAYER = 1e-12
@@ -48,11 +46,7 @@ def bisection_partition(mesh: BodyMesh, parts: int) -> np.ndarray:
     Raises:
         InvalidInputError: If there are fewer cells than parts, or the mesh consists of separate parts.
     """
-    check_count(parts, "parts")
-    if parts > mesh.n_cells:
-        raise InvalidInputError(
-            f"parts must be at most the {mesh.n_cells} cells, got {parts}: take fewer parts"
-        )
+    check_parts(mesh, parts)
     partition = np.zeros(mesh.n_cells, dtype=np.int64)
     if parts > 1:
         pending = [_whole(mesh, parts)]

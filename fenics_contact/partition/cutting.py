@@ -56,6 +56,19 @@ def box_partition(mesh: BodyMesh, boxes: tuple[int, ...]) -> np.ndarray:
     return np.ravel_multi_index(tuple(position.T), boxes).astype(np.int64)
 
 
+def check_parts(mesh: BodyMesh, parts: int) -> None:
+    """Refuse a number of subdomains that a mesh cannot be cut into.
+
+    Raises:
+        InvalidInputError: If it is none from 1 to the number of cells.
+    """
+    check_count(parts, "parts")
+    if parts > mesh.n_cells:
+        raise InvalidInputError(
+            f"parts must be at most the {mesh.n_cells} cells, got {parts}: take fewer parts"
+        )
+
+
 def _face_pieces(mesh: BodyMesh, partition: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Number the face-connected pieces: piece of every cell, (n_cells,), and subdomain of every piece."""
     inside = pairs[partition[pairs[:, 0]] == partition[pairs[:, 1]]]

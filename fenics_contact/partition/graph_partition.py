@@ -15,10 +15,8 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import breadth_first_order
 
-from fenics_contact.checks import check_count
-from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import BodyMesh
-from fenics_contact.partition.cutting import check_one_piece, merge_pieces
+from fenics_contact.partition.cutting import check_one_piece, check_parts, merge_pieces
 from fenics_contact.partition.metis import part_graph
 from fenics_contact.partition.smoothing import smoothed
 from fenics_contact.partition.weights import cell_weights, face_areas
@@ -44,11 +42,7 @@ def graph_partition(mesh: BodyMesh, parts: int, body: str = "") -> np.ndarray:
         InvalidInputError: If there are fewer cells than parts, or the mesh consists of separate parts.
         MissingRequirementError: If pymetis is missing, too old or cannot be loaded.
     """
-    check_count(parts, "parts")
-    if parts > mesh.n_cells:
-        raise InvalidInputError(
-            f"parts must be at most the {mesh.n_cells} cells, got {parts}: take fewer parts"
-        )
+    check_parts(mesh, parts)
     check_one_piece(mesh, body)
     if parts == 1:
         return np.zeros(mesh.n_cells, dtype=np.int64)

@@ -13,7 +13,7 @@ from fenics_contact.progress.event import Event, Kind
 
 #: Through this logger everything is reported.
 LOGGER_NAME = "fenics_contact.progress"
-#: What else hears every event: `shown` while it draws.
+#: What else hears every event: `show_progress` while it draws.
 LISTENERS: list[Callable[[Event], None]] = []
 
 _LOGGER = logging.getLogger(LOGGER_NAME)

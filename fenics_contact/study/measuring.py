@@ -32,7 +32,7 @@ def measured(
         verify: Whether to look for errors too, not only for seconds.
     """
     study, settings = find_study(scene), parameters_from(parameters)
-    _dolfinx.release()
+    _dolfinx.release()  # loads dolfinx, which is no part of a run's seconds
     comm.Barrier()
     began, timer = perf_counter(), PhaseTimer()
     with timer.phase("mesh"):

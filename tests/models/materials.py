@@ -8,17 +8,15 @@ from typing import Any
 import numpy as np
 import ufl
 
-from fenics_contact.scene import (
-    Elasticity,
-    EnergyModel,
-    strain,
-)
+from fenics_contact.scene import Elasticity, EnergyModel, strain
 
 YOUNG, POISSON = 210.0, 0.3
 
 
 @dataclass(frozen=True)
-class FromEnergy(EnergyModel):
+class _Lame:
+    """Parameters of an isotropic material."""
+
     lame: float
     shear: float
 
@@ -26,35 +24,24 @@ class FromEnergy(EnergyModel):
     def parameters(self) -> tuple[float, float]:
         return self.lame, self.shear
 
+
+@dataclass(frozen=True)
+class FromEnergy(_Lame, EnergyModel):
     def energy(self, strain: Any, parameters: Any) -> Any:
         lame, shear = parameters
         return lame / 2 * ufl.tr(strain) ** 2 + shear * ufl.inner(strain, strain)
 
 
 @dataclass(frozen=True)
-class FromStress(Elasticity):
-    lame: float
-    shear: float
-
-    @property
-    def parameters(self) -> tuple[float, float]:
-        return self.lame, self.shear
-
+class FromStress(_Lame, Elasticity):
     def stress(self, u: Any, parameters: Any) -> Any:
         lame, shear = parameters
         return lame * ufl.div(u) * ufl.Identity(len(u)) + 2 * shear * strain(u)
 
 
 @dataclass(frozen=True)
-class EnergyByEntries(EnergyModel):
+class EnergyByEntries(_Lame, EnergyModel):
     """The same in the plane, written with single entries of the strain."""
-
-    lame: float
-    shear: float
-
-    @property
-    def parameters(self) -> tuple[float, float]:
-        return self.lame, self.shear
 
     def energy(self, strain: Any, parameters: Any) -> Any:
         lame, shear = parameters
