@@ -16,7 +16,7 @@ from fenics_contact.gallery import DesignSurface
 from fenics_contact.viz.colours import GREY, INK, ORANGE, SIGNED_MAP
 from fenics_contact.viz.curved_net import curved_net
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
-from fenics_contact.viz.sheet import sheet, show_image
+from fenics_contact.viz.sheet import add_colour_bar, sheet, show_image
 from fenics_contact.viz.stage import Layer, balls, render
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.view import View, frame_around, looking_along
@@ -136,9 +136,7 @@ def _draw(change: _Change, paper: BinaryIO, title: str, units: Units, width: int
         for axes, (name, layers) in zip(panels, parts.items(), strict=True):
             show_image(axes, render(layers, view, frame, round(PART * width)), frame, name)
         key = ScalarMappable(Normalize(*change.clim), SIGNED_MAP)
-        figure.colorbar(
-            key, ax=panels, label=f"outward movement ({units.length})", aspect=30, shrink=0.95, panchor=False
-        )
+        add_colour_bar(figure, panels, key, f"outward movement ({units.length})")
 
 
 def _view(grid: np.ndarray) -> View:
@@ -158,10 +156,8 @@ def _surface_layer(grid: np.ndarray, moved: np.ndarray, clim: tuple[float, float
 
 
 def _net_layers(grid: np.ndarray, net: np.ndarray, colour: str, thickness: float) -> list[Layer]:
-    look, size = (
-        {"color": colour, "ambient": 0.5, "diffuse": 0.6},
-        float(np.ptp(grid.reshape(-1, 3), axis=0).max()),
-    )
+    look = {"color": colour, "ambient": 0.5, "diffuse": 0.6}
+    size = float(np.ptp(grid.reshape(-1, 3), axis=0).max())
     points, edges = curved_net(grid, net)
     bars = pv.PolyData(points, lines=np.insert(edges, 0, 2, axis=1).ravel())
     return [

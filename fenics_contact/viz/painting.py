@@ -131,8 +131,9 @@ def _in_space(scene: Scene, bodies: Mapping[str, Any], spot: Spot | None, paints
     parts = [_image(layers, view, frame_around(view, np.concatenate([points, corners])), paints)]
     if spot is None:
         return parts
+    true = moved(bodies, 1.0)
     for section in section_views(spot, view):
-        true, across = moved(bodies, 1.0), axis_label(section.towards).strip("−")
+        across = axis_label(section.towards).strip("−")
         frame = section_frame(section, spot, points_of(true), paints.reach)
         layers = section_layers(true, section, spot.centre, paints.of_surfaces)
         title = f"section across {across}" if across else "section"

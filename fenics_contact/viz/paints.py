@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, Normalize
 
+from fenics_contact.viz.sheet import add_colour_bar
 from fenics_contact.viz.units import Units
 
 
@@ -60,9 +61,7 @@ class Paints:
             (low, high), "both"
         )
         key = ScalarMappable(self.norm, self.colours)
-        figure.colorbar(
-            key, ax=panels, label=self.label, extend=extend, aspect=30, shrink=0.95, panchor=False
-        )
+        add_colour_bar(figure, panels, key, self.label, extend)
 
     @property
     def of_surfaces(self) -> dict[str, Any]:

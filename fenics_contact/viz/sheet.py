@@ -72,6 +72,11 @@ def show_image(axes: Any, image: np.ndarray, frame: Frame, title: str = "") -> N
     axes.set_title(title)
 
 
+def add_colour_bar(figure: Any, panels: Any, key: Any, label: str, extend: str = "neither") -> None:
+    """Draw a bar of colours at the right of panels, which stay where they are in their room."""
+    figure.colorbar(key, ax=panels, label=label, extend=extend, aspect=30, shrink=0.95, panchor=False)
+
+
 def scale_bar(axes: Any, frame: Frame, unit: str) -> None:
     """Draw a bar of round length into the lower left corner of axes that show a frame."""
     length = nice_number(float(frame.size[0]) / 3)
