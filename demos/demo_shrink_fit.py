@@ -11,7 +11,7 @@
 #    C_s = \frac{1 - \nu^2}{E}\,\frac{1 - a^2/b^2}{(1 + \nu) + (1 - \nu)\,a^2/b^2} $$
 #
 # for a thin disc (plane stress), a free rim of radius $c$ and a shaft that is bonded to a rigid arbor of
-# radius $a$. Friction then transmits a torque a unit of thickness [N mm/mm] up to $T = \mu\,p\,2\pi b^2$,
+# radius $a$. Friction then transmits a torque per unit of thickness [N mm/mm] up to $T = \mu\,p\,2\pi b^2$,
 # beyond which the hub slips.
 #
 # Run it with `make demo DEMO=shrink_fit`, on two ranks with `make demo DEMO=shrink_fit NP=2`.

@@ -1,4 +1,4 @@
-"""How large the area is in which surfaces touch."""
+"""The area in which surfaces touch."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import numpy as np
 from fenics_contact.contact.state import State
 from fenics_contact.scene import Surface, surface_of
 
-#: Steps to the root of a cubic, from above: no more are needed at any ratio of its coefficients in practice.
+#: Newton steps to the root of a cubic, from above: sufficient in practice for any ratio of its coefficients.
 NEWTON_STEPS = 60
 
 
 def contact_area(state: State, pair: int = 0) -> float:
     """Return the area in which the surfaces of a pair touch, in the plane the length, [length²] or [length].
 
-    Its rim runs between closed and open nodes, where pressure and gap say: at a distance d inside the rim of
-    a smooth contact the pressure is K √d, at a distance d outside the gap is 4/3 K d^(3/2) / E* with the same
-    K. The sum of closed nodes' areas jumps from node to node instead, by a quarter where a spot has a few.
-    Where a modulus varies within a material the rim is taken half way between the nodes. Collective.
+    Its rim runs between closed and open nodes and is located by pressure and gap: at a distance d inside the
+    rim of a smooth contact the pressure is K √d, at a distance d outside the gap is 4/3 K d^(3/2) / E* with
+    the same K. The sum of closed nodes' areas would jump from node to node, by a quarter where only a few are
+    closed. Where a modulus varies within a material the rim is placed half way between the nodes. Collective.
 
     Args:
         state: The state.
@@ -32,7 +32,7 @@ def contact_area(state: State, pair: int = 0) -> float:
     surface = surface_of(scene, slave, "faceted")
     nodes = state.torn.decomposition.tearing.global_nodes(slave.body, surface.nodes)
     place = np.searchsorted(nodes, points.slave[mine])
-    # Nodes that meet nothing are open without a gap: what is closed beside them reaches up to them.
+    # Nodes without a contact point are open without a gap: contact beside them reaches up to them.
     pressure, spread = np.zeros(len(nodes)), np.zeros(len(nodes))
     pressure[place] = contact.pressure[mine] * (contact.status[mine] > 0)
     spread[place] = _modulus(state, pair) * np.maximum(contact.gap[mine], 0.0)
@@ -48,9 +48,9 @@ def contact_area(state: State, pair: int = 0) -> float:
 
 
 def _modulus(state: State, pair: int) -> float:
-    """Return the contact modulus E* of a pair, 1/E* the sum of M / (M² − λ²) over the bodies; NaN if unknown.
+    """Return the contact modulus E* of a pair, 1/E* = Σ M / (M² − λ²) over the bodies; NaN if unknown.
 
-    M and λ are the means of the moduli C_iiii and C_iijj, of isotropic bodies those of Lamé.
+    M and λ are the means of the moduli C_iiii and C_iijj; for isotropic bodies λ is Lamé's.
     """
     from fenics_contact.accuracy import moduli  # not before an area is asked for
 
@@ -70,7 +70,7 @@ def _modulus(state: State, pair: int) -> float:
 
 
 def _simplices(corners: int) -> list[tuple[list[int], float]]:
-    """Return the triangles that stand for a facet, with their weights; quadrilaterals are cut both ways."""
+    """Return the triangles that represent a facet, with their weights; quadrilaterals are cut both ways."""
     if corners < 4:
         return [(list(range(corners)), 1.0)]
     return [([k, (k + 1) % 4, (k + 2) % 4], 0.5) for k in range(4)]
@@ -87,7 +87,7 @@ def _closed_share(
     count = inside.sum(axis=1)
     share = (count == facets.shape[1]).astype(float)
     cut = np.flatnonzero((count > 0) & (count < facets.shape[1]))
-    single = np.where(count == 1, 1, 0)[cut, None] == inside[cut]  # the corner that is unlike the others
+    single = np.where(count == 1, 1, 0)[cut, None] == inside[cut]  # the corner that differs from the others
     alone = np.argmax(single, axis=1)
     product = np.ones(len(cut))
     for step in range(1, facets.shape[1]):

@@ -1,4 +1,4 @@
-"""Solve no better than the mesh deserves: tolerance, certificate and estimate in turn."""
+"""Solve no more accurately than the mesh deserves: tolerance, certificate and estimate alternate."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from fenics_contact.feti import DualSystem
 from fenics_contact.qp import DualSolution, DualSolver, SolverStep
 from fenics_contact.timing import PhaseTimer
 
-#: An estimate is made again if the solver's error was more than this share of it: the seams of displacements
-#: that are not solved look rough, by about three times the solver's error.
+#: An estimate is repeated if the solver's error was more than this share of it: jumps between subdomains that
+#: are not converged yet raise it by about three times the solver's error.
 DOUBTED = 0.1
-#: A solution this good is kept where the solver cannot reach what the mesh asks for.
+#: A solution this good is accepted where the solver cannot reach what the mesh asks for.
 GOOD = 1e-6
 
 #: An earlier solution, a multiplier, or nothing.
@@ -50,10 +50,10 @@ def solve_balanced(
         solver: The solver; its tolerance is not used.
         balanced: When to stop.
         start: Multiplier to start from, owned, or None.
-        timer: Collects the seconds of solving and estimating.
+        timer: Collects the wall time of solving and estimating.
 
     Returns:
-        The rounds, the last of which has the answer.
+        The rounds; the last one holds the solution.
 
     Raises:
         ConvergenceError: If the solver fails before its residuals are below 1e-6; carries the history.
@@ -66,7 +66,7 @@ def solve_balanced(
         except ConvergenceError as failure:
             if not rounds.within(GOOD):
                 raise ConvergenceError(str(failure), (*rounds.history, *failure.history)) from failure
-            rounds.remark(f"{tolerance:.1e} was not reached, this is kept")
+            rounds.remark(f"{tolerance:.1e} was not reached, this is accepted")
             break
         if rounds.satisfied(balanced):
             break
@@ -83,8 +83,8 @@ class Rounds:
     Attributes:
         last: The last solution.
         displacement: Torn displacement of the last solution on this rank, [length].
-        errors: What the solver left in it.
-        estimate: Error of the mesh.
+        errors: The solver's error in it.
+        estimate: Discretisation error.
         history: Steps of all rounds.
     """
 
@@ -126,7 +126,7 @@ class Rounds:
         self.remark(f"solver {self.errors.together:.1e}, mesh {self.estimate.total:.1e} in energy norm")
 
     def satisfied(self, balanced: Balanced) -> bool:
-        """Tell whether the solver's error is within its share, by an estimate that can be trusted."""
+        """Return whether the solver's error is within its share, by an estimate that can be trusted."""
         return balanced.satisfied(self.errors, self.estimate.total)
 
     def _estimate(self) -> None:
@@ -135,7 +135,7 @@ class Rounds:
         self._doubted = self.errors.together > DOUBTED * self.estimate.total
 
     def within(self, tolerance: float) -> bool:
-        """Tell whether there is a solution within a tolerance."""
+        """Return whether there is a solution within a tolerance."""
         return bool(self.history) and self.last.residuals.within(tolerance)
 
     def remark(self, words: str) -> None:

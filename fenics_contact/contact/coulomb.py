@@ -20,7 +20,7 @@ from fenics_contact.qp import (
     solve,
 )
 
-#: How much more than an equilibrium's own friction the first Tresca problem may use: it must have an answer.
+#: Factor on an equilibrium's own friction in the first Tresca problem, so that it surely has a solution.
 FIRST_MARGIN = 1.1
 
 
@@ -28,15 +28,15 @@ FIRST_MARGIN = 1.1
 class FixedPoint:
     """Two loops: Ψ ← given bound + μ λ_N around a solver for given slip bounds.
 
-    A Tresca problem is solved no better than the slip bound deserves: its tolerance follows the natural
-    residual that its answer will have with its own slip bound. The bound is refreshed plainly; only where
-    the bounds cycle or the residual stops falling they are damped, and the history says so.
+    A Tresca problem is solved no more accurately than the slip bound deserves: its tolerance follows the
+    natural residual that its solution will have with its own slip bound. The bound is updated undamped;
+    only where the bounds cycle or the residual stops falling are they damped, as the history reports.
 
     Attributes:
         solver: Solver of the Tresca problems.
-        max_steps: Give up after that many Tresca problems.
+        max_steps: Largest number of Tresca problems.
         forcing: Tolerance of a Tresca problem relative to the last natural residual.
-        loosest: Largest tolerance of all, that of the first Tresca problem.
+        loosest: Largest tolerance, that of the first Tresca problem.
         damping: What to do where the plain iteration cycles.
 
     References:
@@ -55,7 +55,7 @@ class FixedPoint:
 
     @property
     def tolerance(self) -> float:
-        """Largest residual of an answer with the slip bound that belongs to its own normal force."""
+        """Largest residual of a solution with the slip bound that belongs to its own normal force."""
         return self.solver.tolerance
 
     def with_tolerance(self, tolerance: float) -> FixedPoint:
@@ -99,8 +99,9 @@ class FixedPoint:
         raise ConvergenceError(self._failure(sequence, reached), history)
 
     def _inner(self, residual: float) -> DualSolver:
-        """Return the solver of the next Tresca problem, given the error that its slip bound has anyway."""
-        # The inner answers may be as bad as their tolerance; half of it is left to the fixed point.
+        """Return the solver of the next Tresca problem, given the error that its slip bound has already."""
+        # Inner solutions may be as inaccurate as their tolerance allows; half of it is left to the fixed
+        # point.
         tolerance = max(0.5 * self.tolerance, min(self.loosest, self.forcing * residual))
         return self.solver.with_tolerance(tolerance)
 
@@ -124,7 +125,7 @@ class FixedPoint:
 def _first_slip_bound(problem: DualProblem, start: Start) -> np.ndarray:
     """Return slip bounds for which the first Tresca problem has an equilibrium. Collective.
 
-    Without friction, the obvious choice, nothing may hold the bodies.
+    Zero, the obvious choice, might leave a body unheld.
     """
     if not start.cold:
         return problem.law.bound(start.iterate.multiplier)
@@ -138,7 +139,7 @@ def _under_own_bound(problem: DualProblem, solution: DualSolution) -> DualSoluti
 
 
 def _continued(history: Sequence[SolverStep], steps: Sequence[SolverStep], products: int) -> list[SolverStep]:
-    """Append the steps of another Tresca problem, numbers and products counted on."""
+    """Append the steps of another Tresca problem, continuing the count of steps and products."""
     outer = history[-1].outer + 1 if history else 0
     counted = (
         replace(step, iteration=number, products=products + step.products, outer=outer)

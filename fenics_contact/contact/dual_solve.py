@@ -1,4 +1,4 @@
-"""Solve the dual system of a scene with its friction, and read off what happens on its contact surfaces."""
+"""Solve the dual system of a scene with its friction, and evaluate the result on its contact surfaces."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def solve_dual(
 
     Args:
         system: The system.
-        solver: `FaceNewton` and `FixedPoint` know Coulomb's law; a `FixedPoint` is put around `Smalse`.
+        solver: `FaceNewton` and `FixedPoint` handle Coulomb's law; `Smalse` is wrapped in a `FixedPoint`.
         start: Earlier solution, or multiplier to start from, owned, or None.
     """
     tresca, coefficient = friction_of(system)
@@ -29,7 +29,7 @@ def solve_dual(
 
 
 def friction_of(system: DualSystem) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return what the friction law of a scene gives for this rank's discs.
+    """Return the data of the friction law for this rank's discs.
 
     Returns:
         The part of the slip bound that is given, shape (n_friction,), [force], and the friction coefficient,

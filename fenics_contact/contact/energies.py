@@ -1,4 +1,4 @@
-"""Energies of a state, and the gap between the primal and the dual one."""
+"""Energies of a state, primal and dual."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Energies:
     Attributes:
         strain: ½ uᵀK u.
         load: Work of the loads, fᵀu.
-        friction: Σ Ψ ‖slip‖, what friction dissipates if the whole load acts at once.
+        friction: Σ Ψ ‖slip‖, the dissipation by friction if the whole load acts at once.
         dual: Value of the dual functional, −½ (f − Bᵀλ)ᵀK⁺(f − Bᵀλ) − λᵀc.
     """
 
@@ -37,11 +37,11 @@ class Energies:
 
     @property
     def primal(self) -> float:
-        """Functional that the displacement minimises at given slip bounds, total potential plus friction."""
+        """Functional that the displacement minimises for given slip bounds, total potential plus friction."""
         return self.total_potential + self.friction
 
     def __str__(self) -> str:
-        """List the energies, one a line."""
+        """List the energies, one per line."""
         told = ("strain", "load", "friction", "total_potential", "primal", "dual")
         return "\n".join(f"{name.replace('_', ' '):16s}{getattr(self, name):14.6e}" for name in told)
 
@@ -60,8 +60,8 @@ def compute_energies(
         displacement: Torn displacement of this rank, [length].
         multiplier: λ, owned, [force].
         friction: Σ Ψ ‖slip‖ of all ranks.
-        rigid: Rigid motions R α in the displacement: they strain nothing, but forces that are a little out of
-            balance work along them.
+        rigid: Rigid motions R α in the displacement: they cause no strain, but forces that are slightly out
+            of balance do work on them.
     """
     torn = system.torn
     internal = torn.load - system.force(multiplier)  # = K u

@@ -24,7 +24,7 @@ from fenics_contact.timing import PhaseTimer
 if TYPE_CHECKING:
     from fenics_contact.accuracy import Balanced
 
-#: Largest relative residual of a scene without contact; its answer then equals that of a direct solver.
+#: Largest relative residual of a scene without contact; its solution then equals that of a direct solver.
 LINEAR_TOLERANCE = 1e-10
 
 
@@ -35,14 +35,14 @@ def dual_state(
     tolerance: float | Balanced | None,
     timer: PhaseTimer,
 ) -> State:
-    """Find a state by its multipliers. Collective.
+    """Compute a state by its multipliers. Collective.
 
     Args:
         torn: The torn system.
         previous: State of a neighbouring geometry or load to start from, or None.
         solver: The dual solver.
-        tolerance: Its tolerance, or how much of the mesh's error it may make; None: `Balanced()`.
-        timer: Collects the seconds.
+        tolerance: Its tolerance, or its share of the discretisation error; None: `Balanced()`.
+        timer: Collects the wall time.
     """
     system, start = _dual_system(torn, previous, timer)
     if isinstance(tolerance, float):
@@ -53,7 +53,7 @@ def dual_state(
 def _dual_system(
     torn: TornSystem, previous: State | None, timer: PhaseTimer
 ) -> tuple[DualSystem, np.ndarray | None]:
-    """Return the dual system and where to start, both with what an earlier state knows. Collective."""
+    """Return the dual system and the start, both reusing an earlier state. Collective."""
     known = known_system(previous)
     system = DualSystem(torn, timer, previous=known)
     if previous is not None and known is not None and isinstance(previous.solution, DualSolution):
@@ -62,14 +62,14 @@ def _dual_system(
 
 
 def known_system(state: State | None) -> DualSystem | None:
-    """Return the dual system of a state, from which the next one takes what did not change."""
+    """Return the dual system of a state, whose unchanged parts the next one reuses."""
     return state.system if state is not None and isinstance(state.system, DualSystem) else None
 
 
 def _to_tolerance(
     system: DualSystem, solver: DualSolver, start: np.ndarray | None, timer: PhaseTimer
 ) -> State:
-    """Find the state to the tolerance of a solver. Collective."""
+    """Compute the state to the tolerance of a solver. Collective."""
     with timer.phase("solve"):
         solution = solve_dual(system, solver, start)
     with timer.phase("state"):
@@ -84,8 +84,8 @@ def _balanced(
     start: np.ndarray | None,
     timer: PhaseTimer,
 ) -> State:
-    """Find the state as well as the mesh deserves. Collective."""
-    # A fixed tolerance needs no estimates and does not load them.
+    """Compute the state as accurately as the mesh deserves. Collective."""
+    # A fixed tolerance needs no estimates and should not import them.
     from fenics_contact.accuracy import Balanced
     from fenics_contact.contact.balancing import solve_balanced
 
@@ -108,7 +108,7 @@ def state_of(
 
 
 def direct_state(torn: TornSystem, previous: State | None, timer: PhaseTimer) -> State:
-    """Find the state of one body without multipliers. Collective."""
+    """Compute the state of one body without multipliers. Collective."""
     known = previous.system if previous is not None and isinstance(previous.system, DirectSystem) else None
     system = DirectSystem(torn, timer, previous=known)
     with timer.phase("solve"):

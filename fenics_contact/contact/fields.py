@@ -36,7 +36,7 @@ def displacement_function(mesh: Any, values: np.ndarray) -> Any:
 
     Args:
         mesh: The body's mesh.
-        values: Displacement of the body's nodes, known at least on this rank's own, shape (n_nodes, dim).
+        values: Displacement of the body's nodes, valid at least on those of this rank, shape (n_nodes, dim).
     """
     function = _dolfinx.coefficient(mesh, "displacement")
     nodes, dofs = _dolfinx.node_dofs(function.function_space)
@@ -46,12 +46,12 @@ def displacement_function(mesh: Any, values: np.ndarray) -> Any:
 
 
 def nodal_function(mesh: Any, name: str, values: np.ndarray) -> Any:
-    """Return a scalar field on a body's mesh by its values in the nodes. Collective.
+    """Return a scalar field on a body's mesh from its nodal values. Collective.
 
     Args:
         mesh: The body's mesh.
         name: Name of the Function.
-        values: One for each node of the body, on every rank, shape (at least n_nodes,).
+        values: Nodal values of the body, on every rank, shape (at least n_nodes,).
     """
     function = _dolfinx.fem.Function(_dolfinx.scalar_space(mesh, 1), name=name)
     nodes, dofs = _dolfinx.node_dofs(function.function_space)
@@ -63,14 +63,14 @@ def nodal_function(mesh: Any, name: str, values: np.ndarray) -> Any:
 def von_mises(displacement: Any, body: Body, comm: MPI.Comm, temperature: Temperature = Temperature()) -> Any:
     """Return the von Mises stress averaged over each cell, [force / length²], a piecewise constant Function.
 
-    The stress is that in space: of plane bodies with what the material carries normal to the plane.
-    Collective on ``comm``.
+    The stress is that in space: for plane bodies with the component normal to the plane. Collective on
+    ``comm``.
 
     Args:
         displacement: The displacement Function of the body.
-        body: Gives the materials.
+        body: The body with its materials.
         comm: Communicator of the state.
-        temperature: Temperature change of the body, whose share is taken off.
+        temperature: Temperature change of the body, whose thermal stress is subtracted.
     """
     mesh, cell_type = displacement.function_space.mesh, body.mesh.cell_type
     parts = _composition(mesh, body)
@@ -105,7 +105,7 @@ def _weighted(materials: tuple[Material, ...], cell_type: str, q: Any, temperatu
 
 
 def _composition(mesh: Any, body: Body) -> Composition:
-    """Return the materials of a body's mesh: all of them on every rank, wherever their cells are."""
+    """Return all materials of a body's mesh on every rank, wherever their cells are."""
     count = len(body.materials)
     if count == 1:
         return Composition(body.materials)
@@ -114,10 +114,10 @@ def _composition(mesh: Any, body: Body) -> Composition:
 
 
 def _cells_of_body(mesh: Any, cells: np.ndarray) -> np.ndarray:
-    """Return which cell of the body each of this rank's own is, shape (n_owned,)."""
+    """Return the number in the body of each cell owned by this rank, shape (n_owned,)."""
     owned = mesh.topology.index_map(mesh.topology.dim).size_local
     mine = _dolfinx.cell_nodes(mesh).reshape(-1, cells.shape[1])[:owned]
-    # dolfinx has its own order of cells: they are recognised by their nodes.
+    # dolfinx reorders cells: they are identified by their nodes.
     _, key = np.unique(np.sort(np.vstack([cells, mine]), axis=1), axis=0, return_inverse=True)
     key = key.ravel()
     place = np.empty(len(cells) + len(mine), dtype=np.int64)
@@ -126,10 +126,10 @@ def _cells_of_body(mesh: Any, cells: np.ndarray) -> np.ndarray:
 
 
 def cell_values(function: Any, cells: np.ndarray) -> np.ndarray:
-    """Collect a cellwise constant Function in the order of a body's cells. Collective on its mesh.
+    """Gather a cellwise constant Function in the order of a body's cells. Collective on its mesh.
 
     Args:
-        function: Function on the body's own mesh, one value a cell.
+        function: Function on the body's own mesh, one value per cell.
         cells: Node numbers of all cells of the body, (n_cells, n_vertices).
 
     Returns:

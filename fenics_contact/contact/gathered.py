@@ -12,7 +12,7 @@ from fenics_contact.pairing import NodeNumbers
 
 @dataclass(frozen=True, eq=False)
 class GatheredFields:
-    """What happens in one body, replicated on all ranks.
+    """The fields of one body, replicated on all ranks.
 
     Attributes:
         points: Fields on nodes by their names: ``displacement``, (n_nodes, dim), [length], and what
@@ -26,15 +26,15 @@ class GatheredFields:
 
 
 def contact_fields(contact: ContactResult, numbers: NodeNumbers, body: str) -> dict[str, np.ndarray]:
-    """Return what happens on a body's contact surfaces as fields on all its nodes.
+    """Return the contact result of a body's surfaces as fields on all its nodes.
 
     Args:
-        contact: What happens on all contact surfaces.
+        contact: Result on all contact surfaces.
         numbers: Numbers of the nodes of all bodies.
         body: Name of the body.
 
     Returns:
-        ``contact_status``, (n_nodes,) int: the value of `Status`, −1 on nodes that are no contact points;
+        ``contact_status``, (n_nodes,) int: the value of `Status`, −1 on nodes that are not contact points;
         and, zero on those, ``contact_pressure``, (n_nodes,), [force / length²], ``contact_force`` on the
         slave and ``contact_slip``, (n_nodes, 3), [force] and [length]. A node that belongs to several pairs
         has their sum, and the status of the last.

@@ -1,4 +1,4 @@
-"""What the geometry of contact surfaces does to a state: how far it is from that of better known ones."""
+"""Error in a state from the geometry of its contact surfaces, by comparison with better known ones."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem
 from fenics_contact.qp import DualSolution, FaceNewton
 
 #: Relative residual of the state of the better geometry: differences between states are a few percent of them
-#: or not worth telling.
+#: or not worth reporting.
 TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
 class GeometryError:
-    """How far a state is from that of the true surfaces on the same mesh.
+    """Distance of a state from that of the true surfaces on the same mesh.
 
     Attributes:
         energy: Distance in energy norm, [√(force · length)].
@@ -31,17 +31,17 @@ class GeometryError:
 def geometry_error(
     system: DualSystem | DirectSystem, solution: DualSolution | DirectSolution
 ) -> GeometryError:
-    """Estimate the share of geometry in the error of a state. Collective.
+    """Estimate the geometry's share in the error of a state. Collective.
 
     The contact problem is solved once more with the gaps between surfaces that are known better: the shapes
     that the meshes carry, where facets or reconstructed surfaces were used; where there are none,
     reconstructed surfaces of the next order. Factors, coarse problem and preconditioner are those of the
-    system. Zero where shapes are known and used, and between flat surfaces. It is no bound: what the normals
-    of facets do is left out, which counts where their gaps happen to be right, as between mirrored bodies by
-    mortar.
+    system. Zero where shapes are known and used, and between flat surfaces. It is not a bound: the error of
+    the facets' normals is left out, which matters where their gaps happen to be right, as between mirrored
+    bodies by mortar.
 
     Raises:
-        ConvergenceError: If the problem of the better geometry is not solved.
+        ConvergenceError: If the solver fails on the better geometry.
     """
     torn = system.torn
     if not isinstance(system, DualSystem) or not isinstance(solution, DualSolution) or not torn.points.count:

@@ -1,4 +1,4 @@
-"""A state as pyvista's MultiBlock: one block a body, the same on all ranks."""
+"""A state as pyvista's MultiBlock: one block per body, the same on all ranks."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from fenics_contact.mesh import BodyMesh
 
-#: What VTK calls the types of cells; their nodes are in VTK's order.
+#: VTK's names of the cell types; their nodes are in VTK's order.
 _VTK_NAMES = {
     "hexahedron": "HEXAHEDRON",
     "tetrahedron": "TETRA",
@@ -35,7 +35,7 @@ def multi_block(
     *,
     linear: bool,
 ) -> Any:
-    """Return what `State.to_pyvista` promises, of meshes and what gathers their fields. Collective."""
+    """Return the result of `State.to_pyvista` from meshes and a function that gathers fields. Collective."""
     with together(comm):
         pv = _pyvista()
     if not np.isfinite(deformed):

@@ -1,4 +1,4 @@
-"""The front door: a scene in, its equilibrium out, and that of the next load, geometry or slip after it."""
+"""The entry point: from a scene to its equilibrium, and on to the next load, geometry or slip."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ from fenics_contact.timing import PhaseTimer
 
 
 class ContactProblem:
-    """Equilibria of a scene, one after another; each starts from the one before.
+    """Successive equilibria of a scene; each starts from the one before.
 
-    What a change leaves alone (topology, numbering, matrices, factors, contact points) is not computed again,
+    What a change does not affect (topology, numbering, matrices, factors, contact points) is not recomputed,
     and the solver starts from the last contact forces. `LoadSequence` and `ShapeProblem` are built on it.
 
     Attributes:
         scene: The scene as it was given.
         comm: Communicator over which the subdomains are spread.
         solver: Dual solver with its tolerance; None: the one that `Scene.plan` names.
-        tolerance: Largest relative residual of answers, see `solve_scene`.
-        timer: Seconds of this rank by phase, over all answers.
-        state: The last answer, None before the first.
+        tolerance: Largest relative residual of the solutions, see `solve_scene`.
+        timer: Wall time of this rank by phase, over all solutions.
+        state: The last solution, None before the first.
 
     Example:
         >>> equilibria = ContactProblem(scene, comm, tolerance=1e-6)  # doctest: +SKIP
@@ -85,7 +85,7 @@ class ContactProblem:
         return self._decomposed(self.scene)
 
     def _decomposed(self, scene: Scene) -> Decomposition:
-        """Return the subdomains; those of the first scene that is solved, whose supports hold some nodes."""
+        """Return the subdomains, those of the first scene solved: its supports fix some nodes."""
         if self._decomposition is None:
             with self.timer.phase("decompose"):
                 self._decomposition = decompose(scene, self.partitions, self.comm)
@@ -95,7 +95,7 @@ class ContactProblem:
     def following(
         cls, state: State, *, solver: DualSolver | None = None, tolerance: Tolerance = None
     ) -> ContactProblem:
-        """Return the problem whose last answer is a state, with its subdomains."""
+        """Return the problem whose last solution is the given state, with its subdomains."""
         decomposition = state.torn.decomposition
         problem = cls(
             state.scene, decomposition.comm,
@@ -115,23 +115,23 @@ class ContactProblem:
         overlap: bool = False,
         sensitivity: bool = False,
     ) -> State:
-        """Find an equilibrium. Collective.
+        """Compute an equilibrium. Collective.
 
         Args:
-            scene: The scene with other loads, values of supports or coordinates; None: as it was given.
+            scene: The scene with other loads, values of supports or coordinates; None: the original one.
             start: State of a neighbouring geometry or load to start from, None for none.
             slip_from: State from which slip is measured, that of the last load step; by default the
-                undeformed one.
-            tolerance: Another one than the problem's.
+                undeformed state.
+            tolerance: Overrides the problem's tolerance.
             overlap: Whether bodies may overlap before they are loaded, as those of a design do.
-            sensitivity: Whether derivatives of the state are wanted, which live on the dual system, and for
-                which the default tolerance is a number.
+            sensitivity: Whether derivatives of the state are wanted; they need the dual system, and the
+                default tolerance is then a number.
 
         Raises:
             InvalidInputError: If scene or partition cannot be used, or supports hold other components than
                 those of the scene that was solved first.
             InfeasibleError: If nothing holds some body against its load.
-            ConvergenceError: If the solver does not reach its tolerance; the last answer stays what it was.
+            ConvergenceError: If the solver does not reach its tolerance; the last solution stays unchanged.
         """
         check_not_forked()
         scene = self.scene if scene is None else scene
@@ -154,7 +154,7 @@ class ContactProblem:
             self.state = direct_state(torn, previous, self.timer)
             return self.state
         solver = self.solver or default_solver(kind)
-        # Derivatives belong to the statuses of single points, which a balanced state leaves open.
+        # Derivatives need the status of every contact point, which a balanced state leaves uncertain.
         if wanted is None and (self.solver is not None or sensitivity):
             wanted = solver.tolerance
         self.state = dual_state(torn, previous, solver, wanted, self.timer)
@@ -165,12 +165,12 @@ class ContactProblem:
         """Build a state from what `stored_state` returned: one product instead of a solve. Collective.
 
         Args:
-            stored: The arrays, found with the same subdomains on any number of ranks.
-            scene: The scene with coordinates, loads and supports of the state; None: as it was given.
+            stored: The arrays, from the same subdomains on any number of ranks.
+            scene: The scene with coordinates, loads and supports of the state; None: the original one.
 
         Returns:
-            The state; its multiplier is that of the stored one, its residuals are recomputed. The last answer
-            stays what it was: assign the state to `state` to go on from there.
+            The state; its multiplier is that of the stored one, its residuals are recomputed. The last
+            solution stays unchanged: assign the state to `state` to continue from it.
 
         Raises:
             InvalidInputError: If the arrays are those of another system.
@@ -205,18 +205,18 @@ def solve_scene(
     solver: DualSolver | None = None,
     tolerance: Tolerance = None,
 ) -> State:
-    """Find the equilibrium of a scene. Collective on ``comm``.
+    """Compute the equilibrium of a scene. Collective on ``comm``.
 
     Args:
         scene: Bodies, supports, loads and contact pairs, the same on every rank.
         comm: Communicator over which the subdomains are spread.
         partitions: Body name -> subdomain of every cell, numbered from 0 within the body; None lets
-            `Scene.partition` cut the bodies into subdomains of a good size.
-        solver: Dual solver with its tolerance; `Scene.plan` tells which one is chosen if it is None.
-        tolerance: Largest relative residual of the answer, or `fenics_contact.accuracy.Balanced`, which
-            solves as well as the mesh deserves. By default the solver's own, and without a solver `Balanced`.
-            Give a number, 1e-6 or less, where the status of single contact points matters, or small
-            differences between states.
+            `Scene.partition` cut the bodies into subdomains of a suitable size.
+        solver: Dual solver with its tolerance; None: the one that `Scene.plan` names.
+        tolerance: Largest relative residual of the solution, or `fenics_contact.accuracy.Balanced`, which
+            solves as accurately as the mesh deserves. By default the solver's own, and without a solver
+            `Balanced`. Give a number, 1e-6 or less, where the status of single contact points matters, or
+            small differences between states.
 
     Raises:
         InvalidInputError: If scene or partition cannot be used.

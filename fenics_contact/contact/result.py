@@ -1,4 +1,4 @@
-"""What happens on the contact surfaces of a solved scene."""
+"""The result on the contact surfaces of a solved scene."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from fenics_contact.pairing import ContactPoints
 
 
 class Status(IntEnum):
-    """What a contact point does."""
+    """Status of a contact point."""
 
-    #: It does not touch and carries no force.
+    #: Open: no contact and no force.
     OPEN = 0
-    #: It touches, and friction holds it: ‖τ‖ ≤ Ψ without slip.
+    #: Closed, and held by friction: ‖τ‖ ≤ Ψ without slip.
     STICK = 1
-    #: It touches and slides: ‖τ‖ = Ψ against the slip, or there is no friction.
+    #: Closed and slipping: ‖τ‖ = Ψ against the slip, or there is no friction.
     SLIP = 2
 
 
@@ -26,14 +26,14 @@ class ContactResult:
     """Forces, distances and status of every contact point, replicated on all ranks.
 
     Attributes:
-        points: Where the contact points are and how they are directed.
+        points: Positions and frames of the contact points.
         normal_force: λ_N ≥ 0, shape (n,), [force].
         friction_force: τ in the points' tangents, zero without friction, shape (n, dim - 1), [force]. It
             acts on the master; the slave feels the opposite.
         slip_bound: Largest friction force, shape (n,), [force].
-        gap: Distance after deformation, shape (n,), [length].
-        slip: Relative tangential displacement in the points' tangents since the last load step, with and
-            without friction, open points too, shape (n, dim - 1), [length].
+        gap: Gap after deformation, shape (n,), [length].
+        slip: Relative tangential displacement in the points' tangents since the last load step, also of
+            frictionless and open points, shape (n, dim - 1), [length].
         slip_before: The same of all load steps before, shape (n, dim - 1), [length].
         status: `Status` of each point, shape (n,). A closed point without friction slips.
     """
@@ -49,7 +49,7 @@ class ContactResult:
 
     @property
     def pressure(self) -> np.ndarray:
-        """Normal force by nodal area, shape (n,), [force / length²]."""
+        """Normal force over nodal area, shape (n,), [force / length²]."""
         return self.normal_force / self.points.area
 
     @property
@@ -64,7 +64,7 @@ class ContactResult:
         return self._in_space(self.slip)
 
     def _in_space(self, tangential: np.ndarray) -> np.ndarray:
-        """Return as vectors in space what is given in the points' tangents."""
+        """Return tangential components as vectors in space."""
         return np.asarray(np.einsum("na,nad->nd", tangential, self.points.tangents))
 
     @property
@@ -73,15 +73,15 @@ class ContactResult:
         return self.slip_before + self.slip
 
     def travel(self, direction: np.ndarray, pair: int = 0) -> float:
-        """Return how far the slave may move, as long as nothing is loaded, until the pair touches, [length].
+        """Return how far the unloaded slave may move until the pair touches, [length].
 
         Args:
             direction: Unit vector along which it moves as a rigid body, shape (dim,).
             pair: Number of the contact pair in the scene.
 
         Returns:
-            The smallest way of all points that the motion brings closer, negative where bodies overlap;
-            infinite if it brings none closer.
+            The smallest distance over all points that the motion brings closer, negative where bodies
+            overlap; infinite if it brings none closer.
         """
         mine = self.on_pair(pair)
         closing = -self.points.normal[mine] @ np.asarray(direction, dtype=np.float64)

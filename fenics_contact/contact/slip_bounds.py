@@ -1,4 +1,4 @@
-"""The next slip bounds of the Coulomb fixed point: plain as long as that works, damped where it cycles."""
+"""The next slip bounds of the Coulomb fixed point: undamped as long as that converges, else damped."""
 
 from __future__ import annotations
 
@@ -9,23 +9,25 @@ import numpy as np
 from fenics_contact._libraries import MPI
 from fenics_contact.qp import Vector, global_sum
 
-#: Slip bounds have returned to earlier ones when these are so much closer than the last ones.
+#: Slip bounds have returned to earlier ones if the distance to these, relative to the last ones, is below
+#: this.
 RETURN_RATIO = 0.3
-#: A cycle is a return in that many steps in a row.
+#: A cycle is a return in this many consecutive steps.
 RETURNS = 3
-#: Residuals have stopped falling when so many steps (of damped ones 1/θ times as many) have not reduced the
-#: best one by this factor.
+#: Residuals have stopped falling if this many steps (1/θ times as many when damped) have not reduced the best
+#: one by this factor.
 PATIENCE, PROGRESS = 10, 0.9
-#: How many earlier slip bounds are compared: the longest period that is recognised, plus one.
+#: Number of earlier slip bounds that are compared: the longest period that is recognised, plus one.
 MEMORY = 6
 
 
 @dataclass(frozen=True)
 class Damping:
-    """Ψ ← (1 − θ) Ψ + θ μ λ_N with θ = 1 until the iteration cycles or stands still.
+    """Ψ ← (1 − θ) Ψ + θ μ λ_N with θ = 1 until the iteration cycles or stagnates.
 
-    Near the solution the plain iteration multiplies an error by an eigenvalue that friction makes negative:
-    below −1 it alternates for ever, and damping by θ moves the eigenvalue ω to 1 − θ (1 − ω).
+    Near the solution the undamped iteration multiplies an error by an eigenvalue that friction makes
+    negative: below −1 it alternates without converging, and damping by θ moves the eigenvalue ω to 1 − θ
+    (1 − ω).
 
     Attributes:
         fractions: The values of θ, each used when the one before it failed.
@@ -35,7 +37,7 @@ class Damping:
 
 
 class SlipBoundSequence:
-    """Chooses slip bounds and remembers how earlier ones fared.
+    """Chooses slip bounds from the record of earlier ones.
 
     Attributes:
         fraction: θ of the next step.
@@ -43,7 +45,7 @@ class SlipBoundSequence:
     """
 
     def __init__(self, comm: MPI.Comm, damping: Damping) -> None:
-        """Begin with the first θ and an empty memory."""
+        """Begin with the first θ and an empty record."""
         self._comm, self._fractions = comm, damping.fractions
         self._stage = 0
         self._bounds: list[Vector] = []
@@ -60,12 +62,12 @@ class SlipBoundSequence:
         return self._stage >= len(self._fractions)
 
     def advance(self, bound: Vector, image: Vector, residual: float) -> tuple[Vector, str]:
-        """Return the next slip bound and what was decided, in words. Collective.
+        """Return the next slip bound and a note on the decision. Collective.
 
         Args:
             bound: Ψ of the last Tresca problem, shape (n_friction,), owned.
-            image: The slip bound that belongs to its answer, shape (n_friction,), owned.
-            residual: Natural residual of that answer with ``image``.
+            image: The slip bound that belongs to its solution, shape (n_friction,), owned.
+            residual: Natural residual of that solution with ``image``.
         """
         self._bounds = [*self._bounds[1 - MEMORY :], bound]
         period, change = self._returned(image)
@@ -84,7 +86,7 @@ class SlipBoundSequence:
         return (1.0 - self.fraction) * bound + self.fraction * image, note
 
     def _failure(self, period: int) -> str:
-        """Return why the present θ does not lead on, empty if it does."""
+        """Return why the present θ fails, empty if it does not."""
         if self._returns >= RETURNS and self._since_best >= RETURNS:
             return f"they cycle with period {period}"
         if self._since_best * self.fraction >= PATIENCE:

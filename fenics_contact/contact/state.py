@@ -39,20 +39,21 @@ def _comm(state: State, *_: Any, **__: Any) -> MPI.Comm:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Displacements, contact forces and how they were found.
+    """Displacements, contact forces and how they were computed.
 
-    Fields on the bodies' own meshes are built when they are first asked for, by all ranks together.
+    Fields on the bodies' own meshes are built on first access, by all ranks together.
 
     Attributes:
-        system: The system that was solved: a dual one, or that of a body that needs none.
+        system: The system that was solved: a dual one, or that of a single body that needs none.
         solution: Multiplier, residuals and history of the solver.
-        torn_displacement: This rank's torn displacement as the solver found it, shape (torn_size,), [length];
-            that of whole bodies is `conforming_displacement`.
-        contact: What happens on the contact surfaces, replicated.
+        torn_displacement: This rank's torn displacement as the solver returned it, shape (torn_size,),
+            [length]; that of whole bodies is `conforming_displacement`.
+        contact: Result on the contact surfaces, replicated.
         energies: Energies of all bodies.
         seconds: Wall time of this rank by phase, of all work up to this state that shares its timer.
-        known_errors: Errors that were found on the way, None if they were not needed; ask `errors`.
-        tolerance: What it was solved to, a relative residual or `Balanced`; None where no solver iterated.
+        known_errors: Errors that were computed on the way, None if they were not needed; use `errors`.
+        tolerance: Tolerance of the solution, a relative residual or `Balanced`; None where no solver
+            iterated.
 
     Example:
         >>> state = solve_scene(scene, comm)  # doctest: +SKIP
@@ -72,7 +73,7 @@ class State:
 
     @property
     def torn(self) -> TornSystem:
-        """The torn system, that is subdomains, rows and contact points."""
+        """The torn system: subdomains, rows and contact points."""
         return self.system.torn
 
     @property
@@ -80,21 +81,21 @@ class State:
         """The dual system.
 
         Raises:
-            InvalidInputError: If the state was found without one.
+            InvalidInputError: If the state was computed without one.
         """
         self._require_multipliers()
         return cast(DualSystem, self.system)
 
     @property
     def dual_solution(self) -> DualSolution:
-        """What the dual solver found; raises as `dual` does."""
+        """The result of the dual solver; raises as `dual` does."""
         self._require_multipliers()
         return cast(DualSolution, self.solution)
 
     def _require_multipliers(self) -> None:
         if isinstance(self.system, DirectSystem):
             raise InvalidInputError(
-                "this needs multipliers, but the state of one body that supports hold was found directly: "
+                "this needs multipliers, but the state of one body that supports hold was solved directly: "
                 "solve with sensitivity=True"
             )
 
@@ -108,8 +109,8 @@ class State:
     def errors(self) -> StateErrors:
         """Errors of the state by solver, friction law, mesh and geometry, in energy norm.
 
-        Collective on first use. Where surfaces are known better than contact took them, or reconstructed, the
-        contact problem is solved once more to tell what that does.
+        Collective on first use. Where surfaces are known better than contact used them, or reconstructed, the
+        contact problem is solved once more to estimate the effect.
         """
         from fenics_contact.accuracy import discretisation_error, solver_errors, state_errors
         from fenics_contact.contact.geometry_error import geometry_error
@@ -125,23 +126,23 @@ class State:
 
     @cached_property
     def unheld(self) -> tuple[UnheldMotion, ...]:
-        """Rigid motions that nothing holds and nothing loads; the bodies stay. Collective on first use."""
+        """Rigid motions that nothing resists and nothing loads; the bodies stay. Collective on first use."""
         return unheld_motions(self.system) if isinstance(self.system, DualSystem) else ()
 
     @cached_property
     def contact_places(self) -> np.ndarray:
-        """Where the slave nodes of the contact points are before deformation, shape (n, dim), [length]."""
+        """Positions of the contact points' slave nodes before deformation, shape (n, dim), [length]."""
         places = np.concatenate([body.mesh.points for body in self.scene.bodies.values()])
         return np.asarray(places[self.contact.points.slave])
 
     @cached_property
     @collectively("State.conforming_displacement", _comm)
     def conforming_displacement(self) -> np.ndarray:
-        """Displacement of whole bodies, which all fields show, shape (torn_size,), [length].
+        """Displacement, continuous across subdomains, used by all fields, shape (torn_size,), [length].
 
-        A solver glues subdomains and holds supports as well as its tolerance asks for. Here copies of a node
-        agree, being their mean weighted by stiffness, and what supports prescribe is met; distances and slips
-        of the contact points are those of `torn_displacement`. Collective on first use.
+        A solver satisfies gluing and supports up to its tolerance. Here copies of a node agree, being their
+        mean weighted by stiffness, and prescribed values are met exactly; distances and slips of the contact
+        points are those of `torn_displacement`. Collective on first use.
         """
         return self.system.conforming(self.torn_displacement)
 
@@ -171,8 +172,8 @@ class State:
     def contact_pressure(self) -> dict[str, Any]:
         """Contact pressure of each body as a Function on its own mesh, [force / length²].
 
-        Its values are those of the contact points in the nodes of the slave surfaces; it is zero in all other
-        nodes, on masters too. Collective on first use.
+        At the nodes of slave surfaces it is that of the contact points, at all other nodes, also on masters,
+        zero. Collective on first use.
         """
         key = "contact_pressure"
         return {
@@ -190,7 +191,7 @@ class State:
         return np.asarray(total / count[:, None])
 
     def _at_nodes(self, body: str) -> np.ndarray:
-        """Return the displacement of a body's nodes, NaN where this rank holds none. Collective at first."""
+        """Return the displacement of a body's nodes, NaN at those not on this rank. Collective at first."""
         tearing = self.torn.decomposition.tearing
         nodes = tearing.global_nodes(body, np.arange(self.scene.bodies[body].mesh.n_nodes))
         return np.asarray(self._nodal_displacement[nodes])
@@ -223,7 +224,7 @@ class State:
         """Return all bodies with their fields for pyvista, the same on every rank. Collective.
 
         Args:
-            deformed: Factor of the displacement by which points are moved; 0 leaves them where they were.
+            deformed: Scale factor of the displacement added to the points; 0 for the undeformed bodies.
             linear: Cut quadratic cells into linear ones on the same nodes, as pictures of `viz` do.
 
         Returns:

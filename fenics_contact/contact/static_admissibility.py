@@ -1,4 +1,4 @@
-"""Is every body held? A conic feasibility problem on rigid motions, before anything is factored."""
+"""Check that every body is held: a conic feasibility problem on rigid motions, before any factorisation."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from fenics_contact.feti import LOAD_ROUNDING, TornSystem, common_kernel
 from fenics_contact.pairing import ContactPoints
 from fenics_contact.scene import RANK_TOLERANCE, Body, resisted_motions, rigid_body_modes
 
-#: A load that needs more of the friction than all but this part is at its limit: how far the body slides is
-#: left to rounding.
+#: A load that needs all but this fraction of the friction is at the limit: how far the body slides would be
+#: decided by rounding.
 MARGIN = 1e-6
-#: Loads count as balanced when less than this part of them is left; the conic solver is asked for a tenth.
+#: Loads count as balanced when less than this fraction of them remains; the conic solver is run to a tenth.
 LEFT = 1e-8
-#: Weight of the normal forces beside what is left of the loads: it keeps the forces of bodies that grip each
-#: other finite, and leaves nothing unbalanced where less than its inverse times the load is needed.
+#: Weight of the normal forces relative to the unbalanced load: it bounds the forces of bodies that grip each
+#: other, and leaves nothing unbalanced where forces below its inverse times the load suffice.
 SMALL = 1e-9
 
 
 def check_held(torn: TornSystem) -> None:
-    """Refuse a scene in which some body can move away under the load. Collective.
+    """Reject a scene in which some body can move away under the load. Collective.
 
-    Asks whether support reactions, what the material itself resists (an elastic bed) and admissible contact
-    forces (pressing, inside the friction cone or disc) exist that balance the load on every body. If not,
-    the dual problem is infeasible: there is a rigid motion that nothing resists and along which the load does
-    work. If friction must be used up for it to the last part of `MARGIN`, forces exist, but any slide along
-    that motion is an answer.
+    Checks whether support reactions, reactions of the material itself (an elastic bed) and admissible contact
+    forces (compressive, inside the friction cone or disc) exist that balance the load on every body. If not,
+    the dual problem is infeasible: there is a rigid motion that nothing resists and on which the load does
+    work. If that takes all friction but a fraction `MARGIN`, forces exist, but the amount of sliding along
+    that motion is undetermined.
 
     Args:
-        torn: Gives scene, contact points and loads; its matrices are not used.
+        torn: The torn system; its matrices are not used.
 
     Raises:
-        InfeasibleError: Names the body and the motion, and says so if it is held only just.
+        InfeasibleError: Names the body and the motion, and whether it is only just held.
     """
     comm = torn.numbering.comm
     with together(comm):
@@ -67,7 +67,7 @@ def _check_balance(torn: TornSystem, bodies: list[_RigidBody], loads: np.ndarray
 
 
 class _RigidBody:
-    """A body seen as rigid: its modes, and the wrenches of supports, ties, contacts and loads on it."""
+    """A body regarded as rigid: its modes, and the wrenches of supports, ties, contacts and loads on it."""
 
     def __init__(self, torn: TornSystem, index: int) -> None:
         tearing = torn.decomposition.tearing
@@ -129,7 +129,7 @@ def _resisted_by_material(body: Body, modes: np.ndarray) -> np.ndarray:
 
 
 def _both(supports: np.ndarray, material: np.ndarray) -> np.ndarray:
-    """Return an orthonormal basis of what is resisted by either."""
+    """Return an orthonormal basis of the motions that either resists."""
     if not material.shape[1]:
         return supports
     basis, size, _ = np.linalg.svd(np.hstack([supports, material]), full_matrices=False)
@@ -143,25 +143,25 @@ def _unresisted_motion(
     torn: TornSystem,
     friction: tuple[float, np.ndarray],
 ) -> np.ndarray | None:
-    """Find x = (reactions, λ_N, τ) in its cones with the smallest ‖[support contact] x − right‖.
+    """Minimise ‖[support contact] x − right‖ over x = (reactions, λ_N, τ) in its cones.
 
-    The smallest distance, unlike feasibility, is found just as well where forces only just suffice.
+    The smallest distance, unlike feasibility, is well determined also where forces only just suffice.
 
     Args:
         support: Wrenches that act in both directions, shape (n_wrenches, n).
         contact: Wrenches of unit contact forces, shape (n_wrenches, n_contact + (dim - 1) n_friction).
         right: The wrench to balance, shape (n_wrenches,).
-        torn: Gives friction coefficients.
-        friction: The part of the friction that may be used, and Tresca bounds in the unit of force of
+        torn: The torn system with its friction coefficients.
+        friction: The fraction of the friction that may be used, and Tresca bounds in the unit of force of
             ``right``, shape (n_friction,).
 
     Returns:
-        None if nothing is left, else the rigid motion that nothing resists, shape (n_wrenches,).
+        None if the load is balanced, else the rigid motion that nothing resists, shape (n_wrenches,).
     """
-    import clarabel  # not before some loaded body floats
+    import clarabel  # only needed if some loaded body floats
 
     forces, admissible, limit, cones = _admissible(support.shape[1], torn, friction)
-    # Unknowns x, the distance t and what is left y; ‖y‖ ≤ t.
+    # Unknowns: x, the distance t and the remainder y; ‖y‖ ≤ t.
     size, left = forces.size, np.arange(len(right))
     balance = sp.hstack([support, contact, sp.csr_matrix((len(left), 1)), sp.identity(len(left))])
     distance = sp.hstack([sp.csr_matrix((1 + len(left), size)), -sp.identity(1 + len(left))])
@@ -180,7 +180,7 @@ def _unresisted_motion(
     if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
         raise ConvergenceError(
             "the check whether every body is held needs an answer, the conic solver ended with "
-            f"{solution.status}: look at the scale of loads and lengths"
+            f"{solution.status}: check the scale of loads and lengths"
         )
     return None if solution.x[size] <= LEFT else np.array(solution.z[: len(left)])
 
@@ -192,7 +192,7 @@ def _admissible(
     import clarabel
 
     part, tresca_bound = friction
-    # Surfaces that supports hold apart cannot be pressed together, whatever the supports would bear.
+    # Surfaces that supports hold apart cannot be pressed together, whatever the supports could carry.
     pressed = ~torn.relations[1].held(torn.decomposition.fixed)[torn.frictional]
     coefficient = part * pressed * torn.friction_coefficient
     n_normal, discs, width = torn.points.count, len(torn.frictional), torn.dim
@@ -216,8 +216,8 @@ def _admissible(
 
 
 def _describe(motion: np.ndarray, bodies: list[_RigidBody], loads: np.ndarray, *, only_just: bool) -> str:
-    # The certificate points against the right side, which is minus the load. Bodies may be taken along by the
-    # one that is pushed: the load works most on that one.
+    # The certificate points against the right side, which is minus the load. The pushed body may take others
+    # along: it is the one on which the load does most work.
     pushed = int(np.argmax(np.einsum("bm,bm->b", motion, loads)))
     free = np.round(motion[pushed] / np.abs(motion[pushed]).max(), 3) + 0.0  # no -0
     words = motion_in_words(free)

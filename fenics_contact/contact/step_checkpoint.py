@@ -1,4 +1,4 @@
-"""The checkpoint of a load history: the states after the steps that are done."""
+"""The checkpoint of a load history: the states after the completed steps."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ KIND = "load history"
 
 
 class StepCheckpoint:
-    """Reads the states of steps that were done before, and writes new ones; nothing without a checkpoint."""
+    """Reads the states of completed steps and writes new ones; does nothing without a checkpoint."""
 
     def __init__(self, checkpoint: Checkpoint | None, problem: ContactProblem) -> None:
-        """Read what there is. Collective.
+        """Read the file if it exists. Collective.
 
         Args:
             checkpoint: The file, or None.
-            problem: What the history belongs to.
+            problem: The problem of the history.
 
         Raises:
-            InvalidInputError: If the file is no checkpoint of this problem; says what to do.
+            InvalidInputError: If the file is not a checkpoint of this problem; says what to do.
         """
         self._checkpoint, self._comm = checkpoint, problem.comm
         self._arrays: dict[str, np.ndarray] = {}
@@ -60,10 +60,10 @@ class StepCheckpoint:
         Args:
             step: The step.
             scene: The scene with its loads and supports.
-            problem: The problem, whose last answer is the state before the step.
+            problem: The problem, whose last solution is the state before the step.
 
         Raises:
-            InvalidInputError: If another step was done there.
+            InvalidInputError: If the stored step is a different one.
         """
         if self._here >= self._stored:
             return None
@@ -73,18 +73,18 @@ class StepCheckpoint:
             unlike = differences(json.loads(str(stored.pop("step"))), described(step, "step"))
             if unlike:
                 raise InvalidInputError(
-                    f"step {self._here} of the checkpoint is another one; there and here differ "
-                    f"{'; '.join(unlike)}: give the same steps to go on, or a new name to start anew"
+                    f"step {self._here} of the checkpoint is a different one; there and here differ "
+                    f"{'; '.join(unlike)}: give the same steps to continue, or a new name to start anew"
                 )
         self._here += 1
         problem.state = problem.restore(stored, scene)
         return problem.state
 
     def keep(self, step: LoadStep, state: State) -> None:
-        """Add the state after a step and write it where that is due. Collective.
+        """Add the state after a step and write it if that is due. Collective.
 
         Raises:
-            CheckpointError: If it cannot be written; the file is then what it was.
+            CheckpointError: If it cannot be written; the file is then unchanged.
         """
         if self._checkpoint is None:
             return
@@ -103,17 +103,17 @@ class StepCheckpoint:
             self._written = self._here
 
     def write_rest(self) -> None:
-        """Write what is done in the middle of a step, where no other rank is needed for that."""
+        """Write the completed steps in the middle of a step, if that needs no other rank."""
         if self._comm.size == 1:
             with suppress(CheckpointError):
                 self.write()
 
     def kept(self, done: int, count: int | None) -> str:
-        """Say what a run leaves that ends now, and how to go on.
+        """Describe what a run that ends now leaves, and how to continue it.
 
         Args:
-            done: Steps that are done.
-            count: All steps, None if nobody knows.
+            done: Number of completed steps.
+            count: Number of all steps, None if unknown.
         """
         if self._checkpoint is None:
             return without_checkpoint(f"{done} load step{'' if done == 1 else 's'}")

@@ -1,4 +1,4 @@
-"""Load steps: equilibrium after equilibrium, friction remembering where the surfaces were."""
+"""Load steps: a sequence of equilibria with frictional slip measured from step to step."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from fenics_contact.scene import LoadStep
 class LoadSequence:
     """The quasi-static history of a scene, one step at a time.
 
-    Slip is measured from the last step: u_T(t) − u_T(t − 1) is what friction opposes. So a block that was
-    pushed and let go keeps the shear that its floor holds, and reversed sliding dissipates again.
+    Slip is measured from the last step: friction opposes u_T(t) − u_T(t − 1). So a block that was pushed and
+    released keeps the shear that its floor sustains, and reversed sliding dissipates again.
 
-    With a checkpoint, steps that a run before this one has done are read instead of solved: one product each.
+    With a checkpoint, steps completed by an earlier run are read instead of solved: one product each.
 
     Attributes:
         scene: The scene with the loads of the last step.
-        problem: What its equilibria are found with.
+        problem: The problem that computes its equilibria.
 
     Example:
         >>> steps = LoadSequence(ContactProblem(scene, comm))  # doctest: +SKIP
@@ -47,13 +47,13 @@ class LoadSequence:
 
         Args:
             problem: Bodies, contact pairs, and the supports and loads that the steps do not give. Give it
-                partitions if a run may go on with another number of ranks.
-            checkpoint: File that is written after the steps and that an interrupted history goes on from.
-            count: How many steps there will be, which progress tells; not needed.
+                partitions if a run may continue with another number of ranks.
+            checkpoint: File that is written after the steps and from which an interrupted history continues.
+            count: Number of steps, for progress reports; optional.
 
         Raises:
-            InvalidInputError: If the checkpoint cannot be read or is one of another scene, or if some ranks
-                have one and others none.
+            InvalidInputError: If the checkpoint cannot be read or belongs to another scene, or if only some
+                ranks have one.
         """
         self.problem, self.scene, self._comm = problem, problem.scene, problem.comm
         kept = None if checkpoint is None else (checkpoint.every, checkpoint.resume)
@@ -68,7 +68,7 @@ class LoadSequence:
 
     @collectively("LoadSequence.advance", lambda self, *_, **__: self._comm)
     def advance(self, step: LoadStep) -> State:
-        """Find the state at the end of the next step. Collective.
+        """Compute the state at the end of the next step. Collective.
 
         Raises:
             InvalidInputError: If the step's supports hold other components than before.
@@ -94,11 +94,11 @@ class LoadSequence:
         return state
 
     def _may_stop(self) -> None:
-        """Stop between two steps if a signal asks for it. Collective."""
+        """Stop between two steps if a signal requested it. Collective."""
         safe_point(lambda: self._done.kept(self._number, self._count), self._done.write, self._comm)
 
     def _left(self) -> str:
-        """Write what can be written in the middle of a step, and say what is kept."""
+        """Write what can be written in the middle of a step, and describe what is stored."""
         self._done.write_rest()
         return self._done.kept(self._number, self._count)
 
@@ -123,7 +123,7 @@ class LoadSequence:
 def solve_steps(
     problem: ContactProblem, steps: Sequence[LoadStep], *, checkpoint: Checkpoint | None = None
 ) -> tuple[State, ...]:
-    """Find the states at the end of every load step, see `LoadSequence`. Collective.
+    """Compute the states at the end of every load step, see `LoadSequence`. Collective.
 
     Args:
         problem: Bodies, contact pairs, and the supports and loads that the steps do not give.

@@ -1,4 +1,4 @@
-"""A state as a few arrays, and back: what a checkpoint holds of an equilibrium."""
+"""A state as a few arrays, and back: the content of a checkpoint of an equilibrium."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ Stored = Mapping[str, np.ndarray]
 
 
 def stored_state(state: State) -> dict[str, np.ndarray]:
-    """Return what a state can be built from again, on any number of ranks. Collective.
+    """Return the arrays from which a state can be rebuilt, on any number of ranks. Collective.
 
     Returns:
         ``multiplier`` λ and ``origin``, from which slip is measured, of all rows in their order, shape
         (n_rows,), ``slid``, the same for points without friction, and ``motion``, the coefficients α of the
-        rigid motions; all replicated. Nothing for a state that was found without multipliers.
+        rigid motions; all replicated. Empty for a state that was computed without multipliers.
     """
     if isinstance(state.system, DirectSystem):
         return {}
@@ -36,7 +36,7 @@ def stored_state(state: State) -> dict[str, np.ndarray]:
 
 
 def with_stored_slip(torn: TornSystem, stored: Stored) -> TornSystem:
-    """Return a system in which slip is measured from where it was for a stored state.
+    """Return a system in which slip is measured from the same origin as for a stored state.
 
     Raises:
         InvalidInputError: If the arrays are those of another system.
@@ -44,7 +44,7 @@ def with_stored_slip(torn: TornSystem, stored: Stored) -> TornSystem:
     if stored["multiplier"].shape != (torn.numbering.total,):
         raise InvalidInputError(
             f"a stored state needs {torn.numbering.total} multipliers, got "
-            f"{stored['multiplier'].size}: give the scene and the partition that it was found with"
+            f"{stored['multiplier'].size}: give the scene and the partition of that state"
         )
     return torn.with_slip_from(stored["origin"][torn.numbering.owned], stored["slid"])
 

@@ -1,4 +1,4 @@
-"""How well a state is solved: to a number, or as well as its mesh deserves."""
+"""How accurately a state is solved: to a number, or as accurately as its mesh deserves."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Tolerance: TypeAlias = "float | Balanced | None"
 
 
 def checked_tolerance(tolerance: object) -> float | Balanced | None:
-    """Return a tolerance as it can be used.
+    """Return a valid tolerance.
 
     Raises:
         InvalidInputError: If it is neither a number between 0 and 1 nor `Balanced`.
@@ -30,7 +30,7 @@ def checked_tolerance(tolerance: object) -> float | Balanced | None:
             f"tolerance must lie between 0 and 1, got {float(tolerance):g}: it is a relative residual, "
             "1e-6 is a good one"
         )
-    from fenics_contact.accuracy import Balanced  # whoever gives one has loaded it
+    from fenics_contact.accuracy import Balanced  # imported already if one was given
 
     if isinstance(tolerance, Balanced):
         return tolerance

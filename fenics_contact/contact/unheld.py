@@ -1,4 +1,4 @@
-"""Rigid motions that nothing holds, in words: bodies that the load does not move stay where they are."""
+"""Rigid motions that nothing resists, in words: bodies that the load does not move stay where they are."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Carry a multiplier over to the system of another geometry or load."""
+"""Transfer a multiplier to the system of another geometry or load."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from fenics_contact.qp import DualSolution
 
 
 def carried_over(old: DualSystem, solution: DualSolution, new: DualSystem) -> np.ndarray:
-    """Return a start for ``new``, owned: gluing forces as they were, contact forces in the new frames.
+    """Return a start for ``new``, owned: unchanged gluing forces, contact forces in the new frames.
 
-    Contact points are recognised by pair and slave node; a point that was not there before starts open.
-    Collective.
+    Contact points are identified by pair and slave node; a new point starts open. Collective.
     """
     before, after = old.torn, new.torn
     start = np.zeros(len(after.numbering.owned))
-    # Ties of a moved scene may have other points, gluing rows stay what they are.
+    # Ties of a moved scene may have other points; gluing rows are unchanged.
     same = before.n_equality == after.n_equality
     gluing_old = before.numbering.owned < (before.n_equality if same else before.n_gluing)
     gluing_new = after.numbering.owned < (after.n_equality if same else after.n_gluing)

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 #: Nodes around the smallest gap to which the gap is fitted.
 AROUND = 30
-#: Surfaces touch along a line if one relative curvature is less than so much of the other.
+#: Contact is taken as line contact if one relative curvature is below this fraction of the other.
 LINE = 1e-2
-#: Gaps that bend by less than so much of the size of the surface do not bend.
+#: A gap counts as flat if its curvature times the size of the surface is below this.
 FLAT = 1e-6
 
 
@@ -36,7 +36,7 @@ def displacement_along(scene: SceneParts, normal: np.ndarray) -> float:
 
 
 def force_along(scene: SceneParts, normal: np.ndarray) -> float | None:
-    """Return the largest force along a direction that the loads on one body add up to, [force].
+    """Return the largest resultant, over the bodies, of the loads along a direction, [force].
 
     None if a load is given as a function or in UFL.
     """
@@ -111,9 +111,9 @@ def hertz_approach(
     approach depends on the whole bodies, it is the depth κ a²/2 by which they would overlap undeformed.
 
     Args:
-        force: What presses the bodies together, [force], in the plane [force / length].
+        force: Force that presses the bodies together, [force], in the plane [force / length].
         modulus: E*, [force / length²].
-        place: Nodes of one surface that face the other, shape (n, dim), [length].
+        place: Coordinates of the nodes of one surface that face the other, shape (n, dim), [length].
         normal: Normals of the gaps there, shape (n, dim).
         gap: Gaps, shape (n,), [length].
     """

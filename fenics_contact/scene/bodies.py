@@ -11,7 +11,7 @@ from fenics_contact.scene.body import Body
 from fenics_contact.scene.materials import Material
 
 OfBody = Material | Mapping[str, Material]
-"""A material, or region to material."""
+"""A material, or a mapping from region to material."""
 
 
 def bodies_from(
@@ -27,8 +27,8 @@ def bodies_from(
     Args:
         meshes: Name to mesh.
         materials: One material for all bodies; or name of the body, or pattern of names with ``*`` and ``?``,
-            to its material, or to a mapping from its regions to theirs. A name goes before patterns, a
-            pattern before those after it.
+            to its material, or to a mapping from its regions to theirs. Names take precedence over patterns,
+            earlier patterns over later ones.
 
     Returns:
         Name to body, in the order of the meshes.
@@ -50,7 +50,7 @@ def bodies_from(
     for key in materials:
         if key not in chosen.values():
             raise InvalidInputError(
-                f"materials must be those of bodies, {key!r} fits none of {list(meshes)}: check its "
+                f"materials must be those of bodies, {key!r} matches none of {list(meshes)}: check its "
                 "spelling, or leave it out"
             )
     return {name: Body(mesh, materials[chosen[name]]) for name, mesh in meshes.items()}

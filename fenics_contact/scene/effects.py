@@ -1,4 +1,4 @@
-"""What a scene calls for. Whatever is not listed is not built."""
+"""The physical effects in a scene. Only what these need is built."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class EffectName(StrEnum):
-    """The effects that a scene can call for."""
+    """The effects that a scene can contain."""
 
     ELASTICITY = "elasticity"
     PRESCRIBED_DISPLACEMENT = "prescribed displacement"
@@ -30,11 +30,11 @@ class EffectName(StrEnum):
 
 @dataclass(frozen=True)
 class Effect:
-    """One physical effect that a scene calls for, and the reason.
+    """One physical effect in a scene, and the reason for it.
 
     Attributes:
         name: Which one.
-        reason: What in the scene calls for it.
+        reason: What in the scene causes it.
     """
 
     name: EffectName
@@ -42,7 +42,7 @@ class Effect:
 
 
 def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
-    """List what a scene calls for, in the order of `EffectName`."""
+    """List the effects in a scene, in the order of `EffectName`."""
     return tuple(_found(scene))
 
 

@@ -11,7 +11,7 @@ from fenics_contact.scene.kernels import rigid_body_modes
 if TYPE_CHECKING:
     from fenics_contact.scene.parts import SceneParts
 
-#: A motion counts as not resisted if it moves supported nodes by less than this part of what others do.
+#: A motion counts as unresisted if it moves supported nodes by less than this fraction of the other motions.
 RANK_TOLERANCE = 1e-9
 
 
@@ -25,13 +25,13 @@ def resisted_motions(modes: np.ndarray, fixed: np.ndarray) -> np.ndarray:
     Returns:
         Coefficients of the modes as columns, shape (n_modes, rank).
     """
-    # The edge of a thin plate moves little when the plate turns about it: singular values show how much,
-    # their squares would drown in rounding.
+    # The edge of a thin plate moves little when the plate turns about it: singular values resolve how much,
+    # their squares would be lost in rounding.
     _, size, motions = np.linalg.svd(modes[fixed], full_matrices=False)
     return np.asarray(motions[size > RANK_TOLERANCE * size.max(initial=0.0)].T)
 
 
 def held_by_supports(scene: SceneParts, body: str) -> bool:
-    """Tell whether the supports of a body resist all its rigid motions."""
+    """Return whether the supports of a body resist all its rigid motions."""
     modes = rigid_body_modes(scene.bodies[body].mesh.points)
     return resisted_motions(modes, scene.fixed(body)).shape[1] == modes.shape[2]

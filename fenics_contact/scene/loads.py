@@ -2,8 +2,8 @@
 
 Loads are dead: they keep direction and size while the body deforms. Values are numbers, functions of position
 (evaluated at the nodes and interpolated) or `Ufl`. Loads are values: two with the same numbers, or with the
-same function object, are equal, and what was assembled for one serves the other. A function must therefore
-always return the same for the same points.
+same function object, are equal, and a vector assembled for one is reused for the other. A function must
+therefore always return the same values for the same points.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ class Traction:
     Attributes:
         body: Name of the body.
         surface: Name of its surface.
-        value: Force a reference area, [force / length²] (in the plane: a unit of thickness). A function gets
-            points, shape (n, dim), and returns the traction there, shape (n, dim).
+        value: Force per reference area, [force / length²] (in the plane: per unit of thickness). A function
+            receives points, shape (n, dim), and returns the traction there, shape (n, dim).
 
     Example:
         >>> even = Traction("block", "z1", (200.0, 0.0, -500.0))  # N/mm²
@@ -37,7 +37,7 @@ class Traction:
     value: VectorValue
 
     def __post_init__(self) -> None:
-        """Refuse what is no vector."""
+        """Reject a value that is not a vector."""
         object.__setattr__(self, "value", checked_vector("Traction.value", self.value))
 
 
@@ -49,7 +49,7 @@ class TotalForce:
     Attributes:
         body: Name of the body.
         surface: Name of its surface.
-        value: Resultant, [force] (in the plane: a unit of thickness).
+        value: Resultant, [force] (in the plane: per unit of thickness).
     """
 
     body: str
@@ -57,12 +57,12 @@ class TotalForce:
     value: GivenVector
 
     def __post_init__(self) -> None:
-        """Refuse what is no vector of numbers."""
+        """Reject a value that is not a vector of numbers."""
         value = checked_vector("TotalForce.value", self.value)
         if not isinstance(value, tuple):
             raise InvalidInputError(
-                f"TotalForce.value must be numbers, got {self.value!r}: a resultant has no place to depend "
-                "on; give a Traction as a function of position"
+                f"TotalForce.value must be numbers, got {self.value!r}: a resultant cannot depend "
+                "on position; give a Traction as a function of position"
             )
         object.__setattr__(self, "value", value)
 
@@ -83,7 +83,7 @@ class Pressure:
     value: ScalarValue
 
     def __post_init__(self) -> None:
-        """Refuse what is no number."""
+        """Reject a value that is not a scalar."""
         object.__setattr__(self, "value", checked_scalar("Pressure.value", self.value))
 
 
@@ -94,35 +94,36 @@ class BodyForce:
 
     Attributes:
         body: Name of the body.
-        value: Force a volume, [force / length³].
+        value: Force per volume, [force / length³].
     """
 
     body: str
     value: VectorValue
 
     def __post_init__(self) -> None:
-        """Refuse what is no vector."""
+        """Reject a value that is not a vector."""
         object.__setattr__(self, "value", checked_vector("BodyForce.value", self.value))
 
 
 @dataclass(frozen=True)
 @checked("temperature_change")
 class ThermalStrain:
-    """A temperature change that would strain the body if nothing held it: σ = C : (ε(u) − ΔT α).
+    """A temperature change that would strain the body if it were free: σ = C : (ε(u) − ΔT α).
 
     Its work is ∫ ΔT (C : α) : ε(v). Several on one body add up. The energy of a state counts it as the work
-    of a load, so that a body that expands freely has the strain energy of its expansion, although no stress.
+    of a load, so that a freely expanding body has the strain energy of its expansion although it is free of
+    stress.
 
     Attributes:
-        body: Name of the body, whose materials must know their thermal expansion.
-        temperature_change: ΔT against the temperature without stress, in degrees.
+        body: Name of the body, whose materials must have a thermal expansion.
+        temperature_change: ΔT relative to the stress-free temperature, in degrees.
     """
 
     body: str
     temperature_change: ScalarValue
 
     def __post_init__(self) -> None:
-        """Refuse what is no number."""
+        """Reject a value that is not a scalar."""
         value = checked_scalar("ThermalStrain.temperature_change", self.temperature_change)
         object.__setattr__(self, "temperature_change", value)
 
@@ -136,7 +137,7 @@ class ThermalStrain:
 SurfaceLoad = Traction | TotalForce | Pressure
 #: What acts in the volume of a body.
 VolumeLoad = BodyForce | ThermalStrain
-#: All that loads a scene.
+#: Any load of a scene.
 Load = SurfaceLoad | VolumeLoad
 
 
@@ -145,13 +146,13 @@ def gravity(body: str, density: float, acceleration: Sequence[float]) -> BodyFor
 
     Args:
         body: Name of the body.
-        density: Mass a volume, in the scene's units, for steel in N, mm, s: 7.85e-9.
-        acceleration: Of gravity, [length / time²], for instance (0, 0, -9810).
+        density: Mass per volume, in the scene's units, for steel in N, mm, s: 7.85e-9.
+        acceleration: Acceleration of gravity, [length / time²], for instance (0, 0, -9810).
     """
     mass, direction = checked_scalar("density", density), checked_vector("acceleration", acceleration)
     if callable(mass) or callable(direction):
         raise InvalidInputError(
-            f"gravity needs numbers, got {density!r} and {acceleration!r}: give a BodyForce for what depends "
-            "on the place"
+            f"gravity needs numbers, got {density!r} and {acceleration!r}: give a BodyForce for what "
+            "varies with position"
         )
     return BodyForce(body, tuple(mass * component for component in direction))

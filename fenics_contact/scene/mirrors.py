@@ -1,4 +1,4 @@
-"""Planes of symmetry: flat sides on rollers, beyond which the body goes on as its mirror image."""
+"""Planes of symmetry: flat sides on rollers, beyond which the body continues as its mirror image."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from fenics_contact.mesh import vector_areas
 if TYPE_CHECKING:
     from fenics_contact.scene.parts import SceneParts
 
-#: A facet lies across an axis if the cosine of its normal misses one by no more.
+#: A facet is normal to an axis if the cosine of its normal differs from one by no more than this.
 ACROSS = 1e-9
 
 
 def mirrored(scene: SceneParts, body: str) -> np.ndarray:
-    """Return which nodes of a body lie on a plane of symmetry across each axis, shape (n_nodes, dim).
+    """Return which nodes of a body lie on a plane of symmetry normal to each axis, shape (n_nodes, dim).
 
-    A plane of symmetry is a flat side across an axis on which a support prescribes that component alone.
+    A plane of symmetry is a flat side normal to an axis on which a support prescribes only that component.
     """
     mesh = scene.bodies[body].mesh
     marks = np.zeros(mesh.points.shape, dtype=bool)

@@ -1,4 +1,4 @@
-"""What the gaps of contact pairs are measured between, and by how much flat facets would miss it."""
+"""Between which surfaces the gaps of contact pairs are measured, and the error of flat facets."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from fenics_contact.surfaces import FacetedSurface, heights, project
 if TYPE_CHECKING:
     from fenics_contact.scene.parts import SceneParts
 
-#: Nodes of a slave that are looked at, those nearest to the master.
+#: Number of slave nodes that are examined, those nearest to the master.
 MOST = 2000
 
 
 @dataclass(frozen=True)
 class PairGeometry:
-    """What gaps of a contact pair are measured between, and by how much flat facets miss that.
+    """Between which surfaces the gaps of a contact pair are measured, and the error of flat facets.
 
     Attributes:
         slave: The slave's surface: the name of its shape (``"Torus"``), ``"reconstructed"``, ``"flat"`` where
-            a surface through the nodes is that of the facets, or ``"facets"`` where these were asked for.
+            a surface through the nodes is that of the facets, or ``"facets"`` where these were requested.
         master: The same of the master; of a rigid obstacle the name of its class.
-        height: Largest height of the true surface over the middles of its facets, [length], where the gap is
-            larger than the smallest one by no more than the approach; everywhere if that is not known. Of the
-            master, and with mortar contact of the slave, too; zero on obstacles: nodes lie on true surfaces.
+        height: Largest height of the true surface over the middles of its facets, [length], where the gap
+            exceeds the smallest one by no more than the approach; everywhere if that is unknown. Of the
+            master and, with mortar contact, also of the slave; zero on obstacles: nodes lie on true surfaces.
         approach: Estimate of how far the bodies come closer, [length]: by Hertz's theory under the largest
             resultant of the loads on one body, or by the largest displacement along the normal that a support
-            prescribes, if that is larger. None if neither can be said.
+            prescribes, if that is larger. None if neither is known.
     """
 
     slave: str
@@ -44,11 +44,11 @@ class PairGeometry:
 
     @property
     def share(self) -> float | None:
-        """By how much facets miss the surfaces, relative to the approach; None if that is not known."""
+        """Error of the facets relative to the approach; None if that is unknown."""
         return None if not self.approach else self.height / self.approach
 
     def __str__(self) -> str:
-        """Say it in one line."""
+        """Describe it in one line."""
         words = f"{self.slave} on {self.master}; facets "
         if self.height == 0.0:
             return words + "miss nothing"
@@ -76,7 +76,7 @@ class _Meeting:
 
 
 def pair_geometry(scene: SceneParts, pair: ContactPair) -> PairGeometry:
-    """Tell what the gaps of a pair are measured between."""
+    """Return between which surfaces the gaps of a pair are measured."""
     geometry = "best" if pair.geometry == "faceted" else pair.geometry
     slave = surface_of(scene, pair.slave, geometry)
     name = _name(scene, pair, pair.slave, slave)
@@ -134,7 +134,7 @@ def _approach(scene: SceneParts, pair: ContactPair, slave: FacetedSurface, met: 
     sizes = [displacement_along(scene, normal)]
     force, modulus = force_along(scene, normal), modulus_of(scene, pair)
     if force is not None and modulus is not None:
-        # Each plane of symmetry through the spot cuts the force in half.
+        # Each plane of symmetry through the contact halves the force.
         whole = force * 2.0 ** np.count_nonzero(slave.mirrored[node])
         sizes.append(hertz_approach(whole, modulus, slave.points[met.node], met.normal, met.gap) or 0.0)
     return max(sizes) or None

@@ -1,4 +1,4 @@
-"""Who may touch whom, with which friction, and who is bonded to whom."""
+"""Contact pairs with their friction laws, and tied surfaces."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene.obstacles import RigidObstacle
 from fenics_contact.surfaces import Geometry
 
-#: Where the contact conditions are asked: at the slave's nodes, or weighted by its shape functions (mortar).
+#: Where contact is enforced: at the slave's nodes, or weighted by its shape functions (mortar).
 Discretisation: TypeAlias = Literal["node", "mortar"]
 
 
@@ -46,7 +46,7 @@ class Coulomb:
         if not (np.isfinite(self.friction_coefficient) and self.friction_coefficient >= 0):
             raise InvalidInputError(
                 f"friction_coefficient must be zero or positive, got {self.friction_coefficient!r}: "
-                "steel on steel has about 0.3; leave friction away for a frictionless pair"
+                "steel on steel has about 0.3; omit friction for a frictionless pair"
             )
 
 
@@ -55,8 +55,8 @@ class Coulomb:
 class Tresca:
     """Friction with a slip bound that does not depend on the pressure.
 
-    Not on whether there is any, either: it also acts on points across an open gap, as in the classical
-    problem with given friction. Use it where surfaces are known to touch.
+    It also acts on points across an open gap, as in the classical problem with given friction. Use it where
+    surfaces are known to touch.
 
     Attributes:
         traction: Largest tangential traction, ≥ 0, [force / length²].
@@ -69,7 +69,7 @@ class Tresca:
         if not (np.isfinite(self.traction) and self.traction >= 0):
             raise InvalidInputError(
                 f"Tresca.traction must be zero or positive, got {self.traction!r}: give the largest "
-                "tangential force a unit of area that the surfaces can carry"
+                "tangential force per unit area that the surfaces can carry"
             )
 
 
@@ -80,23 +80,23 @@ Friction: TypeAlias = Coulomb | Tresca | None
 @dataclass(frozen=True)
 @checked()
 class ContactPair:
-    """Two surfaces that may touch. The slave is kept out of the master.
+    """Two surfaces that may touch. The slave may not penetrate the master.
 
     Attributes:
         slave: Surface whose nodes carry the contact forces: the finer or softer one.
         master: Surface of another body, or a rigid obstacle.
         friction: Law of friction; without one (None) contact is frictionless.
-        discretisation: ``"node"`` keeps every slave node out of its master facet; ``"mortar"`` keeps weighted
-            means of the gap positive. The former is simple, and what shape derivatives know. The latter (dual
+        discretisation: ``"node"`` keeps the gap of every slave node non-negative; ``"mortar"`` does so for
+            weighted means of the gap. The former is simple and supports shape derivatives. The latter (dual
             basis, integration over the common segments of both meshes) passes the contact patch test on
-            meshes that do not match. Nodes are kept off a rigid obstacle one by one, whatever is given.
+            non-matching meshes. Contact with a rigid obstacle is always nodal.
         geometry: What gaps and normals are measured between: ``"best"``, true shapes that the meshes know,
             else smooth surfaces through the nodes; ``"reconstructed"``, always the latter; ``"faceted"``, the
             flat facets, for comparison. Between round bodies the error of facets is often larger than the
             approach of the bodies. For the shapes of meshes see `BodyMesh`.
 
     Raises:
-        InvalidInputError: If a body shall touch itself, or the discretisation or geometry is unknown.
+        InvalidInputError: If a body is paired with itself, or the discretisation or geometry is unknown.
 
     Example:
         >>> pair = ContactPair(Surface("punch", "bottom"), Surface("block", "z1"), Coulomb(0.3), "mortar")
@@ -111,7 +111,7 @@ class ContactPair:
     geometry: Geometry = "best"
 
     def __post_init__(self) -> None:
-        """Refuse self-contact by name."""
+        """Reject self-contact."""
         if isinstance(self.master, Surface) and self.master.body == self.slave.body:
             raise InvalidInputError(
                 f"contact of body {self.slave.body!r} with itself is not supported: "
@@ -130,16 +130,16 @@ class ContactPair:
 @dataclass(frozen=True)
 @checked()
 class Tie:
-    """Two surfaces that stay together: they neither part nor, unless they may slide, shift.
+    """Two surfaces that stay together: they neither separate nor, unless `sliding`, shift.
 
-    What lies between them at the start, a gap of their meshes, stays as it is.
+    An initial gap between their meshes stays as it is.
 
     Attributes:
         slave: Surface whose nodes carry the forces; the finer mesh is the better slave.
         master: Surface of another body.
-        sliding: Whether the surfaces may shift along each other: contact known to be closed.
-        discretisation: ``"node"`` ties every slave node to its master facet, ``"mortar"`` weighted means. See
-            `ContactPair`.
+        sliding: Whether the surfaces may slide along each other: contact known to be closed.
+        discretisation: ``"node"`` ties every slave node to its master facet, ``"mortar"`` ties weighted
+            means. See `ContactPair`.
     """
 
     slave: Surface
@@ -148,7 +148,7 @@ class Tie:
     discretisation: Discretisation = "mortar"
 
     def __post_init__(self) -> None:
-        """Refuse a body that is tied to itself."""
+        """Reject a body that is tied to itself."""
         if self.master.body == self.slave.body:
             raise InvalidInputError(
                 f"body {self.slave.body!r} cannot be tied to itself: a tie joins two bodies; mesh its parts "

@@ -1,4 +1,4 @@
-"""The parts of a scene, and that they fit together."""
+"""The parts of a scene, and the checks that they fit together."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from fenics_contact.scene.supports import Support
 @dataclass(frozen=True)
 @checked()
 class SceneParts:
-    """What a `Scene` consists of; its attributes are told there."""
+    """The parts of a `Scene`; its attributes are documented there."""
 
     bodies: Mapping[str, Body]
     supports: Sequence[Support] = field(default=())
@@ -31,7 +31,7 @@ class SceneParts:
     ties: Sequence[Tie] = field(default=())
 
     def __post_init__(self) -> None:
-        """Refuse names that point to nothing, and loads and supports that do not suit their bodies."""
+        """Reject names that do not exist, and loads and supports that do not suit their bodies."""
         if not self.bodies:
             raise InvalidInputError(
                 "a scene needs at least one body, got none: pass bodies={'name': Body(...)}"
@@ -67,7 +67,7 @@ class SceneParts:
             )
 
     def _require_components(self, part: Load | Support) -> None:
-        """Refuse a vector of another dimension than its body's."""
+        """Reject a vector whose dimension is not that of its body."""
         dim = self.bodies[part.body].mesh.dim
         if isinstance(part.value, tuple) and len(part.value) != dim:
             needed = "two entries, for x and y, as the body is plane" if dim == 2 else "three, for x, y and z"
@@ -77,7 +77,7 @@ class SceneParts:
             )
 
     def _require_dimension(self, obstacle: RigidObstacle) -> None:
-        """Refuse an obstacle of another dimension than the bodies'; one that does not tell may be of any."""
+        """Reject an obstacle whose dimension, if it has one, is not that of the bodies."""
         dim = getattr(obstacle, "dim", self.dim)
         if dim != self.dim:
             raise InvalidInputError(
@@ -87,7 +87,7 @@ class SceneParts:
             )
 
     def _require_linear(self, slave: Surface, master: Surface, discretisation: str, kind: str) -> None:
-        """Refuse mortar coupling of quadratic facets."""
+        """Reject mortar coupling of quadratic facets."""
         orders = {surface.name: self.bodies[surface.body].mesh.order for surface in (slave, master)}
         if discretisation == "mortar" and max(orders.values()) > 1:
             raise InvalidInputError(
@@ -110,7 +110,7 @@ class SceneParts:
         return int(next(iter(self.bodies.values())).mesh.points.shape[1])
 
     def fixed(self, body: str) -> np.ndarray:
-        """Return whether supports prescribe a component of a body's node, shape (n_nodes, dim)."""
+        """Return which components of a body's nodes supports prescribe, shape (n_nodes, dim)."""
         mesh = self.bodies[body].mesh
         marks = np.zeros(mesh.points.shape, dtype=bool)
         for support in self.supports:
@@ -142,7 +142,7 @@ class SceneParts:
         return self._with_meshes({name: self.bodies[name].mesh.moved(x) for name, x in points.items()})
 
     def reshaped(self, points: Mapping[str, np.ndarray]) -> Self:
-        """Return the scene with slightly other coordinates, which surfaces follow, see `BodyMesh.reshaped`.
+        """Return the scene with slightly changed coordinates; surfaces follow, see `BodyMesh.reshaped`.
 
         Args:
             points: Body name -> coordinates, shape (n_nodes, dim), [length].

@@ -19,12 +19,12 @@ from fenics_contact.scene.pairs import Surface
 if TYPE_CHECKING:
     from fenics_contact.scene.parts import SceneParts
 
-#: Bytes for each torn unknown beside the factors: meshes, rows of B, vectors and their history.
+#: Bytes per torn unknown besides the factors: meshes, rows of B, vectors and their history.
 BYTES_PER_UNKNOWN = 1200
 
 
 class SolverKind(StrEnum):
-    """How the equilibrium is found."""
+    """How the equilibrium is computed."""
 
     DIRECT = "sparse factorisation of one body"
     PROJECTED_CG = "projected conjugate gradients"
@@ -42,21 +42,21 @@ class ConeKind(StrEnum):
 
 @dataclass(frozen=True)
 class Plan:
-    """What the solution of a scene needs, and nothing else will be built.
+    """What the solution of a scene needs; nothing else is built.
 
     Attributes:
-        effects: What the scene calls for.
+        effects: The effects in the scene.
         subdomains: Subdomains of all bodies.
         unknowns: Displacement unknowns of all subdomains.
         multipliers: Number of multipliers by kind; those of ties and contact are upper bounds, as only nodes
-            that meet their master get one.
-        solver: How the equilibrium is found.
+            that face their master have one.
+        solver: How the equilibrium is computed.
         cone: Which inequalities the multipliers obey.
         fixed_point: Whether slip bounds follow the normal forces (Coulomb's law).
         coarse_motions: Rigid motions of the subdomains, the size of the coarse problem; 0 without one.
-        adjoint: Whether sensitivities are asked for, which need one adjoint solve a design.
+        adjoint: Whether sensitivities are requested, which need one adjoint solve per design.
         memory: Expected memory of all ranks together without their libraries, [bytes].
-        contacts: What the gaps of each contact pair are measured between.
+        contacts: Between which surfaces the gaps of each contact pair are measured.
     """
 
     effects: tuple[Effect, ...]
@@ -84,7 +84,7 @@ class Plan:
             "cone": self.cone.value,
             "slip bounds": bounds if self.cone in (ConeKind.DISCS, ConeKind.COULOMB) else "none",
             "coarse problem": coarse,
-            "adjoint": "one solve a design" if self.adjoint else "none",
+            "adjoint": "one solve per design" if self.adjoint else "none",
             "memory": f"{self.memory / 1e6:.0f} MB",
             **{f"pair {number}": str(pair) for number, pair in enumerate(self.contacts)},
         }
@@ -125,16 +125,16 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
 
 
 def choose_solver(scene: SceneParts, subdomains: int, *, sensitivity: bool = False) -> SolverKind:
-    """Return how the equilibrium of a scene is found.
+    """Return how the equilibrium of a scene is computed.
 
     Args:
         scene: The scene.
         subdomains: Subdomains of all bodies.
-        sensitivity: Whether derivatives are wanted, which live on the dual system.
+        sensitivity: Whether derivatives are wanted, which need the dual system.
     """
     if EffectName.CONTACT in {effect.name for effect in effects_of(scene)}:
         return SolverKind.FACE_NEWTON
-    # A body that its supports do not hold alone has a singular stiffness.
+    # A body that its supports alone do not hold has a singular stiffness.
     if subdomains == 1 and not sensitivity and held_by_supports(scene, scene.body_names[0]):
         return SolverKind.DIRECT
     return SolverKind.PROJECTED_CG

@@ -1,4 +1,4 @@
-"""A scene: bodies, what holds and loads them, and who may touch whom. Nothing numerical has happened yet."""
+"""A scene: bodies, supports, loads and contact pairs. Nothing numerical has happened yet."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Scene(SceneParts):
 
     Raises:
         InvalidInputError: If a part names a body or a surface that is not there, does not suit the body's
-            dimension or material, or a load is none of the package's.
+            dimension or material, or a load is not one of the package's.
 
     Example:
         >>> from fenics_contact.gallery import block
@@ -44,7 +44,7 @@ class Scene(SceneParts):
     """
 
     def partition(self, ranks: int = 1) -> dict[str, np.ndarray]:
-        """Cut every body into subdomains of a good size.
+        """Cut every body into subdomains of a suitable size.
 
         Args:
             ranks: Number of ranks that need a subdomain each.
@@ -56,7 +56,7 @@ class Scene(SceneParts):
         return {name: default_partition(body.mesh, each, body=name) for name, body in self.bodies.items()}
 
     def effects(self) -> tuple[Effect, ...]:
-        """List what the scene calls for; whatever is not listed is not built."""
+        """List the effects in the scene; only what these need is built."""
         return effects_of(self)
 
     def plan(
@@ -66,7 +66,7 @@ class Scene(SceneParts):
         ranks: int = 1,
         sensitivity: bool = False,
     ) -> Plan:
-        """Tell what will be built: unknowns, multipliers, solver, memory.
+        """Return what will be built: unknowns, multipliers, solver, memory.
 
         Args:
             partitions: Body name -> subdomain of every cell; by default what `partition` returns.

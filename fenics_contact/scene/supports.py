@@ -10,7 +10,8 @@ from fenics_contact.checks import checked
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene.values import OfPosition, evaluate
 
-#: What a support does with one component: leave it free, give it a number, or a function of the points.
+#: What a support does with one component: leave it free (None), or prescribe a number or a function of the
+#: points.
 Component = float | OfPosition | None
 
 
@@ -23,10 +24,10 @@ class Support:
         body: Name of the body.
         surface: Name of its surface.
         value: Displacement [length] for x, y, z (for x, y on a plane body). None leaves a component free; a
-            function gets points, shape (n, dim), and returns the component there, shape (n,).
+            function receives points, shape (n, dim), and returns the component there, shape (n,).
 
     Raises:
-        InvalidInputError: If nothing is prescribed, or something that is no finite number and no function.
+        InvalidInputError: If nothing is prescribed, or something other than a finite number or a function.
 
     Example:
         >>> clamped = Support("block", "x0")
@@ -39,7 +40,7 @@ class Support:
     value: tuple[Component, ...] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        """Refuse a support that prescribes nothing or something that is no number."""
+        """Reject a support that prescribes nothing or something other than a number."""
         given = [component for component in self.value if component is not None]
         numbers = [component for component in given if not callable(component)]
         if len(self.value) not in (2, 3) or not given or not np.all(np.isfinite(numbers)):
@@ -65,7 +66,7 @@ class Support:
             Shape (n, dim), [length].
 
         Raises:
-            InvalidInputError: If a function returns something else than a finite number a point.
+            InvalidInputError: If a function does not return one finite number per point.
         """
         result = np.full(points.shape, np.nan)
         for component, given in enumerate(self.value):

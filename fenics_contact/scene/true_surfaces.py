@@ -20,8 +20,8 @@ def surface_of(
     Args:
         scene: The scene.
         surface: The surface.
-        geometry: What is taken for it between its nodes, see `ContactPair`.
-        finer: Take what is known better than that, see `true_surface`.
+        geometry: How it is represented between its nodes, see `ContactPair`.
+        finer: Use a better representation than that if there is one, see `true_surface`.
     """
     mesh = scene.bodies[surface.body].mesh
     return true_surface(mesh, surface.name, geometry, mirrored=mirrored(scene, surface.body), finer=finer)

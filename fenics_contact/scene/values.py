@@ -1,4 +1,4 @@
-"""What a load or a support may be given as: numbers, a function of position, or UFL."""
+"""Values of loads and supports: numbers, functions of position, or UFL."""
 
 from __future__ import annotations
 
@@ -21,13 +21,14 @@ class Ufl:
     """A value written in UFL: compiled into the form and evaluated at its quadrature points.
 
     Numbers in it are compiled in, too: for a load that changes from step to step a function of position,
-    which needs no compiler, is cheaper. Only numbers and UFL can be differentiated by the shape of a body.
+    which needs no compiler, is cheaper. Only numbers and UFL can be differentiated with respect to the shape
+    of a body.
 
     Attributes:
         function: Takes the spatial coordinate (UFL), returns a UFL vector or scalar.
 
     Example:
-        Water that presses harder with depth:
+        Hydrostatic pressure:
 
         >>> Pressure("dam", "front", Ufl(lambda x: 9.81e-6 * (2e4 - x[2]))).surface
         'front'
@@ -46,7 +47,7 @@ def checked_vector(name: str, value: Any) -> Any:
     """Return numbers as a tuple of floats, a function or UFL as it is.
 
     Raises:
-        InvalidInputError: If it is no vector of a plane or of space.
+        InvalidInputError: If it is not a vector of two or three components.
     """
     if isinstance(value, Ufl) or callable(value):
         return value
@@ -87,22 +88,22 @@ def evaluate(name: str, function: OfPosition, points: np.ndarray, shape: tuple[i
     """Evaluate a function of position.
 
     Args:
-        name: What the values are, for the message.
+        name: Name of the values in messages.
         function: The function.
-        points: Where, shape (n, dim), [length].
+        points: Points, shape (n, dim), [length].
         shape: Shape of one value: () or (dim,).
 
     Raises:
-        InvalidInputError: If it returns another shape or something that is no number.
+        InvalidInputError: If it returns another shape or something other than finite numbers.
         UserCodeError: If it raises.
     """
     with calling(f"the function given as {name}"):
         found = _floats(function(points.copy()))
     wanted = (len(points), *shape)
     if found is None or found.shape != wanted:
-        given = "something that is no finite number" if found is None else f"shape {found.shape}"
+        given = "something other than finite numbers" if found is None else f"shape {found.shape}"
         raise InvalidInputError(
             f"the function given as {name} must return finite numbers of shape {wanted} for points of shape "
-            f"{points.shape}, got {given}: it gets all points at once, a row each"
+            f"{points.shape}, got {given}: it receives all points at once, one row each"
         )
     return found

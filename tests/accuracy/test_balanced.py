@@ -183,7 +183,7 @@ def test_a_good_solution_is_kept_where_the_solver_cannot_reach_a_better_one() ->
     state = solve_scene(
         scene, MPI.COMM_SELF, partitions=CASES[PAIR].cut(scene), solver=solver, tolerance=tolerance
     )
-    assert "1.0e-10 was not reached, this is kept" in remarks(state)[-1]
+    assert "1.0e-10 was not reached, this is accepted" in remarks(state)[-1]
     assert state.dual_solution.residuals.within(1e-7)
 
 

@@ -40,7 +40,7 @@ MODULI = ("young_modulus", "young_moduli", "shear_modulus", "shear_moduli")
 def in_units(scene: Scene, length: float, force: float) -> Scene:
     """Return the scene in other units: a length of 1 becomes ``length``, a force of 1 becomes ``force``.
 
-    In the plane forces count a unit of thickness, which is one of the old units and of the new ones.
+    In the plane forces are per unit of thickness, which is one in the old units and in the new ones.
     """
     area = length ** (scene.dim - 1)
     bodies = {name: _body_in_units(body, length, force / area) for name, body in scene.bodies.items()}

@@ -148,7 +148,7 @@ def test_loads_are_equal_when_their_numbers_or_functions_are() -> None:
         ),
         (
             BodyForce("cell", lambda points: points / 0),
-            r"something that is no finite number: it gets all points",
+            r"something other than finite numbers: it receives all points",
         ),
         (
             BodyForce("cell", Ufl(lambda x: x[0])),
@@ -196,7 +196,7 @@ def test_scalar_loads_must_be_numbers_or_functions() -> None:
     ):
         ThermalStrain("body", float("nan"))
     with pytest.raises(
-        InvalidInputError, match=r"TotalForce.value must be numbers, got .*: a resultant has no pl"
+        InvalidInputError, match=r"TotalForce.value must be numbers, got .*: a resultant cannot depend on pos"
     ):
         TotalForce("body", "x1", lambda points: points)  # type: ignore[arg-type]
 

@@ -41,5 +41,5 @@ def test_regions_of_a_file_get_their_own_materials() -> None:
 def test_a_body_without_material_and_a_material_without_body_are_refused() -> None:
     with pytest.raises(InvalidInputError, match=r"'pad' has none of \['link \*'\]: name it, or give"):
         bodies_from(MESHES, {"link *": STEEL})
-    with pytest.raises(InvalidInputError, match=r"'lnk' fits none of \['link 1', 'link 2', 'pad'\]: check"):
+    with pytest.raises(InvalidInputError, match=r"'lnk' matches none of \['link 1', 'link 2', 'pad'\]"):
         bodies_from(MESHES, {"*": STEEL, "lnk": RUBBER})

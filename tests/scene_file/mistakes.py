@@ -149,7 +149,7 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         f"value = [1{'0' * 400},",
         "scene.toml, line 35: loads.0.value must be three numbers or formulas in brackets, for x, y "
         "and z (two for a plane body), got [10000000000000000000000000000000000000000000000000000000...: "
-        "force a reference area, [force / length²] (in the plane: a unit of thickness); numbers, or "
+        "force per reference area, [force / length²] (in the plane: per unit of thickness); numbers, or "
         "formulas in x, y, z in quotes",
     ),
     "a count has four hundred digits": (

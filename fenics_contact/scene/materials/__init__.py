@@ -1,4 +1,4 @@
-"""Physics models: what a body is made of, written in UFL."""
+"""Material models, written in UFL."""
 
 from fenics_contact.scene.materials.elasticity import Elasticity, strain
 from fenics_contact.scene.materials.energy import EnergyModel

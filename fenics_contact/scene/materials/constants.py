@@ -1,4 +1,4 @@
-"""Checks of engineering constants, and what they are converted to."""
+"""Checks and conversions of engineering constants."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fenics_contact.errors import InvalidInputError
 
 
 def check_isotropic(young_modulus: float, poisson_ratio: float, thermal_expansion: float | None) -> None:
-    """Refuse constants for which the energy is not positive."""
+    """Reject constants for which the strain energy is not positive."""
     if not (np.isfinite(young_modulus) and young_modulus > 0):
         raise InvalidInputError(
             f"young_modulus must be a positive number, got {young_modulus!r}: "
@@ -23,8 +23,8 @@ def check_isotropic(young_modulus: float, poisson_ratio: float, thermal_expansio
         )
     if thermal_expansion is not None and not np.isfinite(thermal_expansion):
         raise InvalidInputError(
-            f"thermal_expansion must be a finite number or None, got {thermal_expansion!r}: give the strain "
-            "a degree, for steel 1.2e-5"
+            f"thermal_expansion must be a finite number or None, got {thermal_expansion!r}: give the "
+            "strain per degree, for steel 1.2e-5"
         )
 
 
@@ -38,7 +38,7 @@ def numbers(name: str, values: Sequence[float], count: int, meaning: str) -> tup
     """Return ``count`` finite numbers as floats.
 
     Raises:
-        InvalidInputError: If they are something else; ``meaning`` ends the message.
+        InvalidInputError: If they are not; ``meaning`` ends the message.
     """
     try:
         found = np.asarray(values, dtype=np.float64)

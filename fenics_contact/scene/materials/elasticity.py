@@ -1,4 +1,4 @@
-"""The base of small-strain elastic models: the stress is all there is to write."""
+"""The base of small-strain elastic models: only the stress has to be written."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ def strain(u: Any) -> Any:
 class Elasticity(ABC):
     """Elasticity with work σ(u) : ε(v) and rigid motions as its kernel; write `parameters` and `stress`.
 
-    A plane model that carries stress normal to its plane adds the members of `Transverse`, or its von Mises
-    stress is that of plane stress. A model that expands adds those of `Thermoelastic`.
+    A plane model with stress normal to its plane adds the members of `Transverse`; otherwise its von Mises
+    stress is that of plane stress. A model with thermal expansion adds those of `Thermoelastic`.
 
     Example:
-        Two moduli chosen apart, in the plane or in space:
+        Two independent moduli, in the plane or in space:
 
         >>> from dataclasses import dataclass
         >>> import ufl
@@ -45,7 +45,7 @@ class Elasticity(ABC):
 
     @property
     def dims(self) -> tuple[int, ...]:
-        """Plane bodies and bodies in space, if a model does not say otherwise."""
+        """Plane bodies and bodies in space, unless a model overrides it."""
         return (2, 3)
 
     @property

@@ -15,7 +15,7 @@ from fenics_contact.scene.materials.elasticity import Elasticity, strain
 
 
 class EnergyModel(Elasticity):
-    """Elasticity given by its energy a volume, W(ε), a quadratic function; write `parameters` and `energy`.
+    """Elasticity given by its energy density W(ε), a quadratic function; write `parameters` and `energy`.
 
     The stress is ∂W/∂ε and the stiffness ∂²W/∂ε², both by UFL.
 
@@ -40,7 +40,7 @@ class EnergyModel(Elasticity):
 
     @abstractmethod
     def energy(self, strain: Any, parameters: Any) -> Any:
-        """Return the energy a volume (UFL scalar) of a strain tensor (dim x dim, UFL), quadratic in it."""
+        """Return the energy density (UFL scalar) of a strain tensor (dim x dim, UFL), quadratic in it."""
 
     def stress(self, u: Any, parameters: Any) -> Any:
         """Return ∂W/∂ε at ε(u).
@@ -69,7 +69,7 @@ class EnergyModel(Elasticity):
         return ufl.as_tensor(0.5 * (left[i, j, k, l] + left[i, j, l, k]), (i, j, k, l))
 
     def _is_quadratic(self, dim: int) -> bool:
-        """Try the parallelogram law, which quadratic forms alone obey."""
+        """Test the parallelogram law, which only quadratic forms satisfy."""
 
         def energy(epsilon: np.ndarray) -> float:
             symmetric = ufl.as_matrix((epsilon + epsilon.T).tolist())

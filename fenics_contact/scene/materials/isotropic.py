@@ -1,4 +1,4 @@
-"""Isotropic elasticity: what all isotropic models share, and the one in space."""
+"""Isotropic elasticity: the common base of all isotropic models, and the model in space."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Isotropic(Elasticity):
     thermal_expansion: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse constants for which the energy is not positive."""
+        """Reject constants for which the strain energy is not positive."""
         check_isotropic(self.young_modulus, self.poisson_ratio, self.thermal_expansion)
 
     @property
@@ -43,12 +43,12 @@ class IsotropicElasticity(Isotropic):
     Attributes:
         young_modulus: Young's modulus E > 0, [force / length²].
         poisson_ratio: Poisson's ratio ν in (−1, 0.5), dimensionless.
-        thermal_expansion: Thermal expansion α, strain a degree. None for a body that no temperature changes.
+        thermal_expansion: Thermal expansion α, strain per degree. None for a body without thermal strain.
     """
 
     @property
     def dims(self) -> tuple[int, ...]:
-        """Bodies in space; in the plane `PlaneStrain` and `PlaneStress` tell the two cases apart."""
+        """Bodies in space; in the plane use `PlaneStrain` or `PlaneStress`."""
         return (3,)
 
     @property

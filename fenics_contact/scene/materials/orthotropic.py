@@ -31,7 +31,7 @@ def material_axes(first: Sequence[float], second: Sequence[float]) -> tuple[Trip
 
     Args:
         first: Direction of the first material axis, any length.
-        second: A direction in the plane of the first two axes; what it has along the first is taken off.
+        second: A direction in the plane of the first two axes; its component along the first is removed.
 
     Returns:
         The three material axes as rows, orthonormal and right-handed.
@@ -60,16 +60,16 @@ def material_axes(first: Sequence[float], second: Sequence[float]) -> tuple[Trip
 class OrthotropicElasticity(Elasticity):
     """Small-strain orthotropic elasticity in space from nine engineering constants in material axes.
 
-    The constants are those of tests along the material axes 1, 2, 3: ν_ij is the contraction along j under
-    tension along i.
+    The constants are those of uniaxial tests along the material axes 1, 2, 3: ν_ij is the contraction along j
+    under tension along i.
 
     Attributes:
         young_moduli: E_1, E_2, E_3 > 0, [force / length²].
         poisson_ratios: ν_12, ν_13, ν_23, dimensionless.
         shear_moduli: G_12, G_13, G_23 > 0, [force / length²].
         orientation: Material axes as rows of a rotation matrix; see `material_axes`.
-        thermal_expansion: Thermal expansion, strain a degree along the material axes. None for a body that no
-            temperature changes.
+        thermal_expansion: Thermal expansion, strain per degree along the material axes. None for a body
+            without thermal strain.
     """
 
     young_moduli: Triple
@@ -79,7 +79,7 @@ class OrthotropicElasticity(Elasticity):
     thermal_expansion: Triple | None = None
 
     def __post_init__(self) -> None:
-        """Refuse constants for which the energy is not positive and axes that are no rotation."""
+        """Reject constants for which the strain energy is not positive, and axes that are not a rotation."""
         order = "give those of the axes 1, 2, 3 (pairs 12, 13, 23)"
         for name in ("young_moduli", "poisson_ratios", "shear_moduli"):
             object.__setattr__(self, name, numbers(name, getattr(self, name), 3, order))
@@ -126,7 +126,7 @@ class OrthotropicElasticity(Elasticity):
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """Upper triangle of the stiffness matrix, and the thermal stress a degree where it was given."""
+        """Upper triangle of the stiffness matrix, and the thermal stress per degree where it was given."""
         C = self.stiffness_matrix
         return upper_triangle(C) + thermal_stresses(C, np.array(self.orientation), self.thermal_expansion)
 
@@ -149,8 +149,8 @@ class OrthotropicPlaneStress(Elasticity):
         poisson_ratio: ν_12, dimensionless.
         shear_modulus: G_12 > 0, [force / length²].
         angle: From the x-axis to material axis 1, counterclockwise, in radians.
-        thermal_expansion: Thermal expansion, strain a degree along the material axes. None for a body that no
-            temperature changes.
+        thermal_expansion: Thermal expansion, strain per degree along the material axes. None for a body
+            without thermal strain.
     """
 
     young_moduli: tuple[float, float]
@@ -160,7 +160,7 @@ class OrthotropicPlaneStress(Elasticity):
     thermal_expansion: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse constants for which the energy is not positive."""
+        """Reject constants for which the strain energy is not positive."""
         moduli = numbers("young_moduli", self.young_moduli, 2, "give those of the axes 1 and 2")
         object.__setattr__(self, "young_moduli", moduli)
         if self.thermal_expansion is not None:
@@ -200,7 +200,7 @@ class OrthotropicPlaneStress(Elasticity):
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """Upper triangle of the stiffness matrix, and the thermal stress a degree where it was given."""
+        """Upper triangle of the stiffness matrix, and the thermal stress per degree where it was given."""
         C = self.stiffness_matrix
         return upper_triangle(C) + thermal_stresses(C, self._axes, self.thermal_expansion)
 

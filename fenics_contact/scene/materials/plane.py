@@ -1,4 +1,4 @@
-"""Isotropic elasticity of plane bodies: plane strain and plane stress. Forces count a unit of thickness."""
+"""Isotropic elasticity of plane bodies: plane strain and plane stress. Forces are per unit of thickness."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class PlaneStrain(Isotropic):
     Attributes:
         young_modulus: Young's modulus E > 0, [force / length²].
         poisson_ratio: Poisson's ratio ν in (−1, 0.5), dimensionless.
-        thermal_expansion: Thermal expansion α, strain a degree. None for a body that no temperature changes.
+        thermal_expansion: Thermal expansion α, strain per degree. None for a body without thermal strain.
     """
 
     @property
@@ -57,7 +57,7 @@ class PlaneStress(Isotropic):
     Attributes:
         young_modulus: Young's modulus E > 0, [force / length²].
         poisson_ratio: Poisson's ratio ν in (−1, 0.5), dimensionless.
-        thermal_expansion: Thermal expansion α, strain a degree. None for a body that no temperature changes.
+        thermal_expansion: Thermal expansion α, strain per degree. None for a body without thermal strain.
     """
 
     @property

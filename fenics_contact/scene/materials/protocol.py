@@ -1,4 +1,4 @@
-"""What a physics model must provide."""
+"""What a material model must provide."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Material(Protocol):
         """Return the stress tensor (dim x dim, UFL) of the displacement ``u``."""
 
     def stiffness(self, u: Any, v: Any, parameters: Any) -> Any:
-        """Return the integrand of the symmetric bilinear form, virtual work a volume (UFL scalar)."""
+        """Return the integrand of the symmetric bilinear form, virtual work per volume (UFL scalar)."""
 
     def kernel(self, points: np.ndarray) -> np.ndarray:
         """Return the zero-energy modes at ``points``, shape (n, dim) -> (n, dim, n_modes)."""
@@ -36,14 +36,14 @@ class Material(Protocol):
 
 @runtime_checkable
 class Thermoelastic(Protocol):
-    """What a material must provide beside for `ThermalStrain` to act on it."""
+    """What a material must provide in addition for `ThermalStrain` to act on it."""
 
     @property
     def expands(self) -> bool:
         """Whether this material was given a thermal expansion."""
 
     def thermal_stress(self, parameters: Any) -> Any:
-        """Return the stress that a temperature rise by one degree loses to expansion (dim x dim, UFL).
+        """Return the stress that free expansion relieves per degree of temperature rise (dim x dim, UFL).
 
         σ = stress(u) − ΔT · thermal_stress; for an isotropic body (3λ + 2G) α I.
         """
@@ -51,13 +51,13 @@ class Thermoelastic(Protocol):
 
 @runtime_checkable
 class Transverse(Protocol):
-    """What a plane model provides beside if it carries stress normal to its plane (plane strain)."""
+    """What a plane model provides in addition if it has stress normal to its plane (plane strain)."""
 
     def transverse_stress(self, u: Any, parameters: Any) -> Any:
         """Return the stress normal to the plane (UFL scalar), without thermal strain."""
 
     def transverse_thermal_stress(self, parameters: Any) -> Any:
-        """Return what a temperature rise by one degree takes from it (UFL scalar)."""
+        """Return by how much it falls per degree of temperature rise (UFL scalar)."""
 
 
 def can_expand(material: Material) -> bool:

@@ -37,7 +37,7 @@ def symmetric_product(entries: Any, vector: list[Any]) -> list[Any]:
 
 
 def rotated_stiffness(C: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    """Turn a stiffness matrix from material axes to those of the scene.
+    """Rotate a stiffness matrix from material axes to those of the scene.
 
     Args:
         C: Stiffness in material axes, Voigt, shape (6, 6) or (3, 3).
@@ -48,7 +48,7 @@ def rotated_stiffness(C: np.ndarray, axes: np.ndarray) -> np.ndarray:
 
 
 def strain_rotation(axes: np.ndarray) -> np.ndarray:
-    """Return the matrix that turns a strain vector of the scene's axes into material axes."""
+    """Return the matrix that rotates a strain vector from the scene's axes to material axes."""
     dim = len(axes)
     T = np.empty((len(PAIRS[dim]),) * 2)
     for column, (i, j) in enumerate(PAIRS[dim]):
