@@ -1,4 +1,4 @@
-"""The bundle: what is known of the objective, as cutting planes seen from the current centre."""
+"""The bundle: cutting planes of the objective, seen from the current centre."""
 
 from __future__ import annotations
 
@@ -18,19 +18,18 @@ class Bundle:
     below J(x) by the linearisation error α_i = J(x) - J(y_i) - g_i·(x - y_i), which is not
     negative for a convex J. For a nonconvex one a plane far away can lie above J(x); the
     subgradient locality measure β_i = max(\|α_i\|, c s_i²), with the distance s_i travelled since
-    y_i, pushes it below again, the further the older it is. The model at x + y is
-    J(x) + max_i (g_i·y - β_i). Row 0 belongs to the centre itself: α_0 = s_0 = 0, which
-    makes the model exact there.
+    y_i, pushes it below again, the further the older it is. The model at x + y is J(x) + max_i (g_i·y - β_i).
+    Row 0 belongs to the centre itself: α_0 = s_0 = 0, which makes the model exact there.
 
     Attributes:
         gradients: g_i in scaled variables, shape (m, n).
         errors: α_i, shape (m,), units of J.
         distances: s_i in scaled variables, shape (m,).
         locality: c, units of J; 0 for a convex objective.
-        noise: Error e_i of the value that plane i was found with, shape (m,), units of J. A plane may lie too
-            high by e_i, seen from a centre whose value is too low by e_0, and is pushed down by both: an
-            inexact plane promises no less decrease than there may be.
-        doubtful: Marks of planes whose slope may be no subgradient, see `Kinked`, shape (m,).
+        noise: Error e_i of the value of plane i, shape (m,), units of J. A plane may lie too high by e_i,
+            seen from a centre whose value is too low by e_0, and is lowered by both: an inexact plane
+            predicts no less decrease than possible.
+        doubtful: Marks of planes whose slope may not be a subgradient, see `Kinked`, shape (m,).
 
     References:
         K. C. Kiwiel, Methods of Descent for Nondifferentiable Optimization, Lecture Notes in
@@ -49,7 +48,7 @@ class Bundle:
     def of_centre(
         cls, gradient: Array, locality: float, noise: float = 0.0, doubtful: bool = False
     ) -> Bundle:
-        """Return the bundle that holds the centre's own plane alone."""
+        """Return the bundle that holds only the centre's own plane."""
         zero = np.zeros(1)
         return cls(gradient[None], zero, zero, locality, np.array([noise]), np.array([doubtful]))
 
@@ -83,13 +82,13 @@ class Bundle:
         )
 
     def refined(self, gradient: Array, change: float, noise: float, doubtful: bool = False) -> Bundle:
-        """Return the bundle after its centre was evaluated again.
+        """Return the bundle after its centre was re-evaluated.
 
         Args:
             gradient: The centre's subgradient, shape (n,), scaled variables.
             change: Change of the centre's value.
-            noise: Its error now.
-            doubtful: Whether its subgradient may be none.
+            noise: Its new error.
+            doubtful: Whether its slope may not be a subgradient.
         """
         gradients, errors, noises = self.gradients.copy(), self.errors + change, self.noise.copy()
         doubts = self.doubtful.copy()
@@ -118,14 +117,14 @@ class Bundle:
     def reduced(self, weights: Array, room: int) -> Bundle:
         """Return a bundle with at most ``room`` planes that has the same solution of the step's programme.
 
-        Planes that do not carry weight go first, those with the largest locality measure before the
-        others. Where even the carrying ones are too many, their convex combination with
-        ``weights``, the aggregate plane, replaces the lightest of them: it alone keeps the
-        predicted decrease, so that the method converges with any ``room`` of at least two.
+        Planes without weight are dropped first, those with the largest locality measure before the others.
+        Where even the weighted ones are too many, their convex combination with ``weights``, the aggregate
+        plane, replaces the lightest of them: it alone preserves the predicted decrease, so that the method
+        converges with any ``room`` of at least two.
 
         Args:
             weights: Multipliers of the planes, shape (m,), not negative, sum one.
-            room: Most planes to keep, at least two.
+            room: Largest number of planes, at least two.
 
         Returns:
             The reduced bundle; row 0 stays where it is.

@@ -31,8 +31,8 @@ _RADIUS = 3.0  # first trust radius, in lengths of the problem
 _RADIUS_LEAST = 1e-8  # least one, in lengths of the problem
 _T_LEAST, _T_MOST = 1e-10, 1e4  # range of t, in units of the first t
 _FIRST_SUBGRADIENT = 0.01  # relative error that the first subgradient of an inexact function may have
-_SLOPE_SHARE = 0.1  # part of the predicted decrease by which an inexact subgradient may be wrong along a step
-_OF_THE_MODEL = (Reason.CONVERGED, Reason.STATIONARY, Reason.NO_DESCENT)  # what subgradients alone say
+_SLOPE_SHARE = 0.1  # error of an inexact subgradient along a step, relative to the predicted decrease
+_OF_THE_MODEL = (Reason.CONVERGED, Reason.STATIONARY, Reason.NO_DESCENT)  # based on subgradients alone
 _BESIDE = "a gradient from beside, as the centre lies on a kink"
 
 
@@ -45,44 +45,44 @@ class BundleTrust:
         min_{y, v}  v + ‖y‖²/(2t)   s.t.   g_i·y - β_i ≤ v,   x + y feasible,
 
     which predicts the decrease w = -v = σ + t‖z‖², where z = -y/t is the aggregate subgradient (normals of
-    the constraints included) and σ its linearisation error. A trial that brings at least ``descent``·w is
-    a serious step and becomes the centre. Any other is a null step: it leaves the centre, adds its plane
-    and, where that plane says little, shortens t. For a convex J no feasible point within the
-    distance r is lower than J(x) by more than σ + r‖z‖: the certificate.
+    the constraints included) and σ its linearisation error. A trial with a decrease of at least ``descent``·w
+    is a serious step and becomes the centre. Any other is a null step: the centre stays, the trial's plane is
+    added and, where that plane improves the model little, t is reduced. For a convex J no feasible point
+    within the distance r is lower than J(x) by more than σ + r‖z‖: the certificate.
 
     It stops, with a `Reason`,
 
     * CONVERGED where w ≤ ε (s + \|J\|) at the present t and the first one and σ + r‖z‖ ≤ 10 ε (s + \|J\|),
     * STATIONARY where σ + r‖z‖ ≤ ε (s + \|J\|),
-    * ITERATION_LIMIT, EVALUATION_LIMIT where ``max_iterations`` or ``max_evaluations`` are spent,
-    * NO_DESCENT, INVALID_DESIGNS where t or the radius is 0 for practical purposes,
-    * STEP_FAILED where the quadratic programme cannot be solved,
+    * ITERATION_LIMIT, EVALUATION_LIMIT where ``max_iterations`` or ``max_evaluations`` is reached, *
+    NO_DESCENT, INVALID_DESIGNS where t or the radius is practically 0, * STEP_FAILED where the quadratic
+    programme cannot be solved,
 
     with ε ``tolerance``, s ``value_scale`` and r the length of the first step, or of the present one where
     that is longer. On the published convex test functions the error of J at the stop is below ε (s + \|J\|);
-    for a nonconvex one the test asks for stationarity only.
+    for a nonconvex one the test implies only stationarity.
 
-    A function that can be evaluated inexactly (`Inexact`) is asked for no more accuracy than the predicted
-    decrease needs. The centre is evaluated again where that has fallen so far that its error counts, and once
-    more before the method stops: at the end value and subgradient are as good as ε asks.
+    A function that can be evaluated inexactly (`Inexact`) is evaluated no more accurately than the predicted
+    decrease requires. The centre is re-evaluated where that has fallen so far that its error matters, and
+    once more before the method stops: at the end value and subgradient are as accurate as ε requires.
 
-    A function may know points at which it returns something that may be no subgradient (`Kinked`). Where the
-    method would stop on such a thing, the centre is given the gradient beside it, planes of other such points
-    are dropped, and the method goes on; from then on such points are given the gradient beside them at once.
+    A function may know points at which its result may not be a subgradient (`Kinked`). Where the method would
+    stop on such a result, the centre is given the gradient at a nearby point, planes of other such points are
+    dropped, and the method continues; from then on such points are given a nearby gradient at once.
 
     Attributes:
         tolerance: ε, relative stopping tolerance.
-        max_iterations: Most serious steps.
-        max_evaluations: Most evaluations, failed ones included.
-        max_bundle: Most planes kept, at least 3; aggregation keeps the method convergent with few.
-        first_step: Length of the first step, as a part of the length that the problem lives on: half the
-            diagonal of the box, or the larger of 1 and ‖x0/scale‖ where a variable is unbounded.
+        max_iterations: Largest number of serious steps.
+        max_evaluations: Largest number of evaluations, failed ones included.
+        max_bundle: Largest number of planes, at least 3; aggregation keeps the method convergent with few.
+        first_step: Length of the first step relative to the length scale of the problem: half the diagonal of
+            the box, or the larger of 1 and ‖x0/scale‖ where a variable is unbounded.
         locality: Weight of the distance in β_i = max(\|α_i\|, c s_i²), c = locality·‖g‖/length: how fast old
-            planes of a nonconvex J are distrusted. 0 is right, and faster, for a convex J.
-        descent: Part of the predicted decrease that makes a step serious, in (0, 1).
-        inexactness: Errors of J that are asked of an inexact function, as a part of the predicted decrease,
+            planes of a nonconvex J lose influence. 0 is right, and faster, for a convex J.
+        descent: Fraction of the predicted decrease that makes a step serious, in (0, 1).
+        inexactness: Errors of J requested from an inexact function, as a fraction of the predicted decrease,
             less than half of ``descent``.
-        value_scale: Absolute part of the stopping test, for an objective whose least value is about 0.
+        value_scale: Absolute part of the stopping test, for an objective whose minimum is about 0.
         raise_on_failure: Whether a stop for any other reason than CONVERGED or STATIONARY raises.
 
     References:
@@ -104,7 +104,7 @@ class BundleTrust:
     raise_on_failure: bool = True
 
     def __post_init__(self) -> None:
-        """Refuse parameters with which the method cannot work."""
+        """Reject parameters with which the method cannot work."""
         for name in ("tolerance", "first_step", "value_scale"):
             if not 0.0 < getattr(self, name) < np.inf:
                 raise InvalidInputError(f"{name} must be positive and finite, got {getattr(self, name)}")
@@ -116,7 +116,7 @@ class BundleTrust:
         if not 0.0 < self.inexactness < 0.5 * self.descent:
             raise InvalidInputError(
                 f"inexactness must lie between 0 and half of descent, {0.5 * self.descent}, got "
-                f"{self.inexactness}: else the error could pass for a descent"
+                f"{self.inexactness}: else the error could be taken for a descent"
             )
         if not 0.0 <= self.locality < np.inf:
             raise InvalidInputError(f"locality must not be negative (0 for a convex J), got {self.locality}")
@@ -124,19 +124,19 @@ class BundleTrust:
     def minimize(
         self, problem: PosedProblem, callback: Callback | None = None, checkpoint: Checkpoint | None = None
     ) -> Result:
-        """Run the method on a checked problem; `fenics_contact.optimize.minimize` is the usual way in.
+        """Run the method on a checked problem; `fenics_contact.optimize.minimize` is the usual entry point.
 
         Args:
-            problem: What `pose` returned.
+            problem: The result of `pose`.
             callback: Called with each record and a copy of the best point.
-            checkpoint: File to go on from and to write to.
+            checkpoint: File to continue from and to write to.
 
         Returns:
             The best point, the reason for the stop and the history.
 
         Raises:
             NotConvergedError: If the stop is a failure and ``raise_on_failure`` is set.
-            InvalidInputError: If the checkpoint cannot be gone on from.
+            InvalidInputError: If the checkpoint cannot be used.
             CheckpointError: If the checkpoint cannot be written.
         """
         progress = Progress(checkpoint, self, problem, callback)
@@ -146,7 +146,7 @@ class BundleTrust:
         return _finish(self, state, reason)
 
     def _run(self, problem: PosedProblem, progress: Progress) -> tuple[MethodState, Reason]:
-        """Go on from where an earlier run was, or from the start, to the stop."""
+        """Run from where an earlier run ended, or from the start, to the stop."""
         state = progress.recalled()
         if state is None:
             state = _start(self, problem)
@@ -204,7 +204,7 @@ def _iterated(
 
 
 def _evaluated(problem: PosedProblem, state: MethodState, x: Array, accuracy: Accuracy) -> Evaluation:
-    """Call the function, and once more beside x where that is called for."""
+    """Call the function, and once more near x where needed."""
     found = evaluate(problem.fun, x, state.evaluations + 1, accuracy)
     return surely(problem, found, state.evaluations + 1) if state.careful else found
 
@@ -215,7 +215,7 @@ def _guarded_step(problem: PosedProblem, state: MethodState) -> tuple[Step, Trus
     trust = state.trust
     step = solve_step(state.bundle, near, trust.t)
     while step.length > 1.001 * trust.radius and not trust.exhausted:
-        # A kink can hold the length while t falls, so that t must be able to fall fast.
+        # A kink can keep the length constant while t falls, so t must be able to fall fast.
         t = trust.t * max(0.05, min(0.5, 0.95 * trust.radius / step.length))
         trust = replace(trust, t=max(t, trust.t_least))
         step = solve_step(state.bundle, near, trust.t)
@@ -225,7 +225,7 @@ def _guarded_step(problem: PosedProblem, state: MethodState) -> tuple[Step, Trus
 def _demand(
     method: BundleTrust, state: MethodState, step: Step, test: StoppingTest, reach: float = 0.0
 ) -> Demand:
-    """Return what a trial of the step needs, or a claim about all points within ``reach``."""
+    """Return the accuracy needed by a trial of the step, or by a claim about all points within ``reach``."""
     norm = float(np.linalg.norm(state.bundle.gradients[0]))
     worth = max(step.decrease, test.limit if reach else test.rounding)
     return demand(worth, max(step.length, reach), norm, (method.inexactness, _SLOPE_SHARE))
@@ -240,7 +240,7 @@ def _wanted(
     *,
     claim: bool,
 ) -> Accuracy | None:
-    """Return the accuracy with which the centre must be evaluated again, None where it is good enough."""
+    """Return the accuracy with which the centre must be re-evaluated, None where it is sufficient."""
     if not can_be_inexact(problem.fun):
         return None
     needed = _demand(method, state, step, test, test.reach if claim else 0.0)
@@ -250,7 +250,7 @@ def _wanted(
 
 
 def _refined(problem: PosedProblem, state: MethodState, step: Step, accuracy: Accuracy) -> MethodState:
-    """Evaluate the centre again, more accurately."""
+    """Re-evaluate the centre, more accurately."""
     centre = state.centre
     found = again(centre, _evaluated(problem, state, centre.x, accuracy))
     change = found.value - centre.value
@@ -263,7 +263,7 @@ def _refined(problem: PosedProblem, state: MethodState, step: Step, accuracy: Ac
 def _reconsidered(
     method: BundleTrust, problem: PosedProblem, state: MethodState, step: Step
 ) -> tuple[MethodState, Reason | None]:
-    """Put aside the doubtful subgradients on which the method would stop, and look again."""
+    """Drop the doubtful subgradients on which the method would stop, and test again."""
     if not state.centre.doubtful:
         return _iterated(method, problem, without_doubt(problem, state))
     if state.evaluations >= method.max_evaluations:

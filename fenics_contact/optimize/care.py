@@ -1,4 +1,4 @@
-"""Subgradients that may be none: before the method stops on them, gradients from beside take their place."""
+"""Doubtful subgradients: before the method stops on them, gradients at nearby points replace them."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from fenics_contact.optimize.state import MethodState
 Array = NDArray[np.float64]
 
 _NEAR = 1e-2  # distance to a neighbour, in lengths of the problem
-_ATTEMPTS = 8  # directions that are tried until one leads half as far
+_ATTEMPTS = 8  # directions that are tried until one yields half the distance
 
 
 def surely(problem: PosedProblem, found: Evaluation, number: int) -> Evaluation:
-    """Return an evaluation whose subgradient is one, as far as the function can tell.
+    """Return an evaluation whose subgradient is valid, as far as the function knows.
 
-    At almost every point a locally Lipschitz function has a gradient, and what such gradients tend to where
-    points tend to x are Clarke subgradients at x: the one beside x in a direction that nothing singles out
-    stands for one of them.
+    At almost every point a locally Lipschitz function has a gradient, and limits of such gradients at points
+    that tend to x are Clarke subgradients at x: the gradient near x in a generic direction approximates one
+    of them.
 
     Args:
         problem: The problem.
@@ -37,9 +37,9 @@ def surely(problem: PosedProblem, found: Evaluation, number: int) -> Evaluation:
 
 
 def without_doubt(problem: PosedProblem, state: MethodState) -> MethodState:
-    """Return the state with a centre that was looked into, without doubtful planes, careful from now on.
+    """Return the state with a verified centre, without doubtful planes, careful from now on.
 
-    A proximal parameter that false promises have worn down begins anew.
+    A proximal parameter that wrong predictions have reduced is reset.
     """
     centre = surely(problem, state.centre, state.evaluations + 1)
     bundle = state.bundle.refined(centre.subgradient * problem.scale, 0.0, centre.error)
@@ -51,8 +51,8 @@ def without_doubt(problem: PosedProblem, state: MethodState) -> MethodState:
 def neighbour(problem: PosedProblem, x: Array) -> Array:
     """Return a feasible point near x in a random direction, the same one for the same x.
 
-    What leaves the box is turned back into it; of several points the one furthest from x is taken, x itself
-    where nothing else is feasible.
+    Steps that leave the box are reflected into it; of several points the one furthest from x is taken, x
+    itself where no other is feasible.
     """
     allowed, scale = problem.allowed, problem.scale
     below, above = (allowed.lower - x) / scale, (allowed.upper - x) / scale

@@ -1,4 +1,4 @@
-"""Where a design may lie: a box and linear constraints, and how they look from a point."""
+"""The feasible set of designs: a box and linear constraints, also relative to a point."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# A row counts as satisfied within this fraction of the size of its terms: rounding, not freedom.
+# A row counts as satisfied within this fraction of the size of its terms, which is rounding.
 _FEASIBILITY = 1e-9
 _PROJECTIONS = 3
 
@@ -44,10 +44,10 @@ class Bounds:
     upper: ArrayLike
 
     def to_scipy(self, *, keep_feasible: bool = False) -> scipy.optimize.Bounds:
-        """Return the box as SciPy has it.
+        """Return the box as SciPy's Bounds.
 
         Args:
-            keep_feasible: Whether a method of SciPy that looks at it may never leave the box.
+            keep_feasible: Whether SciPy methods that support this never leave the box.
         """
         from scipy.optimize import Bounds as ScipyBounds
 
@@ -57,7 +57,7 @@ class Bounds:
 
 @dataclass(frozen=True)
 class LinearConstraints:
-    """Rows A x ≤ b and, where wanted, E x = e.
+    """Rows A x ≤ b and, optionally, E x = e.
 
     A nonlinear constraint (a volume) is given by its linearisation at the start.
 
@@ -68,7 +68,7 @@ class LinearConstraints:
         equality_value: e, shape (r,), or None.
 
     Example:
-        No more than 1 in the sum of three variables, and the first two alike.
+        Three variables whose sum is at most 1 and the first two of which are equal:
 
         >>> constraints = LinearConstraints([[1, 1, 1]], [1.0], [[1, -1, 0]], [0.0])
         >>> nearest_feasible([2.0, 0.0, 0.0], (0.0, 5.0), constraints).round(3).tolist()
@@ -81,7 +81,7 @@ class LinearConstraints:
     equality_value: ArrayLike | None = None
 
     def to_scipy(self) -> list[scipy.optimize.LinearConstraint]:
-        """Return SciPy's constraints −∞ ≤ A x ≤ b and e ≤ E x ≤ e, those of the two that have rows.
+        """Return SciPy's constraints −∞ ≤ A x ≤ b and e ≤ E x ≤ e, omitting those without rows.
 
         Raises:
             InvalidInputError: If a shape does not fit.
@@ -111,7 +111,7 @@ class Surroundings:
 
 @dataclass(frozen=True)
 class FeasibleSet:
-    """{x : lower ≤ x ≤ upper, A x ≤ b, E x = e}, checked and complete (empty where nothing is asked).
+    """{x : lower ≤ x ≤ upper, A x ≤ b, E x = e}, checked and complete (empty where there is no constraint).
 
     Attributes:
         lower: Shape (n,), -inf where free.
@@ -159,7 +159,7 @@ class FeasibleSet:
     def project(self, x: Array) -> Array:
         """Return the feasible point nearest to x, shape (n,); x clipped to the box where it is feasible."""
         ones = np.ones(x.size)
-        # The first programme is solved to a part of the distance; the second removes what that leaves.
+        # The first programme is solved to a fraction of the distance; the second removes the remainder.
         for _ in range(_PROJECTIONS):
             if not self.violations(x):
                 break
@@ -208,7 +208,7 @@ def _residual(matrix: Array, limit: Array, x: Array) -> tuple[Array, Array]:
 
 
 def ranges(allowed: FeasibleSet) -> list[tuple[Array, Array, Array]]:
-    """Return the rows as low ≤ matrix x ≤ high, inequalities and equalities apart, neither without rows."""
+    """Return the rows as low ≤ matrix x ≤ high, inequalities and equalities separately, without empty ones."""
     sides = [
         (allowed.matrix, np.full(len(allowed.limit), -np.inf), allowed.limit),
         (allowed.equality_matrix, allowed.equality_value, allowed.equality_value),
@@ -221,7 +221,7 @@ def feasible_set(
     bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
     constraints: LinearConstraints | None = None,
 ) -> FeasibleSet:
-    """Check what the caller gave and fill in what was left out.
+    """Check the caller's constraints and fill in the defaults.
 
     Args:
         n: Number of variables.

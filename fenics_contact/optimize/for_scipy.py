@@ -1,4 +1,4 @@
-"""The problem in the words of scipy.optimize: scaled, guarded against designs that do not exist, counted."""
+"""The problem in the form of scipy.optimize: scaled, guarded against invalid designs, with a record."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _WITHOUT_DERIVATIVE = ("cobyla", "cobyqa", "nelder-mead", "powell")
 _WITHOUT_BOUNDS = ("cobyla",)  # before SciPy 1.11; as constraints, every version takes them
 _CONSTRAINED = ("cobyla", "cobyqa", "slsqp", "trust-constr")
 _TINY = float(np.finfo(float).tiny)
-_SLOPE = 10.0  # of the wall around designs that do not exist, in scaled values over scaled variables
+_SLOPE = 10.0  # of the wall around invalid designs, in scaled values over scaled variables
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Visit:
         x: Design, shape (n,), in the caller's variables.
         value: J there; nan where it does not exist.
         violation: Distance by which x leaves the feasible set, in scaled variables; 0 inside.
-        note: Why J does not exist; empty where it does.
+        note: Why J does not exist; empty if it does.
     """
 
     x: Array
@@ -46,12 +46,12 @@ class Visit:
 class ForScipy:
     r"""min J(x) over a box and linear constraints, for `scipy.optimize.minimize`.
 
-    SciPy's methods see z = x / scale and J / (1 + \|J(x0)\|), so that their default tolerances mean
-    something. SciPy knows no design that does not exist: where J raises `InvalidDesignError` they see a wall
-    that rises away from the best design met so far, which turns line searches back.
+    SciPy's methods see z = x / scale and J / (1 + \|J(x0)\|), so that their default tolerances are
+    meaningful. SciPy has no notion of invalid designs: where J raises `InvalidDesignError` they see a wall
+    that rises away from the best design so far, which turns line searches back.
 
-    Replicated on the ranks of a communicator, with a ``fun`` that returns the same bits on all of them, as
-    `ShapeProblem` does, the iterates are the same on all of them.
+    Replicated on the ranks of a communicator, with a ``fun`` that returns bitwise equal values on all of
+    them, as `ShapeProblem` does, the iterates are equal, too.
 
     Attributes:
         visits: All evaluations, oldest first.
@@ -88,7 +88,7 @@ class ForScipy:
             scale: Size of each variable, as for `minimize`.
             value: J(x) alone, where that is cheaper (`ShapeProblem.value_of`), for methods that take no
                 derivative.
-            invalid: What methods see where J does not exist, ``inf`` for instance; None for the wall.
+            invalid: Value that methods see where J does not exist, ``inf`` for instance; None for the wall.
 
         Raises:
             InvalidInputError: If a shape does not fit or x0 is not feasible.
@@ -102,11 +102,11 @@ class ForScipy:
 
     @property
     def best(self) -> Visit:
-        """The feasible design with the smallest value that was met."""
+        """The feasible design with the smallest value so far."""
         return self.best_within(1e-9)
 
     def best_within(self, violation: float) -> Visit:
-        """Return the design with the smallest value among those that violate the constraints by no more.
+        """Return the design with the smallest value among those whose violation is within a limit.
 
         Args:
             violation: Largest distance to the feasible set, in scaled variables.
@@ -128,18 +128,18 @@ class ForScipy:
         return len(self.visits)
 
     def design(self, z: ArrayLike) -> Array:
-        """Return x for what SciPy calls x."""
+        """Return x for SciPy's x."""
         return np.asarray(z, dtype=float) * self._problem.scale
 
     def objective_value(self, scaled: float) -> float:
-        """Return J for what SciPy calls fun."""
+        """Return J for SciPy's fun."""
         return float(scaled) * self._unit
 
     def arguments(self, method: str) -> dict[str, Any]:
         """Return the arguments of `scipy.optimize.minimize` for a method by its SciPy name.
 
         Raises:
-            InvalidInputError: If the method cannot keep the constraints.
+            InvalidInputError: If the method cannot handle the constraints.
         """
         name, allowed = method.lower(), self._problem.allowed
         if (len(allowed.matrix) or len(allowed.equality_matrix)) and name not in _CONSTRAINED:
@@ -192,7 +192,7 @@ class ForScipy:
         return float(max(-near.room.min(initial=0.0), np.abs(near.miss).max(initial=0.0), 0.0))
 
     def _refused(self, x: Array, error: InvalidDesignError) -> tuple[float, Array]:
-        """Count a design that does not exist, and return what methods see there."""
+        """Record an invalid design, and return what methods see there."""
         valid = [visit for visit in self.visits if not visit.note]
         if not valid:
             raise error
@@ -203,7 +203,7 @@ class ForScipy:
         away = (x - lowest.x) / self._problem.scale
         distance = float(np.linalg.norm(away))
         top = max(visit.value for visit in valid) / self._unit
-        # Curved, so that the methods that estimate curvature find some.
+        # Curved, because quasi-Newton methods estimate the curvature.
         steep = _SLOPE * (1.0 + distance) / max(distance, _TINY)
         wall = np.asarray(steep * away, dtype=np.float64)
         return top + _SLOPE * (1.0 + 0.5 * distance) * distance, wall
@@ -217,7 +217,7 @@ class ForScipy:
         return ScipyBounds(allowed.lower / scale, allowed.upper / scale, keep_feasible)
 
     def _rows(self, with_box: bool) -> list[scipy.optimize.LinearConstraint]:
-        """All rows in scaled variables, those of the box too where it is asked for."""
+        """All rows in scaled variables, optionally with those of the box."""
         allowed, scale = self._problem.allowed, self._problem.scale
         rows = ranges(allowed)
         if with_box:

@@ -1,4 +1,4 @@
-"""How accurately a function must be evaluated, and when its centre must be evaluated again."""
+"""How accurately a function must be evaluated, and when the centre must be re-evaluated."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import numpy as np
 
 from fenics_contact.optimize.objective import Accuracy, Evaluation
 
-#: Part of what would do that is asked for, so that not every step asks for the centre once more.
+#: Factor on the sufficient accuracy that is requested, so that not every step re-evaluates the centre.
 _HEADROOM = 0.25
-#: A centre that nothing confirms yet is evaluated with errors smaller by this factor.
+#: An unconfirmed centre is evaluated with errors smaller by this factor.
 _CONFIRM = 0.1
 
 
 @dataclass(frozen=True)
 class Demand:
-    """The errors that a decision bears.
+    """The errors that a decision tolerates.
 
-    A trial is judged by the difference of two values, and a step of length ℓ by a subgradient. Errors of J
-    are to stay below share · w and those of the subgradient below part · w/ℓ, with w the predicted decrease
-    or, where that is larger, the decrease that is not worth a step. No trial that raises J then becomes the
+    A trial is assessed by the difference of two values, a step of length ℓ by a subgradient. Errors of J must
+    stay below share · w and those of the subgradient below part · w/ℓ, with w the predicted decrease or,
+    where that is larger, the decrease that is not worth a step. No trial that raises J then becomes the
     centre, as long as twice the share is less than the ``descent`` of the method.
 
     Attributes:
@@ -38,39 +38,39 @@ class Demand:
 
     @property
     def asked(self) -> Accuracy:
-        """What to ask of the function."""
+        """Accuracy to request from the function."""
         return Accuracy(_HEADROOM * self.value, _HEADROOM * self.subgradient)
 
     def missed_by(self, centre: Evaluation) -> bool:
-        """Tell whether the centre must be evaluated again, which must not have been tried already."""
+        """Return whether the centre must be re-evaluated, if that was not tried already."""
         value = centre.error > self.value and centre.asked_value > self.asked.value
         return value or centre.asked_subgradient > self.subgradient
 
     def confirmed_by(self, centre: Evaluation) -> bool:
-        """Tell whether a second evaluation has shown that the subgradient of the centre is good enough."""
+        """Return whether a second evaluation has shown that the centre's subgradient is accurate enough."""
         return centre.turned <= self.subgradient / _CONFIRM or centre.asked_subgradient == 0.0
 
     def sharper_than(self, centre: Evaluation) -> Accuracy:
-        """Return what to ask of a function that is evaluated at the centre once more."""
+        """Return the accuracy for a re-evaluation of the centre."""
         value = min(self.asked.value, _CONFIRM * centre.asked_value)
         return Accuracy(value, min(self.asked.subgradient, _CONFIRM * centre.asked_subgradient))
 
 
 def demand(worth: float, reach: float, norm: float, shares: tuple[float, float]) -> Demand:
-    """Return what a decision needs.
+    """Return the accuracy that a decision needs.
 
     Args:
         worth: Decrease of J that the decision is about.
         reach: Length of the step that it is about, scaled variables.
         norm: Length of the centre's subgradient, scaled variables.
-        shares: Parts of the decrease by which the value and the step's slope may be wrong.
+        shares: Fractions of the decrease by which the value and the step's slope may be wrong.
     """
     slope = norm * reach
     return Demand(shares[0] * worth, min(shares[1] * worth / slope if slope > 0.0 else np.inf, 1.0))
 
 
 def again(centre: Evaluation, found: Evaluation) -> Evaluation:
-    """Return the centre after another evaluation, with what the first one tells of its subgradient."""
+    """Return the re-evaluated centre with the change of its subgradient since the first evaluation."""
     size = float(np.linalg.norm(found.subgradient))
     change = float(np.linalg.norm(found.subgradient - centre.subgradient))
     turned = change / size if size > 0.0 else (0.0 if change == 0.0 else np.inf)

@@ -1,4 +1,4 @@
-"""The door of the package: min J(x) over a box and linear constraints."""
+"""Entry point of the package: min J(x) over a box and linear constraints."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def minimize(
 ) -> Result:
     """Minimise a locally Lipschitz function, convex or not, over a box and linear constraints.
 
-    The iterates depend on nothing but the arguments: replicated on the ranks of a communicator, with a
-    ``fun`` that returns the same bits on all of them, they are the same bits on all of them.
+    The iterates depend only on the arguments: replicated on the ranks of a communicator, with a ``fun`` that
+    returns bitwise equal values on all of them, they are bitwise equal, too.
 
     Args:
         fun: Takes x of shape (n,), returns J(x) and one (Clarke) subgradient of shape (n,). It is only called
@@ -38,19 +38,19 @@ def minimize(
         bounds: Box, or a pair (lower, upper), or None.
         constraints: Linear constraints, or None.
         scale: Size of each variable, shape (n,) or a number. None takes the widths of the box where it is
-            bounded on all sides, so choose bounds that mean something; else 1.
+            bounded on all sides, so choose meaningful bounds; else 1.
         callback: Called after every evaluation with its record and the best point so far, and before the
-            checkpoint is written: a run that died in between tells the record again when it goes on.
-        checkpoint: File that is written after evaluations and from which an interrupted run goes on with the
-            iterates that it would have had; None keeps nothing. Limits and tolerance may be changed between.
+            checkpoint is written: a run that died in between reports the record again when it continues.
+        checkpoint: File that is written after evaluations and from which an interrupted run continues with
+            the same iterates; None writes nothing. Limits and tolerance may be changed between.
 
     Returns:
         The best point, its value and subgradient, the reason for the stop and the history.
 
     Raises:
         InvalidInputError: If a shape does not fit, x0 is infeasible, ``fun`` returns nan or inf, or the
-            checkpoint is unreadable or one of another problem.
-        CheckpointError: If the checkpoint cannot be written; the one before is as it was.
+            checkpoint is unreadable or belongs to another problem.
+        CheckpointError: If the checkpoint cannot be written; the previous one is unchanged.
         InvalidDesignError: If J does not exist at x0.
         NotConvergedError: If the method stops before its tolerance is met, with the history and the best
             result so far; not if ``method.raise_on_failure`` is False.

@@ -20,7 +20,7 @@ _LOG = logging.getLogger(__name__)
 
 @runtime_checkable
 class Inexact(Protocol):
-    """A function that is cheaper where it may be less accurate: a state solved by an iteration."""
+    """A function that is cheaper to evaluate less accurately, such as one of an iteratively solved state."""
 
     def __call__(self, x: Array) -> tuple[float, ArrayLike]:
         """Return value and subgradient as accurately as it can."""
@@ -34,40 +34,40 @@ class Inexact(Protocol):
 
         Args:
             x: Point, shape (n,).
-            value: Largest error of the value, units of J; inf where anything will do.
+            value: Largest error of the value, units of J; inf for any.
             subgradient: Largest error of the subgradient, relative to it.
         """
 
 
 @runtime_checkable
 class Kinked(Protocol):
-    """A function made of smooth pieces, which knows where it cannot tell on which of them a point lies.
+    """A piecewise smooth function that knows where it cannot decide on which piece a point lies.
 
-    What it returns there is the gradient of some combination of pieces, which no point nearby need have: it
-    may be no subgradient. The method believes it until it would stop on it; then it asks for the gradient
-    beside the point.
+    There it returns the gradient of some combination of pieces, which need not occur at any nearby point: it
+    may not be a subgradient. The method uses it until it would stop on it; then it requests the gradient near
+    the point.
     """
 
     def __call__(self, x: Array) -> tuple[float, ArrayLike]:
-        """Return value and subgradient, or what may be one."""
+        """Return value and subgradient, possibly a doubtful one."""
 
     def doubtful(self, x: Array) -> bool:
-        """Tell whether what was returned last, at x, may be no subgradient."""
+        """Return whether the last result, at x, may not be a subgradient."""
 
     def beside(self, x: Array, end: Array) -> ArrayLike:
-        """Return a gradient from a point on the way from x to end, as near to x as a piece can be told.
+        """Return a gradient at a point on the way from x to end, as near to x as a piece can be identified.
 
         Raises `InvalidDesignError` where the function does not exist there.
 
         Args:
             x: Point, shape (n,).
-            end: A feasible point near x, in no special direction, shape (n,).
+            end: A feasible point near x, in a generic direction, shape (n,).
         """
 
 
 @dataclass(frozen=True)
 class Accuracy:
-    """What is asked of an evaluation: 0 the best that the function can do, inf anything.
+    """Requested accuracy of an evaluation: 0 for the best possible, inf for any.
 
     Attributes:
         value: Largest error of J.
@@ -87,11 +87,11 @@ class Evaluation:
         value: J(x).
         subgradient: One subgradient, shape (n,), in the caller's variables.
         error: Estimated error of the value.
-        asked_value: Error of the value that was allowed, 0 for an exact function.
-        asked_subgradient: Relative error of the subgradient that was allowed.
-        turned: By how much the subgradient differs from that of a less accurate evaluation of the same point,
-            relative to it: 0 for an exact function, inf where there is nothing to compare with.
-        doubtful: Whether the subgradient may be none, see `Kinked`.
+        asked_value: Allowed error of the value, 0 for an exact function.
+        asked_subgradient: Allowed relative error of the subgradient.
+        turned: Relative change of the subgradient since a less accurate evaluation of the same point: 0 for
+            an exact function, inf without such an evaluation.
+        doubtful: Whether it may not be a subgradient, see `Kinked`.
     """
 
     x: Array
@@ -105,7 +105,7 @@ class Evaluation:
 
 
 def can_be_inexact(fun: Fun) -> bool:
-    """Tell whether a function gains by being asked for no more accuracy than needed."""
+    """Return whether a function can save work by lower accuracy."""
     return isinstance(fun, Inexact) and fun.inexact
 
 
@@ -116,13 +116,13 @@ def evaluate(fun: Fun, x: Array, number: int, accuracy: Accuracy | None = None) 
         fun: Returns the value and one subgradient.
         x: Point, shape (n,).
         number: Count of this evaluation, for the message.
-        accuracy: What is asked of a function that can be inexact; None for the best it can do.
+        accuracy: Accuracy requested from an inexact function; None for the best possible.
 
     Returns:
         Copies of all three.
 
     Raises:
-        InvalidInputError: If the answer is no pair of a finite number and n finite numbers.
+        InvalidInputError: If the result is not a finite number and n finite numbers.
         InvalidDesignError: If the function raises it.
     """
     if accuracy is None or not (isinstance(fun, Inexact) and fun.inexact):
@@ -140,12 +140,12 @@ def evaluate(fun: Fun, x: Array, number: int, accuracy: Accuracy | None = None) 
 
 
 def beside(fun: Fun, found: Evaluation, end: Array, number: int) -> Evaluation:
-    """Return a doubtful evaluation with the gradient beside it for a subgradient; any other as it is.
+    """Return a doubtful evaluation with a nearby gradient as its subgradient; any other unchanged.
 
-    Where the function does not exist beside the point, what it returned at the point must do.
+    Where the function does not exist near the point, its result at the point is used.
 
     Raises:
-        InvalidInputError: If the answer is not n finite numbers.
+        InvalidInputError: If the result is not n finite numbers.
     """
     if not (found.doubtful and isinstance(fun, Kinked)):
         return found

@@ -1,4 +1,4 @@
-"""The problem min J(x) over a feasible set: checked input and the scales that the method works in."""
+"""The problem min J(x) over a feasible set: checked input and the scales of the method."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class PosedProblem:
         start: Feasible starting point, shape (n,).
         allowed: The feasible set.
         scale: Size of each variable, shape (n,): the method sees x/scale.
-        length: Distance in scaled variables that the problem lives on.
+        length: Length scale of the problem in scaled variables.
     """
 
     fun: Fun

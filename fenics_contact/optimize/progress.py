@@ -1,4 +1,4 @@
-"""How far a minimisation is: kept in its checkpoint with what the function remembers, and told."""
+"""Progress of a minimisation: reported, and stored in its checkpoint with the memory of the function."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from fenics_contact.optimize.state import MethodState
 from fenics_contact.progress import Task
 
 Array = NDArray[np.float64]
-#: What is called after every evaluation, with its record and the best point so far.
+#: Called after every evaluation with its record and the best point so far.
 Callback = Callable[[Record, Array], None]
 
 if TYPE_CHECKING:
     from mpi4py import MPI
 
 KIND = "minimisation by the bundle trust method"
-#: Parameters that only say when to stop: a run may go on with others.
+#: Parameters that only decide when to stop: a run may continue with others.
 LIMITS = {"tolerance", "max_iterations", "max_evaluations", "raise_on_failure"}
 _OF_FUN = "fun."
 
 
 @runtime_checkable
 class Resumable(Protocol):
-    """A function whose values depend on those before, by a warm start for example."""
+    """A function whose values depend on earlier ones, for example by a warm start."""
 
     def __call__(self, x: Array) -> tuple[float, ArrayLike]:
         """Return value and subgradient."""
@@ -48,13 +48,13 @@ class Resumable(Protocol):
         """Communicator on which it is evaluated."""
 
     def fingerprint(self) -> Mapping[str, str]:
-        """Say which function it is, see `fenics_contact.checkpoint.described`."""
+        """Identify the function, see `fenics_contact.checkpoint.described`."""
 
     def memory(self) -> Mapping[str, NDArray[Any]]:
         """Return what the next values depend on. Collective."""
 
     def recall(self, memory: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from what `memory` returned, in another process maybe. Collective."""
+        """Continue from what `memory` returned, possibly in another process. Collective."""
 
 
 class Method(Protocol):
@@ -76,10 +76,10 @@ class Method(Protocol):
 
 
 class Progress:
-    """Keeps a minimisation in its checkpoint, if it has one, and tells how far it is.
+    """Stores a minimisation in its checkpoint, if it has one, and reports its progress.
 
     Attributes:
-        comm: Communicator on which the minimisation is replicated, None where nobody knows.
+        comm: Communicator on which the minimisation is replicated, None if unknown.
     """
 
     def __init__(
@@ -114,10 +114,10 @@ class Progress:
             self._fingerprint.update(self._fun.fingerprint())
 
     def recalled(self) -> MethodState | None:
-        """Return the state that was stored, None where the run starts anew. Collective.
+        """Return the stored state, None where the run starts anew. Collective.
 
         Raises:
-            InvalidInputError: If the file is no checkpoint of this problem; says what to do.
+            InvalidInputError: If the file is not a checkpoint of this problem; says what to do.
         """
         if self._checkpoint is None:
             return None
@@ -134,22 +134,22 @@ class Progress:
 
     @contextmanager
     def reporting(self) -> Iterator[Task]:
-        """Tell that the minimisation is under way, and what it leaves where it is interrupted."""
+        """Report the minimisation as under way, and what it leaves if it is interrupted."""
         with self._task as task, telling_what_is_kept(self._kept, self.comm):
             yield task
 
     def evaluated(self, state: MethodState) -> None:
-        """Tell a state, keep it, and stop here if a signal asks for it. Collective.
+        """Report a state, store it, and stop here if a signal requested it. Collective.
 
-        It is kept after the callback: what that writes is there for every evaluation that is kept.
+        It is stored after the callback, so that the callback's output exists for every stored evaluation.
 
         Raises:
-            CheckpointError: If it cannot be written; the file is then what it was.
-            Interrupted: If a signal was heard, see `fenics_contact.checkpoint.interruptible`.
+            CheckpointError: If it cannot be written; the file is then unchanged.
+            Interrupted: If a signal was received, see `fenics_contact.checkpoint.interruptible`.
         """
         self._tell(state)
         if self._callback is not None:
-            # What it does may be collective, as the writing of a state is.
+            # The callback may be collective, as the writing of a state is.
             with nullcontext() if self.comm is None else _asking(self.comm):
                 self._callback(state.history[-1], state.centre.x.copy())
         self.keep(state)
@@ -161,14 +161,14 @@ class Progress:
         self._task.step(record.evaluations, measure=predicted or None, value=record.best, timed=timed)
 
     def keep(self, state: MethodState, *, last: bool = False) -> None:
-        """Write the state where it is due. Collective.
+        """Write the state if that is due. Collective.
 
         Args:
-            state: Where the method stands.
+            state: The state of the method.
             last: Write it unless the file holds it already.
 
         Raises:
-            CheckpointError: If it cannot be written; the file is then what it was.
+            CheckpointError: If it cannot be written; the file is then unchanged.
         """
         if self._checkpoint is None:
             return
@@ -183,7 +183,7 @@ class Progress:
         self._written = state.evaluations
 
     def _kept(self) -> str:
-        """Say what a run leaves that ends now, and how to go on."""
+        """Describe what a run that ends now leaves, and how to continue it."""
         if self._checkpoint is None:
             return without_checkpoint(_evaluations(0 if self._state is None else self._state.evaluations))
         written = max(self._written, 0)

@@ -16,8 +16,8 @@ from fenics_contact.errors import ConvergenceError, InvalidInputError
 
 Array = NDArray[np.float64]
 
-# Tried in this order until one reports "Solved". One thread and one factorisation method, because
-# replicated ranks must get the same bits.
+# Tried in this order until one reports "Solved". One thread and one factorisation method, because replicated
+# ranks must obtain bitwise equal results.
 _ATTEMPTS: tuple[Mapping[str, Any], ...] = (
     MappingProxyType({"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}),
     MappingProxyType({"tol_gap_abs": 1e-9, "tol_gap_rel": 1e-9, "tol_feas": 1e-9}),
@@ -59,7 +59,7 @@ class QuadraticSolution:
     Attributes:
         point: y, shape (n,).
         multipliers: Multipliers of C y ≤ c, shape (m,), not negative.
-        status: What Clarabel said.
+        status: Clarabel's status.
         exact: False where only Clarabel's reduced tolerances were met.
     """
 
@@ -70,10 +70,10 @@ class QuadraticSolution:
 
 
 def solve(program: QuadraticProgram) -> QuadraticSolution:
-    """Solve a small convex quadratic programme; the same input gives the same bits.
+    """Solve a small convex quadratic programme; the same input gives bitwise equal results.
 
     The tolerances are loosened, then the scaling and the regularisation changed, until Clarabel
-    reports "Solved"; an "AlmostSolved" serves only where no attempt does better.
+    reports "Solved"; an "AlmostSolved" is accepted only if no attempt does better.
 
     Args:
         program: The data, in units in which the solution is of order one.
@@ -83,7 +83,7 @@ def solve(program: QuadraticProgram) -> QuadraticSolution:
 
     Raises:
         InvalidInputError: If the constraints contradict each other.
-        SubproblemError: If every attempt failed; the message lists what Clarabel said each time.
+        SubproblemError: If every attempt failed; the message lists Clarabel's status of each.
 
     References:
         P. J. Goulart and Y. Chen, Clarabel: an interior-point solver for conic programs with

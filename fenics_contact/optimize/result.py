@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 class Reason(Enum):
-    """Why a minimisation stopped; the value says what happened and, where it failed, what to try."""
+    """Why a minimisation stopped; the value states what happened and, after a failure, what to try."""
 
     CONVERGED = "the model predicts no decrease above the tolerance"
     STATIONARY = "the aggregate subgradient and its error vanish within the tolerance"
@@ -48,17 +48,17 @@ class Reason(Enum):
 
 
 class StepKind(Enum):
-    """What became of a trial point."""
+    """Outcome of a trial point."""
 
     #: The first point.
     START = "start"
-    #: It lowers the objective enough and became the centre.
+    #: It lowered the objective enough and became the centre.
     SERIOUS = "serious"
-    #: It does not: its plane was added to the bundle.
+    #: It did not: its plane was added to the bundle.
     NULL = "null"
     #: The objective does not exist there.
     REJECTED = "rejected"
-    #: The centre, evaluated again with a smaller error, or given the gradient beside it, as it is on a kink.
+    #: The centre, re-evaluated with a smaller error, or given a nearby gradient as it lies on a kink.
     REFINED = "refined"
 
 
@@ -68,18 +68,18 @@ class Record:
 
     Attributes:
         iteration: Serious steps up to and with this one.
-        kind: What became of the trial point.
+        kind: Outcome of the trial point.
         value: J at the trial point; nan where it was rejected as invalid.
         best: J at the centre after this evaluation.
-        predicted_decrease: Decrease of J that the model promised.
+        predicted_decrease: Decrease of J that the model predicted.
         t: Proximal parameter of the step.
         step_length: Length of the step in scaled variables.
         aggregate_norm: Length of the aggregate subgradient in scaled variables.
         aggregate_error: Linearisation error of the aggregate subgradient.
         bundle_size: Cutting planes in the model that made the step.
         evaluations: Evaluations up to and with this one.
-        error: Estimated error of `value`; 0 for a function that is exact or does not tell.
-        note: Why a trial point was rejected, or that a gradient is from beside; empty for any other.
+        error: Estimated error of `value`; 0 for a function that is exact or does not report it.
+        note: Why a trial point was rejected, or that a nearby gradient was used; else empty.
     """
 
     iteration: int
@@ -99,7 +99,7 @@ class Record:
 
 @dataclass(frozen=True)
 class Result:
-    """The best point found and how it was reached.
+    """The best point and how it was reached.
 
     Attributes:
         x: Point, shape (n,).
@@ -109,7 +109,7 @@ class Result:
         iterations: Serious steps.
         evaluations: Evaluations of the objective, failed ones included.
         history: One record for each evaluation, oldest first.
-        error: Estimated error of the value; 0 for a function that is exact or does not tell.
+        error: Estimated error of the value; 0 for a function that is exact or does not report it.
     """
 
     x: Array
@@ -127,10 +127,10 @@ class NotConvergedError(ConvergenceError):
 
     Attributes:
         history: One record for each evaluation, oldest first.
-        best: The result so far, with the reason; None on a rank that only heard of the error.
+        best: The result so far, with the reason; None on a rank that was only notified of the error.
     """
 
     def __init__(self, message: str, history: Sequence[Record] = (), best: Result | None = None) -> None:
-        """Keep the history and the best point beside the message."""
+        """Store the history and the best point with the message."""
         super().__init__(message, history)
         self.best = best

@@ -1,4 +1,4 @@
-"""Where the bundle trust method stands between two evaluations, also as arrays for a checkpoint."""
+"""State of the bundle trust method between two evaluations, also as arrays for a checkpoint."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class MethodState:
         centre: Best point with value and subgradient.
         bundle: Cutting planes seen from it.
         trust: Proximal parameter and trust region.
-        first_t: Proximal parameter that the method began with.
+        first_t: Initial proximal parameter.
         history: One record for each evaluation, oldest first.
         careful: Whether doubtful subgradients are replaced at once, see `fenics_contact.optimize.care`.
     """
@@ -48,7 +48,7 @@ class MethodState:
         return self.history[-1].evaluations
 
     def arrays(self) -> dict[str, Any]:
-        """Return the state as arrays by name; `from_arrays` gives back the same bits."""
+        """Return the state as arrays by name; `from_arrays` restores it bitwise."""
         parts: dict[str, Any] = {"centre": self.centre, "bundle": self.bundle, "trust": self.trust}
         stored: dict[str, Any] = {
             f"{part}.{field.name}": np.asarray(getattr(value, field.name))
@@ -65,7 +65,7 @@ class MethodState:
 
     @staticmethod
     def from_arrays(stored: Mapping[str, NDArray[Any]]) -> MethodState:
-        """Return the state that `arrays` was asked for."""
+        """Return the state that `arrays` was called on."""
 
         def part(kind: type[Any], name: str) -> Any:
             values = (stored[f"{name}.{field.name}"] for field in fields(kind))

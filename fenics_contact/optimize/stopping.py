@@ -18,14 +18,14 @@ class StoppingTest:
     r"""Test on the predicted decrease w and on the certificate σ + r‖z‖.
 
     For a convex J no feasible point within the distance r is lower than the centre by more than
-    σ + r‖z‖: that is what the certificate says, whatever t is. The predicted decrease w = σ + t‖z‖² could
-    be small only because t is, so that it is asked for with the first t as well.
+    σ + r‖z‖: this certificate holds for any t. The predicted decrease w = σ + t‖z‖² could be small only
+    because t is, so it is also tested with the first t.
 
     Attributes:
         limit: Decrease of J that is not worth a step, ε (s + \|J\|).
-        rounding: Decrease of J that its floating-point number cannot show.
+        rounding: Decrease of J below floating-point resolution.
         reach: Least r, in scaled variables; a longer step extends it to its own length.
-        first_t: Proximal parameter that the method began with.
+        first_t: Initial proximal parameter.
     """
 
     limit: float
@@ -38,7 +38,7 @@ class StoppingTest:
 
         Args:
             step: The step from the centre.
-            solve: Gives the step from the same centre with another t.
+            solve: Returns the step from the same centre with another t.
         """
         certificate = step.aggregate_error + max(self.reach, step.length) * step.aggregate_norm
         if certificate <= self.limit:

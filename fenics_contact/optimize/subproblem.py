@@ -24,7 +24,7 @@ _LOG = logging.getLogger(__name__)
 
 _REFINEMENTS = 2
 _BLURRED = 1e-2  # ‖z‖ in units of the programme below which a second solve sharpens it
-_VANISHED = 1e-7  # ‖z‖ against the longest subgradient below which rounding rules and nothing sharpens it
+_VANISHED = 1e-7  # ‖z‖ against the longest subgradient below which it is rounding and cannot be sharpened
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Step:
         weights: Multipliers of the cutting planes, shape (m,), not negative, sum one.
         aggregate_norm: ‖z‖ = ‖y‖/t, length of the aggregate subgradient (with the constraints' normals).
         aggregate_error: σ = Σ λ_i β_i + Σ μ_k room_k; w = σ + t ‖z‖².
-        t: Proximal parameter that it was solved with.
+        t: Proximal parameter used.
     """
 
     move: Array
@@ -57,10 +57,10 @@ def solve_step(bundle: Bundle, near: Surroundings, t: float) -> Step:
     r"""Minimise v + ‖y‖²/(2t) subject to g_i·y - β_i ≤ v, C y ≤ room and E y = 0.
 
     The programme is solved in units of its own solution, lengths in t γ and decreases in t γ², so
-    that objective and variables may have any size. γ is the length of a subgradient at first. Near
-    a minimum the aggregate z is much shorter than that and drowns in the solver's tolerance:
-    then the programme is solved again with γ = ‖z‖, without the planes that lie too deep to touch the
-    solution, and the sharper answer is taken if the solver vouches for it.
+    that objective and variables may have any size. γ is the length of a subgradient at first. Near a minimum
+    the aggregate z is much shorter than that and is lost in the solver's tolerance: then the programme is
+    solved again with γ = ‖z‖, without the planes that lie too deep to affect the solution, and the sharper
+    result is used if the solver reports success.
 
     Args:
         bundle: Cutting planes at the centre.
@@ -101,7 +101,7 @@ def _solved(bundle: Bundle, near: Surroundings, t: float, lengths: Array) -> tup
 
 
 def _refined(bundle: Bundle, near: Surroundings, step: Step, lengths: Array) -> Step | None:
-    # Plane i touches at a move y only if β_i ≤ g_i·y - g_0·y; twice that is left as a margin.
+    # Plane i is active at a move y only if β_i ≤ g_i·y - g_0·y; the factor two is a margin.
     live = np.flatnonzero(bundle.measures <= 2.0 * (lengths + lengths[0]) * step.length)
     unit = step.aggregate_norm
     try:

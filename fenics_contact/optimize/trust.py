@@ -1,4 +1,4 @@
-"""How far the model is trusted: the proximal parameter t and the radius of the trust region."""
+"""Control of the step length: the proximal parameter t and the radius of the trust region."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ from dataclasses import dataclass, replace
 
 from fenics_contact.optimize.subproblem import Step
 
-_GROWTH = 10.0  # most by which t grows after one serious step
-_STREAK = 2  # serious steps in a row after which t at least doubles
-_SHRINKAGE = (0.1, 0.5)  # least and most of t that is left after a bad null step
+_GROWTH = 10.0  # largest factor on t after one serious step
+_STREAK = 2  # consecutive serious steps after which t at least doubles
+_SHRINKAGE = (0.1, 0.5)  # smallest and largest factor on t after a bad null step
 _PATIENCE = 1  # null steps that may be far off before t shrinks
 _FAR = 3.0  # a null step is far off when its error exceeds this many predicted decreases
-_CUT = 0.5  # least part of the predicted decrease that a new plane must take away, else the step was too long
+_CUT = 0.5  # fraction of the predicted decrease that a new plane must remove, else the step was too long
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A step that was tried and what the objective did.
+    """A trial step and the response of the objective.
 
     Attributes:
         step: The step with its prediction.
         change: J at the trial point minus J at the centre.
-        slope: g·y with the subgradient found at the trial point.
-        measure: Locality measure β of the plane found there, seen from the centre.
+        slope: g·y with the subgradient at the trial point.
+        measure: Locality measure β of the trial's plane, seen from the centre.
     """
 
     step: Step
@@ -32,12 +32,12 @@ class Trial:
 
     @property
     def error(self) -> float:
-        """Linearisation error α of the plane found, seen from the centre."""
+        """Linearisation error α of the trial's plane, seen from the centre."""
         return self.slope - self.change
 
     @property
     def agreement(self) -> float:
-        """Part of the predicted decrease that came true."""
+        """Fraction of the predicted decrease that was achieved."""
         return -self.change / self.step.decrease
 
     @property
@@ -48,24 +48,24 @@ class Trial:
 
 @dataclass(frozen=True)
 class Trust:
-    """Proximal parameter and trust region with what is remembered to adapt them.
+    """Proximal parameter and trust region with the counts that adapt them.
 
     A large t makes a long step. t follows the parabola that the predicted and the actual change define
     [Kiwiel 1990], within the bracket of Schramm and Zowe: it grows after a step that descends as
-    predicted, and shrinks after one whose cutting plane says little about the centre. Other than
-    theirs, a trial that descends is never thrown away for a longer one: evaluations are what
-    costs, so the step is taken and the next one is longer.
+    predicted, and shrinks after one whose cutting plane says little about the centre. Unlike in their method,
+    a trial that descends is never discarded for a longer one: evaluations dominate the cost, so the step is
+    taken and the next one is longer.
 
     The radius only guards against steps into regions where the objective does not exist.
 
     Attributes:
         t: Proximal parameter.
         radius: Longest step in scaled variables.
-        t_least: Below it no descent is to be expected any more.
+        t_least: Below it no descent can be expected.
         t_most: t never exceeds it.
-        radius_least: Below it the design cannot move any more.
-        serious: Serious steps in a row.
-        nulls: Null steps in a row.
+        radius_least: Below it the design practically cannot move.
+        serious: Consecutive serious steps.
+        nulls: Consecutive null steps.
 
     References:
         H. Schramm and J. Zowe, SIAM J. Optim. 2 (1992) 121-152, inner iteration of section 3.
@@ -102,9 +102,9 @@ class Trust:
     def after_null(self, trial: Trial) -> Trust:
         """Return the trust after a null step: t shrinks where the new plane does not improve the model.
 
-        It improves the model if at the trial point it takes away a part of the predicted decrease
-        despite its locality measure. If it does, but lies far below the centre's value, t waits for
-        a second such step before it shrinks.
+        It improves the model if at the trial point it removes enough of the predicted decrease despite its
+        locality measure. If it does, but lies far below the centre's value, t shrinks only after a second
+        such step.
         """
         nulls, predicted = self.nulls + 1, trial.step.decrease
         improves = trial.slope - trial.measure >= -_CUT * predicted

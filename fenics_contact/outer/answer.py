@@ -1,4 +1,4 @@
-"""What a response returns."""
+"""The result of a response."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Answer:
-    """Quantities of interest at one set of parameters, the same bits on all ranks.
+    """Quantities of interest at one set of parameters, bitwise equal on all ranks.
 
     Attributes:
-        parameters: Every parameter with the value that it had.
+        parameters: Every parameter with its value.
         values: Quantity to value; nan where there is no state.
         subgradients: Quantity to a subgradient by the parameters, shape (n_parameters,), where it is known.
         failure: Why there is no state; empty where there is one.
-        products: Products with the dual operator that it took.
+        products: Number of products with the dual operator.
     """
 
     parameters: Mapping[str, float]

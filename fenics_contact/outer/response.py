@@ -1,4 +1,4 @@
-"""Parameters in, quantities of interest out: states of a scene, or designs."""
+"""From parameters to quantities of interest, by states of a scene or designs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Quantity = Callable[[State], Any]
 """Takes a state, returns a number. Called by all ranks together."""
 Failures = Literal["raise", "nan"]
 
-#: What tells that there is no answer at these parameters, rather than a mistake in the program.
+#: Errors that mean that there is no answer at these parameters, rather than a mistake in the program.
 NO_ANSWER = (InvalidDesignError, InfeasibleError, ConvergenceError)
 
 
@@ -41,13 +41,13 @@ class Response(ABC):
     """A function of named numbers.
 
     Attributes:
-        nominal: Parameter to the value it has unless given.
+        nominal: Parameter to its default value.
         evaluations: Number of answers so far, failed ones included.
         products: Products with the dual operator so far.
     """
 
     def __init__(self, nominal: Mapping[str, float], comm: MPI.Comm, failures: Failures) -> None:
-        """Check what subclasses share."""
+        """Check the parameters and the failure mode."""
         if failures not in ("raise", "nan"):
             raise InvalidInputError(f"failures must be 'raise' or 'nan', got {failures!r}")
         if not nominal:
@@ -71,7 +71,7 @@ class Response(ABC):
 
     @collectively("a response", lambda self, *_, **__: self.comm)
     def __call__(self, parameters: Parameters | None = None, **named: float) -> Answer:
-        """Answer at a set of parameters; what is not given is nominal. Collective.
+        """Evaluate at a set of parameters; the others keep their nominal values. Collective.
 
         Args:
             parameters: All of them in their order, shape (n_parameters,), or a mapping from names.
@@ -81,7 +81,7 @@ class Response(ABC):
             InvalidInputError: If a name is unknown, the shape does not fit or a number is not finite.
             InvalidDesignError: If the design does not exist (``failures="raise"``).
             InfeasibleError: If there is no equilibrium (``failures="raise"``).
-            ConvergenceError: If none is found (``failures="raise"``).
+            ConvergenceError: If the solver fails (``failures="raise"``).
         """
         with together(self.comm):
             values = self._values(parameters, named)
@@ -94,15 +94,15 @@ class Response(ABC):
             nothing = dict.fromkeys(self.quantities, np.nan)
             return Answer(values, nothing, failure=str(error) or type(error).__name__)
         self.products += products
-        # Outer tools on different ranks must see the same bits.
+        # Outer tools on different ranks must see bitwise equal values.
         found, subgradients = self.comm.bcast((found, subgradients))
         return Answer(values, found, subgradients, products=products)
 
     def table(self, samples: ArrayLike) -> np.ndarray:
-        """Answer at many sets of parameters, in their order. Collective.
+        """Evaluate at many sets of parameters, in their order. Collective.
 
         Args:
-            samples: A row a set, shape (n, n_parameters).
+            samples: One row per set, shape (n, n_parameters).
 
         Returns:
             Shape (n, n_quantities).
@@ -110,14 +110,14 @@ class Response(ABC):
         rows = np.array(samples, dtype=float)
         if rows.ndim != 2:
             raise InvalidInputError(
-                f"samples must have shape (n, {len(self.nominal)}), a column for each of "
+                f"samples must have shape (n, {len(self.nominal)}), one column for each of "
                 f"{list(self.parameters)}, got {rows.shape}"
             )
         return np.array([self(row).array for row in rows]).reshape(len(rows), len(self.quantities))
 
     @abstractmethod
     def _answer(self, values: dict[str, float]) -> tuple[dict[str, float], dict[str, np.ndarray], int]:
-        """Return the quantities, the subgradients that are known, and the products it took. Collective."""
+        """Return the quantities, the known subgradients, and the number of products. Collective."""
 
     def _values(self, given: Parameters | None, named: Mapping[str, float]) -> dict[str, float]:
         """Return every parameter's value."""
@@ -146,8 +146,8 @@ class Response(ABC):
 class SceneResponse(Response):
     """Quantities of the equilibrium of a scene that depends on parameters.
 
-    A state starts from the one before, and what a parameter does not touch is kept: factors where only loads
-    change, forms and numbering where meshes stay. So let ``build`` use the same mesh objects again.
+    A state starts from the one before, and what a parameter does not affect is reused: factors where only
+    loads change, forms and numbering where meshes stay. So let ``build`` reuse the same mesh objects.
 
     Example:
         >>> def build(friction, load):  # doctest: +SKIP
@@ -175,16 +175,16 @@ class SceneResponse(Response):
 
         Args:
             build: Takes the parameters by name, returns the scene, the same on every rank.
-            nominal: Parameter to its usual value.
-            quantities: Name to a function of the state; all ranks call it together.
+            nominal: Parameter to its default value.
+            quantities: Name to a function of the state, called by all ranks together.
             comm: Communicator over which the subdomains are spread.
             partitions: As for `solve_scene`.
             solver: As for `solve_scene`.
             tolerance: Relative residual of every state.
-            failures: Whether a state that does not exist or is not found raises, or makes all quantities nan
-                with `Answer.failure` saying why. Other errors always raise.
-            warm: Whether a state starts from the one before; answers differ by their tolerance then from
-                those in another order.
+            failures: Whether a state that does not exist or does not converge raises, or makes all quantities
+                nan with the reason in `Answer.failure`. Other errors always raise.
+            warm: Whether a state starts from the one before; answers then depend on the order of evaluation,
+                within the tolerance.
 
         Raises:
             InvalidInputError: If there is no parameter or no quantity.
@@ -243,7 +243,7 @@ class DesignResponse(Response):
 
         Args:
             problem: The design problem.
-            quantities: More quantities of the state, beside "objective".
+            quantities: Further quantities of the state, in addition to "objective".
             failures: As for `SceneResponse`.
         """
         super().__init__({f"alpha {k}": 0.0 for k in range(problem.size)}, problem.comm, failures)
@@ -266,8 +266,8 @@ def evaluated(quantities: Mapping[str, Quantity], state: State, comm: MPI.Comm) 
     """Return the quantities of a state. Collective.
 
     Raises:
-        InvalidInputError: If one of them is no number.
-        Exception: What a quantity raises on all ranks.
+        InvalidInputError: If one of them is not a number.
+        Exception: The error that a quantity raises on all ranks.
         UserCodeError: If it raises on some of them only.
     """
     found: dict[str, float] = {}
@@ -278,7 +278,7 @@ def evaluated(quantities: Mapping[str, Quantity], state: State, comm: MPI.Comm) 
 
 
 def _number(name: str, value: Any) -> float:
-    """Return the value of a quantity as a number, refuse what is none."""
+    """Return the value of a quantity as a number."""
     array = np.asarray(value)
     if array.size != 1:
         raise InvalidInputError(
@@ -294,7 +294,7 @@ def _number(name: str, value: Any) -> float:
 
 
 def _alike(scene: Scene, other: Scene) -> bool:
-    """Tell whether two scenes can share a decomposition."""
+    """Return whether two scenes can share a decomposition."""
     if scene.body_names != other.body_names:
         return False
     return all(

@@ -1,4 +1,4 @@
-"""Rank 0 drives, the others serve: a function of all ranks, called by a program that runs on one."""
+"""A collective function called by a program that runs on rank 0 alone, while the other ranks serve."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ _CALL, _STOP = "call", "stop"
 
 @contextmanager
 def served(function: Callable[..., Any], comm: MPI.Comm) -> Iterator[Callable[..., Any] | None]:
-    """Let rank 0 call a collective function as if it were alone, while the other ranks wait and join in.
+    """Let rank 0 call a collective function as if it were serial, while the other ranks wait and join in.
 
-    The block runs on every rank; on rank 0 it gets the function, on the others None, and these serve at its
-    end until rank 0 leaves its block. What the function raises on any rank, rank 0 gets from the call and may
-    go on; what leaves the block of one rank leaves that of all. So nobody waits for ranks that are gone.
+    The block runs on every rank; on rank 0 it receives the function, on the others None, and these serve at
+    its end until rank 0 leaves its block. An error of the function on any rank is raised by the call on rank
+    0, which may continue; an error that leaves the block of one rank leaves that of all. So no rank waits for
+    one that is gone.
 
     Arguments are sent from rank 0 (pickled); the value is that of rank 0.
 
@@ -31,20 +32,20 @@ def served(function: Callable[..., Any], comm: MPI.Comm) -> Iterator[Callable[..
         ...         study.optimize(lambda trial: call(load=trial.suggest_float("load", 1.0, 2.0))["peak"])
 
     Args:
-        function: Called by all ranks with equal arguments. An error that one rank alone meets may not leave
-            the others waiting inside the function; those of this package never do.
+        function: Called by all ranks with equal arguments. An error on one rank must not leave the others
+            waiting inside the function; those of this package never do.
         comm: Communicator whose ranks serve.
 
     Yields:
         The function for rank 0, None on the other ranks.
 
     Raises:
-        Exception: What left the block: on the rank itself that error, on the others one of the same class if
+        Exception: The error that left the block, on the rank itself; on the others one of the same class if
             it is one of this package's, else `RemoteError`.
 
     Note:
-        Collective on ``comm``. Code of the block that only rank 0 should run stands under ``if call is not
-        None``. Waiting ranks keep their cores busy.
+        Collective on ``comm``. Put code that only rank 0 should run under ``if call is not None``. Waiting
+        ranks keep their cores busy.
     """
     if comm.rank == 0:
         call = _Call(function, comm)
@@ -68,12 +69,12 @@ def served(function: Callable[..., Any], comm: MPI.Comm) -> Iterator[Callable[..
 
 
 class _Call:
-    """The function as rank 0 has it."""
+    """The function as called on rank 0."""
 
     def __init__(self, function: Callable[..., Any], comm: MPI.Comm) -> None:
         self._function, self._comm = function, comm
         self._open, self._process = True, os.getpid()
-        # Two threads of a tool may not talk to the other ranks at once.
+        # Two threads of a tool must not communicate with the other ranks at once.
         self._turn = threading.Lock()
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
@@ -90,7 +91,7 @@ class _Call:
             return _called(self._function, self._comm, arguments, named, None)
 
     def stop(self, error: Exception | None, leaving: BaseException | None = None) -> None:
-        """Let the other ranks go."""
+        """Release the other ranks."""
         with self._turn:
             if not self._open:
                 return
@@ -119,13 +120,13 @@ def _called(
     earlier: Exception | None,
 ) -> Any:
     """Call the function on this rank; all ranks raise if one does. Collective."""
-    agree(comm, earlier)  # a rank that cannot serve says so before anybody waits for it
+    agree(comm, earlier)  # a rank that cannot serve reports it before any other waits for it
     with collective(comm, "the served function", closed=True):
         return function(*arguments, **named)
 
 
 def _serve(function: Callable[..., Any], comm: MPI.Comm, left: BaseException | None) -> None:
-    """Join in until rank 0 stops; a rank whose block was left by an error only reports it. Collective."""
+    """Join in until rank 0 stops; a rank whose block ended in an error only reports it. Collective."""
     mine = left if left is None or isinstance(left, Exception) else RemoteError(f"the program left: {left!r}")
     while True:
         request = comm.bcast(None, root=0)
@@ -133,7 +134,7 @@ def _serve(function: Callable[..., Any], comm: MPI.Comm, left: BaseException | N
             break
         try:
             _called(function, comm, request[1], request[2], mine)
-        except BaseException:  # rank 0 has it, and decides whether to go on
+        except BaseException:  # it is raised on rank 0, which decides whether to continue
             continue
     _, kind, arguments = request
     if kind is not None:

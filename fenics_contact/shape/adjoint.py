@@ -23,7 +23,7 @@ from fenics_contact.qp import (
 from fenics_contact.shape.linearised_face import LinearisedFace
 from fenics_contact.shape.objective import Partials
 
-#: Derivatives along a rigid motion below this part of their summands are rounding.
+#: Derivatives along a rigid motion below this fraction of their summands are rounding.
 UNFELT = 1e-9
 
 
@@ -55,28 +55,28 @@ def solve_adjoint(
 ) -> Adjoint:
     """Solve the transpose of the linearised state equations. Collective.
 
-    With the bases Z_s (tested) and Z_u (moving) of the state's face and the curvature κ of slipping discs,
+    With the bases Z_s (test) and Z_u (trial) of the state's face and the curvature κ of slipping discs,
 
         K w + Bᵀ Z_s z = ∂J/∂u,      Z_uᵀ B w − κ z = Z_uᵀ ∂J/∂λ.
 
     Eliminating w leaves (Z_uᵀ F Z_s + κ) z − (G Z_u)ᵀ β = Z_uᵀ (B K⁺ ∂J/∂u − ∂J/∂λ) under G Z_s z = Rᵀ ∂J/∂u,
     the system of a Newton step with its two bases swapped.
 
-    All of it is linear in the objective, also the start and the size that the residual is compared with: in
-    other units an objective has the same adjoint, to rounding.
+    Everything is linear in the objective, also the start and the scale of the residual: rescaling the
+    objective rescales the adjoint, to rounding.
 
     Args:
         state: A converged state.
         partials: Partial derivatives of the objective.
         linearised: Branch of the contact law.
-        tolerance: Residual relative to what the objective asks for.
+        tolerance: Residual relative to that of the objective alone.
         max_iterations: Largest number of F-products.
-        start: Multiplier of an adjoint to start from, owned, of any length; that of the same objective at a
+        start: Multiplier of an adjoint to start from, owned, in any scaling; that of the same objective at a
             less accurate state saves most products. By default the multiplier of the state.
 
     Raises:
-        ConvergenceError: If the face does not hold every body, the objective depends on where a body lies
-            that nothing holds, or the tolerance was not reached.
+        ConvergenceError: If the face does not hold every body, the objective changes along a rigid motion
+            that nothing resists, or the tolerance was not reached.
     """
     system = state.dual
     _require_held(system, partials.by_displacement)
@@ -117,12 +117,12 @@ def solve_adjoint(
 
 @dataclass(frozen=True, eq=False)
 class _Begin:
-    """Where the iteration begins.
+    """The start of the iteration.
 
     Attributes:
         point: z, shape (n_face,).
         gradient: Residual of the equations there, shape (n_face,).
-        size: Norm of the projected residual that the objective alone gives rise to, whatever the guess.
+        size: Norm of the projected residual due to the objective alone, independent of the guess.
     """
 
     point: np.ndarray
@@ -133,10 +133,10 @@ class _Begin:
 def _begin(
     problem: DualProblem, transposed: CoupledSystem, right: np.ndarray, load: np.ndarray, guess: np.ndarray
 ) -> _Begin:
-    """Return the shortest z that bears the load plus as much of the guess as shortens the residual most.
+    """Return the shortest z that balances the load plus that multiple of the guess that fits best.
 
-    The guess comes in units of its own (forces, or those of another objective), so that its share is found
-    and not given. Collective; a product each for load and guess.
+    The guess has its own units (forces, or those of another objective), so its factor is computed.
+    Collective; one product each for load and guess.
     """
 
     def image(z: np.ndarray) -> np.ndarray:
@@ -153,10 +153,10 @@ def _begin(
 
 
 def _require_held(system: DualSystem, by_displacement: np.ndarray) -> None:
-    """Refuse objectives that change along motions that nothing holds. Collective.
+    """Reject objectives that change along motions that nothing resists. Collective.
 
-    Such motions are not determined by the state but agreed upon, and how the agreement changes with the shape
-    is no part of the adjoint.
+    Such motions are fixed by convention, not by the state, and how the convention changes with the shape is
+    not part of the adjoint.
     """
     work = system.unheld.T @ by_displacement
     size = abs(system.unheld).T @ np.abs(by_displacement)
@@ -164,15 +164,15 @@ def _require_held(system: DualSystem, by_displacement: np.ndarray) -> None:
     if np.any(np.abs(work) > UNFELT * size):
         raise ConvergenceError(
             "the adjoint needs an objective that is the same wherever nothing holds a body, but this one "
-            "changes along a rigid motion that meets no resistance (`State.unheld`): add a support, or judge "
-            "by stresses, energies or contact forces"
+            "changes along a rigid motion that meets no resistance (`State.unheld`): add a support, or use "
+            "stresses, energies or contact forces"
         )
 
 
 def _scaled(problem: DualProblem, face: Face) -> tuple[DualProblem, Face, np.ndarray | float]:
     """Return problem and face in multipliers scaled by stiffness, and the factors, see `Scaling`.
 
-    The factors are even within a contact, so that both bases of a face stay what they are.
+    The factors are uniform within a contact point, so that both bases of a face are unchanged.
     """
     if problem.scaling is None:
         return problem, face, 1.0

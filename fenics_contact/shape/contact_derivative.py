@@ -1,4 +1,4 @@
-"""How an objective changes with the geometry of the contact points: gap, normal, tangents, weights, areas."""
+"""Derivative of an objective by the geometry of the contact points: gap, normal, tangents, weights, areas."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class RowFields:
         normal: λ_N and ζ_N, shape (2, n).
         friction: τ and ζ_T in the points' tangents, shape (2, n, dim - 1).
         nodes: Nodes of slaves and masters, ascending, shape (n_nodes,).
-        values: Displacement of these nodes, of the adjoint and of the state, shape (2, n_nodes, dim): the
-            field that each multiplier is paired with.
+        values: Displacement of these nodes, of the adjoint and of the state, shape (2, n_nodes, dim): each
+            multiplier is paired with the other field.
         relative: Slave minus master displacement, shape (2, n, dim), in the same order.
     """
 
@@ -50,7 +50,7 @@ class RowFields:
 def contact_by_shape(state: State, adjoint: Adjoint, by_bound: np.ndarray) -> np.ndarray:
     """Return ∂/∂X of −λᵀ B w + ζᵀ(c − B u) plus the slip bounds' share, replicated, shape (n_nodes, dim).
 
-    Pairs with mortar contact must lie where no node moves: their share is left out. Collective.
+    Pairs with mortar contact must lie where no node moves: their contribution is omitted. Collective.
 
     Args:
         state: The state.
@@ -83,7 +83,7 @@ def contact_by_shape(state: State, adjoint: Adjoint, by_bound: np.ndarray) -> np
 
 
 def _by_obstacle(torn: TornSystem, obstacle: RigidObstacle, rows: RowFields, mine: np.ndarray) -> np.ndarray:
-    """Return the derivative by the slave nodes that meet an obstacle, shape (n, dim)."""
+    """Return the derivative by the slave nodes that face an obstacle, shape (n, dim)."""
     by, normal = _by_point(torn.points, rows, mine), torn.points.normal[mine]
     with together(torn.decomposition.comm):
         bending = asked(obstacle, "curvatures", _points(torn, torn.points.slave[mine]))
@@ -94,7 +94,7 @@ def _by_obstacle(torn: TornSystem, obstacle: RigidObstacle, rows: RowFields, min
 def _add_projected(
     result: np.ndarray, torn: TornSystem, pair: ContactPair, rows: RowFields, mine: np.ndarray
 ) -> None:
-    """Add the derivative by slave and master nodes of points found by projection."""
+    """Add the derivative by slave and master nodes of projected points."""
     master = pair.master
     assert isinstance(master, Surface)
     points, surface = torn.points, surface_of(torn.scene, master, pair.geometry)

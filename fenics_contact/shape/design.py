@@ -16,8 +16,8 @@ from fenics_contact.shape.bernstein import tensor_bernstein
 
 #: Default width of the transition strip, relative to the extent of the design surface.
 TRANSITION = 0.15
-#: Distance from the surface, relative to its extent, beyond which nothing moves: behind a boundary that keeps
-#: its place a harmonic displacement has decayed by then.
+#: Distance from the surface, relative to its extent, beyond which nothing moves: behind a fixed boundary a
+#: harmonic displacement has decayed there.
 FAR = 0.4
 
 
@@ -34,8 +34,8 @@ class SurfaceDesign:
         surface: Nodes of the surface, their parameters and directions.
         net: Number of control points along s and t.
         transition: Width of the strip of boundary around the surface that follows it smoothly; the rest of
-            the boundary keeps its place, [length]. By default 0.15 times the extent of the surface. What is
-            far from the surface keeps its place inside too.
+            the boundary is fixed, [length]. By default 0.15 times the extent of the surface. Inner nodes far
+            from the surface are fixed, too.
     """
 
     body: str
@@ -44,7 +44,7 @@ class SurfaceDesign:
     transition: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a net without points or with more points than the surface has nodes."""
+        """Reject a net without points or with more points than the surface has nodes."""
         if min(self.net) < 1:
             raise InvalidInputError(
                 f"a net needs at least one control point each way, got {self.net}: try (7, 4)"
@@ -52,7 +52,7 @@ class SurfaceDesign:
         if any(points > nodes for points, nodes in zip(self.net, self.surface.counts, strict=True)):
             raise InvalidInputError(
                 f"a net of {self.net} control points needs at least as many nodes each way, the surface has "
-                f"{self.surface.counts}: take fewer control points or a finer mesh"
+                f"{self.surface.counts}: use fewer control points or a finer mesh"
             )
 
     @property
@@ -87,7 +87,7 @@ class SurfaceDesign:
     def nodes_beyond_transition(self, mesh: BodyMesh) -> np.ndarray:
         """Return the nodes of the body that do not follow the surface.
 
-        Only subdomains with other nodes are assembled and factored again for a new design.
+        Only subdomains with other nodes are reassembled and refactored for a new design.
 
         Args:
             mesh: The body in its reference shape.
@@ -103,7 +103,7 @@ class SurfaceDesign:
         return np.flatnonzero(far)
 
     def control_points(self, points: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-        """Return where to draw the control points, shape (net[0], net[1], 3), [length].
+        """Return positions for drawing the control points, shape (net[0], net[1], 3), [length].
 
         Each is drawn at its Greville abscissa on the reference surface, moved by its own variable.
 
@@ -120,21 +120,21 @@ class SurfaceDesign:
 
 
 def checked_variables(alpha: np.ndarray, size: int, comm: MPI.Comm) -> np.ndarray:
-    """Return design variables as an array, refuse what is no design. Collective on ``comm``.
+    """Return design variables as a checked array. Collective on ``comm``.
 
     Args:
         alpha: Design variables.
-        size: How many there must be.
-        comm: Communicator of the ranks, which must be given the same.
+        size: Required number of variables.
+        comm: Communicator of the ranks, on which they must be equal.
 
     Raises:
-        InvalidInputError: If they have another shape, are not finite or differ from rank to rank.
+        InvalidInputError: If the shape is wrong, or they are not finite or differ from rank to rank.
     """
     with together(comm):
         variables = np.asarray(alpha, dtype=float)
         if variables.shape != (size,):
             raise InvalidInputError(
-                f"alpha must have shape ({size},), got {variables.shape}: one number a control point"
+                f"alpha must have shape ({size},), got {variables.shape}: one number per control point"
             )
         if not np.isfinite(variables).all():
             first = int(np.flatnonzero(~np.isfinite(variables))[0])

@@ -1,4 +1,4 @@
-"""Derivatives of subdomain integrals by the coordinates of the mesh, from UFL."""
+"""Derivatives of subdomain integrals by the mesh coordinates, from UFL."""
 
 from __future__ import annotations
 
@@ -34,10 +34,9 @@ Materials = tuple[Material, ...]
 
 
 class ShapeForms:
-    """Compiled functionals of one or two displacement fields and their derivatives, by what they express.
+    """Compiled functionals of one or two displacement fields and their derivatives.
 
-    A functional is compiled when it is first asked for, by all ranks together. ``materials`` are those of
-    a `Composition`.
+    A functional is compiled on first use, by all ranks together. ``materials`` are those of a `Composition`.
 
     Attributes:
         moving: Marks of the nodes of all bodies that a design moves, or None for all; derivatives by other
@@ -121,7 +120,7 @@ def _by_shape(form: Any, cell_type: str) -> Any:
 
 
 def work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Return ∂/∂X of a(u, w) − L(w), this rank's share by node of all bodies, shape (n_nodes, dim).
+    """Return ∂/∂X of a(u, w) − L(w), this rank's share, at the nodes of all bodies, shape (n_nodes, dim).
 
     Loads on surfaces are left out: loaded surfaces do not move with a design.
 
@@ -129,13 +128,13 @@ def work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndar
         forms: Compiled derivatives.
         torn: The torn system.
         u: Torn displacement of this rank, [length].
-        w: Torn field in the place of the test function.
+        w: Torn field used as the test function.
 
     Raises:
         InvalidInputError: If a load on a body that moves is a function of position without a derivative.
     """
     loads = moving_loads(torn, forms.moving)
-    for name, body in torn.scene.bodies.items():  # all ranks compile, also for bodies they hold no part of
+    for name, body in torn.scene.bodies.items():  # all ranks compile, also for bodies without a part on them
         for materials in material_sets(body):
             forms.virtual_work_by_shape(materials, body.mesh.cell_type)
             for load in loads:
@@ -183,7 +182,7 @@ def moving_loads(torn: TornSystem, moving: np.ndarray | None) -> list[Load]:
 
 
 def check_differentiable(loads: Sequence[Load]) -> None:
-    """Refuse loads whose change with the place of the nodes is not known.
+    """Reject loads whose derivative by the nodal positions is unknown.
 
     Raises:
         InvalidInputError: If a load is a plain function of position.
@@ -207,8 +206,8 @@ def sum_over_subdomains(
     Args:
         torn: The torn system.
         fields: Torn fields handed to ``evaluate`` as Functions.
-        evaluate: Gets the subdomain and the Functions; returns a vector by dof.
-        moving: Marks of nodes of all bodies; subdomains without one of them are left out.
+        evaluate: Takes the subdomain and the Functions; returns a vector by dof.
+        moving: Marks of nodes of all bodies; subdomains without one of them are skipped.
     """
     tearing = torn.decomposition.tearing
     total = np.zeros((int(tearing.node_offset[-1]), torn.scene.dim))
@@ -226,8 +225,8 @@ def subdomain_fields(
 
     Args:
         torn: The torn system.
-        fields: Torn fields to hand out as Functions.
-        moving: Marks of nodes of all bodies; subdomains without one of them are left out.
+        fields: Torn fields to yield as Functions.
+        moving: Marks of nodes of all bodies; subdomains without one of them are skipped.
     """
     tearing = torn.decomposition.tearing
     starts = np.cumsum([0] + [subdomain.mesh.size for subdomain in torn.subdomains])
@@ -235,7 +234,7 @@ def subdomain_fields(
         mesh = subdomain.mesh
         if moving is not None and not moving[tearing.global_nodes(mesh.body, mesh.nodes)].any():
             continue
-        # Systems of several geometries share the meshes: another one may have moved them since.
+        # Systems of several geometries share the meshes: another one may have moved them in the meantime.
         points = torn.scene.bodies[mesh.body].mesh.points
         _dolfinx.update_coordinates(mesh.space.mesh, points[np.sort(mesh.nodes)])
         functions = []

@@ -13,23 +13,23 @@ from fenics_contact.qp import ContactLayout, DualProblem, DualSolution, Face, cl
 from fenics_contact.scene import Surface
 from fenics_contact.surfaces import edge_distance
 
-#: A contact point is weakly active when it is closer to the switch than this many times the state's residual.
+#: A contact point is weakly active if it is closer to a switch of the contact law than this many residuals.
 UNCERTAINTY = 3.0
-#: What rounding alone leaves of the forces, and of those that would close the gaps.
+#: Relative rounding error of the forces, and of those that would close the gaps.
 ROUNDING = 1e-13
-#: Weak points further from the switch than this fraction of the forces lean to a side, and are taken there.
+#: Weak points further from the switch than this fraction of the forces are assigned to the closer side.
 LEANING = 1e-5
-#: A projection this close to the edge of its facet, in local coordinates, lies on it.
+#: A projection within this distance of a facet's edge, in local coordinates, counts as on the edge.
 EDGE_TOLERANCE = 1e-6
 
 
 class WeakChoice(Enum):
-    """Which branch weakly active points take, all of them the same.
+    """The branch that all weakly active points are given.
 
     Each branch of each point is an element of the limiting coderivative of its contact law, and the adjoint
-    of such a choice is what the inclusion for coderivatives of a composition gives. Of a single weak point
-    either is a Clarke subgradient. Of several it need not be one: designs nearby may close some points only
-    while others open, and no design has all of them open, or all of them closed.
+    of a choice is an element of the inclusion for coderivatives of a composition. With a single weak point
+    either branch gives a Clarke subgradient. With several it need not: nearby designs may close some points
+    only while others open, so that no design has all of them open, or all closed.
     """
 
     RELEASED = "weak contacts count as open, weak discs as slipping"
@@ -38,14 +38,15 @@ class WeakChoice(Enum):
 
 @dataclass(frozen=True)
 class WeakPoints:
-    """How many points lie on a switch of the contact law as far as the state can tell, over all ranks.
+    """Numbers of points on a switch of the contact law, to the accuracy of the state, over all ranks.
 
     Attributes:
         contacts: Points with neither force nor gap.
         discs: Friction discs at their bound without slip.
-        edges: Closed points that project on an edge between facets; they count as inside the facet found.
-        choice: The branch that contacts and discs were given. Those of a loose state that are clearly on one
-            side, only not beyond doubt, are taken there.
+        edges: Closed points that project on an edge between facets; they count as inside the facet they
+            project on.
+        choice: The branch that contacts and discs were given. Those of an inaccurate state that are probably
+            on one side are assigned to that side.
     """
 
     contacts: int
@@ -55,14 +56,14 @@ class WeakPoints:
 
     @property
     def count(self) -> int:
-        """All of them."""
+        """Number of all weak points."""
         return self.contacts + self.discs + self.edges
 
     @property
     def doubtful(self) -> bool:
-        """Whether the branch of all of them together may be one that no design nearby has.
+        """Whether the combination of branches may be one that no nearby design has.
 
-        Where one weak contact closes, its friction may slip: it alone must not be held.
+        Where one weak contact closes, its friction may slip: only that single point must not be held.
         """
         return self.count > 1 or (self.contacts > 0 and self.choice is WeakChoice.HELD)
 
@@ -73,11 +74,11 @@ class LinearisedFace:
 
     Attributes:
         face: Closed, sticking and slipping points.
-        tested: Z_s, directions along which the rows are tested, shape (n_owned, n_face).
-        moving: Z_u, directions along which the multiplier moves: a slipping friction force grows with its
+        tested: Z_s, test directions of the rows, shape (n_owned, n_face).
+        moving: Z_u, directions along which the multiplier varies: a slipping friction force grows with its
             normal force by μ d, shape (n_owned, n_face).
         slip_direction: d at the slipping discs, zero elsewhere, shape (n_friction, 2), owned.
-        weak: What lay on a switch.
+        weak: Points on a switch.
     """
 
     face: Face
@@ -93,7 +94,7 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
     Args:
         state: A converged state.
         choice: Branch for weakly active points.
-        coupling: Leave out the growth of friction with the normal force if False; the derivative is then
+        coupling: If False, the growth of friction with the normal force is omitted; the derivative is then
             that of Tresca friction.
     """
     system, solution = state.dual, state.dual_solution
@@ -149,7 +150,7 @@ class _OnSwitch:
 def _on_switch(
     layout: ContactLayout, trial: np.ndarray, bound: np.ndarray, coefficient: np.ndarray, slack: np.ndarray
 ) -> _OnSwitch:
-    """Return which points are no further from a switch than their slack, [force]."""
+    """Return which points are within their slack, [force], of a switch."""
     contact = np.abs(trial[layout.normal]) <= slack[layout.normal]
     vanishing = contact[layout.friction_of] & (coefficient > 0)
     beyond = np.linalg.norm(trial[layout.tangential], axis=1) - bound
@@ -160,17 +161,18 @@ def _on_switch(
 def _told_apart(
     problem: DualProblem, solution: DualSolution, step: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distance from a switch at which the sides can be told apart, owned, [force]. Collective.
+    """Return the distance from a switch beyond which a point's side is certain, owned, [force]. Collective.
 
-    That is what the residuals of the state can make of λ − ρ r, with ρ the ``step``: those of the contact
-    law are forces already, jumps between subdomains become forces as slips and gaps do.
+    It is the uncertainty of λ − ρ r due to the residuals of the state, with ρ the ``step``: those of the
+    contact law are forces already, jumps between subdomains become forces as slips and gaps do.
 
     Returns:
-        The distance, and that below which points of a loose state lean to neither side, shapes (size,).
+        The distance, and that below which a point of an inaccurate state is assigned to no side, shapes
+        (size,).
     """
     residuals = solution.residuals
     forces, jumps = residuals.natural * residuals.force_scale, residuals.gluing * residuals.gluing_scale
-    moved = np.where(problem.between_supports, 0.0, step * problem.rhs)  # no multiplier moves the others
+    moved = np.where(problem.between_supports, 0.0, step * problem.rhs)  # no multiplier changes the others
     rounding = ROUNDING * max(problem.norm(solution.multiplier), problem.norm(moved))
     told = np.asarray(UNCERTAINTY * (forces + step * jumps) + rounding)
     return told, np.minimum(told, LEANING * residuals.force_scale + rounding)
@@ -179,7 +181,7 @@ def _told_apart(
 def _points_on_edges(state: State) -> int:
     """Count the closed points over an edge of their master facet, where the normal field has a kink.
 
-    Points of mortar contact stand for a mean over facets and lie on none.
+    Points of mortar contact represent a mean over facets and lie on none.
     """
     points = state.torn.points
     total = 0
@@ -193,10 +195,10 @@ def _points_on_edges(state: State) -> int:
 
 
 def _growth(face: Face, starting: np.ndarray, coefficient: np.ndarray) -> sp.csr_matrix:
-    """Return how slipping forces grow with their normal forces, and those that start to.
+    """Return the growth of slipping forces with their normal forces, and that of incipient ones.
 
-    A Coulomb disc has no radius where its contact is weak. When the contact closes, its force grows along the
-    slip: it has a direction and no offset, hence no column of its own; such columns come last.
+    A Coulomb disc has zero radius where its contact is weak. When the contact closes, its force grows along
+    the slip: it has a direction but no offset, hence no column of its own; such columns come last.
     """
     return replace(face, slip=face.slip | starting).growth(coefficient)[:, : face.n_face]
 

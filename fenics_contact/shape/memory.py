@@ -1,4 +1,4 @@
-"""Designs that a problem remembers: the state to start the next one from, and the first, best and last."""
+"""Designs that a problem stores: the state from which the next one starts, and the first, best and last."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ _SAME = "same"
 
 @dataclass(frozen=True, eq=False)
 class DesignPoint:
-    """A design that was evaluated.
+    """An evaluated design.
 
     Attributes:
         alpha: Design variables, shape (size,).
         value: Objective.
-        gradient: The gradient where no point is weakly active, a Clarke subgradient where one is, what their
-            branch gives where several are, see `WeakChoice`, shape (size,).
+        gradient: The gradient where no point is weakly active, a Clarke subgradient where one is, the
+            derivative of the chosen branches where several are, see `WeakChoice`, shape (size,).
         state: Equilibrium.
         weak: Weakly active points and the branch they were given.
         adjoint_iterations: F-products of the adjoint.
-        tolerance: Relative residual that the state was solved to.
-        correction: What the residuals of the state change in the objective, to first order, see
-            `state_error`. With an adaptive tolerance the value has been corrected by it.
-        error: Safe estimate of the error of the value, units of the objective, corrected or not.
+        tolerance: Relative residual of the state.
+        correction: First-order effect of the state's residuals on the objective, see `state_error`. With an
+            adaptive tolerance the value has been corrected by it.
+        error: Safe estimate of the error of the value, whether corrected or not, units of the objective.
         adjoint_multiplier: ζ of the adjoint, owned.
     """
 
@@ -49,7 +49,7 @@ class DesignPoint:
 
 
 class DesignMemory:
-    """The state found last and the first, best and last design; those of an earlier run as arrays.
+    """The last state and the first, best and last design; those of an earlier run as arrays.
 
     Attributes:
         state: State from which the next one starts, None before the first.
@@ -57,7 +57,7 @@ class DesignMemory:
     """
 
     def __init__(self, restore: Callable[[np.ndarray, Stored], State]) -> None:
-        """Remember nothing.
+        """Start empty.
 
         Args:
             restore: Builds the state of a design from what `stored_state` returned. Collective.
@@ -69,11 +69,11 @@ class DesignMemory:
         self.error_by_tolerance = 0.0
 
     def record_state(self, alpha: np.ndarray, state: State) -> None:
-        """Remember the state found last."""
+        """Store the last state."""
         self._alpha, self.state = np.array(alpha, dtype=float), state
 
     def record_point(self, point: DesignPoint) -> None:
-        """Remember a design that was evaluated."""
+        """Store an evaluated design."""
         first, best = self._points.get("first"), self._points.get("best")
         if first is None or np.array_equal(point.alpha, _alpha(first)):
             self._points["first"] = point
@@ -83,14 +83,14 @@ class DesignMemory:
         self.error_by_tolerance = point.error / point.tolerance
 
     def of_design(self, alpha: np.ndarray) -> DesignPoint | None:
-        """Return what is known of this very design. Collective after a run was resumed."""
+        """Return the stored evaluation of exactly this design, if any. Collective after a run was resumed."""
         for name in ("last", "best", "first"):
             if name in self._points and np.array_equal(_alpha(self._points[name]), alpha):
                 return self.point(name)
         return None
 
     def point(self, name: str) -> DesignPoint | None:
-        """Return a design by its name; one of an earlier run is built again first. Collective then."""
+        """Return a design by its name; one of an earlier run is rebuilt first. Collective then."""
         found = self._points.get(name)
         if found is None or isinstance(found, DesignPoint):
             return found
@@ -99,7 +99,7 @@ class DesignMemory:
         return built
 
     def stored(self) -> Stored:
-        """Return all as arrays. Collective."""
+        """Return everything as arrays. Collective."""
         arrays: Stored = {}
         names: dict[int, str] = {}
         for name, kept in self._points.items():
@@ -116,7 +116,7 @@ class DesignMemory:
         return arrays
 
     def recall(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Take up what `stored` returned; only the state to start from is built at once. Collective."""
+        """Load what `stored` returned; only the state to start from is built immediately. Collective."""
         parts: dict[str, Stored] = {}
         for key, values in arrays.items():
             name, _, part = key.partition(".")

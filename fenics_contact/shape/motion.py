@@ -19,7 +19,7 @@ from fenics_contact.shape.design import SurfaceDesign
 
 
 class HarmonicExtension:
-    """Each component of the mesh displacement is harmonic, given on the design surface, zero where held.
+    """Each component of the mesh displacement is harmonic, prescribed on the design surface, zero where held.
 
     The matrix is that of the reference mesh: the extension is linear in the surface displacement, and one
     factorisation serves all designs and, transposed, all gradients.
@@ -35,14 +35,14 @@ class HarmonicExtension:
         """Assemble and factor the Laplacian of a body. Collective on the decomposition's communicator.
 
         Args:
-            decomposition: Says which rank owns which cells.
+            decomposition: Which rank owns which cells.
             name: Name of the body.
             body: The body in its reference shape.
             moving: Nodes of the design surface.
             held: Nodes that do not move.
 
         Raises:
-            InvalidInputError: If a node is to move and to be held.
+            InvalidInputError: If a node is both moved and held.
         """
         both = np.intersect1d(moving, held)
         if len(both):
@@ -83,7 +83,7 @@ class HarmonicExtension:
         return ksp
 
     def extend(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the displacement of all nodes, shape (n_nodes, 3), given the moving ones'. Collective."""
+        """Return the displacement of all nodes, shape (n_nodes, 3), from the moving ones'. Collective."""
         check_not_forked()
         prescribed, right = self._laplacian.createVecs()
         solution = right.duplicate()
@@ -135,10 +135,10 @@ class HarmonicExtension:
 
 
 def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign) -> HarmonicExtension:
-    """Return what moves the mesh of a body with its design. Collective.
+    """Return the extension that moves the mesh of a body with its design. Collective.
 
     Raises:
-        InvalidInputError: If the scene has no such body, or a surface moves that is held or loaded.
+        InvalidInputError: If the scene has no such body, or a moving surface is held or loaded.
     """
     name = design.body
     if name not in scene.bodies:

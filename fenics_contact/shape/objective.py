@@ -1,4 +1,4 @@
-"""What a design is judged by, with the partial derivatives that the adjoint needs."""
+"""Objectives of designs, with the partial derivatives that the adjoint needs."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Partials:
         by_displacement: ∂J/∂u on this rank's torn dofs, shape (torn_size,).
         by_multiplier: ∂J/∂λ, owned, shape (n_owned,).
         by_shape: ∂J/∂X at fixed u and λ, this rank's share, shape (n_nodes, dim) for the nodes of all bodies;
-            what nodes that no design moves get is left open.
+            undefined at nodes that no design moves.
     """
 
     value: float
@@ -59,7 +59,7 @@ class Objective(Protocol):
 
 
 def asking(comm: MPI.Comm) -> AbstractContextManager[None]:
-    """Guard a block in which an objective is asked, which may be a user's own. Collective on ``comm``."""
+    """Guard a block that evaluates an objective, which may be user code. Collective on ``comm``."""
     return collective(comm, "the objective", closed=True, users=True)
 
 
@@ -85,9 +85,9 @@ class VolumeIntegral:
     """J = ∫ integrand(u, x, σ) dx over one body.
 
     Attributes:
-        name: What it is called among compiled forms.
-        integrand: Takes displacement, coordinates and stress (UFL; without what a temperature change takes
-            off), returns a UFL scalar.
+        name: Its name among compiled forms.
+        integrand: Takes displacement, coordinates and stress (UFL; without thermal stress), returns a UFL
+            scalar.
         body: Name of the body.
 
     Example:
@@ -130,7 +130,7 @@ class VolumeIntegral:
         )
 
     def _prepare(self, state: State, forms: ShapeForms, by: str) -> Bind:
-        """Compile the integral or a derivative, return what binds it to a subdomain. Collective."""
+        """Compile the integral or a derivative, return a function that binds it to subdomains. Collective."""
         body = self._body(state)
         cell_type, temperature = body.mesh.cell_type, temperature_of(state.scene.loads, self.body)
         for materials in material_sets(body):
@@ -168,7 +168,7 @@ class ContactForces:
 
     Attributes:
         function: Takes the contact result; returns φ, ∂φ/∂λ_N of shape (n,) and ∂φ/∂τ of shape (n, 2), the
-            latter in the points' tangents. Invariant under rotation of the tangents if it is to be smooth.
+            latter in the points' tangents. Must be invariant under rotation of the tangents to be smooth.
 
     Example:
         >>> def largest(contact):
@@ -192,10 +192,10 @@ class ContactForces:
             return float(value), np.asarray(normal), np.asarray(tangential)
 
     def _differentiated(self, state: State) -> tuple[float, np.ndarray, np.ndarray]:
-        """Return what the user's function does, once it was checked.
+        """Return the checked result of the user's function.
 
         Raises:
-            InvalidInputError: If that is something else than finite numbers of the right shapes.
+            InvalidInputError: If that is not finite numbers of the right shapes.
         """
         count, width = state.torn.points.count, state.torn.dim - 1
         value, normal, tangential = self._asked(state)
@@ -207,7 +207,7 @@ class ContactForces:
         return _finite(value, normal, tangential)
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
-        """Place the user's derivatives on the contact rows; raises as the function's call does."""
+        """Map the user's derivatives to the contact rows; raises as the function's call does."""
         system, torn = state.dual, state.torn
         with together(torn.decomposition.comm):
             value, normal, tangential = self._differentiated(state)
@@ -223,7 +223,7 @@ class ContactForces:
 
 
 def _finite(value: float, *derivatives: np.ndarray) -> tuple[Any, ...]:
-    """Return what a function of contact forces has returned, refuse what is not finite."""
+    """Return the result of a function of contact forces if it is finite, else raise."""
     if not (np.isfinite(value) and all(np.isfinite(numbers).all() for numbers in derivatives)):
         raise InvalidInputError(
             "ContactForces.function must return finite numbers, got NaN or infinity: check divisions by "

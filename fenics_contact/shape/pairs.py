@@ -1,4 +1,4 @@
-"""Which pairs of surfaces a design may move: those whose rows have derivatives by the shape."""
+"""Which pairs of surfaces a design may move: those whose rows have shape derivatives."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fenics_contact.scene import Scene, Surface
 
 
 def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
-    """Refuse designs that move surfaces of mortar contact or of ties, or bodies of quadratic cells.
+    """Reject designs that move surfaces of mortar contact or of ties, or bodies of quadratic cells.
 
     Args:
         scene: The scene.
@@ -24,7 +24,7 @@ def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
         if nodes.any() and scene.bodies[body].mesh.order > 1:
             raise InvalidInputError(
                 f"a design may move only bodies of linear cells, those of {body!r} are of order "
-                f"{scene.bodies[body].mesh.order}: use the mesh that `quadratic` was given"
+                f"{scene.bodies[body].mesh.order}: use the linear mesh that `quadratic` was given"
             )
     for number, pair in enumerate(scene.contacts):
         if pair.discretisation == "mortar" and isinstance(pair.master, Surface):

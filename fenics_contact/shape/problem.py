@@ -34,7 +34,7 @@ from fenics_contact.shape.state_error import state_error
 from fenics_contact.shape.tolerance import AdaptiveTolerance, tightest_of
 from fenics_contact.shape.volume import volume_by_points
 
-#: Tolerance of the adjoint relative to that of the state, and the least: no worse than the state it is of.
+#: Tolerance of the adjoint relative to that of its state, and the smallest: no looser than the state's.
 ADJOINT_SHARE, ADJOINT_FLOOR = 1e-1, 1e-11
 
 logger = logging.getLogger(__name__)
@@ -48,15 +48,15 @@ class ShapeProblem:
     """J(α) with a subgradient, for one or more moving surfaces of a scene.
 
     Call it with α to get (J, subgradient): one state, one adjoint, whatever the number of variables. Where no
-    contact point is weakly active that is the gradient, where one is, a Clarke subgradient. Where several are
-    it may be none (`WeakChoice`): such designs are `doubtful`, `beside` finds a gradient nearby. Topology,
-    partition and compiled forms are kept; each state starts from the one before.
+    contact point is weakly active it is the gradient, where one is, a Clarke subgradient. Where several are
+    it may not be a subgradient (`WeakChoice`): such designs are `doubtful`, and `beside` returns a gradient
+    nearby. Topology, partition and compiled forms are reused; each state starts from the one before.
 
     Attributes:
-        contact: What finds the states.
-        designs: The moving surfaces; α is their variables one after the other.
+        contact: The problem that computes the states.
+        designs: The moving surfaces; α is the concatenation of their variables.
         products: F-products of states and adjoints so far.
-        evaluations: Number of designs evaluated, without those beside others.
+        evaluations: Number of designs evaluated, without those for `beside`.
 
     Example:
         >>> designs = SurfaceDesign("link1", links.first.crown, net=(7, 4))  # doctest: +SKIP
@@ -77,13 +77,13 @@ class ShapeProblem:
         """Decompose the scene and prepare the mesh motion. Collective.
 
         Args:
-            contact: What finds the states of the scene, which it has in its reference shape.
-            designs: What moves.
-            objective: What is judged.
+            contact: The problem that computes the states; its scene is the reference shape.
+            designs: The moving surfaces.
+            objective: The objective.
             choice: Branch for weakly active points.
-            tolerance: Relative residual of all states, or `AdaptiveTolerance()`, with which an optimiser asks
-                for what it needs; None for that of ``contact``, or of its solver, as a balanced state leaves
-                open what derivatives belong to.
+            tolerance: Relative residual of all states, or `AdaptiveTolerance()`, with which an optimiser
+                requests the accuracy that it needs; None for that of ``contact``, or of its solver, as a
+                balanced state leaves the statuses uncertain on which derivatives depend.
         """
         self.contact, self.objective, self.choice = contact, objective, choice
         self.designs = (designs,) if isinstance(designs, SurfaceDesign) else tuple(designs)
@@ -119,7 +119,7 @@ class ShapeProblem:
 
     @property
     def first(self) -> DesignPoint | None:
-        """The design evaluated first. Collective after a run was resumed, for it is built again then."""
+        """The design evaluated first. Collective after a run was resumed, as it is rebuilt then."""
         return self._memory.point("first")
 
     @property
@@ -133,7 +133,7 @@ class ShapeProblem:
         return self._memory.point("last")
 
     def fingerprint(self) -> dict[str, str]:
-        """Say which problem it is, for a checkpoint."""
+        """Identify the problem, for a checkpoint."""
         parts: dict[str, Any] = {
             "scene": self.scene,
             "partitions": self.contact.partitions,
@@ -146,12 +146,12 @@ class ShapeProblem:
         return {key: text for name, part in parts.items() for key, text in described(part, name).items()}
 
     def memory(self) -> dict[str, np.ndarray]:
-        """Return what the next state depends on, and the designs that are kept. Collective."""
+        """Return what the next state depends on, and the stored designs. Collective."""
         counts = np.array([self.evaluations, self.products])
         return {"counts": counts, **self._memory.stored()}
 
     def recall(self, memory: Mapping[str, np.ndarray]) -> None:
-        """Go on from what `memory` returned, also on another number of ranks. Collective."""
+        """Continue from what `memory` returned, also on another number of ranks. Collective."""
         stored = dict(memory)
         self.evaluations, self.products = (int(count) for count in stored.pop("counts"))
         self._memory.recall(stored)
@@ -207,7 +207,7 @@ class ShapeProblem:
         """Return the equilibrium of a design, started from the one before. Collective.
 
         Raises:
-            InvalidDesignError: If the design inverts a cell, or no equilibrium is found for it.
+            InvalidDesignError: If the design inverts a cell or has no equilibrium.
         """
         return self._solved(alpha, self._tightest)
 
@@ -223,7 +223,7 @@ class ShapeProblem:
         """Solve the state and its adjoint and return value and subgradient. Collective.
 
         Raises:
-            InvalidDesignError: If the design inverts a cell, or no equilibrium is found for it.
+            InvalidDesignError: If the design inverts a cell or has no equilibrium.
         """
         known = self._memory.of_design(alpha) if self.inexact else None
         state = self._solved(alpha, self._tightest, known) if self.inexact else self.state_of(alpha)
@@ -248,7 +248,7 @@ class ShapeProblem:
 
     @collectively("ShapeProblem.within", _comm)
     def within(self, alpha: np.ndarray, value: float, subgradient: float) -> tuple[float, np.ndarray, float]:
-        """Return J(α), a subgradient and the estimated error of J, no more accurate than asked. Collective.
+        """Return J(α), a subgradient and the estimated error of J, to the requested accuracy. Collective.
 
         Args:
             alpha: Design variables, shape (size,), [length].
@@ -256,7 +256,7 @@ class ShapeProblem:
             subgradient: Largest relative error of the subgradient, which the tolerance of the state follows.
 
         Raises:
-            InvalidDesignError: If the design inverts a cell, or no equilibrium is found for it.
+            InvalidDesignError: If the design inverts a cell or has no equilibrium.
         """
         policy = self._adaptive
         if policy is None:
@@ -274,17 +274,17 @@ class ShapeProblem:
 
     @collectively("ShapeProblem.doubtful", _comm)
     def doubtful(self, alpha: np.ndarray) -> bool:
-        """Tell whether what was returned last, at α, may be no subgradient. Collective."""
+        """Return whether the last result, at α, may not be a subgradient. Collective."""
         known = self._memory.of_design(alpha)
         return known is not None and known.weak.doubtful
 
     @collectively("ShapeProblem.beside", _comm)
     def beside(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """Return the gradient of a design between two, as near to α as fewest points are weak. Collective.
+        """Return the gradient of the design between two, near α, with the fewest weak points. Collective.
 
         Args:
             alpha: Design variables, shape (size,), [length].
-            end: A design nearby in a direction that nothing singles out, shape (size,), [length].
+            end: A design nearby in a generic direction, shape (size,), [length].
 
         Raises:
             InvalidDesignError: If no design between them has an equilibrium.
@@ -292,13 +292,13 @@ class ShapeProblem:
         known = self._memory.of_design(alpha)
         tolerance = known.tolerance if known else self._tightest
 
-        def judged(near: np.ndarray) -> DesignPoint:
+        def evaluate(near: np.ndarray) -> DesignPoint:
             return self._point_at(near, self._solved(near, tolerance), tolerance, None)
 
-        return with_fewest_weak_points(alpha, end, judged).gradient
+        return with_fewest_weak_points(alpha, end, evaluate).gradient
 
     def _solved(self, alpha: np.ndarray, tolerance: float, known: DesignPoint | None = None) -> State:
-        """Find an equilibrium, from a less accurate one of the same design where it is known. Collective."""
+        """Compute an equilibrium, from a less accurate one of the same design if known. Collective."""
         previous = self._memory.state if known is None else known.state
         with self._timer.phase("mesh motion"):
             scene = self.scene_of(alpha) if known is None else known.state.scene
@@ -311,7 +311,7 @@ class ShapeProblem:
         except ConvergenceError as error:
             if previous is None:
                 raise
-            tell(logger.warning, "a warm start led nowhere, a cold one follows: %s", error)
+            tell(logger.warning, "a warm start failed, a cold one follows: %s", error)
             state = self._solved_cold(scene, tolerance)
         self._memory.record_state(alpha, state)
         return state
@@ -344,7 +344,7 @@ class ShapeProblem:
             gradient = self._by_design(by_points)
         self.products += state.dual.products
         value = partials.value + (error.correction if self.inexact else 0.0)
-        # Ranks must take the same decisions: rounding in sums over ranks may not tell them apart.
+        # Ranks must take the same decisions, whatever the rounding in sums over ranks.
         value, gradient, error = self.comm.bcast((value, gradient, error))
         tell(logger.info, "J = %.9g ± %.1e, %d products", value, error.size, state.dual.products)
         return DesignPoint(

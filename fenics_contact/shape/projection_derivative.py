@@ -19,14 +19,14 @@ from fenics_contact.surfaces import (
 
 @dataclass(frozen=True)
 class PointDerivatives:
-    """Derivatives of a scalar by what the projection gives at each contact point.
+    """Derivatives of a scalar by the results of the projection at each contact point.
 
     Attributes:
         gap: By the gap, shape (n,).
         normal: By the normal, shape (n, 3).
         tangents: By the tangents, shape (n, 2, 3).
         weight: By the weights of the facet's corners, shape (n, corners).
-        axes: Axes that the first tangents lean to, shape (n, 3); `reference_axes` by default.
+        axes: Axes nearest to the first tangents, shape (n, 3); `reference_axes` by default.
     """
 
     gap: np.ndarray
@@ -46,7 +46,7 @@ def frames_pulled_back(
     Args:
         normal: Unit normals, shape (n, 3).
         by_tangents: Derivative by both tangents, shape (n, 2, 3).
-        axes: Axes that the first tangents lean to, shape (n, 3); `reference_axes` by default.
+        axes: Axes nearest to the first tangents, shape (n, 3); `reference_axes` by default.
     """
     axes = reference_axes(normal) if axes is None else axes
     along = np.einsum("nd,nd->n", axes, normal)
@@ -67,7 +67,8 @@ def projection_pulled_back(
     """Return the derivatives by the slave points and by the master's nodes.
 
     The projection solves Σ N_j(ξ) x_j + r n(ξ) − x_s = 0 with n = m/‖m‖, m = Σ N_j(ξ) a_j, a_j the nodal
-    normals; the implicit function theorem gives ξ and r. The gap is r − h, h(ξ) the height of the true one.
+    normals; the implicit function theorem gives ξ and r. The gap is r − h, h(ξ) the height of the true
+    surface.
 
     Args:
         master: The master surface.

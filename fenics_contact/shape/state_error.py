@@ -1,4 +1,4 @@
-"""What an inexact state does to the objective: its residuals weighted by the adjoint."""
+"""Effect of an inexact state on the objective: its residuals weighted by the adjoint."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class StateError:
     """First-order error of an objective at an inexact state, units of the objective.
 
     Attributes:
-        correction: What the value misses to that at the exact state, to first order.
+        correction: Difference of the value at the exact state, to first order.
         spread: √Σ (share of a row or disc)², which does not vanish where shares of both signs cancel.
     """
 
@@ -27,26 +27,26 @@ class StateError:
 
     @property
     def size(self) -> float:
-        """How far off the corrected value may be: what is left is of second order, this is of first.
+        """Estimated error of the corrected value, safe as it is of first order and the true one of second.
 
-        A safe estimate and no bound: a state so loose that it lies on another face can be further off.
+        Not a bound: a state so inaccurate that it lies on another face can be further off.
         """
         return abs(self.correction) + self.spread
 
 
 def state_error(state: State, partials: Partials, linearised: LinearisedFace, adjoint: Adjoint) -> StateError:
-    r"""Return what the residuals of a state change in the objective. Collective; no product.
+    r"""Return the effect of a state's residuals on the objective. Collective; no product.
 
-    The state is u = K⁺(f − Bᵀλ) + R α. What it misses is r = −(B u − c) along the tested directions of the
-    face, to which a slipping disc adds κ s, with the part s of its force across the slip: there the law wants
-    r + κ s = 0 (`Face.curvature`); the balance G λ − e of the bodies; and n = λ − P_Λ(λ − ρ r) off the face,
-    where the law prescribes the multiplier. One step of Newton's method on the face would remove all of it;
-    along it the objective changes by
+    The state is u = K⁺(f − Bᵀλ) + R α. Its residuals are r = −(B u − c) along the test directions of the
+    face, to which a slipping disc adds κ s, with the part s of its force across the slip: there the law
+    requires r + κ s = 0 (`Face.curvature`); the balance G λ − e of the bodies; and n = λ − P_Λ(λ − ρ r) off
+    the face, where the law prescribes the multiplier. One step of Newton's method on the face would remove
+    all of it; along it the objective changes by
 
         δJ = ζᵀ r + zᵀ κ s − βᵀ(G λ − e) − (∂J/∂λ − B w)ᵀ n_off,
 
-    with the adjoint w, ζ = Z_s z and β. The value J + δJ is wrong to second order only, as long as the face
-    is the right one.
+    with the adjoint w, ζ = Z_s z and β. The error of J + δJ is of second order, as long as the face is the
+    right one.
 
     Args:
         state: An inexact state.
@@ -81,7 +81,7 @@ def _bent(linearised: LinearisedFace, multiplier: np.ndarray) -> np.ndarray:
 def _off_face(miss: np.ndarray, linearised: LinearisedFace, layout: ContactLayout) -> np.ndarray:
     """Return n where contacts are open, discs are pinned, and along the force of slipping discs, owned.
 
-    Of discs that slip too far to turn within a step, the face prescribes the force across, too.
+    Where discs slip too far to turn within a step, the face prescribes the force across the slip, too.
     """
     face, direction = linearised.face, linearised.slip_direction
     off = np.zeros_like(miss)

@@ -15,7 +15,7 @@ def normals_pulled_back(
     Args:
         surface: The surface.
         by_normals: Derivative by each nodal normal, shape (n, 3).
-        by_averaged: Derivative by each averaged normal beside that, shape (n, 3).
+        by_averaged: Direct derivative by each averaged normal, shape (n, 3).
     """
     along = np.einsum("nd,nd->n", surface.normals, by_normals)
     by_true = by_normals - along[:, None] * surface.normals

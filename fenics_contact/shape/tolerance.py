@@ -16,11 +16,12 @@ _TIGHTER = (0.3, 1e-3)
 
 @dataclass(frozen=True)
 class AdaptiveTolerance:
-    """The tolerance follows what the optimiser asks for; a design evaluated alone gets the tightest.
+    """The tolerance follows the optimiser's requests; a single evaluation uses the tightest.
 
-    A state is solved to the relative error that its subgradient may have, or to what designs before suggest
-    for the value. Then the adjoint tells the error of the value; where it is too large, the same state is
-    solved on. The value of a design is corrected by that error, so that what is left is of second order.
+    A state is solved to the relative error that its subgradient may have, or to the tolerance that earlier
+    designs suggest for the value. Then the adjoint yields the error of the value; where it is too large, the
+    solve is continued. The value of a design is corrected by that error, so that the remainder is of second
+    order.
 
     Attributes:
         loosest: Largest relative residual of a state.
@@ -31,7 +32,7 @@ class AdaptiveTolerance:
     tightest: float = 1e-9
 
     def __post_init__(self) -> None:
-        """Refuse ranges that are none."""
+        """Reject empty ranges."""
         if not 0.0 < self.tightest <= self.loosest < 1.0:
             raise InvalidInputError(
                 f"tolerances need 0 < tightest <= loosest < 1, got {self.tightest:g} and {self.loosest:g}: "
@@ -44,7 +45,7 @@ class AdaptiveTolerance:
         Args:
             value: Largest error of the objective.
             subgradient: Largest relative error of the subgradient.
-            error_by_tolerance: Error of the objective divided by the tolerance, as seen last; 0 for unknown.
+            error_by_tolerance: Last ratio of the objective's error to the tolerance; 0 if unknown.
         """
         guess = 0.5 * value / error_by_tolerance if error_by_tolerance > 0.0 else np.inf
         return self._clipped(min(subgradient, guess))

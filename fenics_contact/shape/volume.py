@@ -12,7 +12,7 @@ def volume_by_points(mesh: BodyMesh) -> np.ndarray:
     """Return the derivative of the volume by every node, shape (n_nodes, 3), [length²]; in 2D of the area.
 
     Moving the boundary by v changes the volume by ∫ v·n dA, so that only boundary nodes count; two Gauss
-    points a direction integrate this exactly on bilinear faces.
+    points per direction integrate this exactly on bilinear faces.
     """
     faces, _ = boundary_faces(mesh.cells, mesh.dim)
     corners, result = mesh.points[faces], np.zeros_like(mesh.points)

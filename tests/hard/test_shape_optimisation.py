@@ -231,7 +231,7 @@ def test_a_state_that_no_solver_finds_is_a_rejected_trial_and_no_end(
     problem.contact.solver = Hasty()
     with caplog.at_level(logging.WARNING):
         result = minimize(problem, np.zeros(6), bounds=(-0.05 * np.ones(6), 0.05 * np.ones(6)))
-    assert "a warm start led nowhere, a cold one follows" in caplog.text
+    assert "a warm start failed, a cold one follows" in caplog.text
     (note,) = rejected_notes(result)
     assert "no equilibrium of the design was found: face Newton needs residuals below" in note
     assert_steps_shrink_after_rejections(result)

@@ -103,5 +103,5 @@ def test_a_net_finer_than_the_mesh_is_refused() -> None:
     counts = crossed_links().first.crown.counts
     assert crown(counts).size == counts[0] * counts[1]
     for net in ((counts[0] + 1, 2), (2, counts[1] + 1)):
-        with pytest.raises(InvalidInputError, match="take fewer control points or a finer mesh"):
+        with pytest.raises(InvalidInputError, match="use fewer control points or a finer mesh"):
             crown(net)
