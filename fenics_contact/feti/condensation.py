@@ -13,7 +13,7 @@ from fenics_contact._libraries import PETSc
 from fenics_contact.feti.factor import symmetric_matrix
 from fenics_contact.linalg import dispose_with
 
-#: Symbolic factorisations kept. Each holds the numbers of its last matrix as well: a few MB.
+#: Number of cached symbolic factorisations. Each also holds the values of its last matrix: a few MB.
 KEPT = 8
 #: MUMPS control parameter and its value for nested dissection by METIS.
 ORDERING, METIS = 7, 5
@@ -22,7 +22,7 @@ ORDERING, METIS = 7, 5
 class Condensation:
     """S = K_bb − K_bi K_ii⁻¹ K_ib by MUMPS, which factors K_ii and forms S in one pass.
 
-    The ordering and the symbolic factorisation are made once; each call only refills the numbers.
+    The ordering and the symbolic factorisation are computed once; each call only refills the values.
     """
 
     def __init__(self, pattern: sp.csr_matrix, interface: np.ndarray) -> None:
@@ -48,8 +48,8 @@ class Condensation:
 
     def __call__(self, stiffness: sp.csr_matrix) -> np.ndarray:
         """Return S of a matrix with the pattern, shape (n_b, n_b), Fortran order."""
-        # MUMPS takes pivots below some 1e-16 for zeros here: answers would depend on the units of length and
-        # force. A power of two changes no digit.
+        # MUMPS treats pivots below about 1e-16 as zero here: results would depend on the units of length and
+        # force. Scaling by a power of two is exact.
         unit = 2.0 ** np.round(np.log2(stiffness.diagonal().max()))
         self._matrix.setValuesCSR(*self._structure, stiffness.data / unit)
         self._matrix.assemble()
@@ -57,7 +57,7 @@ class Condensation:
         return unit * self._schur_complement()
 
     def _schur_complement(self) -> np.ndarray:
-        # petsc4py has no name for this yet, PETSc's own library has.
+        # petsc4py does not wrap this yet, so PETSc's own library is called.
         matrix, status = ctypes.c_void_p(), ctypes.c_int()
         values = ctypes.POINTER(ctypes.c_double)()
         factor = self._factor.handle
@@ -70,7 +70,7 @@ class Condensation:
 
 
 class Condensations:
-    """Keeps the condensations used last, by pattern and interface.
+    """Caches the most recent condensations, by pattern and interface.
 
     Subdomains of a regular partition share one pattern and a handful of interfaces, and a new geometry
     changes neither.
@@ -100,7 +100,7 @@ class Condensations:
 
 @lru_cache(maxsize=1)
 def _petsc() -> ctypes.CDLL:
-    # The symbols of libpetsc are found through the extension module that is linked with it.
+    # The symbols of libpetsc are resolved through the extension module that is linked with it.
     return ctypes.CDLL(PETSc.__file__)
 
 

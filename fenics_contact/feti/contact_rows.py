@@ -1,4 +1,4 @@
-"""Rows of B at contact points: apart along the normal, slip along the tangents, all components where tied."""
+"""Rows of B at contact points: gap along the normal, slip along the tangents, all components where tied."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from fenics_contact.feti.rows import Rows
 from fenics_contact.pairing import HELD, ContactPoints, movable
 from fenics_contact.scene import Tie
 
-#: Directions are parallel whose sine is below.
+#: Directions count as parallel if their sine is below this.
 PARALLEL = 1e-6
 
 
 @dataclass(frozen=True)
 class Relations:
-    """What each of some rows measures: d·(u_slave − Σ w_j u_master,j).
+    """The relative displacement that each row measures: d·(u_slave − Σ w_j u_master,j).
 
     Attributes:
         points: Contact or tied points.
         which: Point of each row, shape (n_rows,).
         directions: d of each row, shape (n_rows, dim).
-        resting: Marks of rows of friction along which supports prescribe no slip, shape (n_rows,); None for
-            rows of other kinds.
+        resting: Marks of friction rows along which supports prescribe no slip, shape (n_rows,); None for
+            other rows.
     """
 
     points: ContactPoints
@@ -39,7 +39,7 @@ class Relations:
         return len(self.which)
 
     def of_supports(self, prescribed: np.ndarray) -> np.ndarray:
-        """Return what prescribed displacements contribute to each row, shape (n_rows,), [length].
+        """Return the contribution of prescribed displacements to each row, shape (n_rows,), [length].
 
         Args:
             prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
@@ -48,11 +48,11 @@ class Relations:
         return np.asarray(np.einsum("rd,rd->r", self.directions, moved[self.which]))
 
     def held(self, fixed: np.ndarray) -> np.ndarray:
-        """Return which rows supports determine, alone or together with the normal row, shape (n_rows,).
+        """Return which rows supports determine, alone or with the normal row, shape (n_rows,).
 
-        What supports leave of a direction across the plane of two rollers is a part of the normal: along it a
+        With rollers on both sides, the free part of a tangent is parallel to that of the normal: along it a
         closed point cannot slip, and an open one opens. Such a row is left to the normal one unless it has
-        the larger part of the motion, or supports drive the point along it: then it slips.
+        the larger free part, or supports drive the point along it: then it slips.
 
         Args:
             fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
@@ -68,7 +68,7 @@ class Relations:
         return np.asarray((mine <= HELD**2) | (self.resting & tilted))
 
     def freedom(self, fixed: np.ndarray) -> np.ndarray:
-        """Return the length of what supports leave of each direction, from 0 to 1, shape (n_rows,)."""
+        """Return the length of the free part of each direction, from 0 to 1, shape (n_rows,)."""
         return np.asarray(np.linalg.norm(self._left(self.directions, fixed), axis=1))
 
     def _left(self, directions: np.ndarray, fixed: np.ndarray) -> np.ndarray:
@@ -78,15 +78,15 @@ class Relations:
         """Return the part of these rows of B that acts on free components, with an empty right side.
 
         The displacement of a node is the mean of its copies, weighted as the gluing rows are: that makes
-        these rows orthogonal to them. Prescribed components are known: left in, they would couple these rows
-        to those of the supports, and make them redundant where supports hold both surfaces.
+        these rows orthogonal to them. Prescribed components are known: kept, they would couple these rows to
+        those of the supports, and make them redundant where supports hold both surfaces.
 
         Args:
             tearing: Node numbering and copies.
             fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
         """
         jump = self.points.jump[self.which].tocoo()
-        # Ascending by row: every rank builds the same rows, and the owner's copy is that of the slave node.
+        # Sorted by row: every rank builds the same rows, and the owner's copy is that of the slave node.
         order = np.lexsort((jump.col, jump.row))
         row, node, weight = jump.row[order], jump.col[order], jump.data[order]
         copies = tearing.multiplicity[node]
@@ -94,7 +94,8 @@ class Relations:
         copy = np.repeat(tearing.first_copy[node], copies) + within
         row, node = np.repeat(row, copies), np.repeat(node, copies)
         value = (np.repeat(weight, copies) * tearing.copy_share[copy])[:, None] * self.directions[row]
-        # Directions along an axis leave the other components alone: the preconditioner asks what is touched.
+        # Directions along an axis have no entries in other components: the preconditioner depends on the
+        # pattern.
         out = fixed[node] | self.held(fixed)[row][:, None]
         entry, component = np.nonzero(np.where(out, 0.0, value))
         slave = tearing.first_copy[self.points.slave[self.which]]
@@ -123,7 +124,7 @@ def tangential_relations(points: ContactPoints, frictional: np.ndarray, prescrib
 
 
 def tied_relations(points: ContactPoints, ties: Sequence[Tie], fixed: np.ndarray) -> Relations:
-    """Return u_slave − u_master = 0 at tied points, along the normal alone where the tie may slide.
+    """Return u_slave − u_master = 0 at tied points, only along the normal where the tie may slide.
 
     A component that a support prescribes on the slave node is left to the support.
 

@@ -1,4 +1,4 @@
-"""Copies of nodes: the torn system holds each node of the bodies once for every subdomain around it."""
+"""Copies of nodes: the torn system has one copy of each node for every subdomain around it."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from fenics_contact.scene import Scene
 
 @dataclass(frozen=True)
 class Tearing(NodeNumbers):
-    """How the bodies of a scene are cut into subdomains, and which rank owns which.
+    """The subdomains of the bodies of a scene, and the rank that owns each.
 
-    Replicated on all ranks. Subdomains are numbered together as nodes are, body after body. A *copy* is a
-    pair (node, subdomain); copies are sorted by node, then by subdomain.
+    Replicated on all ranks. Subdomains, like nodes, are numbered consecutively, body after body. A *copy* is
+    a pair (node, subdomain); copies are sorted by node, then by subdomain.
 
     Attributes:
         dim: Displacement components of a node.
@@ -26,7 +26,7 @@ class Tearing(NodeNumbers):
         subdomain_rank: Owner of each subdomain, shape (n_subdomains,).
         first_copy: First copy of each node and the total, shape (n_nodes + 1,).
         copy_subdomain: Subdomain of each copy, shape (n_copies,).
-        copy_stiffness: Typical stiffness that each copy feels, the largest being one, shape (n_copies,).
+        copy_stiffness: Typical stiffness at each copy, the largest being one, shape (n_copies,).
     """
 
     dim: int
@@ -55,7 +55,7 @@ class Tearing(NodeNumbers):
 
     @cached_property
     def on_several_ranks(self) -> np.ndarray:
-        """Whether subdomains of different ranks hold a node, shape (n_nodes,)."""
+        """Whether subdomains of different ranks share a node, shape (n_nodes,)."""
         rank, first = self.subdomain_rank[self.copy_subdomain], self.first_copy[:-1]
         return np.asarray(np.minimum.reduceat(rank, first) != np.maximum.reduceat(rank, first))
 
@@ -67,13 +67,12 @@ class Tearing(NodeNumbers):
 def tear(
     scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int, stiffness: Mapping[str, np.ndarray]
 ) -> Tearing:
-    """Cut the bodies along a partition of their cells and deal the subdomains out to ranks.
+    """Cut the bodies along a partition of their cells and distribute the subdomains over ranks.
 
     Args:
         scene: The scene.
         partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
-        ranks: Number of ranks; each gets about equally much work, of every body a run of consecutive
-            subdomains.
+        ranks: Number of ranks; each gets about the same work, of every body consecutive subdomains.
         stiffness: Body name -> typical nodal stiffness of every cell, shape (n_cells,), [force / length].
     """
     numbers = NodeNumbers.of(scene)
@@ -106,11 +105,11 @@ def tear(
 
 
 def _costs(copy_subdomain: np.ndarray, shared: np.ndarray, count: int, dim: int) -> np.ndarray:
-    """Return what each subdomain is expected to cost, shape (n_subdomains,), [s].
+    """Return the estimated cost of each subdomain, shape (n_subdomains,), [s].
 
     Args:
         copy_subdomain: Subdomain of each copy of a node.
-        shared: Whether other subdomains hold that node too.
+        shared: Whether other subdomains share that node.
         count: Number of subdomains.
         dim: Displacement components of a node.
     """
@@ -122,7 +121,7 @@ def _costs(copy_subdomain: np.ndarray, shared: np.ndarray, count: int, dim: int)
 def _deal_out(costs: list[np.ndarray], ranks: int) -> np.ndarray:
     """Return the rank of every subdomain, given the costs body by body.
 
-    Each body is shared by all ranks as far as it goes: where one body changes its shape or has all the
+    Each body is spread over all ranks as far as possible: where one body changes its shape or has all the
     contacts, no rank waits for another.
     """
     place = np.concatenate([(np.cumsum(cost) - 0.5 * cost) / cost.sum() for cost in costs])
@@ -133,10 +132,10 @@ def _deal_out(costs: list[np.ndarray], ranks: int) -> np.ndarray:
 
 
 def _spread_over_ranks(cost: np.ndarray, ranks: int) -> np.ndarray:
-    """Deal consecutive items to ranks so that the costs are about equal and no rank stays empty."""
+    """Distribute consecutive items over ranks so that the costs are about equal and no rank is empty."""
     middle = np.cumsum(cost) - 0.5 * cost
     owner = np.minimum((middle * ranks / cost.sum()).astype(int), ranks - 1)
-    # Every rank gets at least one: no rank is skipped on the way up, and the last ones are kept for the rest.
+    # Every rank gets at least one: no rank is skipped, and enough items remain for the last ones.
     index = np.arange(len(cost))
     without_jumps = np.minimum.accumulate(np.minimum(owner, index) - index) + index
     return np.maximum(without_jumps, ranks - (len(cost) - index))

@@ -1,4 +1,4 @@
-"""What the decomposition of a scene keeps when the geometry changes: meshes, numbering, compiled forms."""
+"""The part of a torn scene that does not depend on its geometry: meshes, numbering, compiled forms."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Decomposition:
         partitions: Body name -> subdomain of every cell within the body, replicated.
         meshes: This rank's subdomain meshes, ascending by number.
         block_offset: First block of dofs of each of them in this rank's torn vector, and the total.
-        copy_block: Block of each copy in this rank's torn vector, −1 where another rank holds it.
+        copy_block: Block of each copy in this rank's torn vector, −1 if another rank holds it.
         gluing: Gluing and Dirichlet rows of all subdomains.
         forms: Compiled forms.
         condensations: Symbolic factorisations of this rank's subdomains.
@@ -58,12 +58,12 @@ class Decomposition:
 
     @property
     def fixed(self) -> np.ndarray:
-        """Whether a component of a node is prescribed, shape (n_nodes, dim), replicated."""
+        """Marks of prescribed components of nodes, shape (n_nodes, dim), replicated."""
         return self.gluing.fixed
 
 
 def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm) -> Decomposition:
-    """Cut a scene into subdomains and spread them over ranks. Collective on ``comm``.
+    """Cut a scene into subdomains and distribute them over ranks. Collective on ``comm``.
 
     Args:
         scene: The scene, the same on every rank.
@@ -71,8 +71,8 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
         comm: Communicator.
 
     Raises:
-        InvalidInputError: If a partition does not fit its body, a subdomain does not hang together, there are
-            more ranks than subdomains, or scene or partitions differ from rank to rank.
+        InvalidInputError: If a partition does not fit its body, a subdomain is not connected, there are more
+            ranks than subdomains, or scene or partitions differ from rank to rank.
     """
     start(comm)
     check_same_input(comm, scene, partitions=partitions)
@@ -111,7 +111,7 @@ def _check_partitions(scene: Scene, partitions: Mapping[str, np.ndarray]) -> Non
         partition = partitions[name]
         if partition.shape != (body.mesh.n_cells,):
             raise InvalidInputError(
-                f"the partition of body {name!r} must have shape ({body.mesh.n_cells},), one subdomain a "
+                f"the partition of body {name!r} must have shape ({body.mesh.n_cells},), one subdomain per "
                 f"cell, got {partition.shape}"
             )
         check_face_connected(body.mesh, partition)

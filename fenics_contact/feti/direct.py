@@ -1,4 +1,4 @@
-"""One body that is not torn and that supports hold: its stiffness is factored, nothing is dualised."""
+"""A single body held by supports: its stiffness is factored directly, without multipliers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class DirectSolution:
 
     Attributes:
         displacement: u, shape (torn_size,), [length].
-        multiplier: Reactions of the supports, one a prescribed component, shape (n_rows,), [force].
+        multiplier: Reactions of the supports, one per prescribed component, shape (n_rows,), [force].
         gluing_residual: ‖f − K u‖ over the free components, relative to the forces that cancel there.
     """
 
@@ -37,10 +37,10 @@ class DirectSolution:
 
 
 class DirectSystem:
-    """K of one body with the components that supports prescribe eliminated.
+    """K of one body with the prescribed components eliminated.
 
     Attributes:
-        torn: The system; it has one subdomain and no rows but those of supports.
+        torn: The system; it has one subdomain and only rows of supports.
         products: Products with a dual operator: none.
     """
 
@@ -54,8 +54,8 @@ class DirectSystem:
 
         Args:
             torn: The system.
-            timer: Collects the seconds.
-            previous: System of another load, whose factor is taken over.
+            timer: Collects the wall time.
+            previous: System of another load, whose factor is reused.
         """
         self.torn = torn
         (body,) = torn.subdomains
@@ -71,7 +71,7 @@ class DirectSystem:
         """Return the displacement under the present load, refined once.
 
         Raises:
-            ConvergenceError: The residual says that more than `WRONG` of the displacement is rounding.
+            ConvergenceError: The residual indicates that more than `WRONG` of the displacement is rounding.
         """
         (body,) = self.torn.subdomains
         stiffness, load, free = body.stiffness, self.torn.load, self._free

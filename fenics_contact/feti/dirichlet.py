@@ -13,17 +13,17 @@ from fenics_contact.feti.inverse import TornInverse
 from fenics_contact.feti.numbering import DualNumbering
 from fenics_contact.qp import global_sum
 
-#: Share of its diagonal added to the contact block of B D⁻¹ Bᵀ. A node in two contact pairs has more rows
-#: than displacements, which makes the block singular; elsewhere so small a share changes nothing.
+#: Fraction of its diagonal added to the contact block of B D⁻¹ Bᵀ. A node in two contact pairs has more rows
+#: than displacements, which makes the block singular; elsewhere so small a fraction has no effect.
 REGULARISATION = 1e-4
 
 
 class DirichletPreconditioner:
     """M = (B D⁻¹ Bᵀ)⁻¹ B D⁻¹ S D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹, S the Schur complement of each K_s on its interface.
 
-    D is the typical stiffness that each copy of a node feels, so that of two neighbours the softer one gives
-    way. Gluing and Dirichlet rows are orthogonal in D⁻¹: B D⁻¹ Bᵀ is diagonal but for the rows of contacts
-    and ties, where it is factored.
+    D is the typical stiffness at each copy of a node, so that of two neighbours the softer one deforms.
+    Gluing and Dirichlet rows are orthogonal in D⁻¹: B D⁻¹ Bᵀ is diagonal except for the rows of contacts and
+    ties, where it is factored.
 
     References:
         Farhat, Roux: An unconventional domain decomposition method for an efficient parallel solution of
@@ -61,7 +61,7 @@ class DirichletPreconditioner:
         return self._apply(residual, self._contact)
 
     def on_face(self, restriction: sp.csr_matrix) -> Callable[[np.ndarray], np.ndarray]:
-        """Return the preconditioner of a face, whose rows alone enter B D⁻¹ Bᵀ. Collective.
+        """Return the preconditioner of a face; only its rows enter B D⁻¹ Bᵀ. Collective.
 
         Rows that are not on the face would stiffen their neighbours, the more the stiffer the slave.
 
@@ -95,7 +95,7 @@ class DirichletPreconditioner:
 class Lifting:
     """The two factors of the preconditioner on a face, M = Lᵀ S L with L = D⁻¹ Bᵀ (B D⁻¹ Bᵀ)⁻¹.
 
-    B L r = r on the rows of the face but for the regularisation of the contact block.
+    B L r = r on the rows of the face, up to the regularisation of the contact block.
     """
 
     _preconditioner: DirichletPreconditioner
@@ -113,8 +113,8 @@ class Lifting:
 class _ContactBlock:
     """(B D⁻¹ Bᵀ)⁻¹ on rows of ties and contacts, by a sparse factor on every rank; others stay unchanged.
 
-    Contact points are replicated as well; a message of one number a contact row is cheaper than the many of a
-    factor that is spread over the ranks.
+    Contact points are replicated, too; one message with a number per contact row is cheaper than the many of
+    a factor that is distributed over the ranks.
     """
 
     def __init__(
@@ -132,7 +132,7 @@ class _ContactBlock:
         self._size = matrix.shape[0]
         if self._size:
             diagonal = matrix.diagonal()
-            # Rows that supports determine alone are empty.
+            # Rows that supports alone determine are empty.
             share = np.where(diagonal > 0.0, REGULARISATION * diagonal, 1.0)
             self._factor = Factor((matrix + sp.diags(share)).tocsr())
 

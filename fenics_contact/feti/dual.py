@@ -19,26 +19,26 @@ from fenics_contact.linalg import sweep
 from fenics_contact.qp import EVEN, CoarseSpace, ContactLayout, DualProblem, Scaling
 from fenics_contact.timing import PhaseTimer
 
-#: Flexibility of rows that have none, relative to the mean of all contact rows.
+#: Substitute flexibility of rows that have none, relative to the mean of all contact rows.
 STIFF = 1e-6
-#: Entries of G below this part of the largest are rounding: gluing rows do not feel the motion of a body.
+#: Entries of G below this fraction of the largest are rounding: a body's motion has no jump in gluing rows.
 UNFELT = 1e-13
 #: A resultant below this fraction of the loads' sum is rounding: the loads balance each other.
 LOAD_ROUNDING = 1e-13
-#: Work of the loads on a motion that nothing holds, relative to their sum, that is more than rounding.
+#: Work of the loads on an unresisted motion, relative to their sum, above which it is not rounding.
 UNBALANCED = 1e-8
 
 
 class DualSystem:
-    """The dual of a torn system: operators on multipliers, and the way back to displacements.
+    """The dual of a torn system: operators on multipliers, and the recovery of displacements.
 
     Attributes:
         torn: The torn system.
         inverse: K⁺ and the interface operators of the subdomains.
-        kernel: This rank's R, shape (torn_size, n_modes), less what `unheld` spans.
-        unheld: This rank's part of the motions that no row of B feels, as columns, shape (torn_size, k):
-            loads must not drive them, and they stay where they are.
-        problem: What the dual solvers see.
+        kernel: This rank's R, shape (torn_size, n_modes), without the span of `unheld`.
+        unheld: This rank's part of the motions in the kernel of B, as columns, shape (torn_size, k): loads
+            must not drive them, and they are zero.
+        problem: The problem for the dual solvers.
         products: F-products so far.
     """
 
@@ -62,9 +62,9 @@ class DualSystem:
 
         Args:
             torn: The torn system.
-            timer: Collects the seconds.
-            kind: How the subdomains are kept; the cost model chooses by default.
-            previous: System of another geometry; the factors of subdomains that stay are taken over.
+            timer: Collects the wall time.
+            kind: How the subdomains are stored; the cost model chooses by default.
+            previous: System of another geometry; the factors of unchanged subdomains are reused.
         """
         timer = timer or PhaseTimer()
         comm = torn.numbering.comm
@@ -85,7 +85,7 @@ class DualSystem:
         self.problem = replace(self.problem, rhs=self.jump(bent) - torn.right)
 
     def _is_that_of(self, previous: DualSystem) -> bool:
-        """Tell whether F and G are those of an earlier system. Collective."""
+        """Return whether F and G are those of an earlier system. Collective."""
         differs = self.torn.B is not previous.torn.B or self.inverse.factored > 0
         return not self.torn.numbering.comm.allreduce(int(differs))
 
@@ -138,7 +138,7 @@ class DualSystem:
         return numbering.to_owned(self._B_interface @ self.inverse.flex(force))
 
     def reach(self, multiplier: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-        """Return abs(B) abs(u), how far the displacements go at each row, owned, [length]. Collective."""
+        """Return abs(B) abs(u), the size of the displacements at each row, owned, [length]. Collective."""
         numbering = self.torn.numbering
         force = self._Bt_interface @ numbering.to_local(multiplier)
         moved = self._bent - self.inverse.flex(force) + self.kernel[self.inverse.interface] @ alpha
@@ -164,13 +164,13 @@ class DualSystem:
     def displacement(self, multiplier: np.ndarray, alpha: np.ndarray) -> np.ndarray:
         """Return u = K⁺(f − Bᵀλ) + R α on this rank's torn dofs, [length]. Collective.
 
-        Of motions that nothing holds u has no part: its mean over the nodes, in the sense of least squares.
+        u contains no unresisted motion: its least-squares fit over the nodes is removed.
         """
         found = self.inverse(self.torn.load - self.force(multiplier)) + self.kernel @ alpha
         return self._at_rest(found)
 
     def _at_rest(self, found: np.ndarray) -> np.ndarray:
-        """Take the part of motions that nothing holds off a torn displacement. Collective."""
+        """Remove the unresisted motions from a torn displacement. Collective."""
         if self.unheld.shape[1] == 0:
             return found
         tearing, here = self.torn.decomposition.tearing, self.torn.decomposition.copy_block
@@ -182,10 +182,10 @@ class DualSystem:
         return found - self.unheld @ np.linalg.solve(sums[:, :-1], sums[:, -1])
 
     def sewn(self, residual: np.ndarray) -> np.ndarray:
-        """Return the interface displacement that makes copies of nodes agree and meets supports. Collective.
+        """Return the interface displacement that makes copies agree and satisfies supports. Collective.
 
-        The copies of a node move to their mean, weighted by the stiffness that each feels, those that
-        supports prescribe to the prescribed value.
+        The copies of a node move to their mean, weighted by the stiffness at each, prescribed ones to the
+        prescribed value.
 
         Args:
             residual: r = c − B u of the displacement, owned, [length].
@@ -197,10 +197,10 @@ class DualSystem:
         return self.preconditioner.lifting(nothing).jump(residual)
 
     def conforming(self, displacement: np.ndarray) -> np.ndarray:
-        """Return a torn displacement as one of whole bodies, in which the copies of a node agree. Collective.
+        """Return a torn displacement made continuous, so that the copies of a node agree. Collective.
 
-        Copies move as `sewn` says; the inside of each subdomain follows with the least energy, as it would
-        under forces on its interface alone. Without that the mean would bend one layer of cells.
+        Copies move by `sewn`; the inside of each subdomain follows with the least energy, as under forces on
+        its interface alone. Otherwise the averaging would strain one layer of cells.
 
         Args:
             displacement: This rank's torn displacement, shape (torn_size,), [length].
@@ -209,7 +209,7 @@ class DualSystem:
         return self._at_rest(displacement + self.inverse.extend(sewn))
 
     def positions(self, rows: np.ndarray) -> np.ndarray:
-        """Return where owned rows lie in this rank's owned vector, −1 for rows of other ranks."""
+        """Return the positions of rows in this rank's owned vector, −1 for rows of other ranks."""
         numbering = self.torn.numbering
         index = np.searchsorted(numbering.owned, rows)
         index = np.minimum(index, max(len(numbering.owned) - 1, 0))
@@ -229,17 +229,17 @@ class DualSystem:
         return (own @ whole_motions(self.torn, offset)).tocsr()
 
     def _without_unheld(self, coarse: CoarseSpace) -> CoarseSpace:
-        """Take the motions that no row feels out of R, and their rows out of G. Collective.
+        """Remove the motions in the kernel of B from R, and their rows from G. Collective.
 
-        They are none of the unknowns: rounding would load them, on every face anew, and nothing answers.
+        They must not be unknowns: rounding would load them, differently on every face, and nothing resists.
 
         Raises:
             InfeasibleError: The load drives one of them.
         """
         unfelt, k = coarse.gram.null_space, coarse.gram.null_space.shape[1]
-        # Without one mode of each, the others still reach every motion that is felt.
+        # Without one mode of each, the others still span every motion that B sees.
         order = scipy.linalg.qr(unfelt.T, mode="r", pivoting=True)[-1] if k else np.arange(coarse.m)
-        # Each in terms of its own mode: then motions of bodies that do not meet have no entries in common.
+        # Each in terms of its own mode: then motions of bodies that are not connected share no entries.
         unfelt = unfelt @ np.linalg.inv(unfelt[order[:k]])
         unfelt[np.abs(unfelt) <= UNFELT * np.abs(unfelt).max(initial=0.0)] = 0.0
         self.unheld = (self.kernel @ sp.csr_matrix(unfelt)).tocsr()
@@ -251,7 +251,7 @@ class DualSystem:
         return CoarseSpace(coarse.comm, coarse.matrix[kept], coarse.load[kept])
 
     def _require_unloaded(self) -> None:
-        """Refuse loads on motions that no row feels. Collective."""
+        """Reject loads on motions in the kernel of B. Collective."""
         if self.unheld.shape[1] == 0:
             return
         work = np.append(self.unheld.T @ self.torn.load, np.abs(self.torn.load).sum())
@@ -263,7 +263,7 @@ class DualSystem:
             )
 
     def _resultants(self, comm: MPI.Comm) -> np.ndarray:
-        """Return e = Rᵀ f, replicated; what is only rounding of balanced loads is set to zero."""
+        """Return e = Rᵀ f, replicated; rounding of balanced loads is set to zero."""
         resultants = np.asarray(comm.allreduce(self.kernel.T @ self.torn.load))
         resultants[np.abs(resultants) <= LOAD_ROUNDING * comm.allreduce(np.abs(self.torn.load).sum())] = 0.0
         return resultants
@@ -291,7 +291,7 @@ class DualSystem:
         return np.flatnonzero(self.positions(self.torn.tangential_rows)[:, 0] >= 0)
 
     def _compliance(self) -> np.ndarray:
-        """Return 1 / the typical stiffness that each interface dof feels."""
+        """Return 1 / the typical stiffness at each interface dof."""
         decomposition = self.torn.decomposition
         here = decomposition.copy_block >= 0
         of_block = np.empty(int(decomposition.block_offset[-1]))
@@ -299,7 +299,7 @@ class DualSystem:
         return of_block[self.inverse.interface // self.torn.dim]
 
     def _scaling(self, coarse: CoarseSpace) -> Scaling | None:
-        """Return factors √(b·b / b·D⁻¹b) of the rows b of B, None where stiffness is even. Collective."""
+        """Return factors √(b·b / b·D⁻¹b) of the rows b of B, None where stiffness is uniform. Collective."""
         B, numbering = self._B_interface, self.torn.numbering
         squares = B.multiply(B)
         plain, weighted = (
@@ -323,9 +323,9 @@ class DualSystem:
         return self._filled(diagonal)
 
     def _filled(self, diagonal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Give rows that supports determine alone the diagonal of their disc, or a small one. Collective.
+        """Give rows that supports alone determine the diagonal of their disc, or a small one. Collective.
 
-        A small one, as such a row has no flexibility: any slip that supports prescribe counts as slip.
+        Small, as such a row has no flexibility: any slip that supports prescribe must count as slip.
 
         Returns:
             The diagonal, and marks of the rows that got a small one, both owned.

@@ -1,4 +1,4 @@
-"""A subdomain kept as two dense matrices on its interface: each application streams one of them once."""
+"""A subdomain stored as two dense matrices on its interface: each application streams one of them once."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from fenics_contact.feti.condensation import Condensations
 from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.subdomain import Subdomain
 
-#: Entries of S below this part of those of K are rounding.
+#: Entries of S below this fraction of those of K are rounding.
 ROUNDED = 1e-12
 
 
 class ExplicitOperator:
-    """(K⁺)_bb and S as packed triangles; S, which only preconditions, in single precision.
+    """(K⁺)_bb and S as packed triangles; S, used only for preconditioning, in single precision.
 
     With the trace Q of the kernel on the interface, orthonormal, S + ρ Q Qᵀ is positive definite, and
 
         K⁺ = T diag(K_ii⁻¹, (S + ρ Q Qᵀ)⁻¹) Tᵀ,   T = [I, −K_ii⁻¹ K_ib; 0, I],
 
-    is a symmetric generalised inverse of K. The application of a dense triangle is limited by the memory
-    alone, and reads a half to a third of what the substitutions with sparse factors read.
+    is a symmetric generalised inverse of K. The application of a dense triangle is limited by memory
+    bandwidth alone, and reads a half to a third of what substitutions with sparse factors read.
     """
 
     def __init__(self, subdomain: Subdomain, interface: np.ndarray, condensations: Condensations) -> None:
@@ -55,7 +55,8 @@ class ExplicitOperator:
     def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
         """Write S, rounded to single precision, times an interface displacement into ``force``.
 
-        Single precision has no room for all units, nor for iterates that diverge: both factors are scaled.
+        The range of single precision suffices neither for all units nor for diverging iterates: both factors
+        are scaled.
         """
         size = float(np.abs(displacement).max(initial=0.0))
         if size == 0.0 or not np.isfinite(size):
@@ -68,7 +69,7 @@ class ExplicitOperator:
     def extend(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the displacement of least energy for one of the interface, and S times the latter.
 
-        By the sparse stiffness and the factor of the inside: S itself is there in single precision only.
+        By the sparse stiffness and the factor of the inside: S itself is stored in single precision only.
         """
         whole = np.empty(self._size + len(self._inside))
         whole[self._interface] = displacement
@@ -109,8 +110,8 @@ class ExplicitOperator:
 def _packed_inverse(schur: np.ndarray, kernel: np.ndarray, typical: float) -> np.ndarray:
     """Return the packed lower triangle of (S + ρ Q Qᵀ)⁻¹, overwriting ``schur``.
 
-    ρ is the largest diagonal entry of S. Where that is rounding beside the typical stiffness, every
-    displacement of the interface is a rigid motion, as in a body that is held statically determinate.
+    ρ is the largest diagonal entry of S. Where that is rounding compared with the typical stiffness, every
+    displacement of the interface is a rigid motion, as in a statically determinate body.
     """
     modes, _ = np.linalg.qr(kernel)
     largest = schur.diagonal().max()

@@ -31,7 +31,7 @@ class Factor:
         pc.setUp()
         self._factor = pc.getFactorMatrix()
         self._right, self._left = given.createVecs()
-        # Only the factor is kept: beside it the copy of the matrix would be a third of the memory.
+        # Only the factor is stored: the copy of the matrix would take another third of its memory.
         pc.destroy()
         given.destroy()
         dispose_with(self, self._factor, self._right, self._left)
@@ -61,7 +61,7 @@ class Factor:
 
 
 def symmetric_matrix(matrix: sp.csr_matrix) -> PETSc.Mat:
-    """Return a symmetric positive definite matrix on one rank as PETSc has it."""
+    """Return a symmetric positive definite matrix on one rank in PETSc's format."""
     csr = (matrix.indptr.astype(PETSc.IntType), matrix.indices.astype(PETSc.IntType), matrix.data)
     given = PETSc.Mat().createAIJ(matrix.shape, csr=csr, comm=PETSc.COMM_SELF)
     given.setOption(PETSc.Mat.Option.SPD, True)
@@ -73,7 +73,7 @@ def symmetric_matrix(matrix: sp.csr_matrix) -> PETSc.Mat:
 def _solver() -> str:
     """Name the factorisation library that this PETSc was built with.
 
-    PETSc's own answer about CHOLMOD is wrong in some distributions, so a 1 x 1 matrix is factored.
+    PETSc reports CHOLMOD wrongly in some distributions, so a 1 x 1 matrix is factored.
     """
     one = PETSc.Mat().createAIJ((1, 1), csr=([0, 1], [0], [1.0]), comm=PETSc.COMM_SELF)
     pc = PETSc.PC().create(PETSc.COMM_SELF)
@@ -88,11 +88,11 @@ def _solver() -> str:
 
 
 def fixing_nodes(points: np.ndarray, count: int = FIXING_NODES) -> np.ndarray:
-    """Pick well-spread nodes: each next one is farthest from those already taken.
+    """Select well-spread nodes: each one is the farthest from those already selected.
 
     Args:
         points: Coordinates, shape (n, dim).
-        count: How many to pick.
+        count: Number of nodes to select.
 
     Returns:
         Row numbers of ``points``, shape (min(count, n),).

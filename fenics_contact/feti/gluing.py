@@ -42,8 +42,8 @@ def prescribed_displacements(scene: Scene, tearing: Tearing) -> np.ndarray:
 def weighted_helmert(stiffness: np.ndarray) -> np.ndarray:
     """Return rows of unit length that vanish on equal copies and are orthogonal in the inner product D⁻¹.
 
-    Row k weighs the mean of the first k copies, each with its stiffness, against the next one; with equal
-    stiffnesses these are the rows of a Helmert matrix.
+    Row k is the difference between the stiffness-weighted mean of the first k copies and the next one; with
+    equal stiffnesses these are the rows of a Helmert matrix.
 
     Args:
         stiffness: D of the copies of each node, shape (n, m).
@@ -61,7 +61,7 @@ def weighted_helmert(stiffness: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class GluingRows:
-    """The equality rows that hold torn bodies together and at their supports.
+    """The equality rows that glue torn bodies together and fix them at their supports.
 
     Attributes:
         rows: The rows; their right side is filled from the supports of a load, see `right_side`.
@@ -74,10 +74,10 @@ class GluingRows:
     fixed: np.ndarray
 
     def right_side(self, prescribed: np.ndarray) -> np.ndarray:
-        """Return c of the rows for prescribed displacements, as `prescribed_displacements` returns them.
+        """Return c of the rows for displacements from `prescribed_displacements`.
 
         Raises:
-            InvalidInputError: If other components are prescribed than those that the rows were built for.
+            InvalidInputError: If the prescribed components are not those for which the rows were built.
         """
         if not np.array_equal(~np.isnan(prescribed), self.fixed):
             raise InvalidInputError(

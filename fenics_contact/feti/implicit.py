@@ -1,4 +1,4 @@
-"""A subdomain kept as sparse factors: each application is a forward and a backward substitution."""
+"""A subdomain stored as sparse factors: each application is a forward and a backward substitution."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fenics_contact.feti.subdomain import Subdomain
 class ImplicitOperator:
     """K⁺ by a sparse Cholesky factor of the regularised stiffness, S by one of the inside.
 
-    Little to set up and little memory where the interface is large.
+    Cheap to set up, and small where the interface is large.
     """
 
     def __init__(self, subdomain: Subdomain, interface: np.ndarray) -> None:

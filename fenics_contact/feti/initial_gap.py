@@ -1,4 +1,4 @@
-"""Room between surfaces: faceting takes some away, supports must not."""
+"""Initial gaps: corrected for faceting, and checked against overlaps that supports prescribe."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from fenics_contact.feti.contact_rows import Relations
 from fenics_contact.pairing import ContactPoints
 from fenics_contact.scene import Scene
 
-#: Supports hold a point along its normal if they leave no larger part of it free: normals of facets are
-#: tilted a little, and what only slips down that tilt makes no room.
+#: Supports hold a point along its normal if the free fraction is no larger than this: normals of facets are
+#: slightly tilted, and sliding along that tilt does not open a gap.
 SLIGHT = 0.02
-#: Penetration that faceting explains, relative to the size of a slave facet.
+#: Penetration attributable to faceting, relative to the size of a slave facet.
 FACETING = 0.1
 
 
 def check_no_penetration(scene: Scene, points: ContactPoints) -> None:
-    """Refuse a start geometry whose bodies overlap by more than their faceting explains.
+    """Reject an initial geometry whose bodies overlap by more than their faceting explains.
 
     Raises:
         InvalidInputError: Names the pair, the number of nodes and the depth.
@@ -35,7 +35,7 @@ def check_no_penetration(scene: Scene, points: ContactPoints) -> None:
 
 
 def gap_with_room(normal: Relations, fixed: np.ndarray, prescribed: np.ndarray) -> np.ndarray:
-    """Return the gaps; between surfaces that supports hold, what faceting takes away is given back.
+    """Return the gaps; between surfaces held by supports, penetration due to faceting is removed.
 
     Args:
         normal: The normal rows of all contact points.
@@ -43,7 +43,7 @@ def gap_with_room(normal: Relations, fixed: np.ndarray, prescribed: np.ndarray) 
         prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
 
     Raises:
-        InvalidInputError: If supports press surfaces into one another.
+        InvalidInputError: If supports press surfaces into each other.
     """
     points = normal.points
     missing = np.where(normal.freedom(fixed) <= SLIGHT, normal.of_supports(prescribed) - points.gap, 0.0)

@@ -1,4 +1,4 @@
-"""The factored subdomains of one rank together: generalised inverse, interface operators and kernel."""
+"""All factored subdomains of one rank: generalised inverse, interface operators and kernel."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from fenics_contact.linalg import prefers_explicit
 
 
 class LocalKind(Enum):
-    """How subdomains are kept."""
+    """How subdomains are stored."""
 
-    #: Whichever of the two is expected to take less time in all.
+    #: Whichever of the two is expected to take less time in total.
     AUTOMATIC = "automatic"
     #: As sparse factors: little set-up and memory, slower products.
     IMPLICIT = "implicit"
@@ -37,7 +37,7 @@ class TornInverse:
         offset: First dof of each subdomain in the torn vector, and the total, shape (n + 1,).
         interface: Interface dofs in the torn vector, shape (n_interface,).
         operators: The factored subdomains.
-        factored: How many of them were factored anew, the others being taken over.
+        factored: Number of newly factored ones; the others are reused.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class TornInverse:
             B: This rank's part of B, shape (n_local_rows, torn_size).
             condensations: Symbolic factorisations to reuse.
             kind: Sparse factors, dense matrices, or whichever the cost model expects to be faster.
-            previous: Operators of another geometry; those of subdomains that did not change are taken over.
+            previous: Operators of another geometry; those of unchanged subdomains are reused.
         """
         self.offset = np.cumsum([0] + [subdomain.mesh.size for subdomain in subdomains])
         self._subdomains, self._kind = tuple(subdomains), kind
@@ -82,7 +82,7 @@ class TornInverse:
         """Return K⁺ times a torn vector, shape (torn_size,)."""
         solution = np.zeros_like(right)
         for operator, start, stop in zip(self.operators, self.offset[:-1], self.offset[1:], strict=True):
-            if right[start:stop].any():  # most subdomains bear no load
+            if right[start:stop].any():  # most subdomains carry no load
                 solution[start:stop] = operator.invert(right[start:stop])
         return solution
 
@@ -97,7 +97,7 @@ class TornInverse:
     def energy(self, displacement: np.ndarray) -> tuple[float, np.ndarray]:
         """Return wᵀ S w of this rank and S w, shape (n_interface,), both in double precision.
 
-        Rigid motions have no energy; they are taken off first, so that nothing of them cancels.
+        Rigid motions have no energy; they are subtracted first, to avoid cancellation.
 
         Args:
             displacement: w, shape (n_interface,).
@@ -151,7 +151,7 @@ class TornInverse:
     def _operator_of(
         self, index: int, subdomain: Subdomain, interface: np.ndarray, kind: LocalKind
     ) -> LocalOperator | None:
-        """Return the operator of a subdomain that has the same matrix as here, and the same interface."""
+        """Return the operator of a subdomain if its matrix and interface are the same as here."""
         same = self._subdomains[index].matrix is subdomain.matrix and self._kind is kind
         return self.operators[index] if same and np.array_equal(self._local[index], interface) else None
 
@@ -171,7 +171,7 @@ def _factored(
 def kernel_matrix(
     subdomains: Sequence[Subdomain], total_modes: int, mode_offset: np.ndarray
 ) -> sp.csr_matrix:
-    """Return R of this rank, shape (torn_size, total_modes): only columns of its own subdomains are filled.
+    """Return R of this rank, shape (torn_size, total_modes): only columns of its own subdomains are nonzero.
 
     Args:
         subdomains: This rank's subdomains.

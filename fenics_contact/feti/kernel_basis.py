@@ -1,8 +1,8 @@
-"""A basis of all rigid motions in which those of whole bodies stand apart.
+"""A basis of all rigid motions in which those of whole bodies are separate vectors.
 
-The motion of a body is the sum of those of its subdomains, and gluing rows do not feel it: in G it would be a
-difference of large numbers, and what holds the body a small rest of them where the body is stiff and what
-it lies on is soft. As a basis vector of its own it keeps all its digits.
+The motion of a body is the sum of those of its subdomains, and it has no jump in gluing rows: in G it would
+be a difference of large numbers, of which the rows that hold the body would be a small remainder if the body
+is stiff and its support soft. As a separate basis vector it suffers no cancellation.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from fenics_contact.errors import together
 from fenics_contact.feti.subdomain import Subdomain, common_kernel
 from fenics_contact.feti.torn import TornSystem
 
-#: Modes of a subdomain must give those of its body up to this, or the body keeps the subdomains' own.
+#: Modes of a subdomain must reproduce those of its body to this accuracy, else the subdomains' own are used.
 SPANNED = 1e-10
 
 
 def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:
-    """Return T that takes the first subdomain's modes of every cut body for those of the body. Collective.
+    """Return T that replaces the modes of every cut body's first subdomain by those of the body. Collective.
 
     Args:
         torn: The torn system.
@@ -57,9 +57,9 @@ def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:
 
 
 def _coefficients(subdomain: Subdomain, modes: np.ndarray) -> np.ndarray | None:
-    """Return the body's modes, (n_nodes, dim, n_modes), in those of a subdomain, a mode a column.
+    """Return the body's modes, (n_nodes, dim, n_modes), in terms of a subdomain's, one per column.
 
-    None if the subdomain has others.
+    None if they are not in its span.
     """
     wanted = modes[subdomain.mesh.nodes].reshape(subdomain.mesh.size, modes.shape[-1])
     found = np.linalg.lstsq(subdomain.kernel, wanted, rcond=None)[0]

@@ -1,4 +1,4 @@
-"""What the dual method asks of one subdomain: flexibility and stiffness seen from its interface."""
+"""The operators of one subdomain in the dual method: flexibility and stiffness on its interface."""
 
 from __future__ import annotations
 
@@ -47,9 +47,9 @@ class LocalOperator(Protocol):
 
 
 def interface_dofs(touched: np.ndarray, kernel: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return the dofs that B touches, and a few more where these let the subdomain move without resistance.
+    """Return the dofs that B touches, and a few more if fixing these does not prevent rigid motions.
 
-    Holding the interface must leave the inside with no rigid motion, or K_ii would be singular.
+    With the interface fixed the inside must have no rigid motion, or K_ii would be singular.
 
     Args:
         touched: Marks of the dofs, shape (n,).
@@ -58,7 +58,7 @@ def interface_dofs(touched: np.ndarray, kernel: np.ndarray, points: np.ndarray) 
     """
     modes, _ = np.linalg.qr(kernel)
     trace = np.linalg.svd(modes[touched], compute_uv=False)
-    # A body on an elastic bed may meet nothing at all; an interface without dofs is none.
+    # A body on an elastic bed may have no contact at all, but the interface must not be empty.
     if not touched.any() or np.count_nonzero(trace > RANK_TOLERANCE) < kernel.shape[1]:
         touched = touched.copy()
         touched.reshape(points.shape)[fixing_nodes(points)] = True

@@ -1,4 +1,4 @@
-"""What a torn displacement is at the nodes of the bodies: the mean of their copies."""
+"""Nodal values of a torn displacement: the mean over the copies of each node."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from fenics_contact.feti.sharing import Sharing
 
 
 def nodal_mean(decomposition: Decomposition, displacement: np.ndarray) -> np.ndarray:
-    """Return the mean over all copies of each node, each weighted by the stiffness it feels. Collective.
+    """Return the mean over all copies of each node, each weighted by its stiffness. Collective.
 
-    Copies on all ranks count, so that the mean does not depend on which rank holds them.
+    Copies on all ranks count, so that the mean does not depend on the distribution.
 
     Args:
         decomposition: Meshes and numbering.

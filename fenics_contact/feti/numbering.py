@@ -1,4 +1,4 @@
-"""Distributed dual vectors: who owns which multiplier, and how shared ones are exchanged."""
+"""Distributed dual vectors: ownership of multipliers, and the exchange of shared ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class DualNumbering:
         comm: Communicator.
         owned: Row numbers that this rank owns, ascending, shape (n_owned,).
         ghosts: Row numbers that it touches but does not own, ascending, shape (n_ghosts,).
-        offset: Position of the first owned entry when the owned parts of all ranks are strung together.
+        offset: Position of the first owned entry in the concatenation of all ranks' owned parts.
         total: Number of rows of all ranks.
     """
 
@@ -48,7 +48,7 @@ class DualNumbering:
         dispose_with(self, self._vector, comm=comm)
 
     def serves(self, owner: np.ndarray, touched: np.ndarray) -> bool:
-        """Tell whether this rank's part is that of rows with these owners, touched as given."""
+        """Return whether this rank's part is that of rows with these owners, touched as given."""
         return np.array_equal(self._owner, owner) and np.array_equal(self._touched, touched)
 
     @property
@@ -63,7 +63,7 @@ class DualNumbering:
         return lookup[rows]
 
     def position(self, rows: np.ndarray) -> np.ndarray:
-        """Return the positions of rows when the owned parts of all ranks are strung together."""
+        """Return the positions of rows in the concatenation of all ranks' owned parts."""
         return self._position[rows]
 
     def to_local(self, owned: np.ndarray) -> np.ndarray:

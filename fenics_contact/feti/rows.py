@@ -1,4 +1,4 @@
-"""Rows of B as sparse triplets over copies of nodes, before any rank picks its own."""
+"""Rows of B as sparse triplets over copies of nodes, before ranks select their own."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Rows:
-    """Some rows of B; entry k says B[row[k], (copy[k], component[k])] = value[k].
+    """Some rows of B; entry k is B[row[k], (copy[k], component[k])] = value[k].
 
     Attributes:
         row: Row of each entry, numbered from 0 within these rows, shape (n_entries,).
@@ -35,7 +35,7 @@ class Rows:
 
 
 def stack(parts: Sequence[Rows]) -> Rows:
-    """Number the rows of several groups one after the other."""
+    """Number the rows of several groups consecutively."""
     starts = np.cumsum([0] + [part.count for part in parts])
     row = np.concatenate([part.row + start for part, start in zip(parts, starts, strict=False)])
     joined = [

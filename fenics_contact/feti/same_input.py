@@ -1,4 +1,4 @@
-"""Every rank must be given the same scene: numbers, topology, and functions as far as their values tell."""
+"""Check that every rank has the same scene: numbers, topology, and values of functions."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from fenics_contact.fem import is_scalar
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.scene import Scene, Support, SurfaceLoad, Ufl, evaluate
 
-#: At so many nodes functions are compared: ranks that mean different ones differ nearly everywhere.
+#: Number of nodes at which functions are compared: different functions differ nearly everywhere.
 COMPARED = 8
 
 
 def check_same_input(comm: MPI.Comm, scene: Scene, **settings: Any) -> None:
-    """Refuse a scene or settings that differ from rank to rank. Collective on ``comm``.
+    """Reject a scene or settings that differ from rank to rank. Collective on ``comm``.
 
-    Compared are hashes of all arrays, the text of all numbers, the parameters of materials, and what
-    functions of position return at a few nodes; of other functions and objects only the names. One message
-    of some bytes a rank; what it costs is the hashing of the meshes.
+    Compares hashes of all arrays, the text of all numbers, the parameters of materials, and values of
+    functions of position at a few nodes; of other functions and objects only the names. One message of some
+    bytes per rank; the cost is the hashing of the meshes.
 
     Args:
         comm: Communicator.
         scene: This rank's scene.
-        **settings: What else must be the same, by name.
+        **settings: Other inputs that must be the same, by name.
 
     Raises:
         InvalidInputError: On all ranks; names what differs.

@@ -1,4 +1,4 @@
-"""Adding up what several ranks hold of the same things."""
+"""Sums of contributions that several ranks hold of the same items."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from fenics_contact._libraries import MPI
 
 
 class Sharing:
-    """Things that more than one rank holds a part of, recognised by numbers that all ranks know."""
+    """Items of which more than one rank may hold a part, identified by global numbers."""
 
     def __init__(self, comm: MPI.Comm, keys: np.ndarray, mine: np.ndarray) -> None:
-        """Find out who shares what. Collective on ``comm``.
+        """Determine which ranks share which items. Collective on ``comm``.
 
         Args:
             comm: Communicator.
-            keys: Number of each thing that this rank holds, ascending, shape (n,).
+            keys: Number of each item that this rank holds, ascending, shape (n,).
             mine: Positions in ``keys`` of those that other ranks may hold as well.
         """
         self.comm = comm
@@ -27,9 +27,9 @@ class Sharing:
         self.shared = np.unique(np.concatenate(self._with))
 
     def add_up(self, values: np.ndarray) -> np.ndarray:
-        """Return values in which the rows of shared things are the sums over all ranks. Collective.
+        """Return values in which the rows of shared items are the sums over all ranks. Collective.
 
-        The ranks that share a thing get the same sum to the last bit.
+        The ranks that share an item obtain bitwise equal sums.
 
         Args:
             values: This rank's parts, shape (n, ...).

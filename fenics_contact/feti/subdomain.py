@@ -18,9 +18,9 @@ from fenics_contact.scene import Body, Load, Material, SurfaceLoad, Ufl
 
 @dataclass(frozen=True)
 class SubdomainMesh:
-    """The part of a scene that survives a change of geometry: mesh, numbering, tagged facets.
+    """The part of a subdomain that does not depend on the geometry: mesh, numbering, tagged facets.
 
-    Blocks of dofs, one a direction, are numbered as dolfinx numbers them.
+    Blocks of dofs, one dof per direction, are numbered as dolfinx numbers them.
 
     Attributes:
         number: Number among all subdomains.
@@ -61,19 +61,19 @@ class SubdomainMesh:
 
 @dataclass(frozen=True)
 class Subdomain:
-    """A subdomain with its numbers for one geometry and one load.
+    """A subdomain with its matrices for one geometry and one load.
 
-    Those that differ in their loads alone share one `matrix`.
+    Those that differ only in their loads share one `matrix`.
 
     Attributes:
         mesh: Mesh and numbering.
-        material: What it was assembled for: its materials and where they are.
-        loads: Loads on it that it was assembled for.
+        material: The materials and their regions for which it was assembled.
+        loads: The loads for which it was assembled.
         points: Coordinates by block, shape (n, dim), [length].
         load: f_s, shape (dim n,), [force].
         kernel: R_s, shape (dim n, n_modes): zero-energy modes as columns.
         typical_stiffness: Mean diagonal entry of K_s, [force / length].
-        matrix: K_s, forgotten when it is factored.
+        matrix: K_s, freed once it is factored.
     """
 
     mesh: SubdomainMesh
@@ -87,20 +87,20 @@ class Subdomain:
 
     @property
     def stiffness(self) -> sp.csr_matrix:
-        """K_s, shape (dim n, dim n); assembled again if it was forgotten."""
+        """K_s, shape (dim n, dim n); reassembled if it was freed."""
         return self.matrix.get()
 
 
 class CachedMatrix:
-    """A matrix that can be made again, so that it need not be kept while nobody needs it."""
+    """A matrix that can be rebuilt, so that it need not be stored while unused."""
 
     def __init__(self, make: Callable[[], sp.csr_matrix]) -> None:
-        """Make it for the first time."""
+        """Build it for the first time."""
         self._make = make
         self._matrix: sp.csr_matrix | None = make()
 
     def get(self) -> sp.csr_matrix:
-        """Return the matrix, made again if need be, and remember it."""
+        """Return the matrix, rebuilt if necessary, and store it."""
         if self._matrix is None:
             self._matrix = self._make()
         return self._matrix
@@ -144,11 +144,12 @@ def assemble(
         body: Its body, with the coordinates to use.
         loads: Loads of the scene, resultants already spread.
         forms: Compiled forms.
-        earlier: The same subdomain in another state. It is returned as it is if coordinates, materials and
-            loads are equal; if the loads alone differ, the result has its matrix and its kernel.
+        earlier: The same subdomain in another state. It is returned unchanged if coordinates, materials and
+            loads are equal; if only the loads differ, its matrix and kernel are reused.
 
     Raises:
-        InvalidInputError: If a matrix or load entry is not a number, or the kernel of the material is none.
+        InvalidInputError: If a matrix or load entry is not a number, or the material's kernel is not a
+            kernel.
     """
     parts = composition(body, mesh.cells)
     points = body.mesh.points[mesh.nodes]
@@ -204,12 +205,12 @@ def _with_stiffness(
 
 
 def _varies(parts: Composition, body: Body, forms: FormLibrary) -> bool:
-    """Tell whether the materials of a mesh depend on the place."""
+    """Return whether the materials of a mesh depend on position."""
     return any(forms.varies(material, body.mesh.cell_type) for material in parts.materials)
 
 
 def _from_own_origin(points: np.ndarray) -> np.ndarray:
-    """Return coordinates that count from one of the points: as exact far from the origin as near it."""
+    """Return coordinates relative to one of the points: as exact far from the origin as near it."""
     return np.asarray(points - points[0])
 
 

@@ -39,12 +39,12 @@ _LOG = logging.getLogger(__name__)
 class TornSystem:
     """min ½ uᵀK u − fᵀu + Σ Ψ_i ‖T_i u‖ subject to B_E u = c_E, B_N u ≤ c_N, distributed over ranks.
 
-    Rows of B are numbered: gluing and Dirichlet rows, rows of ties, normal rows (one a contact point),
-    tangential rows (dim − 1 a frictional point).
+    Rows of B are numbered: gluing and Dirichlet rows, rows of ties, normal rows (one per contact point),
+    tangential rows (dim − 1 per frictional point).
 
     Attributes:
         scene: The scene with the geometry of this system.
-        decomposition: What survives a change of geometry.
+        decomposition: The part that does not depend on the geometry.
         subdomains: This rank's subdomains with their matrices.
         points: Contact points, replicated.
         ties: Points of the ties, replicated.
@@ -53,14 +53,14 @@ class TornSystem:
         friction_coefficient: μ of each frictional point (zero under Tresca), replicated, shape (n_friction,).
         tresca_bound: Fixed slip bound of each frictional point, replicated, shape (n_friction,), [force].
         numbering: Owners and exchange of multipliers.
-        relations: What the rows of ties and contacts measure, in their order, replicated.
+        relations: The relative displacements in the rows of ties and contacts, in their order, replicated.
         B: This rank's part of B, shape (n_local_rows, torn_size); rows of ties and contacts act on free
             components only.
-        supported: What prescribed displacements contribute to the owned rows of ties and contacts, shape
+        supported: Contribution of prescribed displacements to the owned rows of ties and contacts, shape
             (n_owned,), zero on other rows, [length].
-        right: c of the owned rows less what supports contribute, shape (n_owned,), [length].
-        slid: Tangential displacement of the points without friction, which have no such rows, at the place
-            that slip is measured from, replicated, shape (n_contact − n_friction, dim − 1), [length].
+        right: c of the owned rows less the contribution of supports, shape (n_owned,), [length].
+        slid: Tangential displacement of the points without friction, which have no such rows, at the origin
+            of slip, replicated, shape (n_contact − n_friction, dim − 1), [length].
     """
 
     scene: Scene
@@ -84,15 +84,15 @@ class TornSystem:
         return self.numbering.to_owned(self.B @ displacement)
 
     def relative(self, displacement: np.ndarray) -> np.ndarray:
-        """Return B u with what supports contribute, owned, [length]. Collective."""
+        """Return B u with the contribution of supports, owned, [length]. Collective."""
         return self.jump(displacement) + self.supported
 
     def with_slip_from(self, relative: np.ndarray, slid: np.ndarray) -> TornSystem:
         """Return the system in which slip is measured from an earlier displacement.
 
         Args:
-            relative: What `relative` gave for it, owned, shape (n_owned,), [length].
-            slid: What `sliding` gave for it, replicated, shape (n_contact − n_friction, dim − 1), [length].
+            relative: Its value of `relative`, owned, shape (n_owned,), [length].
+            slid: Its value of `sliding`, replicated, shape (n_contact − n_friction, dim − 1), [length].
         """
         tangential = self.numbering.owned >= self.n_equality + self.points.count
         right = np.where(tangential, relative - self.supported, self.right)
@@ -104,7 +104,7 @@ class TornSystem:
         return np.setdiff1d(np.arange(self.points.count), self.frictional, assume_unique=True)
 
     def sliding(self, displacement: np.ndarray) -> np.ndarray:
-        """Return how far points without friction moved along their tangents, [length]. Collective.
+        """Return the tangential displacement of points without friction, [length]. Collective.
 
         Args:
             displacement: Torn displacement of this rank, shape (torn_size,), [length].
@@ -119,7 +119,7 @@ class TornSystem:
         return np.asarray(np.einsum("nad,nd->na", self.points.tangents[chosen], relative))
 
     def driven_as(self, prescribed: np.ndarray) -> bool:
-        """Tell whether supports drive the same frictional points as in this system.
+        """Return whether supports drive the same frictional points as in this system.
 
         Args:
             prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
@@ -131,7 +131,7 @@ class TornSystem:
         """Return the gaps between surfaces known better than those used, see `true_surface`. Collective.
 
         Returns:
-            Shape (n_contact,), [length]; the gap itself where nothing better is known.
+            Shape (n_contact,), [length]; the gap itself where no better surface is known.
         """
         decomposition, points = self.decomposition, self.points
         tearing, comm = decomposition.tearing, decomposition.comm
@@ -143,7 +143,7 @@ class TornSystem:
         return gap
 
     def with_gap(self, gap: np.ndarray) -> TornSystem:
-        """Return the same system with other gaps, shape (n_contact,), [length]."""
+        """Return the system with other gaps, shape (n_contact,), [length]."""
         change = np.zeros(int(self.n_equality + self.points.count + self.tangential_rows.size))
         change[self.normal_rows] = gap - self.points.gap
         points = replace(self.points, gap=gap)
@@ -183,21 +183,21 @@ def build_torn_system(
     overlap: bool = False,
     previous: TornSystem | None = None,
 ) -> TornSystem:
-    """Assemble all numbers of the torn system for the scene's present coordinates. Collective.
+    """Assemble the torn system for the scene's present coordinates. Collective.
 
     Args:
         scene: The scene whose decomposition is given, possibly moved.
         decomposition: Meshes and numbering.
-        overlap: Whether bodies may overlap, as a shape being optimised may its partner: the gap is then
-            negative and the state presses the bodies apart.
-        previous: System of another geometry or load; subdomains for which nothing changed are taken over.
+        overlap: Whether bodies may overlap, as during shape optimisation: the gap is then negative and the
+            state presses the bodies apart.
+        previous: System of another geometry or load; unchanged subdomains are reused.
 
     Raises:
         InvalidInputError: If the bodies overlap at the start, or matrices are not finite.
     """
     comm = decomposition.comm
     loads = as_tractions(scene)
-    decomposition.forms.prepare(scene)  # a new load may be of a kind that the first scene did not have
+    decomposition.forms.prepare(scene)  # a new load may be of a type that the first scene did not have
     with together(comm):
         known = (None,) * len(decomposition.meshes) if previous is None else previous.subdomains
         subdomains = tuple(
@@ -208,7 +208,7 @@ def build_torn_system(
         prescribed = prescribed_displacements(scene, decomposition.tearing)
         right = decomposition.gluing.right_side(prescribed)
     if previous is not None and _meets_alike(scene, previous.scene) and previous.driven_as(prescribed):
-        # Only loads and prescribed values changed: B stays the same object, which tells that F stays too.
+        # Only loads and prescribed values changed: B stays the same object, which marks F as unchanged, too.
         system = replace(previous, scene=scene, subdomains=subdomains)
     else:
         system = _joined(scene, decomposition, subdomains, overlap, previous, prescribed)
@@ -224,7 +224,7 @@ def build_torn_system(
 
 
 def _meets_alike(scene: Scene, other: Scene) -> bool:
-    """Tell whether bodies have the same meshes, and the same pairs of surfaces meet, in two scenes."""
+    """Return whether two scenes have the same meshes and the same pairs of surfaces."""
     meshes = [[body.mesh for body in each.bodies.values()] for each in (scene, other)]
     same = all(mesh is mate for mesh, mate in zip(*meshes, strict=True))
     return same and list(scene.contacts) == list(other.contacts) and list(scene.ties) == list(other.ties)
@@ -281,12 +281,12 @@ def _meeting_points(
 def _own_part(
     rows: Rows, decomposition: Decomposition, known: DualNumbering | None
 ) -> tuple[DualNumbering, sp.csr_matrix]:
-    """Number the multipliers and pick the entries of B that act on this rank's subdomains. Collective."""
+    """Number the multipliers and select the entries of B that act on this rank's subdomains. Collective."""
     block = decomposition.copy_block[rows.copy]
     here = block >= 0
     row, column = rows.row[here], decomposition.tearing.dim * block[here] + rows.component[here]
     touched, comm = np.unique(row), decomposition.comm
-    # The pattern of communication stays as long as no rank's share of the rows changes.
+    # The communication pattern is reused as long as no rank's share of the rows changes.
     stays = known is not None and known.serves(rows.owner, touched)
     if comm.allreduce(int(not stays)) or known is None:
         known = DualNumbering(comm, rows.owner, touched)

@@ -63,15 +63,15 @@ def _norm(comm: MPI.Comm, x: Vector) -> float:
 class AugmentedLagrangian:
     """L(λ, v) = ½ λᵀ(P F P/‖PFP‖ + Q) λ − (P(d − F λ₀)/‖PFP‖ + λ₀ − v)ᵀλ + const.
 
-    λ₀ = Gᵀ(G Gᵀ)⁻¹e, Q = I − P, and v in range(Gᵀ) is the multiplier of Q λ = λ₀, which says the same as
-    G λ = e. Where that holds, L and ½ λᵀF λ − dᵀλ differ by a factor and a constant.
+    λ₀ = Gᵀ(G Gᵀ)⁻¹e, Q = I − P, and v in range(Gᵀ) is the multiplier of Q λ = λ₀, which is equivalent to G λ
+    = e. Where that holds, L and ½ λᵀF λ − dᵀλ differ by a factor and a constant.
 
     Attributes:
         norm: Upper estimate of ‖PFP‖.
     """
 
     def __init__(self, problem: DualProblem, start: Start) -> None:
-        """Estimate ‖PFP‖ unless the start remembers it, and build the right side. Collective."""
+        """Estimate ‖PFP‖ unless the start knows it, and build the right side. Collective."""
         self._problem, self._operator, self._coarse = problem, start.operator, problem.coarse
         self._particular = self._coarse.particular()
         if start.memory is None:

@@ -14,10 +14,10 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.qp.gram import GramInverse, SparseGramInverse
 from fenics_contact.qp.reductions import Vector, global_sum
 
-#: Up to so many rigid motions the small matrices are dense, and every rank factors them.
+#: Up to this number of rigid motions the coarse matrices are dense and factored on every rank.
 DENSE_LIMIT = 600
 
-#: A matrix of size m: dense and summed over the ranks, or beyond the limit sparse, this rank's share alone.
+#: A matrix of size m: dense and summed over the ranks, or beyond the limit sparse, only this rank's share.
 Gram: TypeAlias = Vector | sp.csr_matrix
 
 
@@ -27,8 +27,7 @@ class CoarseSpace:
     Column j of G holds the resultants of the j-th multiplier on every rigid motion. Columns are
     distributed like the multipliers; everything of length m (right side, coefficients) is replicated. The
     matrix G G^T is dense and factored on every rank while it is small; beyond `DENSE_LIMIT` it is sparse and
-    factored on a few ranks, and every solution is a message to all. With m = 0 all methods are cheap and do
-    nothing.
+    factored on a few ranks, and every solution is broadcast. With m = 0 all methods are cheap and do nothing.
 
     Attributes:
         comm: Communicator over which the multipliers are distributed.
@@ -39,13 +38,13 @@ class CoarseSpace:
     def __init__(
         self, comm: MPI.Comm, G: sp.spmatrix | sp.sparray, e: Vector, *, gram: Gram | None = None
     ) -> None:
-        """Take this rank's columns.
+        """Store this rank's columns.
 
         Args:
             comm: Communicator over which the multipliers are distributed.
             G: This rank's columns, sparse, shape (m, n_owned).
             e: Right side, shape (m,), the same on every rank.
-            gram: The matrix G G^T as `gram_matrix` returns it, where the caller knows it already.
+            gram: The matrix G G^T as `gram_matrix` returns it, if known already.
 
         Raises:
             InvalidInputError: The shapes of G and e disagree.
@@ -63,12 +62,12 @@ class CoarseSpace:
 
     @cached_property
     def gram(self) -> GramInverse | SparseGramInverse:
-        """Generalised inverse of G G^T, factored when first asked for. Collective then."""
+        """Generalised inverse of G G^T, factored on first access. Collective then."""
         gram = gram_matrix(self.comm, self.matrix) if self._gram_matrix is None else self._gram_matrix
         return GramInverse(gram) if isinstance(gram, np.ndarray) else SparseGramInverse(self.comm, gram)
 
     def with_load(self, load: Vector) -> CoarseSpace:
-        """Return the coarse space of another load e, shape (m,), replicated; what is factored is shared."""
+        """Return the coarse space of another load e, shape (m,), replicated; factors are shared."""
         other = copy(self)
         other.load = np.asarray(load, dtype=np.float64)
         return other
@@ -117,8 +116,8 @@ class CoarseSpace:
     def unresisted(self) -> Vector:
         """Return the part of e that no multiplier can balance, shape (m,), zero where G has full rank.
 
-        Each null vector z of G G^T is a rigid motion without a single row against it; z^T e is the work
-        that the load does on it.
+        Each null vector z of G G^T is a rigid motion that no row resists; z^T e is the work of the load on
+        it.
         """
         null = self.gram.null_space
         if null.shape[1] == 0:
@@ -142,7 +141,7 @@ class CoarseSpace:
 def gram_matrix(comm: MPI.Comm, columns: sp.csr_matrix) -> Gram:
     """Return C C^T for owned columns C: the sum over the ranks, or beyond `DENSE_LIMIT` this rank's share.
 
-    Matrices of the same size can be added whichever they are. Collective.
+    Matrices of the same size can be added in either form. Collective.
     """
     return summed_if_small(comm, (columns @ columns.T).tocsr())
 

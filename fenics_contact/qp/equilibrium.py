@@ -1,4 +1,4 @@
-"""Can bounds and friction hold the load at all? A question about G, e and the cone only, not about F."""
+"""Whether bounds and friction can balance the load at all: depends on G, e and the cone only, not on F."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fenics_contact.errors import InfeasibleError
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_sum
 
-#: A thin plate clamped at one edge needs as large a force as its length is thicknesses.
+#: A thin plate clamped at one edge needs forces as many times the load as its length is times its thickness.
 LARGEST_FORCE = 1e7
 
 
@@ -19,7 +19,7 @@ class Equilibrium:
     """An admissible multiplier in equilibrium, or the rigid motion that proves there is none.
 
     Attributes:
-        multiplier: The admissible multiplier found, owned; in equilibrium up to `error`.
+        multiplier: An admissible multiplier, owned; in equilibrium up to `error`.
         error: ‖Gᵀ(G Gᵀ)⁻¹(G λ − e)‖ relative to that of e.
         motion: Coefficients of a rigid motion on which the load does work and which no admissible
             multiplier resists, shape (m,); None unless that is proven.
@@ -33,16 +33,16 @@ class Equilibrium:
 def find_equilibrium(
     problem: DualProblem, *, tolerance: float = 1e-4, max_iterations: int = 2000
 ) -> Equilibrium:
-    """Look for an admissible multiplier that balances the load, without a single F-product. Collective.
+    """Compute an admissible multiplier that balances the load, without any F-product. Collective.
 
     Minimises ½‖Q z − λ₀‖² over the admissible set by accelerated projected gradients, Q = I − P. At
-    distance g = Q z − λ₀ with optimality error s = z − P_Λ(z − g), any equilibrium y obeys
-    ‖g‖² ≤ ‖s‖(‖y − z‖ + ‖g‖). Once that would take a force 10⁷ times the load's, none exists.
+    distance g = Q z − λ₀ with optimality error s = z − P_Λ(z − g), any equilibrium y satisfies ‖g‖² ≤ ‖s‖(‖y
+    − z‖ + ‖g‖). Once that would need a force 10⁷ times the load's, none exists.
 
     Args:
         problem: Coarse space, layout and law are used: Tresca's bounds or Coulomb's cones.
-        tolerance: Relative error of equilibrium at which a multiplier counts as found.
-        max_iterations: Give up undecided after that many cheap iterations.
+        tolerance: Relative error of equilibrium at which a multiplier is accepted.
+        max_iterations: Number of cheap iterations after which to stop undecided.
     """
     coarse, law = problem.coarse, problem.law
     target = coarse.particular()
@@ -68,7 +68,7 @@ def find_equilibrium(
 
 
 def require_equilibrium(problem: DualProblem) -> Equilibrium:
-    """Return an admissible multiplier near equilibrium, or refuse the problem. Collective.
+    """Return an admissible multiplier near equilibrium, or reject the problem. Collective.
 
     Raises:
         InfeasibleError: It is proven that none exists.

@@ -12,11 +12,11 @@ import scipy.sparse as sp
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector
 
-#: A truth value for each multiplier.
+#: A boolean for each multiplier.
 Marks = npt.NDArray[np.bool_]
 
-#: Overshoot beyond which a slipping disc keeps its direction: the stiffness κ against a turn would leave no
-#: digits to the others, and a step that forgets the turn errs by the inverse of this.
+#: Overshoot beyond which a slipping disc keeps its direction: the stiffness κ against rotation would swamp
+#: the other entries, and a step that ignores the rotation errs by the inverse of this.
 STEEP = 1e6
 
 
@@ -96,7 +96,7 @@ class Face:
         return self.fixed + self.prolong(self.restrict(x))
 
     def growth(self, rate: Vector) -> sp.csr_matrix:
-        """Return how slipping forces grow with their normal forces, shape (size, n_face).
+        """Return the growth of slipping forces with their normal forces, shape (size, n_face).
 
         Entries ``rate`` · ŵ in the tangential rows of a slipping disc, in the column of its normal
         multiplier.
@@ -123,7 +123,7 @@ class Face:
 
     @property
     def _sliding(self) -> npt.NDArray[np.int64]:
-        """Slipping discs that have a tangent to move along; none in two dimensions."""
+        """Slipping discs with a tangent along which they can move; none in two dimensions."""
         return turning_discs(self.layout, self._turning)
 
     @property
@@ -133,7 +133,7 @@ class Face:
 
 
 def turning_discs(layout: ContactLayout, turning: Marks) -> npt.NDArray[np.int64]:
-    """Return which discs can turn: in two dimensions there is nowhere to turn to."""
+    """Return which discs can turn: none in two dimensions."""
     return np.flatnonzero(turning) if layout.tangential.shape[1] == 2 else np.zeros(0, np.int64)
 
 
@@ -146,7 +146,7 @@ def face_basis(
         layout: Positions of the multipliers.
         closed: Contacts whose normal row is free, shape (n_contact,).
         stick: Discs of which both rows are free, shape (n_friction,).
-        sliding: Discs that are free across a direction; in two dimensions there is none across.
+        sliding: Discs that are free across a direction; in two dimensions none.
         direction: Unit vectors of these discs, shape (n_friction, t).
     """
     single = np.concatenate([layout.equality, layout.normal[closed], layout.tangential[stick].ravel()])

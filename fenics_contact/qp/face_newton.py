@@ -1,4 +1,4 @@
-"""Semismooth Newton on faces: guess which constraints hold, solve the linear face, correct the guess."""
+"""Semismooth Newton on faces: predict the active constraints, solve the linear face, correct them."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from fenics_contact.qp.rescue import DIVERGED, Rescue, Rescued
 from fenics_contact.qp.smalse import Smalse
 from fenics_contact.qp.solution import DualSolution, SmalseMemory, SolverStep
 
-#: Distance from equilibrium of an iterate that proximal points could not repair.
+#: Distance from equilibrium beyond which proximal points cannot repair an iterate.
 UNBALANCED = 1e-6
-#: A residual above this after all steps is no answer by any measure.
+#: A residual above this after all steps is no approximate solution at all.
 HARDLY = 1e-2
-#: Steps in which nothing sticks, one after the other: a single one happens on the way to states that stick.
+#: Consecutive steps in which nothing sticks: a single one occurs on the way to states that stick.
 SLIDING = 5
-#: The rescue before which it is asked whether friction can suffice at all, and by forces of which tolerance.
+#: Number of the rescue before which it is tested whether friction can suffice, and the tolerance of the test.
 DOUBT, ROUGH = 4, 1e-3
-#: After so many steps without progress each further one solves its face better by that factor: where forces
-#: vanish in the end, residuals relative to them say nothing of how far gaps can be trusted.
+#: After this many steps without progress each further one solves its face more accurately by this factor:
+#: where forces vanish in the limit, residuals relative to them do not measure the accuracy of the gaps.
 CARELESS, CARE = 2, 0.25
-#: So many rescues in turn that lead to one and the same iterate are the last; residuals agree so far there.
+#: Number of consecutive rescues to the same iterate after which to stop, and agreement of their residuals.
 VAIN, SAME = 7, 1e-6
 
 
@@ -37,28 +37,28 @@ class FaceNewton:
     """Faces by the natural map w = λ − ρ r, each solved by projected preconditioned CG.
 
     On a face G λ = e holds exactly, so there is no loop for equilibrium. The inner tolerance follows the
-    outer residual, and once no contact changes, the better the last face predicted it, the closer. With
-    Coulomb's law the slip bound is refreshed in every step, and the friction of slipping discs grows with
-    the normal force already within the step: one loop for all.
+    outer residual and, once no contact changes, tightens with the quality of the last face's prediction. With
+    Coulomb's law the slip bound is updated in every step, and the friction of slipping discs grows with the
+    normal force within the step: a single loop.
 
     Floating bodies come to rest after every step (`RigidMotionCorrection`): their motions balance the load
-    with the forces of the next guess. Three more things keep the active set from cycling. A disc whose
-    friction force would turn by more than a right angle has a ρ too large for it; its ρ is reduced until the
-    force stays or the disc sticks. A step that is worse than the last two iterates is cut short, at no cost
-    in products. Steps without progress are followed by a rescue from the best iterate so far, by proximal
-    points, whose convex potential a line search descends (`qp.rescue`), or without a preconditioner by
-    SMALSE; the history says whether the active set cycled or the residual stood still. And nothing is
-    accepted before its residuals were recomputed.
+    with the forces of the next guess. Three further safeguards keep the active set from cycling. A disc whose
+    friction force would turn by more than a right angle has too large a ρ, which is reduced until the force
+    keeps its direction or the disc sticks. A step that is worse than the last two iterates is shortened, at
+    no cost in products. Steps without progress are followed by a rescue from the best iterate so far, by
+    proximal points, whose convex potential a line search descends (`qp.rescue`), or without a preconditioner
+    by SMALSE; the history reports whether the active set cycled or the residual stagnated. No result is
+    accepted before its residuals are recomputed.
 
     Attributes:
         tolerance: Every residual of `Residuals` ends below it.
-        max_steps: Give up after that many Newton steps and rescues.
-        max_products: Give up after that many F-products.
+        max_steps: Largest number of Newton steps and rescues.
+        max_products: Largest number of F-products.
         forcing: Largest inner tolerance relative to the outer residual.
-        loosest: Largest inner tolerance of all.
+        loosest: Largest absolute inner tolerance.
         patience: Steps in which the residual must halve before a rescue is called.
         rescue: Parameters of the fallback of problems without a preconditioner.
-        rescue_products: Products that a rescue may spend; twice as many each time Newton fails again.
+        rescue_products: Products that a rescue may use; doubled each time Newton fails again.
 
     References:
         S. Hüeber, G. Stadler, B. Wohlmuth, A primal-dual active set algorithm for three-dimensional
@@ -83,8 +83,8 @@ class FaceNewton:
         """Solve from ``start``; called by `solve`. Collective.
 
         Raises:
-            InfeasibleError: Some body is held by nothing but contacts that stay open, or too little friction;
-                where all was tried before that was found, its cause carries the history.
+            InfeasibleError: Some body is held only by contacts that stay open, or by too little friction; if
+                that is detected after all else failed, its cause carries the history.
             ConvergenceError: Steps or products were used up; carries the history.
         """
         run = _Run.build(self, problem, start)
@@ -100,13 +100,13 @@ class FaceNewton:
 
 @dataclass(frozen=True, eq=False)
 class _LastRescue:
-    """What the next rescue must know of the last one.
+    """The data of the last rescue that the next one needs.
 
     Attributes:
-        origin: Where it began.
-        result: Where it led to.
-        budget: Products that it might have spent.
-        vain: Rescues in turn, up to it, that led to one and the same iterate.
+        origin: Its initial iterate.
+        result: Its final iterate.
+        budget: Products that it was allowed.
+        vain: Consecutive rescues, including this one, that led to the same iterate.
     """
 
     origin: Iterate
@@ -117,19 +117,19 @@ class _LastRescue:
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """Where a solve by face Newton is.
+    """State of a solve by face Newton.
 
     Attributes:
         newton: The present iterate, with faces and ρ.
         best: The last iterate that halved the residual, or the outcome of a later rescue.
-        memory: What SMALSE learned.
-        history: One line a step or rescue.
+        memory: Estimates from SMALSE.
+        history: One line per step or rescue.
         since_best: Newton steps since the best iterate.
         care: Factor on the tolerance of the next face.
         stuck: Whether the last steps call for a rescue.
         rescues: Rescues so far.
         last_rescue: The last of them.
-        answer: The certified answer, once the iterate is one.
+        answer: The certified solution, once there is one.
     """
 
     newton: NewtonState
@@ -146,15 +146,15 @@ class _State:
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """One solve by face Newton: what stays the same in all its steps.
+    """One solve by face Newton: the data that all its steps share.
 
     Attributes:
         parameters: Those of the method.
         problem: The dual problem.
-        start: Where it begins.
+        start: Its start.
         steps: Newton's method.
-        rescue: What helps where that stands still.
-        friction_alone: The question whether friction can suffice.
+        rescue: The fallback when that stagnates.
+        friction_alone: The test whether friction can suffice.
     """
 
     parameters: FaceNewton
@@ -182,16 +182,16 @@ class _Run:
         return _State(self.steps.init(first), first, self.start.memory)
 
     def exhausted(self, state: _State) -> bool:
-        """Tell whether steps or products are used up, or rescues in vain."""
+        """Return whether steps or products are used up, or rescues are in vain."""
         parameters, products = self.parameters, self.start.operator.products
         in_vain = state.last_rescue is not None and state.last_rescue.vain >= VAIN
         return in_vain or len(state.history) >= parameters.max_steps or products >= parameters.max_products
 
     def step(self, state: _State) -> _State:
-        """Take a Newton step and see whether it made progress. Collective.
+        """Take a Newton step and check its progress. Collective.
 
         Raises:
-            InfeasibleError: All contacts stay open, and something moves that only they could hold.
+            InfeasibleError: All contacts stay open, and some body moves that only they could hold.
         """
         newton, line = self.steps.step(state.newton, len(state.history), state.care)
         history = (*state.history, line)
@@ -215,16 +215,16 @@ class _Run:
         )
 
     def rescued(self, state: _State) -> _State:
-        """Go on from what a rescue makes of the best iterate. Collective.
+        """Continue from the best iterate improved by a rescue. Collective.
 
         Raises:
-            InfeasibleError: Friction is far from enough.
+            InfeasibleError: Friction is far from sufficient.
         """
         if state.rescues + 1 == DOUBT:
             self.friction_alone.require_enough()
         operator, last = self.start.operator, state.last_rescue
         origin = self._rescue_start(state.best)
-        # Where Newton could do nothing with the last rescue, the next one must go further.
+        # If Newton made no progress from the last rescue, the next one must go further.
         again = last is not None and origin is last.origin
         budget = self.parameters.rescue_products
         if last is not None and (again or state.best is last.result):
@@ -259,9 +259,9 @@ class _Run:
         raise failure
 
     def _rescue_start(self, best: Iterate) -> Iterate:
-        """Return where a rescue starts: the first iterate where the best one is far from equilibrium.
+        """Return the start of a rescue: the first iterate if the best one is far from equilibrium.
 
-        SMALSE finds back to equilibrium, proximal points keep what they are given.
+        SMALSE restores equilibrium, proximal points only preserve it.
         """
         lost = self.problem.preconditioner is not None and best.residuals.coarse > UNBALANCED
         return self.start.iterate if lost else best
@@ -274,7 +274,7 @@ class _Run:
         return replace(outcome.line, iteration=len(state.history), note=note)
 
     def _checked(self, iterate: Iterate) -> tuple[Iterate, Certificate | None]:
-        """Recompute an iterate that claims to be the solution; certify it if it is. Collective."""
+        """Recompute the residuals of an apparent solution; certify it if they confirm it. Collective."""
         tolerance = self.parameters.tolerance
         if not iterate.residuals.within(tolerance):
             return iterate, None
@@ -283,7 +283,7 @@ class _Run:
         return answer.iterate, answer if answer.iterate.residuals.within(tolerance) else None
 
     def _failed(self, state: _State) -> str:
-        """Say what was reached, why it went no further and what to try. Collective."""
+        """Describe what was reached, why it went no further and what to try. Collective."""
         parameters, products, history = self.parameters, self.start.operator.products, state.history
         up = [products >= parameters.max_products, len(history) >= parameters.max_steps]
         more = [f"raise {name}" for name, used in zip(("max_products", "max_steps"), up, strict=True) if used]
@@ -305,13 +305,13 @@ class _Run:
 
 
 def _same(before: Iterate, after: Iterate) -> bool:
-    """Tell whether two rescues led to one and the same iterate."""
+    """Return whether two rescues led to the same iterate."""
     worst = after.residuals.worst
     return abs(worst - before.residuals.worst) <= SAME * worst
 
 
 def slides(history: Sequence[SolverStep]) -> bool:
-    """Tell whether all discs slip, and have done so for a while."""
+    """Return whether all discs slip, and have done so for several steps."""
     late = history[-max(SLIDING, len(history) // 4) :]
     return bool(late) and all(step.slip > 0 and step.stick == 0 for step in late)
 
@@ -322,9 +322,9 @@ class ProjectedCG:
 
     Attributes:
         tolerance: Every residual of `Residuals` ends below it.
-        max_products: Give up after that many F-products.
-        max_restarts: Runs after which to give up; more than one is needed only where rounding makes the
-            carried residual differ from the recomputed one.
+        max_products: Largest number of F-products.
+        max_restarts: Largest number of runs; more than one is needed only where rounding makes the recursive
+            residual differ from the recomputed one.
     """
 
     tolerance: float = 1e-9

@@ -36,7 +36,7 @@ class FaceSystem:
     patience: int = 60
 
     def image(self, y: Vector, full: Vector) -> Vector:
-        """Return A y, shape (n_face,), for y on the face and full = F Z y owned."""
+        """Return A y, shape (n_face,), for y on the face and full = F Z y, owned."""
         return self.face.restrict(full) + self.face.curvature * y
 
     def precondition(self, residual: Vector) -> Vector:
@@ -58,13 +58,13 @@ class FaceSystem:
         return on_face - self.face.prolong(self.coarse.transpose(self.coarse.solve(missing)))
 
     def advance(self, step: Vector) -> Vector:
-        """Return how the multiplier moves, Z δ, owned, for a step δ in face coordinates."""
+        """Return the change of the multiplier, Z δ, owned, for a step δ in face coordinates."""
         return self.face.prolong(step)
 
     def motions(self, gradient: Vector) -> Vector:
-        """Return α, the rigid motions that fit a gradient on the face best, replicated. Collective.
+        """Return α, the least-squares fit of rigid motions to a gradient on the face, replicated. Collective.
 
-        Refined once: rounding of bodies that move far would else move others, which nothing loads.
+        Refined once: otherwise rounding of large motions would move other, unloaded bodies.
         """
         alpha = self.coarse.coefficients(gradient)
         return alpha + self.coarse.coefficients(gradient - self.coarse.transpose(alpha))
@@ -98,16 +98,16 @@ class FaceSystems:
         return FaceSystem(problem.comm, face, self._operator, restricted, preconditioner)
 
 
-#: Motions that only offsets resist are to be told from those that nothing resists.
+#: Lower bound on D that keeps motions resisted only by offsets distinct from unresisted ones.
 LEAST_DAMPING = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class ObliqueProjector:
-    """v ↦ v − G_sᵀ (G_u G_sᵀ)⁻¹ G_u v: removes rigid motions, lands where G_u vanishes.
+    """v ↦ v − G_sᵀ (G_u G_sᵀ)⁻¹ G_u v: removes rigid motions, with range in the kernel of G_u.
 
     Attributes:
-        tested: G_s, this rank's columns on the tested basis, shape (m, n_face).
+        tested: G_s, this rank's columns on the test basis, shape (m, n_face).
         moving: Coarse space of G_u on the moving basis.
         inverse: (G_u G_sᵀ)⁻¹.
     """
@@ -118,7 +118,7 @@ class ObliqueProjector:
 
     @classmethod
     def build(cls, tested: sp.csr_matrix, moving: CoarseSpace) -> ObliqueProjector | None:
-        """Factor G_u G_sᵀ; None if it is singular: then the face does not hold every body. Collective."""
+        """Factor G_u G_sᵀ; None if it is singular, when the face does not hold every body. Collective."""
         diagonal = global_sum(moving.comm, moving.matrix.power(2).sum(axis=1))
         scale = 1.0 / np.sqrt(np.maximum(diagonal, np.finfo(float).tiny))
         inverse = invert_square(moving.comm, (moving.matrix @ tested.T).tocsr(), scale)
@@ -139,10 +139,11 @@ class ObliqueProjector:
 
 @dataclass(frozen=True, eq=False)
 class DampedEquilibrium:
-    """Keeps G Z y with little motion of the offsets of slipping discs that κ holds in place.
+    """Preserves G Z y with little motion of the offsets of slipping discs that κ holds in place.
 
-    Next to no normal force, κ is a million times the flexibility of other rows and more. Moved as far as all
-    others to keep equilibrium, such offsets would drown the rest of a residual in κ times as much.
+    Near zero normal force, κ exceeds the flexibility of other rows by a factor of a million and more. If such
+    offsets moved as far as all others to preserve equilibrium, they would swamp the rest of a residual by κ
+    times as much.
 
     Attributes:
         damping: D, that of the face down to `LEAST_DAMPING`, shape (n_face,), owned.
@@ -166,15 +167,14 @@ class CoupledSystem:
     """(Wᵀ F Z + κ) y = Wᵀ d + (G W)ᵀ α on {G Z y = load}, unsymmetric where discs slip.
 
     Newton's step tests with the face's own basis W = Z_s and moves the multiplier along Z = Z_u = Z_s +
-    growth:
-    a column of a normal multiplier carries the friction μ ŵ that slips with it. The adjoint swaps the two.
+    growth: the column of a normal multiplier includes the slipping friction μ ŵ. The adjoint swaps the two.
 
     Attributes:
         system: The symmetric system of the face: F, κ and the preconditioner.
         tested: W, shape (n_owned, n_face).
         moving: Z, shape (n_owned, n_face).
-        oblique: Projector that keeps G Z y and ignores what rigid motions absorb.
-        damped: How equilibrium is kept where offsets are held in place; None where it is kept by all alike.
+        oblique: Projector that preserves G Z y and ignores what rigid motions absorb.
+        damped: Preserves equilibrium where offsets are held in place; None where all entries share equally.
     """
 
     system: FaceSystem
@@ -200,8 +200,8 @@ class CoupledSystem:
             coarse: Equilibrium of all multipliers.
             tested: W, shape (n_owned, n_face).
             moving: Z, shape (n_owned, n_face).
-            damped: Whether to spare offsets that κ holds in place: for systems that must be solved to the
-                last digits, beside switches of the contact law as well.
+            damped: Whether to move offsets that κ holds in place less: for systems that must be solved to the
+                last digits, also near switches of the contact law.
         """
         oblique = ObliqueProjector.build(sp.csr_matrix(coarse.matrix @ tested), coarse.restricted(moving))
         if oblique is None or not damped:
@@ -219,7 +219,7 @@ class CoupledSystem:
         return self.oblique(self.operate(z, full))
 
     def precondition(self, residual: Vector) -> Vector:
-        """Apply the symmetric preconditioner and return to equilibrium, G Z z = 0. Collective."""
+        """Apply the symmetric preconditioner and restore equilibrium, G Z z = 0. Collective."""
         equilibrium = self.damped or self.oblique.moving
         return equilibrium.project(self.system.precondition(residual))
 
@@ -252,7 +252,7 @@ class CoupledFace:
         return self.fixed + self.coupled.moving @ y
 
     def advance(self, step: Vector) -> Vector:
-        """Return how the multiplier moves, Z_u δ, owned, for a step δ in face coordinates."""
+        """Return the change of the multiplier, Z_u δ, owned, for a step δ in face coordinates."""
         return self.coupled.moving @ step
 
     def motions(self, gradient: Vector) -> Vector:
@@ -267,7 +267,7 @@ def couple(system: FaceSystem, coarse: CoarseSpace, growth: Vector, multiplier: 
         system: The symmetric system of the face.
         coarse: Equilibrium of all multipliers.
         growth: dΨ/dλ_N of each disc, shape (n_friction,), owned.
-        multiplier: λ at which the face was found, owned.
+        multiplier: λ at which the face was determined, owned.
 
     Returns:
         The coupled face; None where no disc grows, or where the face does not hold every body.

@@ -93,13 +93,13 @@ class FeasibleSet:
         return result
 
     def step_to_boundary(self, x: Vector, direction: Vector) -> float:
-        """Return the largest step a ≥ 0 with x − a·direction in the set, infinite if nothing is met.
+        """Return the largest step a ≥ 0 with x − a·direction in the set, infinite if there is no boundary.
 
-        For a disc it is the larger root of ‖τ − a p‖² = Ψ², written so that no digits cancel.
+        For a disc it is the larger root of ‖τ − a p‖² = Ψ², written without cancellation.
         """
         p, value = direction[self.layout.normal], x[self.layout.normal]
         falling = p > 0.0
-        with np.errstate(over="ignore"):  # beyond the largest number is as good as never
+        with np.errstate(over="ignore"):  # an overflow means no boundary
             steps = np.maximum(value[falling], 0.0) / p[falling]
         return float(min(steps.min(initial=np.inf), self._disc_steps(x, direction).min(initial=np.inf)))
 

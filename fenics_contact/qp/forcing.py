@@ -1,4 +1,4 @@
-"""How accurately a face is worth solving: the forcing terms of an inexact Newton method."""
+"""How accurately faces are solved: the forcing terms of an inexact Newton method."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class Forcing:
 
     Attributes:
         largest: Largest tolerance relative to the residual.
-        loosest: Largest tolerance of all.
-        tolerance: That of the whole solve: no face is solved much better.
+        loosest: Largest absolute tolerance.
+        tolerance: That of the whole solve: no face is solved much more accurately.
 
     References:
         S. C. Eisenstat, H. F. Walker, Choosing the forcing terms in an inexact Newton method, SIAM J. Sci.
@@ -38,8 +38,8 @@ class Forcing:
 
         Args:
             residuals: Those of the iterate.
-            mismatch: How far, relative to the residual before it, the last residual was from the one that
-                its face predicted; None where the face is another than the last.
+            mismatch: Difference of the last residual from the one that its face predicted, relative to the
+                residual before; None if the face has changed.
             care: Factor on the relative tolerance, at most one.
         """
         term = self.largest if mismatch is None else min(self.largest, mismatch)

@@ -1,4 +1,4 @@
-"""Inverses of symmetric positive semidefinite matrices that survive a rank deficiency, dense or sparse."""
+"""Generalised inverses of symmetric positive semidefinite matrices, dense or sparse."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ RANK_TOLERANCE = 1e-12
 
 
 class GramInverse:
-    """Generalised inverse of S = G G^T that survives a rank deficiency.
+    """Generalised inverse of S = G G^T, which may be rank deficient.
 
     S is scaled to unit diagonal first, because its rows mix translations and rotations. A well conditioned
-    S is factored by Cholesky; otherwise its eigenvectors say which combinations of rows carry nothing and
-    the inverse acts on the others. For any generalised inverse G^T S^- G is the same projector.
+    S is factored by Cholesky; otherwise its eigenvectors separate the null space, and the inverse acts on the
+    complement. For any generalised inverse G^T S^- G is the same projector.
 
     Attributes:
         rank: Number of independent rows.
@@ -63,15 +63,15 @@ def _trusted_cholesky(matrix: Vector) -> Vector | None:
     return factor if reciprocal_condition > RANK_TOLERANCE else None
 
 
-#: Vectors of the first search for null vectors: a floating body gives six.
+#: Vectors in the first search for null vectors: a floating body has six.
 FIRST_BLOCK = 8
 
 
 class SparseGramInverse:
-    """Generalised inverse of S = Σ S_rank that survives a rank deficiency; see `GramInverse`.
+    """Generalised inverse of S = Σ S_rank, which may be rank deficient; see `GramInverse`.
 
-    Null vectors are found by inverse iteration with a few vectors: of a matrix that is singular to
-    rounding they come out at once.
+    Null vectors are computed by inverse iteration with a few vectors, which converges at once for a matrix
+    that is singular to rounding.
 
     Attributes:
         rank: Number of independent rows.

@@ -1,4 +1,4 @@
-"""A multiplier with what is known about it: where a solve starts, what it measures, what it may answer."""
+"""A multiplier with its product and residuals: start, iterates and certified result of a solve."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from fenics_contact.qp.solution import (
     measure,
 )
 
-#: Discs this far inside their slip bound, relatively, count as sticking where only λ is known.
+#: Discs inside their slip bound by this relative margin count as sticking where only λ is known.
 SLIP_MARGIN = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class Iterate:
-    """A multiplier on its way to the solution.
+    """An iterate of the multiplier.
 
     Attributes:
         multiplier: λ, owned.
-        product: F λ, owned, recomputed or carried by recursion.
+        product: F λ, owned, recomputed or updated by recursion.
         residual: r = F λ − d − Gᵀα, owned, with the α of the solver.
         residuals: Residuals of λ.
     """
@@ -40,18 +40,18 @@ class Iterate:
     residuals: Residuals
 
     def motions(self, problem: DualProblem) -> Vector:
-        """Return α, shape (m,), replicated, of which r = F λ − d − Gᵀα was made. Collective."""
+        """Return the α of r = F λ − d − Gᵀα, shape (m,), replicated. Collective."""
         return problem.coarse.coefficients(self.product - problem.rhs - self.residual)
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where a solve begins.
+    """The start of a solve.
 
     Attributes:
         iterate: The first multiplier.
         operator: F with its counter, to be used for the whole solve.
-        memory: What SMALSE learned before, None if nothing.
+        memory: Estimates from an earlier SMALSE, or None.
         cold: Whether λ is the shortest multiplier in equilibrium, Gᵀ(G Gᵀ)⁻¹e.
     """
 
@@ -61,7 +61,7 @@ class Start:
     cold: bool = True
 
     def reached(self, step: SolverStep) -> None:
-        """Tell whoever listens what a step of the solver has reached."""
+        """Report what a step of the solver has reached."""
         self.operator.report(step.products, step.residuals.worst)
 
 
@@ -73,11 +73,10 @@ def iterate_at(problem: DualProblem, multiplier: Vector, product: Vector, alpha:
 
 
 def iterate_fitted(problem: DualProblem, multiplier: Vector, product: Vector) -> Iterate:
-    """Return the iterate with α = (G_F G_Fᵀ)⁻¹ G_F (F λ − d)_F of the rows that λ says are free. Collective.
+    """Return the iterate with α = (G_F G_Fᵀ)⁻¹ G_F (F λ − d)_F of the rows that are free by λ. Collective.
 
     Free are the gluing rows, contacts with λ_N > 0, discs well inside their bound, and the tangents of the
-    others. There r should vanish; open rows have gaps and slipping ones slip, which must not be spread
-    over the bodies.
+    others. There r should vanish; open rows have gaps and slipping ones slip, which must not enter the fit.
     """
     bound = (1.0 - SLIP_MARGIN) * problem.law.bound(multiplier)
     step = contact_step(problem.layout, problem.diagonal)
@@ -88,7 +87,7 @@ def iterate_fitted(problem: DualProblem, multiplier: Vector, product: Vector) ->
 
 
 def iterate_between(problem: DualProblem, before: Iterate, after: Iterate, part: float) -> Iterate:
-    """Return the iterate at a part of the way from one to another, without a product. Collective."""
+    """Return the iterate at a fraction of the way from one to another, without a product. Collective."""
     multiplier, product, residual = (
         np.asarray((1.0 - part) * old + part * new, dtype=np.float64)
         for old, new in (
@@ -101,10 +100,11 @@ def iterate_between(problem: DualProblem, before: Iterate, after: Iterate, part:
 
 
 def answer_at(problem: DualProblem, multiplier: Vector, product: Vector, alpha: Vector) -> Iterate:
-    """Return the iterate with its jumps measured by the displacements where those are known. Collective.
+    """Return the iterate with its jumps relative to the displacements where these are known. Collective.
 
-    On the way to an answer jumps are compared with B K⁺(Bᵀλ − f), which costs nothing more. That says little
-    where loads go straight into supports or press thin pieces that are held: alone they would move far.
+    During the iteration jumps are compared with B K⁺(Bᵀλ − f), which costs nothing extra. That is a poor
+    scale where loads go straight into supports or act on thin parts that are held, which alone would move
+    far.
     """
     iterate = iterate_at(problem, multiplier, product, alpha)
     if problem.reach is None:
@@ -136,7 +136,7 @@ class Certificate:
     def solution(
         self, history: Sequence[SolverStep], products: int, memory: SmalseMemory | None = None
     ) -> DualSolution:
-        """Return the answer of a solve that took ``products`` products."""
+        """Return the solution of a solve that took ``products`` products."""
         return DualSolution(
             problem=self.problem,
             multiplier=self.iterate.multiplier,
@@ -154,13 +154,13 @@ class Certificate:
 
 
 def certify(problem: DualProblem, multiplier: Vector, product: Vector, residual: Vector) -> Certificate:
-    """Recompute everything that can be said about a multiplier. Collective.
+    """Recompute α and residuals of a multiplier. Collective.
 
     Args:
         problem: The dual problem.
         multiplier: λ, owned.
-        product: F λ, owned, computed and not carried by recursion.
-        residual: A solver's own r, owned; of it only the choice of α is kept.
+        product: F λ, owned, computed, not updated by recursion.
+        residual: A solver's own r, owned; only its α is used.
     """
     alpha = problem.coarse.coefficients(product - problem.rhs - residual)
     return Certificate(problem, answer_at(problem, multiplier, product, alpha), alpha)

@@ -1,4 +1,4 @@
-"""Projected Krylov methods on a face: conjugate gradients, and minimal residuals where friction grows."""
+"""Projected Krylov methods on a face: conjugate gradients, and GMRES where friction grows."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ class Stop(Enum):
 
 @dataclass(frozen=True, eq=False)
 class FaceStep:
-    """The answer of an inner solver on a face.
+    """The result of an inner solver on a face.
 
     Attributes:
         step: δ on the face with G Z δ = 0, shape (n_face,), owned.
-        product: F Z δ, owned, carried by recursion.
-        residual: P_F (g + (Zᵀ F Z + κ) δ), shape (n_face,), owned, carried by recursion.
+        product: F Z δ, owned, updated by recursion.
+        residual: P_F (g + (Zᵀ F Z + κ) δ), shape (n_face,), owned, updated by recursion.
         iterations: Number of operator applications.
         measure: Weighted norm of `residual`, the quantity compared with the tolerance.
         stop: Why the iteration ended.
@@ -48,7 +48,7 @@ class FaceStep:
 
 
 class _Rows:
-    """Vectors of several kinds, each kind as the rows of a block that grows."""
+    """Growing blocks of row vectors, one block for each kind of vector."""
 
     def __init__(self, *lengths: int) -> None:
         """Start empty; lengths are those of this rank's vectors of each kind."""
@@ -56,7 +56,7 @@ class _Rows:
         self._blocks: list[Vector] = [np.empty((32, length)) for length in lengths]
 
     def append(self, *rows: Vector) -> None:
-        """Keep one vector of each kind; storage doubles when full."""
+        """Append one vector of each kind; storage doubles when full."""
         if self.count == len(self._blocks[0]):
             self._blocks = [np.vstack([block, np.empty_like(block)]) for block in self._blocks]
         for block, row in zip(self._blocks, rows, strict=True):
@@ -73,10 +73,10 @@ def projected_cg(
 ) -> FaceStep:
     """Minimise ½ δᵀA δ + gᵀδ over G Z δ = 0 with A = Zᵀ F Z + κ. Collective.
 
-    Each iteration applies F once, the preconditioner once, and joins its sums in three messages: the
-    coarse right side and all conjugation coefficients of the new direction in the first, those of its
-    product in the second, the norm of the residual in the third. Conjugation against all previous
-    directions is two matrix–vector products.
+    Each iteration applies F once, the preconditioner once, and combines its sums in three messages: the
+    coarse right side and all conjugation coefficients of the new direction in the first, those of its product
+    in the second, the norm of the residual in the third. Conjugation against all previous directions is two
+    matrix–vector products.
 
     Args:
         system: The face, its operator, coarse space and preconditioner.
@@ -86,7 +86,7 @@ def projected_cg(
         max_iterations: Largest number of operator applications.
 
     Returns:
-        The step and why the iteration ended; nothing is raised, the caller knows what failure means.
+        The step and why the iteration ended; nothing is raised, the caller decides what a failure means.
 
     References:
         C. Farhat, F.-X. Roux, A method of finite element tearing and interconnecting and its parallel
@@ -129,7 +129,7 @@ def projected_cg(
 def _next_direction(
     system: FaceSystem, residual: Vector, rows: _Rows, curvatures: list[float]
 ) -> tuple[Vector, float]:
-    """Return the new direction and its product with the residual, both of the sign that descends."""
+    """Return the new direction and its product with the residual, with the sign of a descent direction."""
     z = system.precondition(residual)
     m = system.coarse.m
     directions, images = rows[0], rows[1]
@@ -159,7 +159,7 @@ def _image(
     return projected, slope, curvature, CURVATURE_TOLERANCE * float(lengths[0] * lengths[1])
 
 
-#: A recomputed residual this many times the tolerance is not the one that the recursion gave.
+#: A recomputed residual above this many tolerances means that the recursion has lost accuracy.
 FALSE_HOPE = 10.0
 
 
@@ -168,11 +168,11 @@ def projected_gmres(
 ) -> FaceStep:
     """Solve (Wᵀ F Z + κ) δ = −g + (G W)ᵀ α with G Z δ = 0. Collective.
 
-    Right preconditioned, without restart, in the norm ‖weights · r‖ of the projected residual, which is what
-    is minimised and compared with the tolerance.
+    Right preconditioned, without restart, in the norm ‖weights · r‖ of the projected residual, which is
+    minimised and compared with the tolerance.
 
     Args:
-        coupled: Tested and moving basis of a face.
+        coupled: The face with its test and trial bases.
         gradient: g = Wᵀ(F λ − d) + κ y at the starting point, shape (n_face,), owned.
         weights: Positive weights, shape (n_face,), owned.
         tolerance: Stop when the weighted norm is at most this.
@@ -206,7 +206,7 @@ def projected_gmres(
             stop = Stop.STAGNATION
             break
         if column[-1] == 0.0:
-            # The whole Krylov space is known: what is left lies outside of the operator's range.
+            # The Krylov space is exhausted: the remainder lies outside the operator's range.
             stop = Stop.CONVERGED if small.residual <= tolerance else Stop.NO_CURVATURE
             break
         vector = image / column[-1]
@@ -215,7 +215,7 @@ def projected_gmres(
     residual = coupled.oblique(gradient + coupled.operate(step, product))
     left = float(np.sqrt(global_sum(comm, (weights * residual) @ (weights * residual))[0]))
     if stop is Stop.CONVERGED and left > FALSE_HOPE * tolerance:
-        # Rounding passed for the image of a direction that has none.
+        # Rounding was taken for the image of a direction that has none.
         stop = Stop.NO_CURVATURE
     return FaceStep(step, product, residual, basis.count, max(left, small.residual), stop)
 
@@ -251,7 +251,7 @@ class _LeastSquares:
             upper, lower = column[i], column[i + 1]
             column[i], column[i + 1] = cosine * upper + sine * lower, cosine * lower - sine * upper
         length = float(np.hypot(column[-2], column[-1]))
-        # A direction without an image leaves the residual what it is: its row changes places with the rest.
+        # A direction without an image leaves the residual unchanged: its row is swapped with the rest.
         cosine, sine = (float(column[-2] / length), float(column[-1] / length)) if length > 0 else (0.0, 1.0)
         column[-2] = length
         self._columns.append(column[:-1])
@@ -266,5 +266,5 @@ class _LeastSquares:
         triangle = np.zeros((size, size))
         for j, column in enumerate(self._columns):
             triangle[: j + 1, j] = column
-        # A vanishing pivot belongs to a direction that the operator does not see; it is left out.
+        # A vanishing pivot belongs to a direction in the operator's kernel; it is left out.
         return np.asarray(np.linalg.lstsq(triangle, np.array(self._right[:size]), rcond=None)[0])

@@ -54,7 +54,7 @@ class ContactLayout:
         return cls(size, np.asarray(normal, dtype=np.int64), rows, np.asarray(owners, dtype=np.int64))
 
     def __post_init__(self) -> None:
-        """Check shapes, ranges and that no entry plays two parts."""
+        """Check shapes, ranges and that no entry is used twice."""
         if self.normal.ndim != 1 or self.tangential.ndim != 2 or self.tangential.shape[1] not in (1, 2):
             raise InvalidInputError(
                 "a layout needs normal of shape (n_contact,) and tangential of shape (n_friction, 1 or 2), "

@@ -19,8 +19,8 @@ class Mpgp:
 
     Attributes:
         expansion: Fixed step ᾱ of the gradient projection times ‖A‖, below 2.
-        proportioning: Γ; the chopped gradient may be Γ times as large as the free one before the active
-            constraints are released.
+        proportioning: Γ; active constraints are released once the chopped gradient exceeds Γ times the free
+            one.
     """
 
     expansion: float = 1.9
@@ -56,11 +56,11 @@ class BoundedQuadratic:
 
 @dataclass(frozen=True, eq=False)
 class BoundedMinimum:
-    """Where MPGP stopped.
+    """The result of MPGP.
 
     Attributes:
         x: The iterate, in the set, owned.
-        gradient: A x − b there, owned, carried by recursion within a sequence of CG steps.
+        gradient: A x − b there, owned, updated by recursion within a sequence of CG steps.
         projected: Norm of the projected gradient.
         iterations: Steps of all kinds.
         reached: Whether the projected gradient met the target.

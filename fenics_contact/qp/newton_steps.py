@@ -1,4 +1,4 @@
-"""Newton steps on faces: classify, solve the linear face, let floating bodies rest, go as far as it pays."""
+"""Newton steps on faces: classify, solve the linear face, equilibrate floating bodies, damp the step."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from fenics_contact.qp.solution import Residuals, SolverStep, contact_step
 
 #: The longest cycle of active sets that is recognised.
 LONGEST_CYCLE = 6
-#: Factor on ρ of a disc whose friction force would turn back.
+#: Factor on ρ of a disc whose friction force would reverse.
 TURNED = 0.3
-#: Parts of a step that are tried where the whole one made things worse.
+#: Fractions of a step that are tried where the full one increases the residual.
 FRACTIONS = (0.5, 0.25, 0.1)
-#: Taken only near a solution: far from one, a step as short as this stays where nothing is known yet.
+#: Used only near a solution: far from one, a step as short as this makes no progress.
 SHORTEST = 0.01
 #: The largest relative residual that counts as near.
 NEAR = 0.5
@@ -41,14 +41,15 @@ class Damped:
 def damp(problem: DualProblem, before: Iterate, after: Iterate, earlier: Residuals | None = None) -> Damped:
     """Return the best of a few points between two iterates if the second is worse than the first. Collective.
 
-    F λ and r are linear in λ and α, so no product is spent; the natural residual is not, and often has its
-    minimum inside: where the active set alternates between two faces the solution lies between them. The
-    way to the right face may lead over a worse one: a step is whole that improves on either of two.
+    F λ and r are linear in λ and α, so no product is needed; the natural residual is not, and often has its
+    minimum inside: where the active set alternates between two faces the solution lies between them. The way
+    to the right face may lead over a worse one: a full step is taken if it improves on either of the last
+    two.
 
     Args:
         problem: The dual problem.
-        before: Where the step began.
-        after: Where it ended.
+        before: Start of the step.
+        after: End of the step.
         earlier: Residuals of the iterate before that, if there was one.
     """
     for residuals in (before.residuals, earlier):
@@ -66,13 +67,13 @@ def _worse(one: Residuals, other: Residuals) -> bool:
 
 @dataclass(frozen=True)
 class Safeguards:
-    """What keeps Newton's method from running in circles.
+    """Safeguards that keep Newton's method from cycling.
 
     Attributes:
-        shorten: Chooses a point of a step, given where it begins and ends and the residuals before that.
-        adapts_step: Whether a disc whose friction force would turn by more than a right angle gets a smaller
-            ρ: it was too large, unless springs prescribe it.
-        moves_held: Whether floating bodies are moved to their rest also where the face holds them all.
+        shorten: Chooses a point of a step, given its ends and the residuals before it.
+        adapts_step: Whether the ρ of a disc whose friction force would turn by more than a right angle is
+            reduced: it was too large, unless springs prescribe it.
+        moves_held: Whether floating bodies are equilibrated also where the face holds them all.
     """
 
     shorten: Callable[[DualProblem, Iterate, Iterate, Residuals | None], Damped] = damp
@@ -82,13 +83,13 @@ class Safeguards:
 
 @dataclass(frozen=True, eq=False)
 class NewtonState:
-    """All that one Newton step leaves to the next.
+    """The data passed from one Newton step to the next.
 
     Attributes:
-        iterate: Where the next step begins.
+        iterate: Start of the next step.
         step: ρ of the natural map, 0 on equality rows, owned.
         faces: The last faces, latest first.
-        mismatch: How far the last residual was from the one that its face predicted, relative to the
+        mismatch: Difference of the last residual from the one that its face predicted, relative to the
             residual before it.
         before: Residuals before the last step, None before the first.
     """
@@ -100,7 +101,7 @@ class NewtonState:
     before: Residuals | None = None
 
     def stall(self, comm: MPI.Comm) -> str:
-        """Say why the last steps led nowhere: whether the active set cycles or stands still. Collective."""
+        """Describe why the last steps made no progress: a cycling or a stationary active set. Collective."""
         if len(self.faces) < 2:
             return "the residual stands still"
         last, *earlier = self.faces
@@ -119,7 +120,7 @@ class _SolvedFace:
 
     Attributes:
         system: The symmetric system of the face.
-        linear: The system that was solved: that one, or with growing friction.
+        linear: The system that was solved: the symmetric one, or that with growing friction.
         multiplier: λ, owned.
         product: F λ, owned.
         inner: The step of the Krylov method.
@@ -140,11 +141,11 @@ class NewtonSteps:
         problem: The dual problem, or that of a proximal point.
         operator: Its operator, counted.
         forcing: How accurately faces are solved.
-        max_products: No face is solved beyond that many F-products of the whole solve.
-        safeguards: What keeps the method from running in circles.
+        max_products: Largest number of F-products of the whole solve.
+        safeguards: Safeguards against cycling.
         natural_step: ρ = 1/diag F, 0 on equality rows, owned.
         systems: The linear systems of faces.
-        correction: Moves floating bodies to their rest.
+        correction: Moves floating bodies into equilibrium.
     """
 
     problem: DualProblem
@@ -178,7 +179,7 @@ class NewtonSteps:
         )
 
     def moved(self, problem: DualProblem) -> NewtonSteps:
-        """Return the same for a problem that differs by its right side or its law."""
+        """Return the method for a problem that differs only in its right side or law."""
         return replace(self, problem=problem, correction=replace(self.correction, problem=problem))
 
     def init(self, iterate: Iterate) -> NewtonState:
@@ -186,7 +187,7 @@ class NewtonSteps:
         return NewtonState(iterate, self.natural_step)
 
     def at_rest(self, iterate: Iterate) -> Iterate:
-        """Return an iterate of another load or position with its floating bodies at rest. Collective."""
+        """Return an iterate of another load or position with floating bodies in equilibrium. Collective."""
         problem = self.problem
         alpha = iterate.motions(problem)
         alpha = alpha + self.correction(iterate.multiplier, iterate.residual, self.natural_step)
@@ -201,14 +202,14 @@ class NewtonSteps:
             care: Factor on the tolerance of the face, at most one.
         """
         before = state.iterate
-        # 1. The face that the natural map chooses, and how many statuses differ from those of the last one.
+        # 1. The face that the natural map selects, and the number of status changes since the last one.
         step, face = self._next_face(state)
         count = face.changes(state.faces[0]) if state.faces else 0
         changed = round(float(global_sum(self.problem.comm, count)[0]))
-        # 2. Its solution, as accurate as the last face was right.
+        # 2. Its solution, as accurate as the last face's prediction warrants.
         expected = None if changed else state.mismatch
         solved = self._solve(face, before, self.forcing.tolerance_of_face(before.residuals, expected, care))
-        # 3. Rigid motions, then as much of the step as pays.
+        # 3. Rigid motions, then the damped step.
         alpha = self._motions(solved, before, step)
         after = iterate_at(self.problem, solved.multiplier, solved.product, alpha)
         mismatch = abs(after.residuals.size - solved.inner.measure) / (before.residuals.size or 1.0)
@@ -218,7 +219,7 @@ class NewtonSteps:
         return following, self._record(number, taken, solved, changed)
 
     def _next_face(self, state: NewtonState) -> tuple[Vector, Face]:
-        """Classify, with a smaller ρ for discs whose force would otherwise turn back."""
+        """Classify, with a smaller ρ for discs whose force would otherwise reverse."""
         layout, iterate = self.problem.layout, state.iterate
         bound = self.problem.law.bound(iterate.multiplier)
         face = classify(layout, bound, iterate.multiplier, iterate.residual, state.step)
@@ -234,7 +235,7 @@ class NewtonSteps:
         problem = self.problem
         system = self.systems.build(face)
         linear = couple(system, problem.coarse, problem.law.growth, before.multiplier) or system
-        # Onto the face and into equilibrium; the Krylov method keeps both.
+        # Onto the face and into equilibrium; the Krylov method preserves both.
         entered = linear.enter(before.multiplier)
         product = before.product + apply_unless_zero(problem, self.operator, entered - before.multiplier)
         gradient = system.gradient(entered, product - problem.rhs)
@@ -249,7 +250,7 @@ class NewtonSteps:
         )
 
     def _motions(self, solved: _SolvedFace, before: Iterate, step: Vector) -> Vector:
-        """Return α after a step: from the rows of the face, then at rest. Collective."""
+        """Return α after a step: from the rows of the face, then in equilibrium. Collective."""
         problem, system, flexed = self.problem, solved.system, solved.product - self.problem.rhs
         alpha = solved.linear.motions(system.gradient(solved.multiplier, flexed))
         alpha = keep_free_motions(system.coarse, before.motions(problem), alpha)

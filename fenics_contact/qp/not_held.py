@@ -1,4 +1,4 @@
-"""Bodies that contact and friction could hold as far as forces go, and do not as they deform."""
+"""Bodies that contact and friction could hold in terms of forces, but do not once they deform."""
 
 from __future__ import annotations
 
@@ -17,19 +17,20 @@ from fenics_contact.qp.reductions import Vector, global_max
 from fenics_contact.qp.slip_law import TrescaLaw
 from fenics_contact.qp.solution import DualSolution, SolverStep
 
-#: Friction may press surfaces together itself, where they wedge: at most so many times what else does, and so
-#: many times where a solver has tried all it can.
+#: Wedging friction may itself press surfaces together: at most by this factor on the other normal forces, and
+#: by the second factor once a solver has exhausted its means.
 WEDGED, HARDLY_WEDGED = 100.0, 2.0
-#: Gaps can be trusted where jumps are smaller than this, and so large a part of the load is out of balance.
+#: Gaps are reliable if jumps are smaller than this, and bodies are unheld if this much of the load is
+#: unbalanced.
 PLAIN = 1e-2
 
 
 def require_contact(history: Sequence[SolverStep], count: int) -> None:
-    """Refuse a problem whose contacts stay open while only they could balance the load.
+    """Reject a problem whose contacts stay open while only they could balance the load.
 
     Args:
         history: Steps of Newton's method and rescues.
-        count: So many last steps of Newton's method must agree.
+        count: Number of last Newton steps that must agree.
 
     Raises:
         InfeasibleError: They do.
@@ -50,10 +51,10 @@ def _lost(step: SolverStep) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class FrictionAlone:
-    """The question whether friction can hold what nothing else holds; asked where a solver gets nowhere.
+    """Test whether friction can hold what nothing else holds; used where a solver makes no progress.
 
     Attributes:
-        problem: The problem that is not solved.
+        problem: The unsolved problem.
         solve: Solves it without friction.
     """
 
@@ -61,13 +62,13 @@ class FrictionAlone:
     solve: Callable[[DualProblem, Start], DualSolution]
 
     def require_enough(self, wedged: float = WEDGED) -> None:
-        """Refuse a problem whose friction is far from enough. Collective.
+        """Reject a problem whose friction is far from sufficient. Collective.
 
         If even ``wedged`` times the slip bounds of the forces without friction cannot balance the load,
-        friction holds nothing, as where supports keep the surfaces apart. That is no proof.
+        friction is taken to hold nothing, as where supports keep the surfaces apart. That is not a proof.
 
         Args:
-            wedged: By so many times friction may press surfaces together itself.
+            wedged: Factor by which friction may itself press surfaces together.
 
         Raises:
             InfeasibleError: Friction does not suffice.
@@ -86,7 +87,7 @@ class FrictionAlone:
 
     @cached_property
     def _forces(self) -> Vector | None:
-        """The multiplier without friction; None where no friction grows with it or it is not found.
+        """The multiplier without friction; None where no friction grows with it or the solve fails.
 
         The bodies are held in all motions that only friction resists. Collective on first use.
         """

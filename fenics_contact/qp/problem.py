@@ -19,16 +19,16 @@ from fenics_contact.qp.reductions import Vector, global_sum
 from fenics_contact.qp.slip_law import SlipLaw, TrescaLaw
 
 Operator = Callable[[Vector], Vector]
-#: What is called with the number of F-products so far and, after a step of a solver, with its residual.
+#: Called with the number of F-products so far and, after a step of a solver, with its residual.
 Report = Callable[[int, float | None], None]
 
-#: Factors that differ by less than this, relatively, are not worth scaling with.
+#: Factors whose relative differences are below this are not worth scaling with.
 EVEN = 1e-6
 
 
 @runtime_checkable
 class FacePreconditioner(Protocol):
-    """A preconditioner that can do better where it knows which multipliers are free."""
+    """A preconditioner that is better when it knows which multipliers are free."""
 
     def __call__(self, residual: Vector) -> Vector:
         """Approximate F⁻¹ r, owned. Collective."""
@@ -39,7 +39,7 @@ class FacePreconditioner(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class DualProblem:
-    """Everything a dual solver may know: an operator, a coarse space and who is who in a vector.
+    """The data of a dual solver: an operator, a coarse space and the layout of vectors.
 
     Vectors are distributed: each rank holds the entries it owns, and the inner product is the sum of
     the ranks' own. Residual convention: r = F λ − d − Gᵀα is minus the violation B u − c of the rows.
@@ -53,11 +53,11 @@ class DualProblem:
         diagonal: Approximate positive diagonal of F, owned, shape (size,); only contact rows are used.
         preconditioner: Approximation of F⁻¹, symmetric positive definite, owned to owned, collective.
         scaling: Factors of multipliers between parts of different stiffness, or None.
-        reach: (λ, α) ↦ abs(B) abs(u), how far the displacements of these go at each row, owned,
-            collective; what the jumps of an answer are compared with. None where displacements are not known.
-        supported: Marks of contact rows that supports determine alone, owned, shape (size,): no multiplier
-            moves them, and their diagonal stands for no flexibility. None where there are no such rows.
-        friction: The law that slip bounds follow; None where no disc bears a force.
+        reach: (λ, α) ↦ abs(B) abs(u), the size of the displacements at each row, owned, collective, with
+            which the jumps of a solution are compared. None where displacements are not known.
+        supported: Marks of contact rows that supports alone determine, owned, shape (size,): no multiplier
+            moves them, and their diagonal is not a flexibility. None where there are no such rows.
+        friction: The law of the slip bounds; None where no disc carries a force.
     """
 
     comm: MPI.Comm
@@ -100,7 +100,7 @@ class DualProblem:
         return float(np.sqrt(self.dot(x, x)))
 
     def check(self) -> None:
-        """Refuse data that no solver could use. Collective on ``comm``.
+        """Reject data that no solver could use. Collective on ``comm``.
 
         Raises:
             InvalidInputError: A shape disagrees with the layout, or an entry is not finite.
@@ -132,7 +132,7 @@ class DualProblem:
 
 @dataclass(frozen=True, eq=False)
 class Scaling:
-    """Factors s of the multipliers, λ = s μ, that make them evenly stiff, and the coarse space of μ.
+    """Factors s of the multipliers, λ = s μ, that equalise their stiffness, and the coarse space of μ.
 
     The projector of the problem for μ is that of λ with P_Q = I − Q Gᵀ(G Q Gᵀ)⁻¹G, Q = diag(s²). Where the
     coefficients jump, preconditioned projected conjugate gradients need such a Q to converge independently
@@ -152,11 +152,11 @@ class Scaling:
 
     @classmethod
     def build(cls, factor: Vector, coarse: CoarseSpace) -> Scaling:
-        """Scale a coarse space; its matrix is factored when it is first needed."""
+        """Scale a coarse space; its matrix is factored on first use."""
         return cls(factor, CoarseSpace(coarse.comm, coarse.matrix @ sp.diags(factor), coarse.load))
 
     def with_load(self, load: Vector) -> Scaling:
-        """Return the scaling of a problem with another right side e; what is factored is shared."""
+        """Return the scaling of a problem with another right side e; factors are shared."""
         return replace(self, coarse=self.coarse.with_load(load))
 
     def applied_to(self, problem: DualProblem) -> DualProblem:
@@ -185,7 +185,7 @@ def _scaled(precondition: Operator, s: Vector) -> Operator:
 
 @dataclass(frozen=True, eq=False)
 class _ScaledPreconditioner:
-    """x -> M(x / s) / s, on faces as well: s is even within a contact, so that Z is that of λ."""
+    """x -> M(x / s) / s, on faces as well: s is uniform within a contact, so that Z is that of λ."""
 
     inner: FacePreconditioner
     factor: Vector
@@ -223,13 +223,13 @@ class CountedOperator:
         return product
 
     def report(self, products: int, residual: float | None) -> None:
-        """Tell whoever listens how many products there were and what residual they led to."""
+        """Report the number of products and the residual reached."""
         if self._report is not None:
             self._report(products, residual)
 
 
 class ShiftedOperator:
-    """x ↦ F x + D x with D diagonal; what is counted are the products of F."""
+    """x ↦ F x + D x with D diagonal; it counts the products of F."""
 
     def __init__(self, operator: CountedOperator, shift: Vector) -> None:
         """Add ``shift``, the diagonal of D, shape (n_owned,), to F."""

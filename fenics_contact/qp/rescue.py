@@ -20,22 +20,22 @@ from fenics_contact.qp.solution import Residuals, SmalseMemory, SolverStep, cont
 REDUCTION = 0.1
 #: Stiffness of the springs of a proximal point in units of 1/diag F: soft for Newton, stiff for the centre.
 SPRINGS = 10.0
-#: Where a centre takes no more steps than this, the springs of the next are stiffer by that factor: springs
-#: that stay the same move the centre by ever the same small part of its way to the solution.
+#: If a centre takes no more steps than this, the springs of the next are stiffer by this factor: constant
+#: springs move the centre by the same small fraction of its way to the solution each time.
 FEW, STIFFER = 2, 4.0
 #: Newton steps of a rescue by proximal points.
 PROXIMAL_STEPS = 60
-#: The centre moves once the residual with springs is this small, or so much smaller than that without.
+#: The centre moves once the residual with springs is this small, or this much smaller than that without.
 CENTRED, AHEAD = 0.03, 0.3
-#: A residual from which nothing comes back.
+#: A residual beyond recovery.
 DIVERGED = 1e12
-#: Largest inner tolerances, relative to the residual and of all.
+#: Largest inner tolerances, relative to the residual and absolute.
 FORCING, LOOSEST = 0.25, 0.1
-#: The whole step is taken where the potential rises at its end by less than this fraction of its first fall.
+#: The full step is taken if the potential's slope at its end is below this fraction of its initial descent.
 STEEP = 0.3
-#: The slope at which a minimum of the potential counts as found, relative to the first one.
+#: Slope at which a minimum of the potential is accepted, relative to the initial one.
 LEVEL = 0.1
-#: Gluing residual from which on bodies are in pieces, and their potential says nothing.
+#: Gluing residual above which bodies are torn apart, and their potential is meaningless.
 TORN = 0.1
 
 
@@ -43,14 +43,14 @@ TORN = 0.1
 class ProximalPoint:
     """min ½ λᵀF λ − dᵀλ + ½ ‖λ − λ̄‖²_D over G λ = e and Λ(Ψ): contacts and friction on springs 1/D.
 
-    In displacements that is to minimise a convex function with a continuous derivative, the potential energy
-    with augmented Lagrangians of contact and friction, so that Newton's method with a line search gets there
-    from anywhere, and without cycles. Its face is Newton's of the problem with F + D, d + D λ̄ and ρ = 1/D;
-    the centre λ̄ then moves to the force of the springs.
+    In displacements this minimises a convex, continuously differentiable function, the potential energy with
+    augmented Lagrangians of contact and friction, so that Newton's method with a line search converges
+    globally and without cycles. Its face is Newton's of the problem with F + D, d + D λ̄ and ρ = 1/D; the
+    centre λ̄ then moves to the spring forces.
 
     Attributes:
         original: The problem without springs.
-        problem: The problem with springs: F + D, d + D λ̄, D in place of the diagonal of F, and Tresca's law
+        problem: The problem with springs: F + D, d + D λ̄, D instead of the diagonal of F, and Tresca's law
             with the slip bound of the centre.
         operator: F + D, counted.
         stiffness: 1/D in units of 1/diag F: the larger, the nearer to the problem without springs.
@@ -69,7 +69,7 @@ class ProximalPoint:
 
     @classmethod
     def build(cls, problem: DualProblem, operator: CountedOperator, stiffness: float) -> ProximalPoint:
-        """Put springs of stiffness ``stiffness`` / diag F in all contacts and discs, without a centre yet.
+        """Add springs of stiffness ``stiffness`` / diag F to all contacts and discs, without a centre yet.
 
         Args:
             problem: The dual problem.
@@ -115,14 +115,14 @@ def descend(
     """Return the minimum between two iterates of the potential that a proximal point minimises. Collective.
 
     The potential energy of displacements u(λ, α) together with that of springs ρ in all contacts and discs is
-    convex; its derivative along a step is that of r, against the force λ that deforms the bodies less the
-    force P_Λ(λ − ρ r) of the springs. Bodies in pieces come together first, whatever the potential.
+    convex; its derivative along a step is the product of that of r with the force λ that deforms the bodies
+    less the force P_Λ(λ − ρ r) of the springs. Torn bodies are joined first, whatever the potential.
 
     Args:
         problem: Problem of a proximal point, F + D with ρ = 1/D.
-        before: Where the step began.
-        after: Where it ended.
-        earlier: Residuals before that, which say nothing of the potential.
+        before: Start of the step.
+        after: End of the step.
+        earlier: Residuals before that, which are not used.
     """
     slope = _slope(problem, before, after)
     first, last = slope(0.0), slope(1.0)
@@ -158,20 +158,20 @@ def _slope(problem: DualProblem, before: Iterate, after: Iterate) -> Callable[[f
     return slope
 
 
-#: Springs prescribe ρ, a potential says how far to go, and a face that holds all bodies moves them already:
-#: moving them in turns with the rest would creep.
+#: Springs prescribe ρ, a potential determines the step length, and a face that holds all bodies moves them
+#: already: moving them alternately with the rest would converge slowly.
 WITH_SPRINGS = Safeguards(shorten=descend, adapts_step=False, moves_held=False)
 
 
 @dataclass(frozen=True, eq=False)
 class Rescued:
-    """What a rescue led to.
+    """The result of a rescue.
 
     Attributes:
         iterate: The improved iterate, with its residuals under the law of the problem.
         line: Its line of history, without number and reason.
-        memory: What SMALSE learned.
-        reached: Whether the residual is as small as was aimed at.
+        memory: Estimates from SMALSE.
+        reached: Whether the residual met its target.
     """
 
     iterate: Iterate
@@ -182,7 +182,7 @@ class Rescued:
 
 @dataclass(frozen=True, eq=False)
 class Rescue:
-    """Improves iterates that Newton's method cannot, with their slip bound held for a while.
+    """Improves iterates that Newton's method cannot, with their slip bound temporarily fixed.
 
     By proximal points where a preconditioner makes faces cheap; by SMALSE, which solves no face, elsewhere.
 
@@ -203,8 +203,8 @@ class Rescue:
 
         Args:
             start: The iterate that Newton could not improve.
-            budget: Largest number of products to spend.
-            further: Whether an earlier rescue from the same iterate was of no use.
+            budget: Largest number of products.
+            further: Whether an earlier rescue from the same iterate did not help.
         """
         limit, memory = start.operator.products + budget, start.memory
         if self.problem.preconditioner is None:
@@ -216,7 +216,7 @@ class Rescue:
         return Rescued(iterate, line, memory, reached)
 
     def _by_proximal_points(self, start: Start, limit: int, further: bool) -> tuple[Iterate, SolverStep]:
-        """Take Newton steps with springs, and move their centre whenever they come to rest. Collective."""
+        """Take Newton steps with springs, and move their centre whenever they converge. Collective."""
         path = self._first_centre(start)
         for number in range(PROXIMAL_STEPS):
             newton, line = path.steps.step(path.newton, number)
@@ -234,17 +234,17 @@ class Rescue:
         return iterate, replace(line, method="proximal rescue")
 
     def _first_centre(self, start: Start) -> _ProximalPath:
-        """Put soft springs between the bodies and their forces at the start. Collective."""
+        """Add soft springs centred at the initial forces. Collective."""
         point = ProximalPoint.build(self.problem, start.operator, SPRINGS)
         point = point.centred(start.iterate.multiplier)
         steps = self._steps(point)
         return _ProximalPath(point, steps, steps.init(steps.at_rest(point.enter(start.iterate))))
 
     def _next_centre(self, path: _ProximalPath, operator: CountedOperator, iterate: Iterate) -> _ProximalPath:
-        """Move the centre to the force of the springs, and make them stiffer if it came quickly. Collective.
+        """Move the centre to the spring forces, and stiffen the springs if convergence was quick. Collective.
 
         Args:
-            path: Where the steps came to rest.
+            path: The converged steps.
             operator: F, counted.
             iterate: The iterate there without springs.
         """
@@ -278,7 +278,7 @@ class Rescue:
 
 @dataclass(frozen=True, eq=False)
 class _ProximalPath:
-    """Where a rescue by proximal points is.
+    """State of a rescue by proximal points.
 
     Attributes:
         point: Springs and their centre.
@@ -295,5 +295,5 @@ class _ProximalPath:
 
 def _improved(after: Residuals, before: Residuals, further: bool) -> bool:
     better = after.worst_beside(before) <= REDUCTION * before.worst_beside(after)
-    # From a very bad iterate any other is better by far, but not always one from which Newton gets anywhere.
+    # Almost any iterate is far better than a very bad one, but not always good enough for Newton to progress.
     return better and (not further or after.worst <= REDUCTION)

@@ -1,4 +1,4 @@
-"""Floating bodies at rest: they move until the trial forces of contact and friction balance their load."""
+"""Equilibrium of floating bodies: they move until trial forces of contact and friction balance their load."""
 
 from __future__ import annotations
 
@@ -12,37 +12,37 @@ from fenics_contact.qp.feasible import FeasibleSet
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 
-#: Imbalance relative to the sum of all forces at which bodies count as at rest.
+#: Imbalance relative to the sum of all forces at which bodies count as in equilibrium.
 BALANCED = 1e-11
-#: Imbalance relative to the multipliers of the whole problem that is rounding.
+#: Imbalance relative to the multipliers of the whole problem that counts as rounding.
 ROUNDING = 1e-14
-#: The first again, where the bounds of friction were refreshed as often as allowed.
+#: As the first, where the bounds of friction were updated as often as allowed.
 NEARLY = 1e-6
-#: Steps of Newton's method, coupled or with frozen bounds, and refreshes of frozen bounds.
+#: Steps of Newton's method, coupled or with frozen bounds, and updates of frozen bounds.
 COUPLED_STEPS, FROZEN_STEPS, REFRESHES = 30, 60, 30
-#: Motions that contact resists less than this, relative to the others, stay what they are.
+#: Motions that contact resists less than this, relative to the others, are left unchanged.
 UNRESISTED = 1e-10
-#: What a row feels of a motion of length one, relative to all that it feels of motions, that is rounding.
+#: Entry of a row for a motion of length one, relative to the row's norm, that counts as rounding.
 UNFELT = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
 class RigidMotionCorrection:
-    """Chooses the rigid motions of floating bodies without a single F-product.
+    """Chooses the rigid motions of floating bodies without any F-product.
 
-    A body that nothing but contact holds moves by N β, Gᵀ N = 0 on the gluing rows. At a multiplier λ with
-    r = F λ − d − Gᵀα, each contact answers such a motion by the trial force P_Λ(λ − ρ(r − Gᵀ N β)): a spring
-    that opens, sticks or slips. The correction solves
+    A body held only by contact moves by N β, Gᵀ N = 0 on the gluing rows. At a multiplier λ with r = F λ − d
+    − Gᵀα, each contact responds to such a motion with the trial force P_Λ(λ − ρ(r − Gᵀ N β)): a spring that
+    opens, sticks or slips. The correction solves
 
         Nᵀ G P_Λ(λ − ρ (r − Gᵀ N β)) = Nᵀ e,
 
-    six equations a body. The face that Newton's method finds next then holds the bodies: without this a body
-    that hardly anything holds overshoots its place in every step, and others are not held at all.
+    six equations per body. The next face of Newton's method then holds the bodies: otherwise a weakly held
+    body overshoots its position in every step, and others are not held at all.
 
     Newton's method with the bound that follows the trial normal force comes first. Where it does not halve
-    the imbalance in every step, the bound is frozen in turns; then β minimises a convex potential, the
-    sum of Huber functions of the slips for friction, and is found from anywhere. Where no motion balances
-    the load under these bounds, bodies move on as linear springs would.
+    the imbalance in every step, the bound is frozen and updated alternately; then β minimises a convex
+    potential, for friction the sum of Huber functions of the slips, with global convergence. Where no motion
+    balances the load under these bounds, bodies move as on linear springs.
 
     Attributes:
         problem: The dual problem, whose law is that of the trial forces.
@@ -59,7 +59,7 @@ class RigidMotionCorrection:
         """Find the floating bodies. Collective."""
         motions = _floating_motions(problem)
         rows = np.asarray(problem.coarse.matrix.T @ motions)
-        # Against forces of rounding a body would have to move as far as their rows are rounding.
+        # Rows that are rounding would let forces of rounding size move a body arbitrarily far.
         felt = np.sqrt(problem.coarse.matrix.power(2).sum(axis=0)).reshape(-1, 1)
         rows[np.abs(rows) <= UNFELT * np.asarray(felt)] = 0.0
         return cls(problem, motions, rows)
@@ -92,7 +92,7 @@ class RigidMotionCorrection:
 
 
 def keep_free_motions(face: CoarseSpace, earlier: Vector, alpha: Vector) -> Vector:
-    """Return α with the motions that a face says nothing about as they were.
+    """Return α with the motions that a face leaves undetermined unchanged.
 
     Args:
         face: Coarse space of the face.
@@ -120,7 +120,7 @@ def _floating_motions(problem: DualProblem) -> Vector:
 
 @dataclass(frozen=True, eq=False)
 class _Balance:
-    """The trial multiplier of a motion, its bound, what is missing to equilibrium and the potential."""
+    """The trial multiplier of a motion, its bound, the imbalance and the potential."""
 
     motion: Vector
     trial: Vector
@@ -136,7 +136,7 @@ class _Balance:
 
 @dataclass(frozen=True, eq=False)
 class _Springs:
-    """Trial forces as functions of a motion z, in units in which all springs together have stiffness one.
+    """Trial forces as functions of a motion z, in units in which the total spring stiffness is one.
 
     Attributes:
         problem: The dual problem.
@@ -168,15 +168,16 @@ class _Springs:
         return _Balance(z, trial, bound, sums[:-1] - self.load, float(sums[-1] - self.load @ z))
 
     def target(self, balance: _Balance) -> float:
-        """Return the imbalance at which bodies count as at rest. Collective.
+        """Return the imbalance at which bodies count as in equilibrium. Collective.
 
-        That is small beside the forces that act on them. Where next to none do, it is rounding of the others.
+        It is small relative to the forces that act on them; where almost none act, it is the rounding of the
+        others.
         """
         largest = global_max(self.problem.comm, float(np.abs(self.rows).max(initial=0.0)))
         return max(BALANCED * self._scale(balance), ROUNDING * largest * self.forces)
 
     def _scale(self, balance: _Balance) -> float:
-        """Return the size of all forces taken together. Collective."""
+        """Return the norm of all forces. Collective."""
         contact = self.problem.layout.contact
         force = FeasibleSet(self.problem.layout, balance.bound).project(balance.trial)
         sizes = global_sum(self.problem.comm, np.abs(self.rows[contact]).T @ np.abs(force[contact]))
@@ -186,8 +187,8 @@ class _Springs:
         """Return the derivative of the imbalance, shape (k, k). Collective.
 
         Args:
-            balance: Where.
-            growth: dΨ/dλ_N where the bound follows the trial normal force, None where it is frozen.
+            balance: The balance at the motion. growth: dΨ/dλ_N where the bound follows the trial normal
+                force, None where it is frozen.
         """
         normal, pairs = self.problem.layout.normal, self.problem.layout.tangential
         closed = normal[balance.trial[normal] > 0.0]
@@ -197,7 +198,7 @@ class _Springs:
         return np.asarray(self.problem.comm.allreduce(local), dtype=np.float64)
 
     def _slipped(self, balance: _Balance, growth: Vector | None, moved: Vector) -> Vector:
-        """Return how the friction forces change where the trial ones change by ``moved``, (n, t, k)."""
+        """Return the change of the friction forces when the trial ones change by ``moved``, (n, t, k)."""
         layout = self.problem.layout
         trial = balance.trial[layout.tangential]
         length = np.linalg.norm(trial, axis=1)
@@ -218,7 +219,7 @@ def _equilibrium_motion(springs: _Springs, bound: Vector) -> Vector:
 
     Args:
         springs: Trial forces.
-        bound: Friction that bodies may use while their trial forces say that they are apart, owned.
+        bound: Friction that bodies may use while their trial forces indicate separation, owned.
     """
     begin = springs.at(np.zeros(len(springs.load)))
     target = springs.target(begin)

@@ -1,4 +1,4 @@
-"""Where the slip bound of a disc comes from: given (Tresca) or the normal force (Coulomb)."""
+"""Slip bounds of discs: given (Tresca) or from the normal force (Coulomb)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fenics_contact.qp.reductions import Vector
 
 
 class SlipLaw(Protocol):
-    """A rule that gives the slip bound Ψ belonging to a multiplier."""
+    """A rule for the slip bound Ψ that belongs to a multiplier."""
 
     def bound(self, multiplier: Vector) -> Vector:
         """Return Ψ, a nodal force per friction disc, shape (n_friction,), owned."""
@@ -71,7 +71,7 @@ class TrescaLaw:
 class CoulombLaw:
     """Slip bounds Ψ = Ψ₀ + μ max(λ_N, 0): a given part, zero by default, and one that follows λ_N.
 
-    With both parts the law is Mohr's and Coulomb's, or Tresca's on some discs and Coulomb's on others.
+    With both parts it is the Mohr-Coulomb law, or Tresca's on some discs and Coulomb's on others.
 
     Attributes:
         layout: Positions of the multipliers.
@@ -134,5 +134,5 @@ class CoulombLaw:
         return admitted
 
     def scaled(self, factor: Vector) -> CoulombLaw:
-        """Return the law with the given part Ψ₀ / s; μ is the same, as s is that of the whole contact."""
+        """Return the law with the given part Ψ₀ / s; μ is unchanged, as s is that of the whole contact."""
         return CoulombLaw(self.layout, self.friction_coefficient, np.asarray(self.given / factor))

@@ -1,4 +1,4 @@
-"""SMALSE-M: equilibrium by an augmented Lagrangian, bounds and discs by MPGP inside. Safe and slow."""
+"""SMALSE-M: equilibrium by an augmented Lagrangian, bounds and discs by MPGP inside. Robust but slow."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fenics_contact.qp.reductions import Vector
 from fenics_contact.qp.slip_law import TrescaLaw
 from fenics_contact.qp.solution import DualSolution, Residuals, SmalseMemory, SolverStep, measure
 
-#: A lack in the rise of the Lagrangian below this fraction of it says nothing about M.
+#: A deficit in the increase of the Lagrangian below this fraction of it is not significant for M.
 ROUNDING = 1e-13
 
 
@@ -31,8 +31,8 @@ class Smalse:
         tolerance: Every residual of `Residuals` ends below it.
         max_products: Give up after that many F-products.
         balance: First M: the inner iteration stops at ‖projected gradient‖ ≤ M·(equilibrium error).
-        loosest: η: but never before ‖projected gradient‖ ≤ η‖b‖.
-        balance_reduction: Factor on M when the Lagrangian rises too little.
+        loosest: η: but not before ‖projected gradient‖ ≤ η‖b‖.
+        balance_reduction: Factor on M when the Lagrangian increases too little.
         mpgp: Parameters of the inner iteration.
 
     References:
@@ -110,7 +110,7 @@ class SmalseState:
 def outer_iterations(problem: DualProblem, start: Start, parameters: Smalse) -> Iterator[SmalseState]:
     """Yield the state after every outer iteration, without end, for given slip bounds. Collective.
 
-    The multiplier of G λ = e is kept as the vector v = G̃ᵀμ in range(Gᵀ) and updated by v ← v + Q λ − λ₀.
+    The multiplier of G λ = e is stored as the vector v = G̃ᵀμ in range(Gᵀ) and updated by v ← v + Q λ − λ₀.
     """
     lagrangian = AugmentedLagrangian(problem, start)
     feasible = problem.law.feasible(start.iterate.multiplier)

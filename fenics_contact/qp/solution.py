@@ -1,4 +1,4 @@
-"""What a dual solver answers: the multiplier, how good it is, and how it was found."""
+"""The result of a dual solver: the multiplier, its residuals, and the history."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 
 FORCE_FLOOR = 1e-10
-#: Errors of contact forces below this fraction of the largest of all forces are rounding, and count as none.
-ROUNDING = 1e-14  # the same for jumps beside those that the loads alone would open
+#: Errors of contact forces below this fraction of the largest force are rounding, and count as zero.
+ROUNDING = 1e-14  # also for jumps relative to those that the loads alone would cause
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,8 @@ class Residuals:
     Attributes:
         natural: ‖λ − P_Λ(λ − ρ r)‖ over the contact rows, relative to ‖λ_N‖.
         gluing: ‖r‖ over the equality rows, relative to the displacements that cancel there,
-            max(‖(F λ − d)_E‖, ‖d_E‖), or of an answer to the displacements themselves, if they are smaller.
+            max(‖(F λ − d)_E‖, ‖d_E‖), or, for a final solution, to the displacements themselves if they are
+            smaller.
         coarse: Distance of λ from equilibrium, ‖Gᵀ(G Gᵀ)⁻¹(G λ − e)‖, relative to ‖λ‖.
         violation: Largest violation of a bound or disc, relative to ‖λ_N‖.
         force_scale: The force by which `natural` and `violation` were divided.
@@ -38,18 +39,18 @@ class Residuals:
 
     @property
     def worst(self) -> float:
-        """The largest residual, which steers the iteration: the natural one is at least the violation."""
+        """The largest residual, which controls the iteration: the natural one is at least the violation."""
         return max(self.natural, self.gluing, self.coarse)
 
     @property
     def size(self) -> float:
-        """√(natural² + gluing²), the number that the solution of a face predicts."""
+        """√(natural² + gluing²), which the solution of a face predicts."""
         return float(np.hypot(self.natural, self.gluing))
 
     def worst_beside(self, other: Residuals) -> float:
-        """The worst residual in the smaller scales of two: only such numbers tell which iterate is better.
+        """The worst residual in the smaller scales of two, so that two iterates can be compared.
 
-        A huge wrong force divided by itself is 1, and so is the missing part of one that is nearly right.
+        A huge wrong force divided by itself is 1, no worse than the missing part of a nearly correct one.
         """
         force = min(self.force_scale, other.force_scale) or max(self.force_scale, other.force_scale)
         gluing = min(self.gluing_scale, other.gluing_scale) or max(self.gluing_scale, other.gluing_scale)
@@ -57,18 +58,18 @@ class Residuals:
         return max(natural, _ratio(self.gluing * self.gluing_scale, gluing), self.coarse)
 
     def beside(self, reach: float) -> Residuals:
-        """Return the residuals with the gluing residual relative to displacements that are smaller."""
+        """Return the residuals with the gluing residual relative to smaller displacements."""
         if not 0.0 < reach < self.gluing_scale:
             return self
         return replace(self, gluing=self.gluing * self.gluing_scale / reach, gluing_scale=reach)
 
     def within(self, tolerance: float) -> bool:
-        """Tell whether every residual is at most ``tolerance``; NaN is not."""
+        """Return whether every residual is at most ``tolerance``; False for NaN."""
         return all(value <= tolerance for value in (self.natural, self.gluing, self.coarse, self.violation))
 
 
 def contact_step(layout: ContactLayout, diagonal: Vector) -> Vector:
-    """Return ρ = 1/diag F on the contact rows, one value a disc, and 0 on equality rows, owned."""
+    """Return ρ = 1/diag F on the contact rows, one value per disc, and 0 on equality rows, owned."""
     step = np.zeros(layout.size)
     step[layout.normal] = 1.0 / diagonal[layout.normal]
     step[layout.tangential] = 1.0 / diagonal[layout.tangential].mean(axis=1, keepdims=True)
@@ -78,11 +79,11 @@ def contact_step(layout: ContactLayout, diagonal: Vector) -> Vector:
 def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual: Vector) -> Residuals:
     """Compute all residuals with the slip bound that belongs to the multiplier. Collective.
 
-    Contact forces below 1e-10 of ‖λ‖ count as none, so that a body that merely touches does not keep the
-    iteration alive, and so do forces below 1e-10 of those that would close the gaps, ρ‖d‖: rounding of r
-    gives rise to such. No force closes gaps between supports: rows that these determine alone have a ρ that
-    stands for no stiffness, and excuse no error but their own. Where no normal force acts at all, ‖λ‖ over
-    all contact rows stands in for ‖λ_N‖.
+    Contact forces below 1e-10 of ‖λ‖ count as zero, so that a body that merely touches does not prolong the
+    iteration, and so do forces below 1e-10 of those that would close the gaps, ρ‖d‖, as rounding of r causes
+    them. No force closes gaps between supports: rows that these alone determine have a ρ that is not a
+    stiffness, and excuse only their own error. Where no normal force acts at all, ‖λ‖ over all contact rows
+    replaces ‖λ_N‖.
 
     Args:
         problem: The dual problem.
@@ -152,8 +153,8 @@ class SolverStep:
         closed: Closed contacts.
         stick: Sticking discs.
         slip: Slipping discs.
-        note: What the solver decided, in words; empty for an ordinary step.
-        outer: Which of several solves it belongs to, from 0: a Tresca problem of the Coulomb fixed point, or
+        note: The solver's decision in words; empty for an ordinary step.
+        outer: Number of the solve that it belongs to, from 0: a Tresca problem of the Coulomb fixed point, or
             a round with a smaller tolerance.
     """
 
@@ -179,11 +180,11 @@ class SolverStep:
 
 @dataclass(frozen=True)
 class SmalseMemory:
-    """What SMALSE learned and can use again for a neighbouring problem.
+    """Estimates of SMALSE that it can reuse for a neighbouring problem.
 
     Attributes:
         norm: Upper estimate of ‖PFP‖.
-        balance: M, the ratio of projected gradient to equilibrium error at which it stopped.
+        balance: M, the ratio of projected gradient to equilibrium error at which inner iterations stop.
     """
 
     norm: float
@@ -195,7 +196,7 @@ class DualSolution:
     """A multiplier that satisfies every residual to the solver's tolerance.
 
     Attributes:
-        problem: What was solved.
+        problem: The solved problem.
         multiplier: λ, owned.
         residual: r = F λ − d − Gᵀα, owned: minus the violation B u − c of every row.
         product: F λ, owned.
@@ -203,10 +204,10 @@ class DualSolution:
         slip_bound: Ψ at the solution, shape (n_friction,), owned.
         residuals: The residuals, recomputed from `product`.
         iterations: Outer steps of the solver.
-        products: F-products of this solve, all purposes.
-        history: One record a step, oldest first.
+        products: F-products of this solve, for all purposes.
+        history: One record per step, oldest first.
         reason: Why the solver stopped, in words.
-        memory: What SMALSE learned, None if it never ran.
+        memory: Estimates of SMALSE, None if it did not run.
     """
 
     problem: DualProblem

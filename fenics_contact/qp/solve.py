@@ -1,4 +1,4 @@
-"""One call for every dual problem and every dual solver."""
+"""The common entry point for all dual problems and dual solvers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from fenics_contact.qp.reductions import Vector
 from fenics_contact.qp.slip_law import CoulombLaw, SlipLaw, TrescaLaw
 from fenics_contact.qp.solution import DualSolution, SolverStep
 
-#: How often a solution in scaled multipliers is made more accurate before it is given up.
+#: Largest number of times that a solution in scaled multipliers is refined.
 SCALED_ATTEMPTS = 4
 
 
@@ -33,7 +33,7 @@ class DualSolver(Protocol):
 
     @property
     def tolerance(self) -> float:
-        """Largest relative residual of an answer."""
+        """Largest relative residual of a solution."""
 
     def with_tolerance(self, tolerance: float) -> DualSolver:
         """Return the solver with another tolerance."""
@@ -71,8 +71,8 @@ def solve(
 
     Raises:
         InvalidInputError: Shapes disagree, values are not finite, or the solver does not fit the problem.
-        InfeasibleError: The load drives a rigid motion that no admissible multiplier resists; looked for
-            only in a cold start.
+        InfeasibleError: The load drives a rigid motion that no admissible multiplier resists; tested only in
+            a cold start.
         ConvergenceError: The tolerance was not met; carries the history.
     """
     problem.check()
@@ -86,7 +86,7 @@ def solve(
 def _solve_as_given(
     problem: DualProblem, solver: DualSolver, start: DualSolution | Vector | None, same: bool
 ) -> DualSolution:
-    """Solve a problem with its law; ``same`` tells whether the start is a solution of it. Collective."""
+    """Solve a problem with its law; ``same``: whether the start is a solution of it. Collective."""
     with Task("solve", unit="products", target=solver.tolerance) as task:
         if start is None:
             require_equilibrium(problem)
@@ -131,7 +131,7 @@ def _solve_scaled(
 
 
 def _scaled_start(problem: DualProblem, start: DualSolution | Vector | None) -> DualSolution | Vector | None:
-    """Return where to start for μ, λ = s μ, see `Scaling`."""
+    """Return the start for μ, λ = s μ, see `Scaling`."""
     assert problem.scaling is not None
     s = problem.scaling.factor
     if not isinstance(start, DualSolution):
@@ -194,7 +194,7 @@ def _begin(
         iterate = iterate_fitted(problem, multiplier, product)
     memory = None if earlier is None else earlier.memory
     if start is not None and problem.norm(coarse.particular()) == 0.0:
-        # No body is pushed: no force at all may be nearer than those of another load, and is known for free.
+        # No body is loaded: zero forces, free of cost, may be closer than those of another load.
         nothing = np.zeros_like(multiplier)
         rest = iterate_fitted(problem, nothing, nothing)
         if rest.residuals.worst <= iterate.residuals.worst:
@@ -203,7 +203,7 @@ def _begin(
 
 
 def _as_it_is(problem: DualProblem, start: Start, tolerance: float) -> DualSolution | None:
-    """Return a start that is the answer already: nothing is loaded, or nothing has changed. Collective."""
+    """Return a start that is the solution already: nothing is loaded, or nothing has changed. Collective."""
     iterate = start.iterate
     if not iterate.residuals.within(tolerance):
         return None

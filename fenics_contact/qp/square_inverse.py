@@ -16,7 +16,7 @@ from fenics_contact.qp.reductions import Vector
 
 #: Reciprocal condition number below which a matrix counts as singular.
 RANK_TOLERANCE = 1e-10
-#: Random vectors that look for a null vector.
+#: Number of random vectors in the search for a null vector.
 PROBES = 4
 
 
