@@ -22,28 +22,28 @@ from fenics_contact.qp import (
     global_max,
 )
 
-#: Forces out of balance below this share of all forces are rounding.
+#: Imbalance below this fraction of all forces is rounding.
 ROUNDING = 1e-13
-#: More out of balance than this share of all forces, and duality bounds nothing.
+#: Imbalance above this fraction of all forces, at which duality gives no bound.
 UNBALANCED = 1e-9
-#: Rounds of projections on the cone and on equilibrium, one after the other.
+#: Rounds of alternating projections on the cone and on equilibrium.
 ROUNDS = 100
-#: A round that leaves more than this share of what was out of balance leads nowhere.
+#: A round that leaves more than this fraction of the imbalance makes no progress.
 PROGRESS = 0.9
-#: A slip bound beyond every force.
+#: A slip bound larger than any force.
 ENDLESS = 1e300
 
 
 @dataclass(frozen=True, eq=False)
 class Statuses:
-    """What contact does at a multiplier, and which rows are free for it.
+    """Statuses of contact at a multiplier, and the rows that are free for them.
 
     Attributes:
         problem: The dual problem.
-        closed: Contacts that press, shape (n_contact,), owned.
-        stick: Discs that stick, shape (n_friction,), owned.
+        closed: Closed contacts, shape (n_contact,), owned.
+        stick: Sticking discs, shape (n_friction,), owned.
         slip: Discs on the circle, shape (n_friction,), owned; the others are pinned (Ψ = 0).
-        directions: Multiplier that gives the directions of friction forces, owned.
+        directions: Multiplier whose friction forces give the directions, owned.
     """
 
     problem: DualProblem
@@ -59,11 +59,11 @@ class Statuses:
 
     @cached_property
     def coarse(self) -> CoarseSpace:
-        """Equilibrium by the free rows alone, in scaled multipliers. Collective on first use."""
+        """Equilibrium on the free rows only, in scaled multipliers. Collective on first use."""
         return self.problem.scaled_problem.coarse.restricted(self.free)
 
     def spaces(self) -> Iterator[tuple[sp.csr_matrix, CoarseSpace]]:
-        """Bases of rows with their equilibrium: of the free rows, of all contacts that press, of all."""
+        """Bases of rows with their equilibrium: of the free rows, of all closed contacts, of all."""
         yield self.free, self.coarse
         layout, coarse = self.problem.layout, self.problem.scaled_problem.coarse
         nowhere = np.zeros_like(self.slip)
@@ -79,16 +79,16 @@ class Statuses:
 
 @dataclass(frozen=True, eq=False)
 class Admissible:
-    """A multiplier that a Tresca problem admits.
+    """An admissible multiplier of a Tresca problem.
 
     Attributes:
         multiplier: λ with λ_N ≥ 0, ‖τ‖ ≤ Ψ and G λ = e, owned.
-        statuses: What contact does.
-        slip_bound: Ψ of the Tresca problem, shape (n_friction,), owned. It is the given one except where this
+        statuses: Statuses of contact.
+        slip_bound: Ψ of the Tresca problem, shape (n_friction,), owned. It is the given one unless that
             follows the normal forces of a solution and no multiplier within it balances the load: at a load
-            that all friction just resists the solver's tolerance decides about that. It then is raised to the
-            forces that were found.
-        unbalanced: What is left of G λ − e, measured in multipliers, relative to ‖λ‖.
+            that friction only just resists this depends on the solver's tolerance. It is then raised to the
+            computed forces.
+        unbalanced: The remaining G λ − e, measured in multipliers, relative to ‖λ‖.
     """
 
     multiplier: Vector
@@ -100,17 +100,17 @@ class Admissible:
 def admissible(
     problem: DualProblem, slip_bound: Vector, follows: Marks, multiplier: Vector, residual: Vector
 ) -> Admissible:
-    """Find an admissible multiplier near a computed one. Collective; no product.
+    """Compute an admissible multiplier near a given one. Collective; no product.
 
-    Where the map w = λ − ρ r of the solver says open, the normal force is set to zero, where it says slip,
-    friction is set on its circle: what is missing there costs energy of first order, as gap and slip are not
-    small. Elsewhere λ is projected on the cone.
+    Where the map w = λ − ρ r of the solver indicates open contact, the normal force is set to zero, where it
+    indicates slip, friction is set on its circle: a deficit there costs energy of first order, as gap and
+    slip are not small. Elsewhere λ is projected on the cone.
 
     Args:
         problem: The dual problem.
         slip_bound: Ψ, shape (n_friction,), owned.
         follows: Discs whose slip bound follows the normal force, shape (n_friction,), owned. That of the
-            others is given and never raised.
+            others is given and not raised.
         multiplier: λ, owned.
         residual: r = F λ − d − Gᵀα, owned.
     """
@@ -137,22 +137,22 @@ def admissible(
 
 
 def _balanced_by_nearest(problem: DualProblem, feasible: FeasibleSet, start: Vector) -> tuple[Vector, float]:
-    """Return the nearest multiplier of the cone in equilibrium, and how much is left of G λ − e. Collective.
+    """Return the nearest multiplier of the cone in equilibrium, and the remaining G λ − e. Collective.
 
-    Slower than `_balanced` and without its preferences, but it finds a multiplier wherever there is one:
-    projections in turns come to rest before they reach a narrow set.
+    Slower than `_balanced` and without its preferences, but it finds a multiplier whenever there is one:
+    alternating projections stagnate before they reach a narrow set.
     """
     found = nearest(problem, feasible, start, ROUNDING * _forces(problem, start))
     return found, _unbalanced(problem, found)
 
 
 def _balanced(statuses: Statuses, feasible: FeasibleSet, start: Vector) -> tuple[Vector, float]:
-    """Return a multiplier of the cone in equilibrium, and how much is left of G λ − e. Collective.
+    """Return a multiplier of the cone in equilibrium, and the remaining G λ − e. Collective.
 
-    The shortest change of the free multipliers balances, or where these do not suffice, of all that press, or
-    of all; what then leaves the cone is projected again. Contact forces next to those that were moved take
-    part: gluing forces alone would carry the difference through the bodies, which bends thin ones. Forces
-    across open gaps come last, as each costs its gap in energy.
+    The shortest change of the free multipliers restores equilibrium or, where these do not suffice, of all
+    closed ones, or of all; the result is projected on the cone again. Neighbouring contact forces take part:
+    gluing forces alone would carry the difference through the bodies, which bends thin ones. Forces across
+    open gaps come last, as each costs its gap in energy.
     """
     problem, found = statuses.problem, feasible.project(start)
     left = _unbalanced(problem, found)
@@ -178,7 +178,7 @@ def basis(
         closed: Contacts whose normal row is in it, shape (n_contact,).
         stick: Discs of which both rows are in it, shape (n_friction,).
         turning: Discs of which the direction across the friction force is in it, shape (n_friction,).
-        multiplier: Gives the friction forces, owned.
+        multiplier: Multiplier with the friction forces, owned.
     """
     tau = multiplier[layout.tangential]
     length = np.linalg.norm(tau, axis=1, keepdims=True)
@@ -193,5 +193,5 @@ def _unbalanced(problem: DualProblem, multiplier: Vector) -> float:
 
 
 def _forces(problem: DualProblem, multiplier: Vector) -> float:
-    """Return the size of all forces, [force]. Collective."""
+    """Return the norm of all forces, [force]. Collective."""
     return max(problem.norm(multiplier), problem.coarse.norm(problem.coarse.load))

@@ -1,4 +1,4 @@
-"""When a state is solved well enough: as soon as its mesh is what limits it."""
+"""Stop once the mesh, not the solver, limits the accuracy of a state."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from fenics_contact.accuracy.state_errors import SolverErrors
 from fenics_contact.errors import InvalidInputError
 
-#: Share of what is allowed that the next tolerance aims at: errors do not fall exactly as residuals do.
+#: Fraction of the allowed error that the next tolerance aims at: errors do not fall exactly as residuals do.
 MARGIN = 0.5
 #: Smallest and largest ratio of one tolerance to the one before.
 STEP = (1e-4, 0.3)
@@ -20,20 +20,20 @@ class Balanced:
     """A tolerance that follows the mesh: the solver's error is at most a share of the discretisation's.
 
     The scene is solved to ``loosest``. Then the error of the discretisation is estimated, that of the solver
-    bounded (`StateErrors`), and if the latter is more than its share, the solver goes on from where it is to
-    a tolerance that the ratio tells. A mesh that represents the solution exactly is solved to ``finest``.
+    bounded (`StateErrors`), and if the latter is more than its share, the solver continues to a tolerance
+    that follows from the ratio. On a mesh that represents the solution exactly it is ``finest``.
 
-    Displacements, contact pressures and energies then are as good as the mesh allows. So are supports and the
-    seams between subdomains, which hold by multipliers. That is not the same for what jumps: whether a point
-    at the edge of the contact is closed, or sticks, may still change, and derivatives by the shape, which
-    belong to one choice of these statuses, with it. Where statuses or differences between neighbouring
-    states matter, give a number: 1e-6 settles nearly all, 1e-8 all that are not weakly active.
+    Displacements, contact pressures and energies are then as accurate as the mesh allows, and so are supports
+    and gluing, which are enforced by multipliers. Discontinuous results are not: whether a point at the edge
+    of the contact is closed, or sticks, may still change, and with it shape derivatives, which depend on
+    these statuses. Where statuses or differences between neighbouring states matter, give a number: 1e-6
+    settles nearly all, 1e-8 all that are not weakly active.
 
     Attributes:
         share: Largest error of the solver, law of friction included, relative to that of the mesh.
-        loosest: First tolerance, and the largest of all.
+        loosest: First and largest tolerance.
         finest: Smallest tolerance.
-        rounds: How often the tolerance is tightened at most.
+        rounds: Largest number of times that the tolerance is tightened.
 
     Raises:
         InvalidInputError: If the share or the tolerances are not positive or in the wrong order.
@@ -57,7 +57,7 @@ class Balanced:
             )
 
     def satisfied(self, errors: SolverErrors, discretisation: float) -> bool:
-        """Tell whether the solver's errors are within their share of the discretisation's."""
+        """Return whether the solver's errors are within their share of the discretisation's."""
         return errors.together <= self.share * discretisation
 
     def tightened(self, reached: float, errors: SolverErrors, discretisation: float) -> float:
@@ -65,11 +65,12 @@ class Balanced:
 
         Args:
             reached: Largest residual so far.
-            errors: What the solver left.
+            errors: The solver's errors.
             discretisation: Estimated error of the mesh, [√(force · length)].
         """
         allowed, have = self.share * discretisation, errors.together
-        # Where so little is allowed no step on the way is of any use; where nothing is known each is.
+        # For so small an allowed error intermediate tolerances are useless; with an unknown error all are
+        # useful.
         if np.isfinite(have) and allowed <= self.finest * have:
             return self.finest
         ratio = MARGIN * allowed / have

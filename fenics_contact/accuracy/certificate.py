@@ -11,9 +11,9 @@ from fenics_contact.accuracy.lifted import ROUNDING, Lifted, lift
 from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem
 from fenics_contact.qp import DualProblem, DualSolution, Vector, global_max, global_sum
 
-#: A multiplier that moves by less, relatively, is what it was.
+#: A relative change of the multiplier below this counts as none.
 UNMOVED = 1e-14
-#: Friction this near to its bound, relatively, is on it.
+#: Friction within this relative distance of its bound counts as on it.
 ON_CIRCLE = 1e-13
 
 
@@ -22,12 +22,12 @@ class Certificate:
     """Bounds of the algebraic error of a state in energy norm, [√(force · length)].
 
     Attributes:
-        bound: Upper bound of ‖u − u⋆‖ and of the same for the displacement that fields show; infinite where
-            no admissible pair was found.
-        moved: The part of it by which the multiplier was moved to be admissible.
+        bound: Upper bound of ‖u − u⋆‖, also for the continuous displacement of the fields; infinite if no
+            admissible pair was found.
+        moved: Its part due to making the multiplier admissible.
         gap: J(v) − θ(λ) of the admissible pair, [force · length].
         known: The admissible multiplier and its statuses.
-        error: Estimate of how far the state's multiplier is from the solution, owned, [force].
+        error: Estimated error of the state's multiplier, owned, [force].
     """
 
     bound: float
@@ -40,29 +40,28 @@ class Certificate:
 def certify(system: DualSystem, solution: DualSolution) -> Certificate:
     """Bound the algebraic error of a solution. Collective; at most one product and two applications of S.
 
-    With an admissible multiplier λ (λ_N ≥ 0, ‖τ‖ ≤ Ψ, G λ = e), u = K⁺(f − Bᵀλ) + R α, and a displacement
-    v = u + w that no row forbids, at given slip bounds
+    With an admissible multiplier λ (λ_N ≥ 0, ‖τ‖ ≤ Ψ, G λ = e), u = K⁺(f − Bᵀλ) + R α, and an admissible
+    displacement v = u + w, at given slip bounds
 
         J(v) − θ(λ) = ½ wᵀK w + Σ λ_N (c − B v)_N + Σ (Ψ‖s‖ − τ·s),   s the slip of v,
 
-    a sum of parts none of which is negative, and J(v) − θ(λ) ≥ ½‖v − u⋆‖² + ½‖u − u⋆‖² in energy norm,
-    u⋆ being the solution. So u⋆ is in the ball around the middle u + ½w of radius ½√(4 gap − ‖w‖²), and no
-    displacement x is farther from it than ‖x − u − ½w‖ + ½√(4 gap − ‖w‖²). The bound is that of the farther
-    one of two: of u, and of what fields show, in which copies of nodes agree (`DualSystem.conforming`). What
-    moved the multiplier of the solution into the cone, δ, counts with its own energy δᵀF δ.
+    a sum of non-negative terms, and J(v) − θ(λ) ≥ ½‖v − u⋆‖² + ½‖u − u⋆‖² in energy norm, u⋆ being the
+    solution. So u⋆ is in the ball around the midpoint u + ½w of radius ½√(4 gap − ‖w‖²), and no displacement
+    x is farther from it than ‖x − u − ½w‖ + ½√(4 gap − ‖w‖²). The bound is for the farther of two
+    displacements: u, and that of the fields, in which copies of nodes agree (`DualSystem.conforming`). The
+    change δ that made the multiplier admissible counts with its own energy δᵀF δ.
 
-    The way w is that of the preconditioner, and the bound is as close as this is good: mostly within a factor
-    of two of the error, for nearly incompressible bodies, thin plates and stiff bodies on soft ones of one of
-    ten to thirty.
+    The correction w is that of the preconditioner, whose quality determines the sharpness: mostly a factor of
+    two, for nearly incompressible bodies, thin plates and stiff bodies on soft ones ten to thirty.
 
     The bound is for Tresca's problem with the slip bounds of the solution. Where these are given, that is the
-    problem; and it is infinite where no multiplier within them balances the load. Where they follow the
-    normal forces it is not the bound of the distance to the solution of Coulomb's law, see `friction_error`
-    for the rest; and where these bounds are too small for the load, Tresca's problem has no solution and they
-    are raised, see `Admissible`.
+    actual problem; and it is infinite where no multiplier within them balances the load. Where they follow
+    the normal forces it does not bound the distance to the solution of Coulomb's law, see `friction_error`
+    for the rest; and where they are too small for the load, Tresca's problem has no solution and they are
+    raised, see `Admissible`.
 
-    It holds to rounding: energies and products are those of double precision, rows that are closed to 1e-9
-    of what was open count as closed, and so does a load that is balanced to 1e-9.
+    It holds to rounding: energies and products are in double precision, rows that are closed to 1e-9 of their
+    initial violation count as closed, and a load that is balanced to 1e-9 as balanced.
 
     Args:
         system: The dual system.
@@ -92,19 +91,19 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
 
 
 def _distances(system: DualSystem, solution: DualSolution, lifted: Lifted) -> tuple[float, float]:
-    """Return how far from u + ½w the found displacement is, and the one that fields show. Collective."""
+    """Return the distances from u + ½w of the computed displacement and of that of the fields. Collective."""
     energy, _ = system.inverse.energy(system.sewn(solution.residual) - 0.5 * lifted.displacement)
     shown = float(np.sqrt(global_sum(system.problem.comm, energy)[0]))
     return 0.5 * float(np.sqrt(lifted.energy)), shown
 
 
 def direct_error(system: DirectSystem, solution: DirectSolution) -> float:
-    """Return the energy norm of what a factorisation left unsolved, √(rᵀK⁻¹r), [√(force · length)]."""
+    """Return the energy norm of the error of a factorisation, √(rᵀK⁻¹r), [√(force · length)]."""
     return float(np.sqrt(max(system.energy_of_residual(solution.displacement), 0.0)))
 
 
 def _cancelled(problem: DualProblem, solution: DualSolution) -> float:
-    """Return the size of the displacements that cancel in r. Collective."""
+    """Return the norm of the displacements that cancel in r. Collective."""
     moved = np.abs(solution.product - problem.rhs).max(initial=0.0)
     return global_max(problem.comm, max(moved, np.abs(problem.rhs).max(initial=0.0)))
 
@@ -116,9 +115,9 @@ def _pressed(problem: DualProblem, known: Admissible, residual: Vector) -> float
 
 
 def _rubbed(problem: DualProblem, known: Admissible, residual: Vector) -> float:
-    """Return Σ Ψ‖s‖ − τ·s, what friction forces fall short of. Collective.
+    """Return Σ Ψ‖s‖ − τ·s, the deficit of the dissipation by friction forces. Collective.
 
-    As (Ψ − ‖τ‖)‖s‖ + ½‖τ‖‖s‖‖ŝ − τ̂‖², in which nothing cancels where force and slip have one direction.
+    As (Ψ − ‖τ‖)‖s‖ + ½‖τ‖‖s‖‖ŝ − τ̂‖², which is free of cancellation where force and slip are parallel.
     """
     tau, slid = known.multiplier[problem.layout.tangential], -residual[problem.layout.tangential]
     force, way = np.linalg.norm(tau, axis=1), np.linalg.norm(slid, axis=1)

@@ -1,4 +1,4 @@
-"""How far a displacement is from that of a mesh without end: the recovery estimate of the discretisation."""
+"""Recovery-based estimate of the discretisation error of a displacement."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class DiscretisationError:
     """Estimates of the discretisation error in the norm √∫ C ε : ε, [√(force · length)].
 
     Attributes:
-        total: Of all bodies together.
+        total: That of all bodies together.
         by_body: Body name -> its part; the sum of squares is that of `total`.
     """
 
@@ -56,20 +56,20 @@ def discretisation_error(torn: TornSystem, displacement: np.ndarray) -> Discreti
     """Estimate the discretisation error of a displacement. Collective.
 
     On each cell η² = ∫ C (ε* − ε) : (ε* − ε) with the strain ε of the displacement and the strain ε* of a
-    recovered gradient, which is continuous within one material of one body (see `recovery`). Strains by
-    temperature are in both and drop out.
+    recovered gradient, which is continuous within one material of one body (see `recovery`). Thermal strains
+    are in both and cancel.
 
-    It is no bound. Estimate over error tends to 1 where the solution is smooth. It was measured between 0.7
-    and 1.1 under contact that two or more nodes hold, at 0.7 where clamped corners and edges between
+    It is not a bound. The ratio of estimate to error tends to 1 where the solution is smooth. It was measured
+    between 0.7 and 1.1 for contact on two or more nodes, at 0.7 where clamped corners and edges between
     materials dominate, and at 0.9 for quadrilaterals that lock at ν = 0.499. A body one cell thick does not
-    show how strains vary across it: there the estimate may be a quarter of the error; of a body of one cell
-    it tells nothing. Where a mesh locks completely, the error exceeds the displacement and the estimate does
-    not follow. The error of the geometry, where facets stand for a curved surface, is not in it.
+    resolve how strains vary across it: there the estimate may be a quarter of the error; for a body of one
+    cell it is meaningless. Where a mesh locks completely, the error exceeds the displacement and the estimate
+    does not follow. The geometry error of facets on a curved surface is not included.
 
     Args:
         torn: The torn system.
         displacement: This rank's torn displacement, shape (torn_size,), [length]: that of a state is
-            `State.conforming_displacement`. Where copies of a node differ, their mean counts.
+            `State.conforming_displacement`. Where copies of a node differ, their mean is used.
 
     Returns:
         The estimate.
@@ -121,7 +121,7 @@ class _Energies:
         mesh, whole = subdomain.mesh, self._body.mesh
         nodes, kind = whole.cells[mesh.cells], self._body.material_of_cells[mesh.cells]
         result = np.zeros(len(nodes))
-        # Where materials meet a node has several recovered gradients: one material at a time.
+        # Where materials meet, a node has several recovered gradients: one material at a time.
         for number in np.unique(kind):
             cells, way = np.flatnonzero(kind == number), self._ways[number]
             u, g = displacement[cells], gradient[cells]
@@ -132,5 +132,5 @@ class _Energies:
                 blocks = order[np.searchsorted(mesh.nodes[order], nodes[cells])]
                 material = self._body.materials[number]
                 result[cells] = energy_on_subdomain(way, material, subdomain, blocks, u, g)[cells]
-        # Moduli without resistance to rotations have eigenvalues of zero, to rounding.
+        # Moduli are insensitive to rotations, so some eigenvalues are zero up to rounding.
         return np.maximum(result, 0.0)

@@ -1,4 +1,4 @@
-"""How far slip bounds are from those that Coulomb's law asks for, in energy norm."""
+"""Error due to slip bounds that do not satisfy Coulomb's law exactly, in energy norm."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from fenics_contact.qp import DualSolution, global_sum
 
 
 def friction_error(system: DualSystem, solution: DualSolution, certificate: Certificate) -> float:
-    """Estimate the error by slip bounds that are not those of the solution. Collective; no product.
+    """Estimate the error due to inexact slip bounds. Collective; no product.
 
-    The slip bounds of a solution follow its normal forces, Ψ = Ψ₀ + μ λ_N, and are wrong by μ δλ_N where
-    these are wrong by δλ_N. The certificate knows δλ_N nearly: one preconditioned step. On slipping points
-    friction then changes by μ δλ_N along its direction, which bends the bodies by about √Σ F_ii (μ δλ_i)².
-    Where the preconditioner exaggerates, it is at most μ times the bound: the normal forces are no worse.
+    The slip bounds of a solution follow its normal forces, Ψ = Ψ₀ + μ λ_N, and have an error μ δλ_N where
+    these have an error δλ_N. The certificate approximates δλ_N by one preconditioned step. At slipping points
+    friction then changes by μ δλ_N along its direction, which deforms the bodies by about √Σ F_ii (μ δλ_i)².
+    Where the preconditioner overestimates, it is limited to μ times the bound.
 
-    It is an estimate and no bound: Coulomb's law minimises nothing. It tells the distance from the solution
-    of Tresca's problem with the slip bounds of the certificate, for which this is an upper bound, to that of
-    Coulomb's law; what slip bounds were raised by for the certificate counts. Zero where nothing slips, and
-    where slip bounds do not follow the normal forces.
+    It is an estimate, not a bound: Coulomb's law does not minimise an energy. It measures the distance from
+    the solution of Tresca's problem with the slip bounds of the certificate, to which that bound refers, to
+    that of Coulomb's law, including the raise of slip bounds for the certificate. Zero where nothing slips,
+    and where slip bounds do not follow the normal forces.
 
     Args:
         system: The dual system.
         solution: A solution of its problem.
-        certificate: What `certify` found for it.
+        certificate: Its certificate.
 
     Returns:
         Energy norm of the change, [√(force · length)].

@@ -1,4 +1,4 @@
-"""An admissible displacement near a computed one, and what the way there costs in energy."""
+"""An admissible displacement near a computed one, and the energy of the correction."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from fenics_contact.accuracy.admissible import Admissible, basis
 from fenics_contact.feti import DualSystem
 from fenics_contact.qp import Marks, Vector, contact_step, global_max, global_sum
 
-#: Corrections of what the regularised contact block leaves.
+#: Number of corrections for the regularisation of the contact block.
 REFINEMENTS = 12
-#: Share of the violation at the start, and of the displacements that cancel in the rows, that is rounding.
+#: Rounding relative to the initial violation, and to the displacements that cancel in the rows.
 ROUNDING, CANCELLED = 1e-9, 1e-14
 
 
@@ -25,10 +25,10 @@ class Lifted:
     Attributes:
         displacement: w, shape (n_interface,), [length].
         energy: wᵀ S w, [force · length].
-        residual: r after it, owned, [length]; rows that were closed hold exactly zero.
-        multiplier: Estimate −M r of how far the multiplier is from the solution, owned, [force].
-        left: Violation that is left, relative to the first one; more than rounding only if the rows
-            contradict each other.
+        residual: r after it, owned, [length]; zero in the rows that were closed.
+        multiplier: Estimate −M r of the multiplier's error, owned, [force].
+        left: Remaining violation relative to the initial one; more than rounding only if rows are
+            contradictory.
     """
 
     displacement: Vector
@@ -39,27 +39,27 @@ class Lifted:
 
 
 def lift(system: DualSystem, known: Admissible, residual: Vector, cancelled: float) -> Lifted:
-    """Close the rows that should be closed, and all that the correction would let penetrate. Collective.
+    """Close the rows that should be closed, and those that would penetrate after the correction. Collective.
 
     The correction is that of the Dirichlet preconditioner, w = D⁻¹Bᵀ(B D⁻¹Bᵀ)⁻¹ r, with its energy wᵀ S w:
-    the preconditioned residual rᵀ M r. What the regularised contact block leaves is corrected again, at the
-    price of that small block alone; S is applied once, for half an F-product.
+    the preconditioned residual rᵀ M r. The effect of regularising the contact block is corrected at the cost
+    of that small block alone; S is applied once, for half an F-product.
 
     Args:
         system: The dual system.
         known: An admissible multiplier with its statuses.
         residual: Its r = F λ − d − Gᵀα, owned, [length].
-        cancelled: Size of the displacements that cancel in r, [length].
+        cancelled: Norm of the displacements that cancel in r, [length].
     """
     comm, tangential = system.problem.comm, system.problem.layout.tangential
     slid = np.linalg.norm(residual[tangential], axis=1)
     step = contact_step(system.problem.layout, system.problem.diagonal)[tangential[:, 0]]
-    # Where a slip is short, its part across the friction force is cheaper to take away than to pay for.
+    # Where a slip is short, removing its part across the friction force costs less energy than keeping it.
     statuses = known.statuses
     across = statuses.slip & (step * slid < known.slip_bound)
     rows = _Rows(system, known, statuses.closed, statuses.stick, across)
     closing = _close(rows, residual, cancelled)
-    if closing.left > ROUNDING:  # a node of two pairs may be told to stick where it should close
+    if closing.left > ROUNDING:  # a node of two pairs may be set to stick where it should close
         nothing = np.zeros_like(across)
         closing = _close(replace(rows, stick=nothing, across=nothing), residual, cancelled)
     energy, force = system.inverse.energy(closing.displacement)
@@ -71,7 +71,7 @@ def lift(system: DualSystem, known: Admissible, residual: Vector, cancelled: flo
 
 @dataclass(frozen=True, eq=False)
 class _Closing:
-    """Displacement w that closes rows, r after it, and what is left relative to the start."""
+    """Displacement w that closes rows, r after it, and the remaining violation relative to the start."""
 
     rows: _Rows
     displacement: Vector
@@ -80,7 +80,7 @@ class _Closing:
 
 
 def _close(rows: _Rows, residual: Vector, cancelled: float) -> _Closing:
-    """Close rows, and those that penetrate after it. Collective; no application of S."""
+    """Close rows, and those that penetrate afterwards. Collective; no application of S."""
     system = rows.system
     comm, w = system.problem.comm, np.zeros(len(system.inverse.interface))
     start = global_max(comm, np.abs(rows.wanted(residual)).max(initial=0.0))
@@ -107,8 +107,8 @@ class _Rows:
         system: The dual system.
         known: An admissible multiplier.
         closed: Contacts to close, shape (n_contact,), owned.
-        stick: Discs whose slip is taken away, shape (n_friction,), owned.
-        across: Discs whose slip across the friction force is taken away, shape (n_friction,), owned.
+        stick: Discs whose slip is removed, shape (n_friction,), owned.
+        across: Discs whose slip across the friction force is removed, shape (n_friction,), owned.
     """
 
     system: DualSystem

@@ -12,19 +12,19 @@ from fenics_contact.scene import Material
 
 
 def moduli(forms: FormLibrary, material: Material, cell_type: str) -> np.ndarray:
-    """Return C of C g : g, twice the energy a volume of a displacement gradient g.
+    """Return C of C g : g, twice the energy per volume of a displacement gradient g.
 
-    A material knows stiffnesses of displacements alone, and its stress may be any UFL. On a cell with the
-    displacement g x it stores C g : g times the volume. Some materials resist displacements too: what they
-    add falls with the square of the size of the cell and drops out of two sizes.
+    A material only defines a bilinear form of displacements, and its stress may be any UFL. On a cell with
+    the displacement g x it stores C g : g times the volume. Some materials resist displacements, too: that
+    contribution scales with the square of the cell size and is eliminated by two sizes.
 
     Args:
-        forms: Compiled forms that the material is among.
+        forms: Compiled forms, including those of the material.
         material: A material whose moduli are the same everywhere.
         cell_type: Type of the cell.
 
     Returns:
-        Shape (dim², dim²), g_kj at place dim k + j, [force / length²].
+        Shape (dim², dim²), g_kj at index dim k + j, [force / length²].
     """
     parts = Composition((material,))
 

@@ -1,4 +1,4 @@
-"""The nearest multiplier that is within its cone and in equilibrium: a projection on both."""
+"""The nearest multiplier within its cone and in equilibrium: the projection on the intersection."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from fenics_contact.qp import DualProblem, FeasibleSet, Vector, global_sum
 
 #: Newton steps and halvings of one.
 STEPS, HALVINGS = 100, 30
-#: Share of the promised decrease that a step must keep, and of the imbalance that it may leave instead.
+#: Fraction of the predicted decrease that a step must achieve, or of the imbalance that it may leave.
 ARMIJO, REDUCED = 1e-4, 0.5
-#: Largest weight of multipliers that their bounds hold, beside those that are free.
+#: Largest weight of multipliers at their bounds, relative to free ones.
 HELD = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """α with λ₀ − Gᵀα, its multiplier, what is left of G λ − e, and the value of the convex function."""
+    """α with λ₀ − Gᵀα, its multiplier, the remaining G λ − e, and the value of the convex function."""
 
     alpha: Vector
     trial: Vector
@@ -29,21 +29,21 @@ class _Point:
 
 
 def nearest(problem: DualProblem, feasible: FeasibleSet, start: Vector, enough: float) -> Vector:
-    """Return the multiplier of a cone in equilibrium that is nearest to another one. Collective; no product.
+    """Return the multiplier of a cone in equilibrium that is nearest to a given one. Collective; no product.
 
     With P the projection on the cone it is λ(α) = P(λ₀ − Gᵀα), where α minimises the convex function
 
         −½‖λ(α) − λ₀‖² − α·(G λ(α) − e),
 
     whose gradient is e − G λ(α): a semismooth Newton method with as many unknowns as there are rigid motions.
-    Where the cone has just one multiplier in equilibrium α grows without end, and G λ − e still vanishes.
-    Lengths are those of the scaled multipliers.
+    Where the cone has only one multiplier in equilibrium, α grows without bound while G λ − e tends to zero.
+    Norms are those of the scaled multipliers.
 
     Args:
         problem: The dual problem.
         feasible: The cone.
         start: λ₀, owned.
-        enough: Length of G λ − e, measured in multipliers, at which to stop.
+        enough: Norm of G λ − e, measured in multipliers, at which to stop.
 
     Returns:
         Within the cone, owned; in equilibrium unless there is no such multiplier.
@@ -82,7 +82,7 @@ class _Search:
         return self._problem.coarse.norm(point.lacking)
 
     def step(self, point: _Point, left: float) -> _Point | None:
-        """Return a better point on Newton's way, None where there is none. Collective."""
+        """Return a better point along the Newton step, None if there is none. Collective."""
         weight = HELD * min(1.0, left / self._size)
         direction = self._coarse.restricted(self._slope(point, weight)).solve(point.lacking)
         promised = float(point.lacking @ direction)
@@ -117,5 +117,5 @@ class _Search:
 
 
 def evening(problem: DualProblem) -> Vector:
-    """Return the factors of the scaled multipliers, one where stiffness is even, owned."""
+    """Return the factors of the scaled multipliers, one where stiffness is uniform, owned."""
     return np.ones(problem.layout.size) if problem.scaling is None else problem.scaling.factor

@@ -1,4 +1,4 @@
-"""The patch of nodes around every site, and what fits of polynomials ask of it."""
+"""The patch of nodes around every site, with the normal equations of polynomial fits."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from fenics_contact.accuracy.polynomials import Polynomials
 from fenics_contact.accuracy.sites import Sites
 
-#: Numbers that a chunk of patches holds at once.
+#: Largest number of entries in a chunk of patches.
 CHUNK = 2_000_000
 
 
@@ -29,23 +29,23 @@ class Moments:
     right: np.ndarray
 
     def part(self, chosen: np.ndarray) -> Moments:
-        """Return those of some of the sites, by number or by mark."""
+        """Return those of some sites, given by indices or a mask."""
         return Moments(self.rows[chosen], self.matrix[chosen], self.right[chosen])
 
 
 @dataclass(frozen=True)
 class Patches:
-    """The patches of all sites, each with coordinates in which it is as long as wide.
+    """The patches of all sites, each with coordinates in which it is isotropic.
 
     The nodes of a patch are those of the cells around the site that are of its material, each weighted by the
     number of cells that it shares with the site.
 
     Attributes:
         sites: The sites.
-        turn: T of each site: a difference d of places is T d in its own coordinates, shape
-            (n_sites, dim, dim), [1 / length].
+        turn: T of each site: a difference d of positions is T d in its own coordinates, shape (n_sites, dim,
+            dim), [1 / length].
         weight: Sum of the weights of each patch, shape (n_sites,).
-        polynomials: What is fitted, of one degree more than displacements have.
+        polynomials: The fitted polynomials, one degree higher than displacements.
     """
 
     sites: Sites
@@ -59,7 +59,7 @@ class Patches:
         return int(self.turn.shape[1])
 
     def moments(self, displacement: np.ndarray) -> Iterator[Moments]:
-        """Yield the normal equations of all sites, some at a time. Collective.
+        """Yield the normal equations of all sites in chunks. Collective.
 
         Args:
             displacement: Displacement of each site, shape (n_sites, dim), [length].
@@ -90,7 +90,7 @@ class Patches:
         return Moments(rows, weighted @ basis, weighted @ jump)
 
     def _chunks(self, rows: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield sites in chunks of about equally many neighbours."""
+        """Yield sites in chunks with about equal numbers of neighbours."""
         if not len(rows):
             return
         count = np.diff(self.sites.neighbours.indptr)[rows]
@@ -120,7 +120,7 @@ def find_patches(sites: Sites) -> Patches:
 
 
 def padded(sites: Sites, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return neighbours and their weights as tables, filled up with neighbours of no weight.
+    """Return neighbours and their weights as tables, padded with neighbours of weight zero.
 
     Args:
         sites: The sites.

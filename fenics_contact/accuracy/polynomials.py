@@ -1,4 +1,4 @@
-"""Polynomials about a point by their derivatives there, scaled such that no direction is preferred."""
+"""Polynomials about a point by their derivatives there, scaled to be rotationally invariant."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ import numpy as np
 class Polynomials:
     """All polynomials up to a degree that vanish at a point.
 
-    The coefficient of a mixed derivative is √ (number of its orders) times it: the sum of squares is that of
-    the whole tensor of derivatives. Derivatives of the highest degree come last.
+    The coefficient of a mixed derivative is √(number of its permutations) times it: the sum of squares is
+    that of the full tensor of derivatives. Derivatives of the highest degree come last.
 
     Attributes:
         dim: Number of coordinates.
@@ -32,14 +32,14 @@ class Polynomials:
 
     @property
     def highest(self) -> slice:
-        """Which of them are of the highest degree."""
+        """The polynomials of the highest degree."""
         return slice(self.count - len(self._indices(self.degree)), self.count)
 
     def values(self, away: np.ndarray) -> np.ndarray:
         """Evaluate them: d_i, then ½ d_i², d_i d_j / √2, and so on.
 
         Args:
-            away: Differences of places, shape (..., dim).
+            away: Differences of positions, shape (..., dim).
 
         Returns:
             Shape (..., m).
@@ -57,7 +57,7 @@ class Polynomials:
         return np.asarray((coefficients / scale[:, None])[:, place])
 
     def coefficients_of(self, tensors: np.ndarray) -> np.ndarray:
-        """Return what `tensors` turns into the given ones."""
+        """Return the coefficients of the given tensors, the inverse of `tensors`."""
         index = tuple(np.array(self._indices(self.degree)).T)
         return np.asarray(tensors[(slice(None), *index)] * self._places[1][:, None])
 
@@ -80,7 +80,7 @@ class Polynomials:
 
     @cached_property
     def _places(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return which coefficient each entry of the tensor of highest derivatives is, and their scales."""
+        """Return the coefficient of each entry of the tensor of highest derivatives, and their scales."""
         indices = self._indices(self.degree)
         entries = np.moveaxis(np.indices((self.dim,) * self.degree), 0, -1)
         number = {index: position for position, index in enumerate(indices)}
@@ -90,5 +90,5 @@ class Polynomials:
 
 
 def _orders(index: tuple[int, ...]) -> int:
-    """Return how many orders the factors of a product have."""
+    """Return the number of permutations of the factors of a product."""
     return factorial(len(index)) // prod(factorial(index.count(i)) for i in set(index))

@@ -1,13 +1,13 @@
-"""Displacement gradients at the nodes, better than those of the cells: polynomial-preserving recovery.
+"""Recovered displacement gradients at the nodes: polynomial-preserving recovery.
 
-Around each site the differences of the displacement to the neighbouring nodes are fitted by a polynomial of
-one degree more than the displacement has; the recovered gradient is the polynomial's at the site, exact for
-displacements of that degree on any mesh. A patch at the boundary mostly leaves some of the highest
-derivatives open (of linear cells, two layers of nodes tell no curvature normal to them): these come from the
-neighbours inside the body, all the rest from the patch's own nodes. Where none is inside, as in a plate one
-cell thick, what the best patches leave open is zero.
+Around each site the differences of the displacement to the neighbouring nodes are fitted by a polynomial one
+degree higher than the displacement; the recovered gradient is the polynomial's at the site, exact for
+displacements of that degree on any mesh. A patch at the boundary usually leaves some of the highest
+derivatives undetermined (with linear cells, two layers of nodes do not determine the curvature normal to
+them): these are taken from the neighbours inside the body, all others from the patch's own nodes. Where none
+is inside, as in a plate one cell thick, derivatives that even the best patches leave undetermined are zero.
 
-Patches are of one material: strains may jump where materials meet.
+A patch contains one material: strains may jump where materials meet.
 
 References:
     Z. Zhang and A. Naga, A new finite element gradient recovery method: superconvergence property, SIAM J.
@@ -23,17 +23,17 @@ from fenics_contact._libraries import MPI
 from fenics_contact.accuracy.patches import Moments, Patches, find_patches
 from fenics_contact.accuracy.sites import Sites
 
-#: Weight of the highest derivatives beside the moments of a patch, which are of order one: it decides only on
-#: what the patch leaves open, and keeps rounding from deciding on it.
+#: Weight of the highest derivatives relative to the moments of a patch, which are of order one: it affects
+#: only what the patch leaves undetermined, which rounding would decide otherwise.
 SLIGHT = 1e-5
-#: A patch is not trusted with highest derivatives if the inverse of its moments adds up to more than this on
-#: them, by their degree and the dimension. It is 5.5 and 13.1 inside regular meshes of linear cells, 144 and
-#: 273 of quadratic ones; on curved boundaries it may be finite by the little that layers of nodes are bent,
-#: which tells nothing but noise.
+#: A patch does not determine the highest derivatives if the trace of the inverse of its moments on them
+#: exceeds this, by degree and dimension. It is 5.5 and 13.1 inside regular meshes of linear cells, 144 and
+#: 273 of quadratic ones; on curved boundaries it may be finite only because layers of nodes are slightly
+#: curved, which yields noise.
 OPEN = {(2, 2): 8.0, (2, 3): 18.0, (3, 2): 210.0, (3, 3): 400.0}
-#: Their weight, by degree, where neighbours tell what they should be.
+#: Their weight, by degree, where neighbours prescribe them.
 FIRM = {2: 0.2, 3: 0.02}
-#: Where no patch is trusted, those are that are worse than the best by up to this factor.
+#: Where no patch suffices, those within this factor of the best are used.
 ALIKE = 1.5
 
 
@@ -54,7 +54,7 @@ def recovered_gradients(sites: Sites, displacement: np.ndarray) -> np.ndarray:
     for moments in patches.moments(displacement):
         inverse = np.linalg.inv(moments.matrix + SLIGHT * penalty)
         first = inverse @ moments.right
-        # Once more with what is left, which takes the weight's own share off.
+        # Once more with the remainder, which removes the effect of the weight.
         found[moments.rows] = first + inverse @ (moments.right - moments.matrix @ first)
         spread = np.einsum("nii->n", inverse[:, highest, highest])
         open_ = spread > OPEN[patches.polynomials.degree, dim]
@@ -65,12 +65,12 @@ def recovered_gradients(sites: Sites, displacement: np.ndarray) -> np.ndarray:
 
 
 def _ask_neighbours(patches: Patches, open_: Moments, doubt: np.ndarray, found: np.ndarray) -> None:
-    """Fit again what was left open, with highest derivatives of neighbours; layer by layer. Collective.
+    """Refit undetermined sites with the highest derivatives of neighbours, layer by layer. Collective.
 
     Args:
         patches: The patches.
-        open_: Normal equations of the sites whose patches leave something open, n of them.
-        doubt: How little each of them tells, shape (n,).
+        open_: Normal equations of the n undetermined sites.
+        doubt: Measure of how poorly each is determined, shape (n,).
         found: Coefficients of all sites, which are overwritten, shape (n_sites, m, dim), [length].
     """
     comm = patches.sites.sharing.comm
@@ -88,7 +88,7 @@ def _ask_neighbours(patches: Patches, open_: Moments, doubt: np.ndarray, found: 
 
 
 def _fitted(patches: Patches, moments: Moments, derivatives: np.ndarray) -> np.ndarray:
-    """Fit again with given highest derivatives for those that a patch leaves open.
+    """Refit with given highest derivatives where a patch leaves them undetermined.
 
     Args:
         patches: The patches.
@@ -107,7 +107,7 @@ def _fitted(patches: Patches, moments: Moments, derivatives: np.ndarray) -> np.n
 def _mean_of_neighbours(
     patches: Patches, rows: np.ndarray, known: np.ndarray, found: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return whether sites have neighbours that are known, and the mean of their highest derivatives.
+    """Return whether sites have known neighbours, and the mean of these neighbours' highest derivatives.
 
     Collective.
 

@@ -15,12 +15,12 @@ class Sites:
     """The nodes of this rank's cells of one order, one site for every material that meets there.
 
     Attributes:
-        order: Of the cells.
+        order: Order of the cells.
         node: Node of each site among those of all bodies, shape (n_sites,).
         points: Coordinates, shape (n_sites, dim), [length].
         sharing: Sites that other ranks hold as well.
-        neighbours: How many of this rank's cells of their material two sites share, shape
-            (n_sites, n_sites), without diagonal.
+        neighbours: Number of this rank's cells of their material that two sites share, shape (n_sites,
+            n_sites), without diagonal.
         of_cells: Number of a subdomain -> site of each node of its cells, as dolfinx orders the cells of its
             mesh, nodes in the order of the body's mesh; shape (n_cells, nodes of a cell).
         cells: Number of this rank's cells around each site, shape (n_sites,).
@@ -41,7 +41,7 @@ class Sites:
 
 
 def find_sites(torn: TornSystem, order: int = 1) -> Sites:
-    """Number the sites of this rank's subdomains whose cells are of an order. Collective."""
+    """Number the sites of this rank's subdomains whose cells have a given order. Collective."""
     scene, tearing = torn.scene, torn.decomposition.tearing
     kinds = max(len(body.materials) for body in scene.bodies.values())
     keys: dict[int, np.ndarray] = {}

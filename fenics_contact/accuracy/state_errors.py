@@ -1,4 +1,4 @@
-"""The errors of a state, all in one norm: how well it was solved, and how well its mesh can tell."""
+"""The errors of a state, all in one norm: solver, friction law, mesh and geometry."""
 
 from __future__ import annotations
 
@@ -20,20 +20,21 @@ class StateErrors:
     """Errors of a state in energy norm, relative to that of the displacement, ‖u‖ = √(uᵀK u).
 
     Attributes:
-        algebraic: Upper bound of what the solver left in the displacement, by duality: of the one that
-            fields show, `State.conforming_displacement`, and of the one it found. Without Coulomb's law that
-            is the distance to the solution; with it, the distance to the solution of Tresca's problem with
-            the state's own slip bounds, and `friction` estimates the rest. Infinite where nothing is known,
-            see `certify`.
-        friction: Estimate, no bound, of the distance from there to the solution of Coulomb's law, see
+        algebraic: Upper bound of the solver's error, by duality: both of the fields,
+            `State.conforming_displacement`, and of the torn displacement. Without Coulomb's law that is the
+            distance to the solution; with it, the distance to the solution of Tresca's problem with the
+            state's own slip bounds, and `friction` estimates the rest. Infinite where no bound is known, see
+            `certify`.
+        friction: Estimate, not a bound, of the distance from there to the solution of Coulomb's law, see
             `friction_error`; zero without it.
-        discretisation: Estimate, no bound, of the error of the mesh, see `discretisation_error`.
-        geometry: Estimate, no bound, of the error by the geometry of contact surfaces, see `geometry_error`:
-            the distance to the state of the true surfaces on the same mesh.
-        peak_by_geometry: What that error does to the largest contact pressure, relative to it.
+        discretisation: Estimate, not a bound, of the error of the mesh, see `discretisation_error`.
+        geometry: Estimate, not a bound, of the error by the geometry of contact surfaces, see
+            `geometry_error`: the distance to the state of the true surfaces on the same mesh.
+        peak_by_geometry: Its effect on the largest contact pressure, relative to it.
         norm: ‖u‖, [√(force · length)].
         by_body: Body name -> its part of `discretisation`; the sum of squares is its square.
-        own_bounds: Whether slip bounds follow normal forces, so that `algebraic` is for those of the state.
+        own_bounds: Whether slip bounds follow normal forces, so that `algebraic` refers to those of the
+            state.
 
     Example:
         >>> print(state.errors)  # doctest: +SKIP
@@ -54,7 +55,7 @@ class StateErrors:
     peak_by_geometry: float = 0.0
 
     def with_geometry(self, energy: float, peak_pressure: float) -> StateErrors:
-        """Return the errors with the share of the geometry.
+        """Return the errors with that of the geometry.
 
         Args:
             energy: Distance in energy norm, [√(force · length)].
@@ -85,11 +86,11 @@ class StateErrors:
 
 @dataclass(frozen=True)
 class SolverErrors:
-    """What a solver left, in energy norm, [√(force · length)].
+    """Errors of a solver, in energy norm, [√(force · length)].
 
     Attributes:
         algebraic: Upper bound of its error at the slip bounds of its solution.
-        friction: Estimate of the error by these slip bounds.
+        friction: Estimate of the error due to these slip bounds.
         own_bounds: Whether slip bounds follow normal forces; else those of the solution are given.
     """
 
@@ -104,7 +105,7 @@ class SolverErrors:
 
 
 def solver_errors(system: DualSystem | DirectSystem, solution: DualSolution | DirectSolution) -> SolverErrors:
-    """Return what a solver left. Collective; at most one product and one application of S."""
+    """Return the errors of a solver. Collective; at most one product and one application of S."""
     if isinstance(system, DirectSystem):
         assert isinstance(solution, DirectSolution)
         return SolverErrors(direct_error(system, solution), 0.0)
@@ -115,11 +116,11 @@ def solver_errors(system: DualSystem | DirectSystem, solution: DualSolution | Di
 
 
 def state_errors(solver: SolverErrors, estimate: DiscretisationError, norm: float) -> StateErrors:
-    """Join the errors of a state.
+    """Combine the errors of a state.
 
     Args:
-        solver: What the solver left.
-        estimate: What the mesh cannot tell.
+        solver: Errors of the solver.
+        estimate: Discretisation error.
         norm: Energy norm of the displacement, [√(force · length)].
     """
     by_body = {name: _ratio(value, norm) for name, value in estimate.by_body.items()}

@@ -13,7 +13,7 @@ def energy_of_difference(
     """Return ∫ C (g − ∇u) : (g − ∇u) over each of some cells of one material.
 
     Args:
-        moduli: C as `moduli` gives it, shape (dim², dim²), [force / length²].
+        moduli: C from `moduli`, shape (dim², dim²), [force / length²].
         cell_type: Type of the cells.
         points: Coordinates of the nodes, shape (n, nodes of a cell, dim), [length].
         displacement: u at the nodes, shape (n, nodes of a cell, dim), [length].
@@ -47,7 +47,7 @@ def _by_quadrature(
     positions, weights = quadrature(cell)
     values, slopes = shape_values(cell, positions), shape_gradients(cell, positions)
     total = np.zeros(len(points))
-    for weight, value, slope in zip(weights, values, slopes, strict=True):  # a few places, all cells at once
+    for weight, value, slope in zip(weights, values, slopes, strict=True):  # a few points, all cells at once
         of_cells, jacobian = _cell_gradients(points, displacement, slope)
         difference = (np.tensordot(gradient, value, axes=(1, 0)) - of_cells).reshape(len(points), -1)
         total += weight * jacobian * np.einsum("na,na->n", difference @ moduli, difference)
@@ -57,12 +57,12 @@ def _by_quadrature(
 def _cell_gradients(
     points: np.ndarray, displacement: np.ndarray, slopes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return ∇u and the Jacobian determinant of cells at one place, shapes (n, dim, dim) and (n,).
+    """Return ∇u and the Jacobian determinant of cells at one point, shapes (n, dim, dim) and (n,).
 
     Args:
         points: Coordinates of the nodes, shape (n, nodes of a cell, dim).
         displacement: u there, shape (n, nodes of a cell, dim).
-        slopes: Of the shape functions at the place, shape (nodes of a cell, dim).
+        slopes: Gradients of the shape functions at the point, shape (nodes of a cell, dim).
     """
     jacobian = np.matmul(points.transpose(0, 2, 1), slopes)
     determinant, adjugate = determinants(jacobian), _adjugate(jacobian)
@@ -80,6 +80,6 @@ def _adjugate(matrices: np.ndarray) -> np.ndarray:
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products of rows; NumPy's own takes longer to look at its axes than to multiply."""
+    """Cross products of rows; NumPy's own is dominated by its overhead."""
     ahead, behind = [1, 2, 0], [2, 0, 1]
     return np.asarray(a[:, ahead] * b[:, behind] - a[:, behind] * b[:, ahead])

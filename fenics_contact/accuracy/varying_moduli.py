@@ -1,4 +1,4 @@
-"""The energy of a difference of gradients where moduli vary from place to place: by compiled forms."""
+"""The energy of a difference of gradients for moduli that vary in space: by compiled forms."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from fenics_contact.fem import FormLibrary, Template, Written, scalar_constants,
 from fenics_contact.feti import Subdomain
 from fenics_contact.scene import Material
 
-#: Of the quadrature on linear cells, where gradients of both kinds are of first degree in each coordinate;
-#: it is twice that on quadratic ones.
+#: Degree of the quadrature on linear cells, where both gradients are of first degree in each coordinate; it
+#: is doubled on quadratic ones.
 DEGREE = 2
 
 
 def compile_energy(forms: FormLibrary, material: Material, cell_type: str) -> Template:
-    """Compile the energy of a material, where it is not there yet. Collective."""
+    """Compile the energy of a material unless that was done. Collective."""
     key = ("energy of a difference", material, cell_type)
     name = ("energy of a difference", type(material), cell_type)
     return forms.templates.get(key, name, partial(_write, material, cell_type))
 
 
 def _write(material: Material, cell_type: str) -> Written:
-    """Return ∫ C (g − ∇u) : (g − ∇u) over each cell, the rows of g and u being coefficients.
+    """Return ∫ C (g − ∇u) : (g − ∇u) over each cell, with the rows of g and u as coefficients.
 
-    A material knows displacements alone. Its energy is written for c·x − d with constants c and d, whose
-    gradient is c; then c gives way to g − ∇u, and d to (g − ∇u)·x: materials may resist displacements too,
-    and there are none here.
+    A material is defined for displacements only. Its energy is written for c·x − d with constants c and d,
+    whose gradient is c; then c is replaced by g − ∇u, and d by (g − ∇u)·x, so that the displacement is zero:
+    materials may resist displacements, too.
     """
     dim = _dolfinx.dimension(cell_type)
     template = _dolfinx.template(cell_type)
@@ -60,8 +60,8 @@ def energy_on_subdomain(
         form: The compiled form of the material.
         material: The material.
         subdomain: The subdomain.
-        blocks: Block of each node of some cells, shape (n, nodes of a cell); elsewhere the result is of no
-            use.
+        blocks: Block of each node of some cells, shape (n, nodes of a cell); elsewhere the result is
+            undefined.
         displacement: u at these nodes, shape (n, nodes of a cell, dim), [length].
         gradient: g there, shape (n, nodes of a cell, dim, dim), dimensionless.
 

@@ -1,4 +1,4 @@
-"""Errors that say what is needed, what was given and what to do, raised by all ranks or by none."""
+"""Errors that state what is needed, what was given and what to do, raised by all ranks or by none."""
 
 from fenics_contact.errors.agreement import agree, collective, collectively, together
 from fenics_contact.errors.kinds import (
@@ -35,4 +35,4 @@ __all__ = [
 ]
 
 for _kind in [value for value in globals().values() if isinstance(value, type)]:
-    _kind.__module__ = __name__  # tracebacks name the place that they are imported from
+    _kind.__module__ = __name__  # tracebacks show the public module

@@ -1,11 +1,11 @@
-"""What one rank meets, all ranks meet: errors are agreed on before they are raised.
+"""An error of one rank becomes an error of all: ranks agree before they raise.
 
-Every point at which ranks agree is one and the same exchange on a communicator of this package's own: the
-end of a block that fails or succeeds on each rank by itself (`together`), and the beginning of a function
-that all ranks have to call (`collective`). So a rank that has failed anywhere tells the others at the next
-such point that they reach, wherever that is, and so does one whose program has ended. Ranks that wait inside
-a call of MPI which the failed one will never make cannot be told; where a failed rank finds that nobody
-comes, it ends the program on all of them.
+Every point at which ranks agree is the same exchange on a communicator of this package's own: the end of a
+block that fails or succeeds on each rank by itself (`together`), and the beginning of a function that all
+ranks must call (`collective`). So a rank that has failed anywhere notifies the others at the next such point
+that they reach, and so does one whose program has ended. Ranks that wait inside an MPI call which the failed
+one will never make cannot be notified; if no other rank arrives, the failed one ends the program on all of
+them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from fenics_contact.errors.user_code import described_error, failure
 if TYPE_CHECKING:  # these errors also report that mpi4py is missing
     from mpi4py import MPI
 
-#: Marks errors that all ranks have met already.
+#: Marks errors that all ranks have raised already.
 _AGREED = "_fenics_contact_agreed"
 
 Given = ParamSpec("Given")
@@ -47,18 +47,17 @@ def agree(
     Args:
         comm: Communicator whose ranks must stay together.
         error: This rank's error, or None.
-        where: What this rank calls; all ranks must call the same.
+        where: Name of the call; it must be the same on all ranks.
         wait: Seconds after which a rank with an error ends the program, because the others wait in a call
-            that it will not make; None where they are sure to come.
-        users: This rank's error was met in a user's code. If others have met none, all raise a
-            `UserCodeError` instead; what all meet, such as an exception by which the user stops a run, stays
-            what it is.
+            that it will not make; None where they are sure to arrive.
+        users: This rank's error comes from user code. If other ranks have none, all raise a `UserCodeError`
+            instead; one that all have, such as an exception by which the user stops a run, is unchanged.
 
     Raises:
         BaseException: ``error`` itself where there is one.
         FenicsContactError: On the other ranks, of the failing rank's class where that is one of
-            this package's, else `RemoteError`; exits and interrupts stay what they are.
-        InvalidInputError: If ranks call different things.
+            this package's, else `RemoteError`; exits and interrupts are unchanged.
+        InvalidInputError: If ranks make different calls.
     """
     if comm.size == 1:
         if error is not None:
@@ -89,7 +88,7 @@ def together(comm: MPI.Comm, where: str = "") -> Iterator[None]:
         where: As for `agree`.
 
     Raises:
-        BaseException: What the block raised on this rank, or as in `agree` what it raised on another.
+        BaseException: The error of the block on this rank, or as in `agree` that on another.
 
     Example:
         >>> with together(comm):  # doctest: +SKIP
@@ -108,18 +107,18 @@ def together(comm: MPI.Comm, where: str = "") -> Iterator[None]:
 
 @contextmanager
 def collective(comm: MPI.Comm, where: str, *, closed: bool = False, users: bool = False) -> Iterator[None]:
-    """Run a block that makes collective calls; what one rank alone meets in it, all ranks meet.
+    """Run a block that makes collective calls; an error of one rank becomes an error of all.
 
-    The ranks meet at its beginning: there they hear of a failure of another one since they met last, and of
-    ranks that call something else. A rank that fails inside tells the others where these meet next. Where
-    they do not, because they wait in a call of MPI for the one that failed, it ends the program: an error
-    is logged, and all ranks are aborted.
+    The ranks meet at its beginning: there they learn of a failure of another one since the last meeting, and
+    of ranks that make a different call. A rank that fails inside notifies the others where these meet next.
+    If they do not, because they wait in an MPI call for the failed one, it ends the program: an error is
+    logged, and all ranks are aborted.
 
     Args:
         comm: Communicator whose ranks run the block.
-        where: What it is, for messages.
-        closed: Meet at its end, too: who comes after it knows that nobody failed in it.
-        users: It is a user's code, as for `agree`.
+        where: Its name, for messages.
+        closed: Meet at its end, too, so that after it no rank has failed in it.
+        users: It is user code, as for `agree`.
 
     Raises:
         BaseException: As `agree`.
@@ -142,11 +141,11 @@ def collective(comm: MPI.Comm, where: str, *, closed: bool = False, users: bool 
 def collectively(
     where: str, comm_of: Callable[..., MPI.Comm]
 ) -> Callable[[Callable[Given, Found]], Callable[Given, Found]]:
-    """Make the whole of a function a `collective` block.
+    """Make a whole function a `collective` block.
 
     Args:
         where: Its name, for messages.
-        comm_of: Gets its arguments, returns the communicator.
+        comm_of: Takes its arguments, returns the communicator.
 
     Example:
         >>> @collectively("Model.solve", lambda self: self.comm)
@@ -168,7 +167,7 @@ Report = tuple[type[BaseException], str, Any]
 
 
 def _report(error: BaseException) -> Report:
-    """Return what other ranks need: a class that they know, the message, the status of an exit."""
+    """Return the data for other ranks: a class that they know, the message, the status of an exit."""
     kind = type(error)
     if isinstance(error, FenicsContactError) and kind.__module__.startswith("fenics_contact."):
         return kind, str(error), None
@@ -180,7 +179,7 @@ def _report(error: BaseException) -> Report:
 
 
 def _named(error: BaseException | None, where: str) -> BaseException | None:
-    """Return an error of a user's code as one that says whose it is."""
+    """Return an error of user code as one that names the code."""
     if isinstance(error, FenicsContactError) or not isinstance(error, Exception):
         return error
     named = failure(where, error)
@@ -189,19 +188,19 @@ def _named(error: BaseException | None, where: str) -> BaseException | None:
 
 
 def _remote(reports: list[Report | None]) -> BaseException:
-    """Return what a rank raises that has met nothing itself."""
+    """Return the error for a rank without one of its own."""
     rank, (kind, message, code) = next((r, report) for r, report in enumerate(reports) if report is not None)
     if kind is SystemExit:
         return SystemExit(code)
     text = f"{message} (met on rank {rank})" if message else f"met on rank {rank}"
     try:
         return kind(text)
-    except TypeError:  # a class that is made of more than a message
+    except TypeError:  # a class whose constructor needs more than a message
         return RemoteError(f"{kind.__name__}: {text}")
 
 
 def _strayed(places: list[str]) -> InvalidInputError:
-    """Return what all ranks raise that call different things."""
+    """Return the error for ranks that make different calls."""
     other = next(rank for rank, place in enumerate(places) if place != places[0])
     first, second = (place or "a step inside the package" for place in (places[0], places[other]))
     return InvalidInputError(

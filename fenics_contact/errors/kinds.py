@@ -15,22 +15,22 @@ class InvalidInputError(FenicsContactError, ValueError):
 
 
 class InvalidDesignError(InvalidInputError):
-    """The objective does not exist at this design, for example because a cell is inverted.
+    """The objective is undefined at this design, for example because a cell is inverted.
 
     A minimisation that meets it tries a shorter step.
     """
 
 
 class InfeasibleError(FenicsContactError):
-    """No equilibrium exists: nothing holds some motion of some body."""
+    """No equilibrium exists: some motion of some body is not resisted."""
 
 
 class MissingRequirementError(FenicsContactError, ImportError):
-    """A library that the package stands on is missing or has an unsupported version."""
+    """A library that the package needs is missing or has an unsupported version."""
 
 
 class ForkedProcessError(FenicsContactError, RuntimeError):
-    """Something is to be computed in a process that was forked from one that had computed."""
+    """A computation in a process that was forked from one that had computed already."""
 
 
 class ConvergenceError(FenicsContactError, RuntimeError):
@@ -41,7 +41,7 @@ class ConvergenceError(FenicsContactError, RuntimeError):
     """
 
     def __init__(self, message: str, history: Sequence[Any] = ()) -> None:
-        """Keep the history beside the message."""
+        """Store the history with the message."""
         super().__init__(message)
         self.history = tuple(history)
 
@@ -49,9 +49,9 @@ class ConvergenceError(FenicsContactError, RuntimeError):
 class UserCodeError(FenicsContactError, RuntimeError):
     """A function, material or obstacle that was given to this package failed.
 
-    The message says which one, how and where; what it raised is the cause on the rank that met it.
+    The message states which one, how and where; its exception is the cause on the rank where it was raised.
     """
 
 
 class RemoteError(FenicsContactError, RuntimeError):
-    """Another rank of the communicator met an error; its message is repeated here."""
+    """Another rank of the communicator raised an error; its message is repeated here."""

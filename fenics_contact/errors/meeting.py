@@ -1,8 +1,8 @@
-"""The one exchange by which ranks meet: each says where it is, and hears where the others are.
+"""The exchange by which ranks meet: each reports where it is, and learns where the others are.
 
-It takes place on a communicator of this package's own, a duplicate of the user's. Ranks look for the others
-again and again instead of waiting inside MPI, so that they can tell what they wait for, hear an interrupt,
-and give up. A rank whose program has come to its end answers until the others have come to theirs, too.
+It takes place on a communicator of this package's own, a duplicate of the user's. Ranks poll for the others
+instead of waiting inside MPI, so that they can report what they wait for, receive an interrupt, and give up.
+A rank whose program has ended answers until those of the others have ended, too.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from fenics_contact.errors.telling import tell
 if TYPE_CHECKING:  # these errors also report that mpi4py is missing
     from mpi4py import MPI
 
-#: Seconds that a rank which failed among collective calls waits for the others: as long as the calls took so
+#: Seconds that a rank which failed in collective calls waits for the others: as long as the calls took so
 #: far, but within these limits.
 SHORTEST_WAIT, LONGEST_WAIT = 5.0, 60.0
-#: After so many seconds a rank says where it waits for the others.
+#: Seconds after which a rank reports where it waits for the others.
 PATIENCE = 30.0
-#: Waiting ranks look again after this part of the time that they have waited, and after this at most [s].
+#: Waiting ranks poll again after this fraction of the time waited, and at most after this many seconds.
 PAUSE, LONGEST_PAUSE = 0.05, 5e-3
-#: What a rank that failed says in place of where it is.
+#: What a failed rank reports instead of its position.
 FAILED = 0
-#: Where ranks are whose program is over.
+#: Position of ranks whose program has ended.
 ENDED = "nothing any more, for its program has ended"
 
-#: Duplicates that are in use: those who meet there are answered at the end of the program, too.
+#: Duplicates in use: ranks that meet there are answered at the end of the program, too.
 _open: dict[int, MPI.Comm] = {}
 _LOG = logging.getLogger(__name__)
 _WAITING = (
@@ -48,9 +48,9 @@ _ENDING = (
 
 
 def own_of(comm: MPI.Comm) -> MPI.Comm:
-    """Return the duplicate of a communicator on which ranks meet; what users send never meets this.
+    """Return the duplicate of a communicator on which ranks meet, separate from users' messages.
 
-    Collective on ``comm`` when it is asked for first.
+    Collective on ``comm`` on first use.
     """
     kind: Any = type(comm)
     key = _key(kind)
@@ -59,7 +59,8 @@ def own_of(comm: MPI.Comm) -> MPI.Comm:
         own = comm.Dup()
         comm.Set_attr(key, own)
         _open[id(own)] = own
-    # What was registered last comes first: before the end of PETSc, which waits for ranks and may be new.
+    # Handlers run in reverse order: this one before the end of PETSc, which waits for ranks and may be
+    # recent.
     atexit.unregister(_answer_until_all_have_ended)
     atexit.register(_answer_until_all_have_ended, os.getpid())
     return cast("MPI.Comm", own)
@@ -67,7 +68,7 @@ def own_of(comm: MPI.Comm) -> MPI.Comm:
 
 @cache
 def _key(kind: Any) -> int:
-    """Return the key under which MPI keeps an attribute of this module with communicators of a class."""
+    """Return the key under which MPI stores an attribute of this module with communicators of a class."""
     return int(kind.Create_keyval(delete_fn=_freed))
 
 
@@ -80,16 +81,16 @@ class Post:
     """One exchange under way.
 
     Attributes:
-        places: Where all ranks are, once `ended` says that it is over.
+        places: Where all ranks are, once `ended` is true.
     """
 
     def __init__(self, own: MPI.Comm, place: int) -> None:
-        """Say where this rank is."""
+        """Report where this rank is."""
         self._mine, self.places = array("q", [place]), array("q", [0]) * own.size
         self._request = own.Iallgather(self._mine, self.places)
 
     def ended(self) -> bool:
-        """Tell whether all ranks have said where they are."""
+        """Return whether all ranks have reported where they are."""
         return bool(self._request.Test())
 
 
@@ -101,12 +102,12 @@ def place_of(where: str) -> int:
 def exchanged(
     own: MPI.Comm, error: BaseException | None, where: str, wait: float | None
 ) -> tuple[list[int], BaseException | None]:
-    """Return where all ranks are, and this rank's error: also an interrupt that it met while it waited.
+    """Return where all ranks are, and this rank's error, possibly an interrupt received while waiting.
 
     Args:
-        own: What `own_of` returned.
+        own: The communicator from `own_of`.
         error: This rank's error, or None.
-        where: What this rank calls.
+        where: Name of this rank's call.
         wait: Seconds after which a rank with an error ends the program; None for never.
     """
     post = Post(own, place_of(where) if error is None else FAILED)
@@ -124,17 +125,18 @@ def exchanged(
                 tell(_LOG.warning, _WAITING, own.rank, waited, where)
             time.sleep(min(PAUSE * waited, LONGEST_PAUSE))
         except BaseException as caught:
-            # The exchange must end before its buffers go: an interrupt has to wait for that, not for ever.
+            # The exchange must end before its buffers are freed: an interrupt waits for that, but not for
+            # ever.
             if error is not None or type(caught).__module__.startswith("mpi4py"):
                 raise
             error, wait = caught, SHORTEST_WAIT + time.monotonic() - begun
 
 
 def _answer_until_all_have_ended(process: int) -> None:
-    """Stay until the other ranks have come to their end, too, as MPI itself would, but tell those that call.
+    """Stay until the other ranks have ended, too, as MPI itself would, but answer those that call.
 
     Args:
-        process: The one that is a rank; children that it has forked are none.
+        process: Id of the process that is the rank; forked children are not ranks.
     """
     finalized = any(sys.modules[type(own).__module__].Is_finalized() for own in _open.values())
     if os.getpid() != process or finalized:

@@ -1,4 +1,4 @@
-"""Reports to loggers: a handler that fails does not stop a run, on one rank least of all."""
+"""Reports to loggers: a failing handler must not stop a run, least of all on one rank."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from typing import Any
 
 
 def tell(log: Callable[..., None], message: str, *arguments: Any, **named: Any) -> None:
-    """Log a message, whatever handlers do.
+    """Log a message, whatever handlers raise.
 
-    A handler of the user's that raises is treated as those of the standard library treat their own errors:
-    its traceback goes to stderr if ``logging.raiseExceptions`` is set, and the run goes on.
+    A user's handler that raises is treated as in the standard library: its traceback goes to stderr if
+    ``logging.raiseExceptions`` is set, and the run continues.
 
     Args:
         log: Method of a logger, such as ``logger.info``.
         message: The message.
-        *arguments: What is put into it.
-        **named: As the method takes them.
+        *arguments: Values that are formatted into it.
+        **named: Keyword arguments of the method.
 
     Example:
         >>> tell(logging.getLogger("fenics_contact").debug, "%d products", 3)

@@ -1,4 +1,4 @@
-"""Calls of what a user has given: whatever they raise says who raised it."""
+"""Calls of user code, whose errors name their source."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from fenics_contact.errors.kinds import FenicsContactError, InvalidInputError, U
 
 @contextmanager
 def calling(what: str) -> Iterator[None]:
-    """Call a user's code: what it raises becomes a `UserCodeError` that names it.
+    """Call user code: its exceptions become a `UserCodeError` that names it.
 
-    An exit counts as a failure too: a load or a material may not end a program, on one rank least of all.
+    An exit counts as a failure, too: a load or a material may not end a program, least of all on one rank.
     Errors of this package, which such code may raise on purpose, and interrupts pass.
 
     Args:
-        what: Whose code it is, for the message: "the function given as Traction on body 'bar'".
+        what: Name of the code, for the message: "the function given as Traction on body 'bar'".
 
     Raises:
         UserCodeError: If the block raises; the cause is chained.
@@ -38,16 +38,16 @@ def calling(what: str) -> Iterator[None]:
 
 
 def failure(what: str, error: BaseException) -> UserCodeError:
-    """Return what is raised when a user's code has met an error."""
+    """Return the exception for an error of user code."""
     return UserCodeError(f"{what} failed with {described_error(error)}: mend it, or catch the error there")
 
 
 @contextmanager
 def running(what: str) -> Iterator[None]:
-    """Run what a scene file names: whatever it raises is a mistake in the file; leaving Python, too.
+    """Run code that a scene file names: any exception, also an exit, is a mistake in the file.
 
     Raises:
-        InvalidInputError: With the class and the words of what was raised.
+        InvalidInputError: With the class and the message of the exception.
     """
     try:
         yield
@@ -63,7 +63,7 @@ def described_error(error: BaseException) -> str:
     """Return class, message and place of an error in one line."""
     try:
         message = str(error)
-    except Exception:  # a class of the user's may fail at that, too
+    except Exception:  # a user's class may fail at that, too
         message = "a message that cannot be shown"
     name = type(error).__name__
     frames = traceback.extract_tb(error.__traceback__)

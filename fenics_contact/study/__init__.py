@@ -1,7 +1,7 @@
-"""What accuracy costs in time: runs of one scene with other meshes, tolerances and discretisations.
+"""Cost of accuracy in time: runs of one scene with different meshes, tolerances and discretisations.
 
-`run_study` measures, `write_report` concludes; ``python -m fenics_contact accuracy SCENE`` does both. A scene
-of one's own is a Python file that defines ``study``, a `StudyScene`.
+`run_study` measures, `write_report` evaluates; ``python -m fenics_contact accuracy SCENE`` does both. A scene
+of your own is a Python file that defines ``study``, a `StudyScene`.
 """
 
 from __future__ import annotations

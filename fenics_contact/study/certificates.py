@@ -1,4 +1,4 @@
-"""Does the certificate keep its promise: never below the true error, and not far above it?"""
+"""Check that the certificate is never below the true error, and not far above it."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from dataclasses import dataclass
 
 from fenics_contact.study.results import Results
 
-#: How far above the true error a certificate may be.
+#: Largest accepted ratio of a certificate to the true error.
 LARGEST_FACTOR = 10.0
 
 
 @dataclass(frozen=True)
 class CertificateCheck:
-    """The certificates of all runs beside the true errors.
+    """The certificates of all runs compared with the true errors.
 
     Attributes:
-        checked: Runs of which both are known.
-        unknown: Runs without one of them.
+        checked: Number of runs of which both are known.
+        unknown: Number of runs without one of them.
         smallest_factor: Smallest ratio of the certificate to the true error, 1 or more if it is a bound.
         largest_factor: Largest ratio.
-        broken: What was promised and not kept, in words.
+        broken: Descriptions of violations.
     """
 
     checked: int
@@ -32,7 +32,7 @@ class CertificateCheck:
 def check_certificates(results: Results) -> CertificateCheck:
     """Compare the certificate of every run with its true algebraic error.
 
-    The solution that counts as exact has a certificate of its own, which is how uncertain the comparison is.
+    The reference solution has a certificate of its own, which is the uncertainty of the comparison.
     """
     factors, broken, unknown = [], [], 0
     for run in results.good:

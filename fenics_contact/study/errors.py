@@ -1,4 +1,4 @@
-"""Errors of every run in every quantity: against the truth, the limit of the meshes, or the finest one."""
+"""Errors of every run in every quantity: relative to an exact value, an extrapolation, or the finest mesh."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from fenics_contact.study.richardson import extrapolate, measured_rate
 
 @dataclass(frozen=True)
 class Reference:
-    """What a quantity is compared with.
+    """The reference value of a quantity.
 
     Attributes:
         kind: "extrapolated", "finest mesh", or the source of the true value, such as "theory".
-        value: Its value; None for a true one, which may differ from run to run.
-        rate: Rate that the extrapolation found, None without one.
+        value: Its value; None for an exact one, which may differ from run to run.
+        rate: Rate of the extrapolation, None without one.
         note: Why nothing was extrapolated.
-        true: Whether it is a true value, which every run has beside its own.
+        true: Whether it is an exact value, which every run stores with its own.
     """
 
     kind: str
@@ -45,11 +45,11 @@ class Errors:
 
     @cached_property
     def references(self) -> dict[str, Reference]:
-        """Quantity -> what it is compared with."""
+        """Quantity -> its reference."""
         return {quantity.name: self._reference(quantity) for quantity in self.results.scene.quantities}
 
     def of(self, run: Run, quantity: str) -> float | None:
-        """Return the relative error of a run, None where it is not known."""
+        """Return the relative error of a run, None if unknown."""
         found = (run.quantities or {}).get(quantity)
         if run.failed or found is None:
             return None
@@ -66,7 +66,7 @@ class Errors:
         return float(np.linalg.norm(value - known) / scale)
 
     def sequence(self, parameters: Parameters) -> tuple[Run, ...]:
-        """Return the runs that differ from some settings in the mesh size alone, coarse ones first."""
+        """Return the runs that differ from some settings only in the mesh size, coarse ones first."""
         alike = [
             run
             for run in self.results.good
@@ -75,7 +75,7 @@ class Errors:
         return tuple(sorted(alike, key=lambda run: run.parameters.size))
 
     def strictest(self, parameters: Parameters) -> Parameters:
-        """Return settings with the smallest tolerance that the base's method was run with."""
+        """Return settings with the smallest tolerance at which the base's method was run."""
         numbers = [
             float(run.parameters.tolerance)
             for run in self.results.good
@@ -119,7 +119,7 @@ class Errors:
         return Reference(kind, found.value, found.rate, found.refused)
 
     def _is_finest(self, run: Run) -> bool:
-        """Tell whether a run discretises like the one that the finest mesh's value is from."""
+        """Return whether a run has the discretisation of the reference on the finest mesh."""
         sequence = self.sequence(self.strictest(self.results.base))
         if not sequence:
             return False

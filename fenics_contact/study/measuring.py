@@ -1,4 +1,4 @@
-"""One run: solve, measure, compare with the exact answer of the same mesh."""
+"""One run: solve, measure, compare with the exact discrete solution."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from fenics_contact.timing import PhaseTimer
 def measured(
     comm: MPI.Comm, scene: str, parameters: Mapping[str, Any], *, verify: bool = False
 ) -> dict[str, Any]:
-    """Run once and return everything that is known of it. Collective.
+    """Run once and return all measurements. Collective.
 
     Args:
         comm: Communicator.
         scene: As for `find_study`.
         parameters: The settings, as `Parameters.as_dict` returns them.
-        verify: Whether to look for errors too, not only for seconds.
+        verify: Whether to compute errors, too, not only times.
     """
     study, settings = find_study(scene), parameters_from(parameters)
-    _dolfinx.release()  # loads dolfinx, which is no part of a run's seconds
+    _dolfinx.release()  # loads dolfinx, which is not part of a run's time
     comm.Barrier()
     began, timer = perf_counter(), PhaseTimer()
     with timer.phase("mesh"):
@@ -63,7 +63,7 @@ def error_parts(state: State) -> dict[str, float | None]:
     """Return the three parts of a state's error, relative to its energy norm. Collective."""
     errors = state.errors
     parts = {name: float(getattr(errors, name)) for name in ("algebraic", "friction", "discretisation")}
-    # Where no admissible pair was found the bound is infinite, which JSON does not know.
+    # Without an admissible pair the bound is infinite, which JSON cannot represent.
     return {name: value if np.isfinite(value) else None for name, value in parts.items()}
 
 
@@ -76,10 +76,10 @@ def _counts(states: tuple[State, ...]) -> dict[str, int]:
 
 
 def _quantity(quantity: Quantity, outcome: Outcome) -> dict[str, Any] | None:
-    """Return a quantity with its exact value where there is one; None where the run does not know it.
+    """Return a quantity with its exact value if there is one; None if the run does not have it.
 
-    Of several numbers with an exact answer only the norms and the norm of the difference are kept: their
-    places may differ from mesh to mesh.
+    Of several numbers with an exact value only the norms and the norm of the difference are stored: their
+    positions may differ from mesh to mesh.
     """
     value = np.asarray(quantity.value(outcome), dtype=np.float64)
     if value.size == 0 or not np.all(np.isfinite(value)):

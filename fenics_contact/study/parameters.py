@@ -1,4 +1,4 @@
-"""The settings of one run, and which runs a study makes of them."""
+"""The settings of one run, and the runs of a study."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ RunTolerance: TypeAlias = float | Literal["balanced"]
 
 #: Discretisations of contact, see `scene.ContactPair`.
 DISCRETISATIONS = ("node", "mortar")
-#: How Coulomb's law is met: within every Newton step, or by a loop of Tresca problems around them.
+#: How Coulomb's law is solved: within every Newton step, or by an outer loop of Tresca problems.
 SOLVERS = ("newton", "fixed point")
 
 
 @dataclass(frozen=True)
 class Parameters:
-    """What may differ between two runs of a study.
+    """The settings that may differ between two runs of a study.
 
     Attributes:
-        size: How fine the mesh is, in the scene's own count: cells on the contact radius, for instance.
+        size: Mesh resolution in the scene's own count: cells on the contact radius, for instance.
         cell: Type of the cells, a key of `geometry.CELL_TYPES`.
         discretisation: "node" or "mortar", see `scene.ContactPair`.
         tolerance: Largest relative residual, or "balanced".
         solver: "newton" (`qp.FaceNewton`) or "fixed point" (`contact.FixedPoint` around it).
-        subdomains: About how many subdomains; None: of a good size.
+        subdomains: Approximate number of subdomains; None: of a suitable size.
     """
 
     size: int
@@ -43,7 +43,7 @@ class Parameters:
     subdomains: int | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what no scene knows."""
+        """Reject settings that no scene knows."""
         _require("size", self.size, isinstance(self.size, int) and self.size > 0, "a positive integer")
         _require("cell", self.cell, self.cell in CELL_TYPES, f"one of {sorted(CELL_TYPES)}")
         known = self.discretisation in DISCRETISATIONS
@@ -61,7 +61,7 @@ class Parameters:
         return self.tolerance == BALANCED
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the settings by name, as JSON knows them."""
+        """Return the settings by name, ready for JSON."""
         return asdict(self)
 
     def __str__(self) -> str:
@@ -73,7 +73,7 @@ class Parameters:
 
     @property
     def tolerance_words(self) -> str:
-        """The tolerance as tables and axes show it."""
+        """The tolerance as shown in tables and axes."""
         return str(self.tolerance) if isinstance(self.tolerance, str) else f"{self.tolerance:.0e}"
 
     def differences(self, other: Parameters) -> tuple[str, ...]:
@@ -82,7 +82,7 @@ class Parameters:
         return tuple(name for name in mine if mine[name] != theirs[name])
 
     def rank(self) -> tuple[int, float]:
-        """Return something to sort by: coarse before fine, loose before strict, balanced last."""
+        """Return a sort key: coarse before fine, loose before strict, balanced last."""
         return self.size, 0.0 if isinstance(self.tolerance, str) else -self.tolerance
 
 
@@ -98,10 +98,10 @@ def _require(name: str, given: object, holds: bool, allowed: str) -> None:
 
 @dataclass(frozen=True)
 class Sweep:
-    """Which settings a study varies: one at a time around a base, and mesh and tolerance together.
+    """The settings that a study varies: one at a time around a base, and mesh and tolerance together.
 
     Attributes:
-        base: Where one setting at a time is varied.
+        base: Settings around which one at a time is varied.
         sizes: Meshes, all with every tolerance, and with the base's other settings.
         tolerances: Tolerances of the Newton method.
         cells: Cell types, on all meshes.

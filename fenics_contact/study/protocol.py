@@ -1,4 +1,4 @@
-"""What a scene must offer to be studied: how it is built, what is measured, and what theory says."""
+"""What a scene must provide for a study: construction, measured quantities, and theoretical values."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from fenics_contact.study.parameters import Parameters, Sweep
 
 @dataclass(frozen=True)
 class Problem:
-    """What one run solves.
+    """The problem of one run.
 
     Attributes:
         scene: The scene.
-        steps: Load steps; none: the scene as it is, at once.
+        steps: Load steps; none: the scene in a single step.
         design: A surface by whose control points the total potential is differentiated, or None.
     """
 
@@ -33,10 +33,10 @@ class Problem:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one run found; everything in it is replicated or collective.
+    """The result of one run; everything in it is replicated or collective.
 
     Attributes:
-        problem: What was solved.
+        problem: The solved problem.
         states: States at the end of every load step.
         parameters: Settings of the run.
         gradient: Derivative of the total potential by the design, shape (n_variables,); empty without one.
@@ -53,28 +53,28 @@ class Outcome:
         return self.states[-1]
 
     def slave_points(self) -> np.ndarray:
-        """Return where the contact points lie before the load, shape (n, dim), [length]."""
+        """Return the initial positions of the contact points, shape (n, dim), [length]."""
         return self.state.contact_places
 
 
-#: A number, or several that are judged together by their Euclidean norm.
+#: A number, or several that are compared by their Euclidean norm.
 Value: TypeAlias = float | np.ndarray
 Measure: TypeAlias = Callable[[Outcome], Value]
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """Something a user wants to know to a certain accuracy.
+    """A quantity of interest.
 
     Attributes:
-        name: In words, "peak pressure".
+        name: Its name, such as "peak pressure".
         unit: Its unit, empty for a ratio.
-        value: Measures it. Called by all ranks together; returns the same on each.
-        exact: The true value: a number, or a function of the outcome where theory takes measured forces;
-            None where the study must extrapolate.
-        source: What the true value is from, in a few words.
-        rate: Power of the mesh size with which theory lets the error fall, None where it says nothing.
-        phases: What must be done beside the state to know it, such as "adjoint": its time counts.
+        value: Evaluates it. Called by all ranks together; returns the same value on each.
+        exact: The true value: a number, or a function of the outcome where theory uses measured forces; None
+            where the study must extrapolate.
+        source: Source of the true value, in a few words.
+        rate: Theoretical convergence rate in the mesh size, None if unknown.
+        phases: Phases needed in addition to the state, such as "adjoint": their time counts.
     """
 
     name: str
@@ -88,21 +88,21 @@ class Quantity:
 
 @dataclass(frozen=True)
 class StudyScene:
-    """A scene whose accuracy is studied, with everything that a study needs to know about it.
+    """A scene whose accuracy is studied, with all data that a study needs.
 
     Attributes:
         name: Short name, part of file names.
-        title: For headings.
+        title: Title for headings.
         build: Builds the problem of a run; collective on the communicator.
-        quantities: What is measured; the first is the main one.
+        quantities: The measured quantities; the first is the main one.
         sweep: Runs of a study.
         quick: Runs of a study of about a minute.
-        size_name: What `Parameters.size` counts, "cells on the contact radius".
+        size_name: Meaning of `Parameters.size`, "cells on the contact radius".
         spacing: Mesh size h by `Parameters.size`, in the unit below.
         spacing_unit: Unit of h.
-        energy_rate: Power of h with which theory lets the error fall in energy norm: 1 for linear elements,
-            less where the solution has a singularity.
-        about: What a reader must know of the scene, in a few sentences.
+        energy_rate: Theoretical convergence rate in energy norm: 1 for linear elements, less where the
+            solution has a singularity.
+        about: Description of the scene in a few sentences.
 
     Example:
         >>> study = StudyScene("bar", "A bar", build, (length,), sweep, sweep)  # doctest: +SKIP
@@ -121,7 +121,7 @@ class StudyScene:
     about: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse a scene without anything to measure, and names that files or tables cannot bear."""
+        """Reject a scene without quantities, and names that are unsuitable for files or tables."""
         if not self.quantities:
             raise InvalidInputError("a study needs at least one quantity, got none: say what is measured")
         names = [quantity.name for quantity in self.quantities]
@@ -134,7 +134,7 @@ class StudyScene:
 
     @property
     def facts(self) -> SceneFacts:
-        """What the results need to know about the scene, without its functions."""
+        """The data of the scene for the results, without its functions."""
         runs = (*self.sweep.runs(), *self.quick.runs())
         quantities = tuple(
             QuantityFacts(q.name, q.unit, "" if q.exact is None else q.source, q.rate, q.phases)
@@ -147,7 +147,7 @@ class StudyScene:
 
 @dataclass(frozen=True)
 class QuantityFacts:
-    """A quantity in stored results: as `Quantity`, the source being empty where no true value is known."""
+    """A quantity in stored results: as `Quantity`, with an empty source where no true value is known."""
 
     name: str
     unit: str

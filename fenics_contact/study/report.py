@@ -1,4 +1,4 @@
-"""Everything that a study leaves: results, table, figures; and the page of all studies."""
+"""The output of a study: results, table, figures; and the page of all studies."""
 
 from __future__ import annotations
 
@@ -49,15 +49,15 @@ have; ratios above one are dearer.
 
 
 def write_report(folder: str | Path, results: Results, *, figures: bool = True) -> str:
-    """Write ``study.json``, ``table.md`` and the figures of a study, also of one that is not complete.
+    """Write ``study.json``, ``table.md`` and the figures of a study, also of an incomplete one.
 
     Args:
-        folder: Where to; created.
-        results: What was measured.
+        folder: Output folder; created.
+        results: The measurements.
         figures: Whether to draw; needs matplotlib.
 
     Returns:
-        What an accuracy takes and what a setting costs, as Markdown.
+        The costs of accuracies and of settings, as Markdown.
     """
     target, errors = Path(folder), Errors(results)
     findings = {"references": errors.references, "certificates": check_certificates(results)}
@@ -72,7 +72,7 @@ def write_report(folder: str | Path, results: Results, *, figures: bool = True) 
 
 
 def write_overview(folder: str | Path) -> Path:
-    """Write ``README.md`` of a folder that holds studies, each in a folder of its own.
+    """Write ``README.md`` of a folder of studies, each in its own folder.
 
     Args:
         folder: The folder.
@@ -103,7 +103,7 @@ def overview_page(folder: Path) -> str:
 
 
 def table_page(errors: Errors) -> str:
-    """Return ``table.md``: what was found, and every run."""
+    """Return ``table.md``: the findings, and every run."""
     check = check_certificates(errors.results)
     parts = [_title(errors, 1), _measured(errors.results), _answers(errors), "## Rates\n"]
     parts += [rates_table(errors), "## Certificates\n", _certificates(check), "## Runs\n", _runs(errors)]
@@ -116,7 +116,7 @@ def _title(errors: Errors, level: int) -> str:
 
 
 def _measured(results: Results) -> str:
-    """Say how it was measured."""
+    """Describe how it was measured."""
     repeats = sorted({run.repeats for run in results.good}) or [0]
     load = max((run.load_average for run in results.good), default=0.0)
     between = f"{repeats[0]} to {repeats[-1]}" if len(repeats) > 1 else f"{repeats[0]}"
@@ -129,7 +129,7 @@ def _measured(results: Results) -> str:
 
 
 def _answers(errors: Errors) -> str:
-    """Return what an accuracy takes and what a setting costs."""
+    """Return the costs of accuracies and of settings."""
     scene, ranks = errors.results.scene, errors.results.ranks
     of = f"size: {scene.size_name}; on {ranks} rank{'s' if ranks > 1 else ''}"
     return (
@@ -139,7 +139,7 @@ def _answers(errors: Errors) -> str:
 
 
 def rates_table(errors: Errors) -> str:
-    """Tell, for each quantity, what it is compared with and how fast its error falls, beside theory."""
+    """Return, for each quantity, its reference and its measured and theoretical convergence rates."""
     strict = errors.strictest(errors.results.base)
     head, body = ("quantity", "compared with", "value", "rate found", "rate of theory"), []
     for quantity in errors.results.scene.quantities:

@@ -1,4 +1,4 @@
-"""What a study found, as it is kept in `study.json` and read from there."""
+"""The results of a study, as stored in `study.json`."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from fenics_contact.study.protocol import QuantityFacts, SceneFacts
 
 @dataclass(frozen=True)
 class Run:
-    """One set of parameters, measured.
+    """The measurements of one set of parameters.
 
     Attributes:
         parameters: The settings.
-        failed: Why there is no answer; empty if there is one.
+        failed: Why there is no result; empty if there is one.
         seconds: Wall time from the mesh to the state, median of the repeats, [s].
         spread: Smallest and largest of the repeats, [s].
-        repeats: How many there were.
-        phases: Seconds by phase of the repeat in the middle, slowest rank.
-        phases_after: The same of what comes after the state: objective, adjoint, gradient.
-        memory: Peak resident memory of all ranks together, [byte]; None where it is not known.
+        repeats: Number of repeats.
+        phases: Seconds by phase of the median repeat, slowest rank.
+        phases_after: The same for work after the state: objective, adjoint, gradient.
+        memory: Peak resident memory of all ranks together, [byte]; None if unknown.
         load_average: Largest load of the machine over the minute before a repeat.
         counts: Sizes, products and statuses.
         residual: Largest relative residual that was reached.
-        quantities: Name -> value, and exact value and relative error where theory knows it.
+        quantities: Name -> value, and exact value and relative error where there is one.
         parts: Errors by solver, friction law and mesh, relative energy norms.
-        true_errors: What they bound: `TrueErrors`; None where no exact solution was found.
+        true_errors: The true errors, `TrueErrors`; None where no exact solution was computed.
     """
 
     parameters: Parameters
@@ -51,12 +51,12 @@ class Run:
     true_errors: Mapping[str, float] | None = None
 
     def value(self, quantity: str) -> Any:
-        """Return the value of a quantity, None where the run does not know it."""
+        """Return the value of a quantity, None if the run does not have it."""
         found = (self.quantities or {}).get(quantity)
         return None if found is None else found["value"]
 
     def seconds_of(self, quantity: QuantityFacts) -> float:
-        """Return what it takes to know a quantity: the state and what comes after it, [s]."""
+        """Return the time to compute a quantity: that of the state and the phases after it, [s]."""
         return self.seconds + sum(self.phases_after.get(phase, 0.0) for phase in quantity.phases)
 
 
@@ -65,11 +65,11 @@ class Results:
     """All runs of a study.
 
     Attributes:
-        scene: What was studied.
+        scene: The studied scene.
         ranks: MPI ranks of every run.
         runs: The runs, coarse ones first.
         base: Settings around which one at a time was varied.
-        versions: What computed them.
+        versions: Versions of the software.
     """
 
     scene: SceneFacts
@@ -80,12 +80,12 @@ class Results:
 
     @property
     def good(self) -> tuple[Run, ...]:
-        """The runs that have an answer."""
+        """The runs that have a result."""
         return tuple(run for run in self.runs if not run.failed)
 
 
 def write_results(path: Path, results: Results, findings: Mapping[str, Any]) -> Path:
-    """Write results with what was concluded from them as JSON."""
+    """Write results and findings as JSON."""
     scene = results.scene
     facts = {f.name: getattr(scene, f.name) for f in fields(scene)}
     facts["spacing"] = {str(size): h for size, h in scene.spacing.items()}

@@ -1,4 +1,4 @@
-"""What a sequence of meshes converges to, if it does."""
+"""The limit of a sequence of meshes, if it converges."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-#: Rates between which a sequence counts as converging: beyond them an extrapolated value means nothing.
+#: Rates between which a sequence counts as converging: beyond them an extrapolated value is meaningless.
 RATES = (0.45, 6.0)
 #: Relative changes below this are rounding.
 ROUNDING = 1e-12
@@ -20,7 +20,7 @@ class Extrapolation:
 
     Attributes:
         value: f₀; that of the finest mesh where it could not be extrapolated.
-        rate: p, None where there is none.
+        rate: p, None if there is none.
         refused: Why nothing was extrapolated; empty if it was.
     """
 
@@ -30,11 +30,11 @@ class Extrapolation:
 
 
 def extrapolate(spacing: Sequence[float], values: Sequence[float]) -> Extrapolation:
-    """Extrapolate to h = 0 by Richardson's rule with a rate that the meshes show themselves.
+    """Extrapolate to h = 0 by Richardson's rule with the measured rate.
 
     Args:
         spacing: Mesh sizes, falling, (n,).
-        values: What was computed on them, (n,).
+        values: Values on them, (n,).
 
     References:
         P. J. Roache, Quantification of uncertainty in computational fluid dynamics, Annu. Rev. Fluid Mech.

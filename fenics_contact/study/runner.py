@@ -1,4 +1,4 @@
-"""Measurements in processes of their own: repeated, kept when they are done, taken up where they stopped."""
+"""Measurements in separate processes: repeated, stored when finished, resumed where they stopped."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from fenics_contact.io import write_json
 from fenics_contact.launching import Ending, finished, last_words, launcher
 from fenics_contact.progress import Task, duration, show_progress
 
-#: The program of a run: the communicator is for a program to choose, not for the package.
+#: The program of a run: the program, not the package, chooses the communicator.
 PROGRAM = "from mpi4py import MPI; from fenics_contact.study.worker import main; main(MPI.COMM_WORLD)"
 WITHOUT_MPI = "from fenics_contact.study.worker import main; main(None)"
-#: Failures that may not happen again.
+#: Failures that may be transient.
 TRANSIENT = {"crash", "timeout"}
 
 Record = dict[str, Any]
@@ -31,20 +31,20 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Job:
-    """Something that is measured.
+    """A measurement.
 
     Attributes:
-        name: How progress and tables call it.
-        function: What is called on all ranks, ``"module:function"``: with the communicator and the arguments.
-            It returns a mapping that JSON can hold, the same on every rank.
+        name: Its name in progress and tables.
+        function: Function called on all ranks, ``"module:function"``, with the communicator and the
+            arguments. It returns a mapping that JSON can hold, the same on every rank.
         arguments: Named arguments that JSON can hold.
-        first: More of them, for the first measurement alone.
+        first: Additional ones for the first measurement only.
         ranks: MPI ranks; 0: one process without MPI, whose function gets None for the communicator.
-        threads: BLAS threads of each rank; None: one, unless the environment says otherwise.
-        repeats: How often it is measured.
-        short: Seconds from which on it is measured only once: what disturbs short runs matters little to it.
-        limit: Seconds after which it is given up.
-        weight: About how long it takes beside others.
+        threads: BLAS threads of each rank; None: one, unless the environment sets another number.
+        repeats: Number of measurements.
+        short: Duration, [s], from which it is measured only once, as disturbances matter little.
+        limit: Seconds after which it is aborted.
+        weight: Approximate duration relative to others.
     """
 
     name: str
@@ -63,13 +63,13 @@ def measure(job: Job, *, first: bool = True) -> Record:
     """Measure once.
 
     Args:
-        job: What.
-        first: Whether with the arguments of the first measurement.
+        job: The measurement.
+        first: Whether to use the arguments of the first measurement.
 
     Returns:
-        What the function returned, with ranks, ``peak_memory`` and ``import_memory`` of all ranks together,
-        [byte], and the machine's ``load_average`` over the minute before; or ``failed``, which says why there
-        is no answer by ``kind`` and ``message``.
+        The result of the function, with ranks, ``peak_memory`` and ``import_memory`` of all ranks together,
+        [byte], and the machine's ``load_average`` over the minute before; or ``failed`` with ``kind`` and
+        ``message``.
     """
     load = os.getloadavg()[0]
     with tempfile.TemporaryDirectory() as folder:
@@ -86,7 +86,7 @@ def measure(job: Job, *, first: bool = True) -> Record:
 
 
 def _environment(threads: int | None) -> dict[str, str]:
-    """Return the environment of a run: this very package, and ranks, not threads, that share the cores."""
+    """Return the environment of a run: this package, with ranks instead of threads on the cores."""
     kept = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", **os.environ}
     if threads is not None:
         kept["OPENBLAS_NUM_THREADS"] = str(threads)
@@ -109,7 +109,7 @@ def _failure(command: list[str], ending: Ending, limit: float) -> dict[str, str]
 
 
 def fingerprint(files: Iterable[Path]) -> str:
-    """Return a short hash of the code that runs execute: what other code has measured is not used."""
+    """Return a short hash of the code that runs execute: measurements of other code are not used."""
     digest = hashlib.sha256()
     for path in sorted(files):
         digest.update(path.name.encode() + b"\0" + path.read_bytes())
@@ -118,11 +118,11 @@ def fingerprint(files: Iterable[Path]) -> str:
 
 @dataclass(frozen=True)
 class Store:
-    """Finished measurements on the disk, one file each.
+    """Finished measurements on disk, one file each.
 
     Attributes:
-        folder: Where the files are.
-        mark: What the code that ran is called, see `fingerprint`.
+        folder: Folder of the files.
+        mark: Mark of the measured code, see `fingerprint`.
     """
 
     folder: Path
@@ -135,7 +135,7 @@ class Store:
         return self.folder / f"{hashlib.sha256(key).hexdigest()[:16]}-{repeat}.json"
 
     def read(self, job: Job, repeat: int) -> Record | None:
-        """Return a measurement or the failure that was met, None if it is not there or damaged (logged)."""
+        """Return a measurement or its failure, None if it is missing or damaged (logged)."""
         path = self.file(job, repeat)
         if not path.exists():
             return None
@@ -146,12 +146,12 @@ class Store:
         return record
 
     def records(self, job: Job) -> list[Record]:
-        """Return all measurements of a job, the first one first; none where that is missing."""
+        """Return all measurements of a job, the first one first; empty if that is missing."""
         found = [self.read(job, repeat) for repeat in range(job.repeats)]
         return [record for record in found if record is not None] if found[0] is not None else []
 
     def complete(self, job: Job) -> bool:
-        """Tell whether a job is measured as often as it should be, without a failure."""
+        """Return whether a job has all its measurements, without a failure."""
         missing = any(self.missing(job, repeat) for repeat in range(job.repeats))
         return not missing and not any("failed" in record for record in self.records(job))
 
@@ -161,7 +161,7 @@ class Store:
             self.file(job, repeat).unlink(missing_ok=True)
 
     def missing(self, job: Job, repeat: int) -> bool:
-        """Tell whether a measurement is not there and makes sense, or failed in a way that may pass."""
+        """Return whether a measurement is missing and needed, or failed in a way that may be transient."""
         record = self.read(job, repeat)
         if record is not None:
             return "failed" in record and record["failed"]["kind"] in TRANSIENT
@@ -171,7 +171,7 @@ class Store:
         )
 
     def write(self, job: Job, repeat: int, record: Record) -> None:
-        """Keep a measurement; the file appears whole or not at all."""
+        """Store a measurement; the file is written atomically."""
         what = {"name": job.name, "arguments": dict(job.arguments), "code": self.mark}
         write_json(self.file(job, repeat), {**what, **record})
 
@@ -184,21 +184,22 @@ def measure_all(
     warm_up: Sequence[Job] = (),
     stream: TextIO | None = None,
 ) -> None:
-    """Measure what is missing, and keep it.
+    """Measure and store what is missing.
 
-    A job is repeated only after all others were measured: load that lasts a while hits none alone.
+    A job is repeated only after all others were measured, so that a temporary load does not affect one job
+    only.
 
     Args:
-        jobs: What is wanted, in the order of measurement.
-        store: Where measurements are kept.
-        title: What progress calls all of it.
-        warm_up: Jobs whose compiled forms the others find; done first if anything is missing, and not kept.
-        stream: Where progress is told; stderr by default.
+        jobs: The jobs, in the order of measurement.
+        store: Store of the measurements.
+        title: Title in progress reports.
+        warm_up: Jobs that fill the cache of compiled forms; run first if anything is missing, and not stored.
+        stream: Stream for progress; stderr by default.
 
     Raises:
-        MissingRequirementError: If several ranks are asked for and there is no mpirun.
+        MissingRequirementError: If several ranks are requested and there is no mpirun.
     """
-    launcher(max(job.ranks for job in jobs) or 1)  # refuses ranks that cannot be started
+    launcher(max(job.ranks for job in jobs) or 1)  # raises if the ranks cannot be started
     for repeat in range(max(job.repeats for job in jobs)):
         wanted = [job for job in jobs if repeat < job.repeats and store.missing(job, repeat)]
         for job in warm_up if wanted and not repeat else ():
@@ -210,7 +211,7 @@ def measure_all(
 
 
 def _measure_each(jobs: Sequence[Job], store: Store, repeat: int, title: str) -> None:
-    """Measure some jobs once each; the time that is left follows from their weights."""
+    """Measure some jobs once each; the remaining time follows from their weights."""
     weights, spent = [job.weight for job in jobs], 0.0
     with Task(title, unit="runs", total=len(jobs)) as task:
         for number, job in enumerate(jobs, 1):
@@ -235,7 +236,7 @@ def _outcome(record: Record) -> str:
 def summarised(name: str, records: Sequence[Record]) -> Record:
     """Return one record for all measurements of a job.
 
-    Seconds, memory and load become medians, also by phase; everything else is the first one's.
+    Seconds, memory and load become medians, also by phase; everything else is from the first one.
 
     Args:
         name: Of the job, for errors.

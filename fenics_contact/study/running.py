@@ -1,4 +1,4 @@
-"""Run a study: every set of parameters that is not measured yet, in a process of its own."""
+"""Run a study: every set of parameters that is not measured yet, each in its own process."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from fenics_contact.study.results import Results, Run
 from fenics_contact.study.runner import Job, Record, Store, fingerprint, measure_all, summarised
 from fenics_contact.study.scenes import find_study, scene_file
 
-#: A run that takes longer, [s], is measured once.
+#: A run longer than this, [s], is measured once.
 SHORT = 10.0
 _PACKAGE = Path(__file__).resolve().parents[1]
-#: Modules of this part that change numbers of a run.
+#: Modules of this part that affect the numbers of a run.
 _MEASURING = {"measuring.py", "parameters.py", "solving.py", "true_error.py", "worker.py"}
 
 
@@ -27,9 +27,9 @@ class Settings:
 
     Attributes:
         ranks: MPI ranks of every run.
-        repeats: How often a run of less than 10 s is measured; the median counts.
-        limit: Seconds after which a run is given up.
-        verify: Compare with the exact solution of the same mesh, and measure the errors' parts.
+        repeats: Number of measurements of a run of less than 10 s; the median counts.
+        limit: Seconds after which a run is aborted.
+        verify: Compare with the exact discrete solution, and measure the parts of the error.
     """
 
     ranks: int = 1
@@ -46,25 +46,25 @@ def run_study(
     settings: Settings | None = None,
     stream: TextIO | None = None,
 ) -> Results:
-    """Measure all runs of a study that are not there yet.
+    """Measure all missing runs of a study.
 
-    Every run has a process of its own, so that its memory is its own and a failure ends nothing but itself;
-    what failed is recorded with its reason. Finished runs are kept and used again while the code and the
-    settings stay the same.
+    Every run has its own process, so that its memory is separate and a failure affects no other run; failures
+    are recorded with their reason. Finished runs are stored and reused while the code and the settings stay
+    the same.
 
     Args:
         scene: Name of a built-in study or a Python file, see `find_study`.
-        runs: Folder in which runs are kept, one file each; created.
-        sweep: Which runs; the scene's own by default.
+        runs: Folder for the runs, one file each; created.
+        sweep: The runs; the scene's own by default.
         settings: Ranks, repeats, limits.
-        stream: Where progress is told; stderr by default.
+        stream: Stream for progress; stderr by default.
 
     Returns:
-        What was measured.
+        The measurements.
 
     Raises:
         InvalidInputError: If the scene is unknown.
-        MissingRequirementError: If several ranks are asked for and there is no mpirun.
+        MissingRequirementError: If several ranks are requested and there is no mpirun.
     """
     plan = prepare(scene, runs, sweep=sweep, settings=settings)
     plan.measure(stream)
@@ -79,7 +79,7 @@ class StudyPlan:
         study: The scene.
         base: Settings around which one at a time is varied.
         jobs: All runs, coarse ones first.
-        store: Where measurements are kept, marked with the code as it was at the start.
+        store: Store of the measurements, marked with the code at the start.
         ranks: MPI ranks of every run.
     """
 
@@ -90,19 +90,19 @@ class StudyPlan:
     ranks: int
 
     def measure(self, stream: TextIO | None = None) -> None:
-        """Measure what is missing; progress is told on a stream, stderr by default."""
+        """Measure what is missing; progress is reported on a stream, stderr by default."""
         jobs, title = tuple(self.jobs.values()), self.study.title
         measure_all(jobs, self.store, title=title, warm_up=self._warm_up(), stream=stream)
 
     def collected(self) -> Results:
-        """Return what has been measured so far."""
+        """Return the measurements so far."""
         found = {parameters: self.store.records(job) for parameters, job in self.jobs.items()}
         runs = tuple(_joined(parameters, records) for parameters, records in found.items() if records)
         what = {**versions(), "code": self.store.mark}
         return Results(self.study.facts, self.ranks, runs, self.base, what)
 
     def _warm_up(self) -> Sequence[Job]:
-        """Return one run of each kind of those that are missing, on the smallest mesh."""
+        """Return one run of each missing kind, on the smallest mesh."""
         smallest = min(parameters.size for parameters in self.jobs)
         kinds = {
             (parameters.cell, parameters.balanced): replace(
@@ -140,7 +140,7 @@ def _arguments(job: Job, parameters: Parameters) -> dict[str, object]:
 
 
 def _code(scene: str) -> list[Path]:
-    """Return the files that a run executes: pictures change no number of it."""
+    """Return the files that a run executes: plotting does not affect its numbers."""
     rooms = [room for room in _PACKAGE.iterdir() if room.is_dir() and room.name not in ("study", "viz")]
     executed = [path for room in rooms for path in room.rglob("*.py")]
     executed += [_PACKAGE / "study" / name for name in _MEASURING]
@@ -148,7 +148,7 @@ def _code(scene: str) -> list[Path]:
 
 
 def _joined(parameters: Parameters, records: Sequence[Record]) -> Run:
-    """Return what is known of a run from all its measurements."""
+    """Return the run that combines all its measurements."""
     if "failed" in records[0]:
         failed = records[0]["failed"]
         return Run(parameters, failed=f"{failed['kind']}: {failed['message']}")

@@ -33,10 +33,10 @@ def _solver(parameters: Parameters) -> DualSolver | None:
 
 
 def cut(scene: Scene, subdomains: int | None, ranks: int) -> dict[str, np.ndarray] | None:
-    """Cut the bodies into about so many subdomains together, in proportion to their cells.
+    """Cut the bodies into about the given number of subdomains in total, in proportion to their cells.
 
     Returns:
-        Body name -> subdomain of every cell; None where the number is left open.
+        Body name -> subdomain of every cell; None where no number is given.
     """
     if subdomains is None:
         return None
@@ -51,7 +51,7 @@ def cut(scene: Scene, subdomains: int | None, ranks: int) -> dict[str, np.ndarra
 
 
 def _nodes(mesh: BodyMesh, parts: int) -> float:
-    """Return how many nodes a subdomain has when a body is cut into so many."""
+    """Return the nodes per subdomain when a body is cut into a number of parts."""
     side = (mesh.n_nodes / parts) ** (1.0 / mesh.dim)
     return max(2.0**mesh.dim, (side + 1.0) ** mesh.dim)
 

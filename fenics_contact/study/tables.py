@@ -1,4 +1,4 @@
-"""What users ask a study: which settings an accuracy takes, and what a setting costs; as Markdown tables."""
+"""Markdown tables of a study: the settings that an accuracy needs, and the cost of a setting."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from fenics_contact.study.parameters import Parameters
 from fenics_contact.study.protocol import QuantityFacts
 from fenics_contact.study.results import Run
 
-#: Relative errors that users ask for.
+#: Relative errors of interest.
 TARGETS = (0.1, 0.05, 0.02, 0.01, 0.005)
-#: Times that differ by less are the same.
+#: Times that differ by less count as equal.
 AS_FAST = 1.1
-#: What a run is told by, and what it takes.
+#: Columns that identify a run, and its cost.
 SETTINGS = ("size", "cells", "contact", "tolerance", "solver", "subdomains")
 
 
@@ -26,17 +26,17 @@ def table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:
 
 
 def percent(value: float | None) -> str:
-    """Write a relative number in percent with two digits, nothing for None."""
+    """Format a relative number in percent with two digits, empty for None."""
     return "" if value is None else f"{100 * value:.2g} %"
 
 
 def seconds(value: float) -> str:
-    """Write a time, [s], with two digits at least."""
+    """Format a time, [s], with at least two digits."""
     return f"{value:.0f}" if value >= 100 else f"{value:.2g}"
 
 
 def settings(run: Run) -> tuple[str, ...]:
-    """Return the settings of a run, one each of `SETTINGS`."""
+    """Return the settings of a run, one for each of `SETTINGS`."""
     known, subdomains = run.parameters, (run.counts or {}).get("subdomains", "")
     return (
         str(known.size), known.cell, known.discretisation, known.tolerance_words, known.solver,
@@ -45,11 +45,11 @@ def settings(run: Run) -> tuple[str, ...]:
 
 
 def accuracy_table(errors: Errors, targets: Sequence[float] = TARGETS) -> str:
-    """Tell for every quantity and accuracy the fastest run that reaches it, see `reliable`.
+    """Tabulate for every quantity and accuracy the fastest run that reaches it, see `reliable`.
 
     Args:
         errors: Errors of a study's runs.
-        targets: Relative errors that are asked for.
+        targets: Required relative errors.
 
     Returns:
         A table in Markdown.
@@ -77,7 +77,7 @@ def _way(errors: Errors, quantity: QuantityFacts, target: float) -> tuple[str, .
 
 
 def reliable(errors: Errors, run: Run, quantity: str, target: float) -> bool:
-    """Tell whether a run meets a target, and so does every run that solves finer and stricter.
+    """Return whether a run and every finer and stricter one meet a target.
 
     An error that passes through zero is small by chance on one mesh, and larger again on the next.
     """
@@ -89,7 +89,7 @@ def reliable(errors: Errors, run: Run, quantity: str, target: float) -> bool:
 
 
 def _refines(other: Parameters, this: Parameters) -> bool:
-    """Tell whether settings discretise alike, at least as fine, and are solved at least as strictly."""
+    """Return whether settings have the same discretisation, and mesh and tolerance are at least as fine."""
     alike = (other.cell, other.discretisation) == (this.cell, this.discretisation)
     if not alike or other.size < this.size:
         return False
@@ -101,7 +101,7 @@ def _refines(other: Parameters, this: Parameters) -> bool:
 def _cheapest(
     errors: Errors, quantity: QuantityFacts, runs: Sequence[tuple[Run, float]]
 ) -> tuple[Run, float]:
-    """Return the fastest run; of those that are as fast, to the accuracy of clocks, the most usual one."""
+    """Return the fastest run; of those that are equally fast, to timing accuracy, the most usual one."""
     fastest = min(run.seconds_of(quantity) for run, _ in runs)
     alike = [pair for pair in runs if pair[0].seconds_of(quantity) <= AS_FAST * fastest]
     base = errors.results.base
@@ -109,7 +109,7 @@ def _cheapest(
 
 
 def cost_table(errors: Errors) -> str:
-    """Tell what other values of settings cost and give beside the base's, on the finest common mesh.
+    """Tabulate cost and effect of other values of settings than the base's, on the finest common mesh.
 
     Args:
         errors: Errors of a study's runs.
@@ -133,9 +133,9 @@ def cost_table(errors: Errors) -> str:
 
 
 def compared(errors: Errors) -> list[tuple[str, Run, Run]]:
-    """Return setting, run and twin: the twin has the base's value of the setting, and is alike otherwise.
+    """Return setting, run and twin: the twin has the base's value of that setting and equals it otherwise.
 
-    Of runs with the same value that of the finest mesh and the strictest tolerance counts.
+    Among runs with the same value that of the finest mesh and the strictest tolerance is used.
     """
     base, known = errors.results.base, {run.parameters: run for run in errors.results.good}
     found: dict[tuple[str, object], tuple[str, Run, Run]] = {}

@@ -1,4 +1,4 @@
-"""What the certificate must bound: the distance from the exact solution of the same discrete problem."""
+"""The error that the certificate must bound: the distance from the exact solution of the discrete problem."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fenics_contact.contact import ContactProblem, State
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.qp import DualSolution, FaceNewton, solve
 
-#: Tolerances of the solution that counts as exact: the first that can be reached.
+#: Tolerances of the reference solution: the first that can be reached is used.
 EXACT = (1e-11, 1e-10, 1e-9)
 
 
@@ -19,13 +19,13 @@ EXACT = (1e-11, 1e-10, 1e-9)
 class TrueErrors:
     """Energy norms of displacement errors over that of the displacement.
 
-    Of the displacement that the solver found and the one that fields show the worse one counts.
+    The larger one of the torn displacement and of that of the fields is used.
 
     Attributes:
-        algebraic: Distance from the solution for the slip bounds that the state itself has.
-        total: Distance from the solution of the friction law, that of the slip bounds included.
-        uncertainty: How far these solutions may be from exact ones, by their own certificates.
-        tolerance: Residual down to which they were found.
+        algebraic: Distance from the solution for the state's own slip bounds.
+        total: Distance from the solution of the friction law, including the error of the slip bounds.
+        uncertainty: Error of these reference solutions, by their own certificates.
+        tolerance: Residual of the reference solutions.
     """
 
     algebraic: float
@@ -38,7 +38,7 @@ def true_errors(states: tuple[State, ...]) -> TrueErrors | None:
     """Solve the last step again, as exactly as possible, and compare. Collective.
 
     Returns:
-        The errors; None where no such solution could be found.
+        The errors; None where no such solution could be computed.
     """
     state = states[-1]
     if not isinstance(state.solution, DualSolution):
@@ -69,9 +69,9 @@ def _compared(states: tuple[State, ...], solver: FaceNewton) -> TrueErrors:
 
 
 def _distance(state: State, other: DualSolution, displacement: np.ndarray) -> float:
-    """Return √(dᵀK d) for the difference d of displacements, by K d = −Bᵀδλ and what sewing adds. Collective.
+    """Return √(dᵀK d) for a difference d of displacements, K d = −Bᵀδλ plus the sewing part. Collective.
 
-    The larger one, of the displacement that the solver found and of the one that fields show.
+    The larger one, of the torn displacement and of that of the fields.
     """
     system = state.dual
     moved = displacement - state.torn_displacement

@@ -1,4 +1,4 @@
-"""The program of one run: calls a function on all ranks and leaves its record."""
+"""The program of one run: calls a function on all ranks and writes its record."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from fenics_contact.io import write_json
 
 
 def main(comm: MPI.Comm | None, arguments: list[str] | None = None) -> None:
-    """Do what the JSON object of the command line asks for and write the record. Collective.
+    """Run the job given as a JSON object on the command line and write the record. Collective.
 
     Keys: ``function`` and ``arguments`` as in `runner.Job`, and ``file`` of the record. Loading libraries is
-    no part of what the function measures, and its memory is told apart.
+        not part of the measured time, and its memory is reported separately.
     """
     task = json.loads((sys.argv[1:] if arguments is None else arguments)[0])
     try:
@@ -48,10 +48,10 @@ def _called(comm: MPI.Comm | None, function: str, arguments: dict[str, Any]) -> 
 
 
 def peak_memory() -> int:
-    """Return the largest resident memory of this process so far, [byte]; 0 where nobody keeps it.
+    """Return the largest resident memory of this process so far, [byte]; 0 where it is not available.
 
-    Linux keeps it by address space; `resource.getrusage` would also count what the process was before it
-    became this program. Pages that ranks share are counted on each of them.
+    Linux records it by address space; `resource.getrusage` would also count the process before it became this
+    program. Pages that ranks share are counted on each of them.
     """
     status = Path("/proc/self/status")
     lines = status.read_text().splitlines() if status.exists() else []

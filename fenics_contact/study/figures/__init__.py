@@ -1,6 +1,6 @@
 """The figures of a study, of `Errors`, for files and notebooks.
 
-They need matplotlib, an extra; nothing but the report imports them.
+They need matplotlib, an extra; only the report imports them.
 """
 
 from fenics_contact.study.figures.accuracy import plot_accuracy

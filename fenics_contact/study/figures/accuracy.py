@@ -1,4 +1,4 @@
-"""Error against time: what every second buys."""
+"""Error against time."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ def plot_accuracy(errors: Errors, path: Path | None = None) -> Picture:
         path: PNG file to write, None to write none.
 
     Returns:
-        The picture, which stands for its file where a path is needed.
+        The picture, which can be used like a path to its file.
     """
     return picture(errors, path, _draw_all)
 
 
 def pareto_front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
-    """Return the numbers of the points that no other point beats in both, by rising cost.
+    """Return the indices of the Pareto-optimal points, by rising cost.
 
     Args:
-        costs: What each point costs, (n,).
-        errors: How wrong each point is, (n,).
+        costs: Cost of each point, (n,).
+        errors: Error of each point, (n,).
     """
     front: list[int] = []
     for number in sorted(range(len(costs)), key=lambda k: (costs[k], errors[k])):

@@ -1,4 +1,4 @@
-"""Error against mesh size, with the rate that theory states beside the measured one."""
+"""Error against mesh size, with the theoretical and the measured rate."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def plot_convergence(errors: Errors, path: Path | None = None) -> Picture:
         path: PNG file to write, None to write none.
 
     Returns:
-        The picture, which stands for its file where a path is needed.
+        The picture, which can be used like a path to its file.
     """
     return picture(errors, path, _draw_all)
 
@@ -70,7 +70,7 @@ def _draw(
     error: Callable[[Run], float | None],
     rate: float | None,
 ) -> None:
-    """Draw what is wrong on every mesh, and the line of theory's rate a little below the first way's end."""
+    """Draw the error on every mesh, and a line with the theoretical rate below the first series."""
     scene, through = errors.results.scene, None
     places = sorted({scene.spacing[run.parameters.size] for run in errors.results.good})
     for series in ways:

@@ -27,7 +27,7 @@ def plot_parts(errors: Errors, path: Path | None = None) -> Picture:
         path: PNG file to write, None to write none.
 
     Returns:
-        The picture, which stands for its file where a path is needed.
+        The picture, which can be used like a path to its file.
     """
     return picture(errors, path, _draw_all)
 

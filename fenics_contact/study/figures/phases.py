@@ -28,7 +28,7 @@ def plot_phases(errors: Errors, path: Path | None = None) -> Picture:
         path: PNG file to write, None to write none.
 
     Returns:
-        The picture, which stands for its file where a path is needed.
+        The picture, which can be used like a path to its file.
     """
     return picture(errors, path, _draw_all)
 
@@ -60,13 +60,13 @@ def _mesh(run: Run) -> str:
 def draw_stacked(
     axes: Any, bars: Sequence[Mapping[str, float]], names: Sequence[str], unit: str = ""
 ) -> None:
-    """Draw bars of phases upon each other, with the sum above them.
+    """Draw stacked bars of phases, with the sum above them.
 
     Args:
-        axes: Where to.
-        bars: What every phase takes, by bar.
-        names: What stands below the bars.
-        unit: What stands behind the sums.
+        axes: Matplotlib axes.
+        bars: Time of every phase, by bar.
+        names: Labels below the bars.
+        unit: Unit after the sums.
     """
     found = dict.fromkeys(phase for bar in bars for phase in bar)
     others = [phase for phase in found if phase not in ORDER]

@@ -1,4 +1,4 @@
-"""Runs that belong together, with the look they have in every figure."""
+"""Runs that belong together, with their style in every figure."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fenics_contact.study.results import Run
 from fenics_contact.viz import BLUE, GREEN, GREY, ORANGE, Picture, draw_picture, png_path
 
 WIDTH = 1600
-#: Colours and symbols of cells and of discretisations of contact other than the base's, in turn.
+#: Colours and symbols, by cell type and by contact discretisation other than the base's.
 LOOKS = {
     "cell": ((GREEN, "s"), ("#882255", "X"), ("#332288", "p")),
     "discretisation": (("#cc79a7", "D"),),
@@ -28,11 +28,11 @@ class Series:
     """Some runs of a study.
 
     Attributes:
-        name: In words.
+        name: Its label.
         runs: The runs, coarse ones first.
         colour: Its colour.
         symbol: Its symbol, so that colours are not needed.
-        connected: Whether the runs are one after the other on a way.
+        connected: Whether the runs form a sequence.
     """
 
     name: str
@@ -51,12 +51,12 @@ class Series:
 
 
 def picture(errors: Errors, path: Path | None, draw: Callable[[Errors, BinaryIO], None]) -> Picture:
-    """Return what a function draws of a study, and write it to a PNG file if there is a path."""
+    """Return a function's picture of a study, and write it to a PNG file if there is a path."""
     return draw_picture(None, png_path(path), lambda paper: draw(errors, paper))
 
 
 def series_of(errors: Errors) -> list[Series]:
-    """Return the runs of a study sorted by what they vary; every run is in one series at most."""
+    """Return the runs of a study grouped by what they vary; every run is in at most one series."""
     base, results = errors.results.base, errors.results
     strict = errors.strictest(base)
     name = "" if strict.balanced else f"tolerance {strict.tolerance_words}"
@@ -97,7 +97,7 @@ def by_mesh_and_tolerance(errors: Errors) -> tuple[Sequence[Run], Sequence[Run]]
 
 
 def panels(figure: Any, count: int) -> list[Any]:
-    """Return axes for so many panels, two or three beside each other."""
+    """Return axes for a number of panels, two or three side by side."""
     columns = count if count < 4 else (2 if count == 4 else 3)
     axes = figure.subplots(-(-count // columns), columns, squeeze=False).ravel()
     for spare in axes[count:]:
@@ -106,7 +106,7 @@ def panels(figure: Any, count: int) -> list[Any]:
 
 
 def height(count: int) -> int:
-    """Return the height in pixels of a sheet with so many panels."""
+    """Return the height in pixels of a sheet with a number of panels."""
     return 160 + 560 * (1 if count < 4 else 2)
 
 
@@ -122,7 +122,7 @@ def scaled(axes: Any) -> None:
     axes.set_yscale("log")
     for axis, scale, unit in ((axes.xaxis, 1.0, ""), (axes.yaxis, 100.0, " %")):
         low, high = axis.get_view_interval()
-        subs = (1.0, 2.0, 5.0) if high < 50.0 * low else (1.0,)  # 2 and 5 where it spans little
+        subs = (1.0, 2.0, 5.0) if high < 50.0 * low else (1.0,)  # 2 and 5 where the range is small
         axis.set_major_locator(LogLocator(subs=subs, numticks=12))
         written = lambda value, _, scale=scale, unit=unit: f"{scale * value:g}{unit}"  # noqa: E731
         axis.set_major_formatter(FuncFormatter(written))
@@ -131,7 +131,7 @@ def scaled(axes: Any) -> None:
 
 
 def against(errors: Errors, quantity: str) -> str:
-    """Return a quantity and what its errors are measured against, in words."""
+    """Return what a quantity's errors are relative to, in words."""
     kind = errors.references[quantity].kind
     words = {"extrapolated": "the limit of the meshes", "finest mesh": "the finest mesh"}
     return f"(against {words.get(kind, kind)})"

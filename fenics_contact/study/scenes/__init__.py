@@ -11,7 +11,7 @@ from fenics_contact.checks import require_file
 from fenics_contact.errors import InvalidInputError, running
 from fenics_contact.study.protocol import StudyScene
 
-#: Names of the studies that the package has.
+#: Names of the built-in studies.
 BUILT_IN = ("hertz", "cattaneo_mindlin", "chain_links")
 
 
@@ -47,7 +47,7 @@ def _from_file(path: Path) -> StudyScene:
     if spec is None or spec.loader is None:
         raise InvalidInputError(f"{str(path)!r} cannot be read as Python: give a file that ends in '.py'")
     module = importlib.util.module_from_spec(spec)
-    sys.modules[module_name] = module  # dataclasses of the file look themselves up there
+    sys.modules[module_name] = module  # dataclasses of the file are looked up there
     with running(f"the Python file '{path}'"):
         spec.loader.exec_module(module)
     return _checked(getattr(module, "study", None), str(path))

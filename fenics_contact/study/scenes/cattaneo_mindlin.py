@@ -1,17 +1,18 @@
 """Cattaneo and Mindlin: two equal cylinders pressed, then sheared until the edges of the contact slip.
 
-The bodies mirror each other and are of the same material: what one's surface does under pressure and shear,
-the other's does in the mirror, so that pressing calls for no friction and shearing changes no pressure,
-also in bodies that are no half planes and on meshes that mirror each other. What is left of the size of the
-bodies, 30 times the contact, is its curvature of the surfaces over the contact, (1/30)², below a
-thousandth. Far edges are moved, not loaded. How far belongs to the size of the bodies, as a line load shifts
-a half plane without bounds; tractions do not know about it, so theory takes the measured forces P and Q:
+The bodies are mirror images of the same material: their surfaces deform symmetrically under pressure and
+shear, so that pressing causes no friction and shearing changes no pressure, also in bodies other than half
+planes and on mirrored meshes. The finite size of the bodies, 30 times the contact, only adds a curvature of
+the surfaces over the contact, (1/30)², of about a thousandth. Far edges are displaced, not loaded. The
+displacement depends on the size of the bodies, as a line load shifts a half plane without bound; tractions do
+not, so theory uses the measured forces P and Q:
 
     a² = 2 P R / (π E*),  p0 = 2 P / (π a),  c = a √(1 − Q / (μ P)),
     q(x) = μ p0 [√(1 − x²/a²) − c/a √(1 − x²/c²)].
 
-The radius is a thousand times the contact, as theory presses along one direction, and contact along its
-normals. Both a and c end at nodes of all meshes to within a thousandth, so that errors fall at clean rates.
+The radius is a thousand times the contact, as pressure acts along one direction in theory and along the
+normals in the computation. Both a and c coincide with nodes of all meshes to within a thousandth, so that
+errors fall at clean rates.
 
 References:
     K. L. Johnson, Contact Mechanics, Cambridge 1985, section 7.2. M. L. Williams, Stress singularities
@@ -35,10 +36,10 @@ from fenics_contact.study.scenes.nested_box import mirrored, nested_half
 
 YOUNG, POISSON, FRICTION = 1000.0, 0.3, 0.4
 RADIUS, SIZE = 2000.0, 30.0
-#: Half the width of what has equal cells; the half contact is 1.
+#: Half the width of the region of equal cells; the half contact is 1.
 CORE = 1.25
 PRESS, SHEAR = 0.00205, 0.000735
-#: Displacements go like r^0.711 at the corners between free and held edges, with ν = 0.3 in plane strain:
+#: Displacements vary as r^0.711 at the corners between free and held edges, with ν = 0.3 in plane strain:
 #: sin²(λπ/2) = (4 (1 − ν)² − λ²) / (3 − 4ν) [Williams 1952].
 CORNER = 0.711
 
@@ -55,7 +56,7 @@ def half(side: float, n: int, cell: str = "quadrilateral") -> BodyMesh:
 
 def build(parameters: Parameters, comm: MPI.Comm | None = None) -> Problem:
     """Return the bodies and the two steps: pressed, sheared."""
-    del comm  # every rank builds the same
+    del comm  # every rank builds the same mesh
     material = PlaneStrain(YOUNG, POISSON)
     bodies = {
         name: Body(half(side, parameters.size, parameters.cell), material)
@@ -74,7 +75,7 @@ def build(parameters: Parameters, comm: MPI.Comm | None = None) -> Problem:
 
 @dataclass(frozen=True)
 class Theory:
-    """What the measured forces P and Q of a state give.
+    """Theoretical values for the measured forces P and Q of a state.
 
     Attributes:
         half_width: a, [length].
@@ -93,7 +94,7 @@ class Theory:
 
 
 def theory(state: State) -> Theory:
-    """Return Cattaneo's and Mindlin's answer for the forces of a state."""
+    """Return Cattaneo's and Mindlin's solution for the forces of a state."""
     contact = state.contact
     force, shear = contact.normal_force.sum(), np.abs(contact.friction_force.sum())
     a = np.sqrt(2 * force * RADIUS / np.pi * 2 * (1 - POISSON**2) / YOUNG)
@@ -129,7 +130,7 @@ def weighted_traction(outcome: Outcome) -> np.ndarray:
 
 
 def exact_traction(outcome: Outcome) -> np.ndarray:
-    """Return what `weighted_traction` should be."""
+    """Return the exact `weighted_traction`."""
     exact = theory(outcome.state).traction(outcome.slave_points()[:, 0])
     return np.asarray(exact * np.sqrt(outcome.state.contact.points.area))
 
@@ -181,7 +182,7 @@ study = StudyScene(
     energy_rate=CORNER,
     about=(
         "Two mirrored bodies in plane strain are pressed together, then sheared, with Coulomb friction. "
-        "Theory takes the measured forces; tangential traction is judged in L². Friction force and energy at "
-        "the given displacements depend on the size of the bodies and are extrapolated."
+        "Theory uses the measured forces; tangential traction is compared in L². Friction force and energy "
+        "at the given displacements depend on the size of the bodies and are extrapolated."
     ),
 )

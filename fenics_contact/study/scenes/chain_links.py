@@ -1,7 +1,7 @@
-"""Two links of a chain, the published experiment: link 1 is held, link 2 hangs in it and is pulled.
+"""Two links of a chain, the published experiment: link 1 is held, link 2 is pulled.
 
-There is no exact answer; what other meshes of up to 1.6 million unknowns give stands in for it. All measure
-contact between the smooth crowns.
+There is no exact solution; values on meshes of up to 1.6 million unknowns replace it. All meshes use contact
+between the smooth crowns.
 """
 
 from __future__ import annotations
@@ -29,24 +29,24 @@ from fenics_contact.study.protocol import Outcome, Problem, Quantity, StudyScene
 FRICTION, PULL = 0.3, 80e3
 #: Cells around, through and across a link for each unit of `Parameters.size`; 4 is the published mesh.
 CELLS = (12, 2, 5)
-#: Of the demo: ten cells of the published mesh lie across the spot.
+#: As in the demo: ten cells of the published mesh lie across the contact.
 GRADING = 2.5
-#: Energy [N mm] and peak pressure [MPa] to 0.2 %, and where they are from: the table of
+#: Energy [N mm] and peak pressure [MPa] to 0.2 %, and their source: the table of
 #: `docs/studies/true_surfaces.md`, which also has Hertz's 4384 MPa.
 ENERGY, PEAK, FINER = -20260.0, 4350.0, "meshes of up to 1.6 million unknowns"
-#: Displacements go like √r where the held grip ends on the smooth surface of the link.
+#: Displacements vary as √r where the held grip ends on the smooth surface of the link.
 GRIP = 0.5
 
 
 def graded_links(cells: tuple[int, int, int], comm: MPI.Comm, cell: str = "hexahedron") -> TwoLinks:
-    """Mesh the links with gmsh as the demo does, with so many cells around, through and across each."""
+    """Mesh the links with gmsh as in the demo, given the numbers of cells around, through and across."""
     around, through, across = cells
     shape = LinkShape(n_around=around, n_a=through, n_b=across, grading=GRADING, cell=cell)
     return two_links(shape, comm=comm)
 
 
 def chain(links: TwoLinks, friction_coefficient: float = FRICTION) -> Scene:
-    """Return the chain of the demo: link 1 is held, link 2 hangs in it and is pulled with 80 kN, [N, mm]."""
+    """Return the chain of the demo: link 1 is held, link 2 is pulled with 80 kN, [N, mm]."""
     steel = IsotropicElasticity(2.1e5, 0.3)
     pair = ContactPair(
         slave=Surface("link 2", "contact"),
@@ -67,7 +67,7 @@ def build(parameters: Parameters, comm: MPI.Comm) -> Problem:
     links = graded_links((around, through, across), comm, parameters.cell)
     scene = chain(links)
     pairs = [replace(pair, discretisation=parameters.discretisation) for pair in scene.contacts]
-    # Shape derivatives know contact by nodes.
+    # Shape derivatives support nodal contact only.
     design = SurfaceDesign("link 1", links.first.crown) if parameters.discretisation == "node" else None
     return Problem(replace(scene, contacts=pairs), design=design)
 
@@ -83,7 +83,7 @@ def peak_pressure(outcome: Outcome) -> float:
 
 
 def friction_force(outcome: Outcome) -> float:
-    """Return the sum of the sizes of all friction forces."""
+    """Return the sum of the magnitudes of all friction forces."""
     return float(np.linalg.norm(outcome.state.contact.friction_force, axis=1).sum())
 
 

@@ -1,13 +1,13 @@
 """Hertz: two round bodies pressed together without friction, on meshes that do not match.
 
-Both are quarters of blocks, 40 contact radii large, with a face that is round like a ball's of a radius a
-thousand times that of the contact. They are made of one material and guided along their sides. The force is
-that for which the contact radius is 1, a node of every mesh:
+Both are quarters of blocks, 40 contact radii large, with a spherical face of a radius a thousand times that
+of the contact. They are of the same material and guided along their sides. The force is chosen for a contact
+radius of 1, a node of every mesh:
 
     p0 = 3 F / (2 π a²),   a³ = 3 F R* / (4 E*),   R* = R / 2,   E* = E / (2 (1 − ν²)).
 
-The cells of the upper body, the slave, are 4/5 as large as those of the lower one. Both bodies have as many
-cells along their cores of equal cells, so that finer meshes are like coarser ones.
+The cells of the upper body, the slave, are 4/5 as large as those of the lower one. Both bodies have the same
+number of cells along their cores of equal cells, so that meshes are similar.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def round_block(side: float, core: float, size: int, cell: str) -> BodyMesh:
 
 def build(parameters: Parameters, comm: MPI.Comm) -> Problem:
     """Return the scene of a run."""
-    del comm  # every rank builds the same
+    del comm  # every rank builds the same mesh
     size, cell = parameters.size, parameters.cell
     material = IsotropicElasticity(YOUNG, POISSON)
     meshes = {"upper": round_block(1.0, 1.0, size, cell), "lower": round_block(-1.0, COARSER, size, cell)}

@@ -1,7 +1,7 @@
-"""Blocks and rectangles fine at one point and coarser with the distance from it, all cells nearly cubes.
+"""Blocks and rectangles that are fine at one point and coarsen with distance, all cells nearly cubes.
 
-A lattice graded along its axes drags its fine spacing through the whole body, so that far cells become
-slender and the dual problem hard; here every layer is a copy of the one inside it, enlarged.
+A lattice graded along its axes carries its fine spacing through the whole body, so that far cells become
+slender and the dual problem ill-conditioned; here every layer is an enlarged copy of the one inside it.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def nested_half(core: float, size: float, count: int, cell: str = "quadrilateral
     sides = [inner.surfaces[side] for side in ("x0", "x1", "y1")]
     points, skin, rows = _shells(inner, sides, core, size, count)
     local = np.searchsorted(skin, np.concatenate(sides))
-    # Edges have the body on their left: seen from the next layer they run the other way.
+    # Edges have the body on their left: for the next layer they run in the other direction.
     stacked = np.concatenate([rows[:-1, local[:, ::-1]], rows[1:, local]], axis=-1).reshape(-1, 4)
     cells = np.concatenate([inner.cells, stacked])
     mesh = BodyMesh(points, cells, box_sides(points, cells))
@@ -96,10 +96,10 @@ def _shells(
 
 
 def _facing(inner: BodyMesh, axis: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the facets of the core that face along an axis, and the places of their nodes in a hexahedron.
+    """Return the facets of the core normal to an axis, and the positions of their nodes in a hexahedron.
 
-    Cells of all layers are numbered along the axes like those of a lattice, with the way outwards in place of
-    their own axis: then all can be split alike.
+    Cells of all layers are numbered along the axes like those of a lattice, with the outward direction in
+    place of their own axis, so that all can be split alike.
 
     Returns:
         Facets, (n, 4), and the vertex numbers of their inner copies, then of their outer ones, (n, 8).
