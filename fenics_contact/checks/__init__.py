@@ -1,4 +1,4 @@
-"""Arguments that users give: types, counts, numbers, vectors, files."""
+"""Checks of users' arguments: types, counts, numbers, vectors, files."""
 
 from __future__ import annotations
 

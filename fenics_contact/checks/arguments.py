@@ -1,4 +1,4 @@
-"""Numbers that meshes are built from: what is none is refused by its name."""
+"""Checks of the numbers from which meshes are built, with the argument's name in messages."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 
-#: Largest number of cells in a row, and of all else that is counted: more is a slip of the pen.
+#: Largest number of cells in a row, and of any other count: more is a typing error.
 MOST = 1_000_000
-#: Coordinates and sizes lie below: their products, and the squares of these, must be numbers, too.
+#: Bound on coordinates and sizes: their products, and the squares of these, must be finite, too.
 LARGEST = 1e60
 #: Largest logarithm of the ratio of two cells of one mesh.
 STEEPEST = 8.0
 
 
 def check_count(value: int, name: str, least: int = 1) -> None:
-    """Refuse a count that is not an integer from ``least`` to `MOST`."""
+    """Reject a count that is not an integer from ``least`` to `MOST`."""
     if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
         raise InvalidInputError(
             f"{name} must be an integer of at least {least}, got {brief(value)}: choose another count"
@@ -28,7 +28,7 @@ def check_count(value: int, name: str, least: int = 1) -> None:
 
 
 def check_numbers(**given: Any) -> None:
-    """Refuse arguments, given by their names, that are no finite numbers, or too large to be multiplied."""
+    """Reject arguments, given by their names, that are not finite numbers, or too large to be multiplied."""
     for name, value in given.items():
         if not _is_number(value):
             raise InvalidInputError(
@@ -37,7 +37,7 @@ def check_numbers(**given: Any) -> None:
 
 
 def check_grading(value: Any) -> None:
-    """Refuse a logarithm of the ratio of two cells of one mesh that is negative or too large for it."""
+    """Reject a grading, the logarithm of a ratio of cells of one mesh, that is negative or too large."""
     check_numbers(grading=value)
     if not 0.0 <= value <= STEEPEST:
         raise InvalidInputError(
@@ -47,7 +47,7 @@ def check_grading(value: Any) -> None:
 
 
 def check_row(values: Any, name: str, count: int) -> None:
-    """Refuse what is not a sequence of so many finite numbers."""
+    """Reject a value that is not a sequence of ``count`` finite numbers."""
     known = isinstance(values, Sequence | np.ndarray) and np.ndim(values) == 1 and len(values) == count
     if not known or not all(map(_is_number, values)):
         raise InvalidInputError(
@@ -56,12 +56,12 @@ def check_row(values: Any, name: str, count: int) -> None:
 
 
 def brief(value: Any) -> str:
-    """Return a value as messages repeat it, also an integer that Python refuses to write."""
+    """Return a value for messages, also an integer that Python refuses to convert to text."""
     if isinstance(value, int) and value.bit_length() > 100:
         return "an integer of more than thirty digits"
     try:
         text = repr(value)
-    except ValueError:  # of such an integer inside of it
+    except ValueError:  # such an integer inside it
         return f"a {type(value).__name__} of very large integers"
     return text if len(text) <= 200 else f"{text[:197]}..."
 

@@ -1,4 +1,4 @@
-"""Arguments are of the types that a class declares, or refused: others would mean something else unseen."""
+"""Type checks of a class's arguments: values of other types would silently mean something else."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fenics_contact.errors import InvalidInputError
 
 Class = TypeVar("Class", bound=type)
 
-#: Plain types, what they are called, and what else stands for them; a truth value is no number.
+#: Plain types, their names, and other accepted types; a boolean is not a number.
 _PLAIN: dict[Any, tuple[str, tuple[type, ...]]] = {
     float: ("a number", (int, float, np.integer, np.floating)),
     int: ("an integer", (int, np.integer)),
@@ -28,9 +28,9 @@ _PLAIN: dict[Any, tuple[str, tuple[type, ...]]] = {
 
 
 def checked(*own: str) -> Callable[[Class], Class]:
-    """Let a dataclass refuse values of other types than its fields declare, before its own checks.
+    """Let a dataclass reject values whose types are not those of its fields, before its own checks.
 
-    Stands below ``@dataclass``.
+    Place it below ``@dataclass``.
 
     Args:
         own: Fields whose types the class checks itself.
@@ -59,7 +59,7 @@ def checked(*own: str) -> Callable[[Class], Class]:
             if further is not None:
                 further(self)
 
-        __post_init__.__doc__ = getattr(further, "__doc__", None) or "Refuse values of other types."
+        __post_init__.__doc__ = getattr(further, "__doc__", None) or "Reject values of other types."
         cls.__post_init__ = __post_init__  # type: ignore[attr-defined]
         return cls
 
@@ -67,10 +67,10 @@ def checked(*own: str) -> Callable[[Class], Class]:
 
 
 def _check(instance: Any, cls: type, own: tuple[str, ...]) -> None:
-    """Refuse the first field whose value does not fit its type.
+    """Reject the first field whose value does not fit its type.
 
     Raises:
-        InvalidInputError: What the field must be, what it is, and what it stands for.
+        InvalidInputError: States what the field must be, what it is, and its meaning.
     """
     hints = _hints(cls)
     for field in fields(instance):
@@ -91,11 +91,11 @@ def _hints(cls: type) -> dict[str, Any]:
 
 
 def _misfit(value: Any, hint: Any, place: str) -> tuple[str, Any, Any] | None:
-    """Return where a value does not fit, what is declared there and what is there; None if it fits."""
+    """Return where a value does not fit, the declared type and the value there; None if it fits."""
     if get_origin(hint) in (Union, UnionType):
         if any(_misfit(value, option, place) is None for option in get_args(hint)):
             return None
-        # What has the right form tells more exactly where.
+        # For the alternative of the right form the misfit is located more precisely.
         inner = (_misfit(value, option, place) for option in get_args(hint))
         return next((wrong for wrong in inner if wrong and wrong[0] != place), (place, hint, value))
     if not _is_one(value, hint):
@@ -108,7 +108,7 @@ def _misfit(value: Any, hint: Any, place: str) -> tuple[str, Any, Any] | None:
 
 
 def _is_one(value: Any, hint: Any) -> bool:
-    """Tell whether a value is what a hint says, whatever it holds."""
+    """Return whether a value has the outer type of a hint, regardless of its content."""
     kind = get_origin(hint) or hint
     if kind is Any:
         return True
@@ -125,7 +125,7 @@ def _is_one(value: Any, hint: Any) -> bool:
 
 
 def _parts(value: Any, hint: Any) -> Sequence[tuple[Any, Any]]:
-    """Return what a sequence or a mapping holds, with places or keys."""
+    """Return the items of a sequence or a mapping, with indices or keys."""
     kind = get_origin(hint)
     if kind is Mapping:
         return list(value.items())
@@ -133,7 +133,7 @@ def _parts(value: Any, hint: Any) -> Sequence[tuple[Any, Any]]:
 
 
 def _members(kind: Any) -> list[str]:
-    """Return what a protocol asks for; nothing where it is none."""
+    """Return the members that a protocol requires; none for other types."""
     if not getattr(kind, "_is_protocol", False):
         return []
     protocols = [each for each in kind.__mro__ if getattr(each, "_is_protocol", False)]
@@ -141,7 +141,7 @@ def _members(kind: Any) -> list[str]:
 
 
 def _named(hint: Any) -> str:
-    """Say what a type asks for."""
+    """Describe what a type requires."""
     kind, inside = get_origin(hint) or hint, get_args(hint)
     if kind in (Union, UnionType, Literal):
         *first, last = [repr(part) if kind is Literal else _named(part) for part in inside]
@@ -164,7 +164,7 @@ def _named(hint: Any) -> str:
 
 
 def meaning(owner: Any, name: str) -> str:
-    """Return what the documentation of a class or function says about a field or an argument, "" if nothing.
+    """Return the documentation of a field or an argument of a class or function, "" if there is none.
 
     Args:
         owner: The class or function.

@@ -1,4 +1,4 @@
-"""Files that are read: they must be there."""
+"""Checks that input files exist."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from fenics_contact.errors import InvalidInputError
 
 
 def require_file(path: Path, what: str = "a file") -> None:
-    """Refuse a path that leads to no file; a name that is too long, or lies in a closed folder, too.
+    """Reject a path that is not a readable file, also if its name is too long or its folder closed.
 
     Args:
         path: The path.
-        what: What is expected there, with its article.
+        what: Description of the expected file, with its article.
 
     Raises:
-        InvalidInputError: Saying what is there instead.
+        InvalidInputError: States what is there instead.
     """
     try:
         if path.is_file():

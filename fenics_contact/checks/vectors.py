@@ -1,4 +1,4 @@
-"""Vectors that a user gives: two or three finite numbers."""
+"""Vectors given by users: two or three finite numbers."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 
-#: A vector as a user gives it.
+#: A vector given by a user.
 GivenVector: TypeAlias = tuple[float, ...]
 
 
 def floats(values: np.ndarray) -> GivenVector:
-    """Return the entries of an array of one dimension as a user would give them."""
+    """Return the entries of a one-dimensional array as plain numbers."""
     return tuple(float(value) for value in values)
 
 

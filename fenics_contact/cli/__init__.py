@@ -1,7 +1,7 @@
-"""The command line ``fenics-contact``: one module a command, all on top of the package.
+"""The command line ``fenics-contact``: one module per command, all on top of the package.
 
-Commands write to stdout on rank 0 alone; the package's own words go through logging to stderr. How a command
-ends is in `fenics_contact.cli.endings`.
+Commands write to stdout on rank 0 only; the package's own messages go through logging to stderr. Exit codes
+are in `fenics_contact.cli.endings`.
 """
 
 from fenics_contact.cli.app import app, main

@@ -1,4 +1,4 @@
-"""`fenics-contact accuracy`: measure what accuracy costs in time."""
+"""`fenics-contact accuracy`: measure the cost of accuracy in time."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ ABOUT = (
     "what was measured already is not measured again. Runs have processes of their own: ask for ranks with "
     "--ranks."
 )
-#: Options that take any number of values: --sizes 2 3 4. An option without a value stands for none.
+#: Options that take any number of values: --sizes 2 3 4. Without a value the list is empty.
 LISTS = ("--sizes", "--tolerances", "--cells", "--discretisations", "--fixed-points", "--subdomains")
 
 
@@ -140,12 +140,12 @@ def _measure(plan: StudyPlan) -> int:
 
 
 def _sweep(given: Mapping[str, Sequence[Any] | None], sweep: Sweep) -> Sweep:
-    """Return the runs that the options ask for, the scene's where they say nothing.
+    """Return the runs selected by the options, the scene's by default.
 
     Raises:
         InvalidInputError: If a cell type is unknown.
     """
-    nothing = (None, options.NOTHING)  # of an option that was given without a value
+    nothing = (None, options.NOTHING)  # option given without a value
     known: dict[str, Any] = {
         name: tuple(value for value in values if value not in nothing)
         for name, values in given.items()

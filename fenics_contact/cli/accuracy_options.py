@@ -10,7 +10,7 @@ import typer
 from fenics_contact.study import BALANCED, BUILT_IN, DISCRETISATIONS, RunTolerance
 
 NAMES = ", ".join(BUILT_IN)
-#: Value of an option that was given without one.
+#: Value of an option given without one.
 NOTHING = ""
 
 
@@ -69,7 +69,7 @@ OutputOption: TypeAlias = Annotated[
     Path | None, typer.Option("--output", help="Folder of the results (output/studies/NAME).")
 ]
 RunsOption: TypeAlias = Annotated[
-    Path | None, typer.Option("--runs", help="Folder in which runs are kept (OUTPUT/runs).")
+    Path | None, typer.Option("--runs", help="Folder in which runs are stored (OUTPUT/runs).")
 ]
 RanksOption: TypeAlias = Annotated[
     Any, typer.Option("--ranks", parser=_positive, metavar="N", help="MPI ranks of every run.")

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
 PROGRAM = "fenics-contact"
-#: What the command-line library raises for options that do not exist, whatever it calls its own modules.
+#: Exception of the command-line library for unknown options, independent of its module names.
 UsageProblem: type[Exception] = next(
     kind
     for kind in typer.BadParameter.__mro__
@@ -33,10 +33,10 @@ UsageProblem: type[Exception] = next(
 
 
 class Program(TyperGroup):
-    """All commands; what they raise becomes a sentence and an exit code."""
+    """All commands; their exceptions become a sentence and an exit code."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command that the arguments name."""
+        """Run the command given by the arguments."""
         try:
             with terminable():
                 return super().invoke(ctx)
@@ -74,10 +74,10 @@ def _version(wanted: bool) -> None:
 @app.callback()
 def program(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Say the version and end.")
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
     ] = False,
     verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Also say what the solvers do, on stderr.")
+        bool, typer.Option("--verbose", "-v", help="Also report what the solvers do, on stderr.")
     ] = False,
 ) -> None:
     """Prepare logging."""
@@ -86,7 +86,7 @@ def program(
 
 
 def main(comm: MPI.Comm, arguments: Sequence[str] | None = None) -> int:
-    """Run the command that the arguments name; return the exit code, the same on every rank.
+    """Run the command given by the arguments; return the exit code, the same on every rank.
 
     Args:
         comm: All ranks of the program.
@@ -95,7 +95,7 @@ def main(comm: MPI.Comm, arguments: Sequence[str] | None = None) -> int:
     prepare_streams()
     _log_to_stderr(comm)
     given = list(sys.argv[1:] if arguments is None else arguments)
-    # Ranks above 0 have nothing to say: neither help nor what demos might print.
+    # Ranks above 0 print nothing: neither help nor the output of demos.
     silence = contextlib.nullcontext() if comm.rank == 0 else contextlib.redirect_stdout(io.StringIO())
     logger = logging.getLogger("fenics_contact")
     level = logger.level
@@ -103,7 +103,7 @@ def main(comm: MPI.Comm, arguments: Sequence[str] | None = None) -> int:
         with silence:
             return _run(given, comm)
     finally:
-        logger.setLevel(level)  # a command may say more than the program that called this function
+        logger.setLevel(level)  # a command may be more verbose than the program that called this function
 
 
 def _run(arguments: Sequence[str], comm: MPI.Comm) -> int:
@@ -119,13 +119,13 @@ def _run(arguments: Sequence[str], comm: MPI.Comm) -> int:
         return int(problem.exit_code)  # type: ignore[attr-defined]
     except BrokenPipeError:
         return 0
-    except OSError as error:  # of the library: what it writes itself, as help, may find no room
+    except OSError as error:  # of the library: its own output, such as help, may fail on a full disk
         return int(report_error(unsaid(error), comm))
     return code if isinstance(code, int) else 0
 
 
 class _Visible(logging.Formatter):
-    """Writes what a terminal shows and does not obey."""
+    """Writes records with control characters escaped."""
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line of a record."""
@@ -133,7 +133,7 @@ class _Visible(logging.Formatter):
 
 
 def _log_to_stderr(comm: MPI.Comm) -> None:
-    """Send warnings of rank 0 to stderr; other ranks meet the same."""
+    """Send warnings of rank 0 to stderr; those of other ranks are the same."""
     handler = logging.StreamHandler(sys.stderr) if comm.rank == 0 else logging.NullHandler()
     handler.setFormatter(_Visible("%(message)s"))
     logging.basicConfig(level=logging.WARNING, handlers=[handler])

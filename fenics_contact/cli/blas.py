@@ -1,4 +1,4 @@
-"""Which BLAS this process computes with, and how fast it is."""
+"""The BLAS of this process, and its speed."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from time import perf_counter
 
 import numpy as np
 
-#: Size of the product that is measured, and how often: a tenth of a second with the reference BLAS.
+#: Size and number of the measured products: a tenth of a second with the reference BLAS.
 SIZE, REPEATS = 400, 5
-#: Below so many GFLOP/s on one core a BLAS is slow: the reference one reaches 1 to 3, tuned ones 10 and more.
+#: Speed in GFLOP/s on one core below which a BLAS is slow: the reference one reaches 1 to 3, tuned ones 10
+#: and more.
 SLOW = 5.0
 _LIBRARY = re.compile(r"(libopenblas|libmkl_rt|libblis|libatlas|libsatlas|libtatlas|libblas)[^/]*\.so[^/]*$")
 _REFERENCE = re.compile(r"(^|/)blas/libblas|libblas\.so\.3\.\d")
@@ -21,7 +22,7 @@ _REFERENCE = re.compile(r"(^|/)blas/libblas|libblas\.so\.3\.\d")
 
 @dataclass(frozen=True)
 class Blas:
-    """A BLAS library that is loaded.
+    """A loaded BLAS library.
 
     Attributes:
         path: Its file.
@@ -35,7 +36,7 @@ class Blas:
 
     @property
     def slow(self) -> bool:
-        """Whether it costs much more time than it need."""
+        """Whether it is much slower than necessary."""
         return self.reference or (self.speed is not None and self.speed < SLOW)
 
     def __str__(self) -> str:
@@ -45,7 +46,7 @@ class Blas:
 
 
 def loaded_blas() -> list[Blas]:
-    """Return the BLAS libraries that are loaded into this process, as far as the system tells."""
+    """Return the BLAS libraries loaded into this process, as far as the system reports them."""
     try:
         maps = Path("/proc/self/maps").read_text()
     except OSError:
@@ -81,7 +82,7 @@ def _measured(file: str) -> float | None:
         )  # fmt: skip
 
     speed = _rate(multiply)
-    return speed if np.all(result == SIZE) else None  # another meaning of its integers, for instance
+    return speed if np.all(result == SIZE) else None  # for instance another integer type
 
 
 def _rate(work) -> float:  # type: ignore[no-untyped-def]

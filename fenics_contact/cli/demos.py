@@ -1,4 +1,4 @@
-"""`fenics-contact demo`: list, run or copy what comes with the package."""
+"""`fenics-contact demo`: list, run or copy the demos of the package."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ def demo(
     context: typer.Context,
     name: Annotated[
         str | None,
-        typer.Argument(metavar="NAME", help="Which; without it all are listed.", show_default=False),
+        typer.Argument(metavar="NAME", help="Name of a demo; without it all are listed.", show_default=False),
     ] = None,
     copy: Annotated[bool, typer.Option("--copy", help="Only copy its file into this folder.")] = False,
 ) -> None:
-    """List the demos, or run one; what follows NAME is handed to it (--size small).
+    """List the demos, or run one; further arguments are passed to it (--size small).
 
     Names that end in .toml are example scenes. Results go to output/NAME in the current folder.
     """
@@ -91,7 +91,7 @@ def _run(desk: Desk, chosen: Shipped, arguments: list[str]) -> None:
     try:
         runpy.run_path(str(chosen.path), run_name="__main__")
     except SystemExit as end:
-        if isinstance(end.code, str):  # a demo that was given wrong options ends with words
+        if isinstance(end.code, str):  # a demo with wrong options exits with a message
             raise InvalidInputError(end.code) from end
         if end.code:
             raise typer.Exit(end.code) from end

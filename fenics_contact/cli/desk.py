@@ -1,4 +1,4 @@
-"""What a command works with: its communicator, and where it writes."""
+"""The communicator of a command, and its output."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fenics_contact.progress import at_terminal, visible
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-#: Columns of what is written to a file or a pipe.
+#: Columns of output to a file or a pipe.
 WIDTH = 110
 
 
@@ -39,7 +39,7 @@ class Desk:
         return "1 rank" if self.comm.size == 1 else f"{self.comm.size} ranks"
 
     def say(self, text: str = "") -> None:
-        """Write a line, as it is."""
+        """Write a line verbatim."""
         self._write(Text(text))
 
     def show(self, table: Table) -> None:
@@ -47,7 +47,7 @@ class Desk:
         self._write(table)
 
     def _write(self, what: Table | Text) -> None:
-        """Write on rank 0: with colours to a terminal, else without blanks at the ends of lines."""
+        """Write on rank 0: with colours to a terminal, else without trailing blanks."""
         if self.comm.rank != 0:
             return
         drawn = at_terminal(sys.stdout)
@@ -60,13 +60,13 @@ class Desk:
         )
         console.print(_Visible(what), soft_wrap=isinstance(what, Text))
         lines = console.file.getvalue().split("\n")  # type: ignore[attr-defined]
-        # Through sys.stdout itself: bars that are drawn at this moment stay below.
+        # Through sys.stdout itself, so that progress bars stay below.
         say("\n".join(lines if drawn else [line.rstrip() for line in lines]))
 
 
 @dataclass(frozen=True)
 class _Visible:
-    """What is to be written, without what a terminal would obey in its texts."""
+    """Output with the control characters of its texts escaped."""
 
     what: Table | Text
 
@@ -77,7 +77,7 @@ class _Visible:
 
 
 def desk_of(context: typer.Context) -> Desk:
-    """Return the desk that the program has handed to a command."""
+    """Return the desk that the program passed to a command."""
     return cast(Desk, context.obj)
 
 

@@ -1,4 +1,4 @@
-"""How a command ends: a number for scripts and a sentence for people, the same on every rank."""
+"""Exit codes for scripts and messages for people, the same on every rank."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ EPILOG = "\b\nExit codes:\n" + "\n".join(f"{code.value:<4d} {words}" for code, w
 
 
 class Terminated(BaseException):
-    """The process was asked to end (SIGTERM)."""
+    """The process received SIGTERM."""
 
 
 def ending_of(error: BaseException) -> Ending:
@@ -72,7 +72,7 @@ def ending_of(error: BaseException) -> Ending:
 
 @contextmanager
 def terminable() -> Iterator[None]:
-    """Let SIGTERM end the block as Ctrl-C does, so that what must be put in order is."""
+    """Let SIGTERM end the block as Ctrl-C does, so that clean-up is done."""
 
     def stop(*_: Any) -> None:
         raise Terminated
@@ -85,10 +85,10 @@ def terminable() -> Iterator[None]:
 
 
 def report_error(error: BaseException, comm: MPI.Comm) -> Ending:
-    """Say on rank 0 how a command ended, and return its exit code.
+    """Report on rank 0 how a command ended, and return its exit code.
 
-    Errors of this package are met by all ranks together. Any other may be met by one alone while others wait
-    for it: then all are ended. So it is with an interrupt, which meets ranks at different places.
+    Errors of this package are raised on all ranks together. Any other may occur on one rank while the rest
+    wait for it: then all are ended. The same holds for an interrupt, which reaches ranks at different places.
     """
     code = ending_of(error)
     known = isinstance(error, FenicsContactError)
@@ -106,7 +106,7 @@ def report_error(error: BaseException, comm: MPI.Comm) -> Ending:
 
 
 def _leave(comm: MPI.Comm, code: Ending) -> None:
-    """End this rank without waiting for others, which may be anywhere."""
+    """End this rank without waiting for others, whose position is unknown."""
     sys.stdout.flush()
     sys.stderr.flush()
     if comm.size > 1:

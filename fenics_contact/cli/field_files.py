@@ -1,4 +1,4 @@
-"""Files of fields, looked at and drawn by pyvista."""
+"""Files of fields, read and drawn by pyvista."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FIELD_FILES = (".vtu", ".vtm", ".pvd")
 
 
 def newest_member(path: Path) -> Path:
-    """Return the last file that a .pvd file names; any other file itself.
+    """Return the last file named in a .pvd file; any other file itself.
 
     Raises:
         InvalidInputError: If a .pvd file names none or cannot be read.
@@ -51,7 +51,7 @@ def _blocks(path: Path) -> dict[str, Any]:
 
 
 def fields_in(path: Path) -> dict[str, str]:
-    """Return name -> range of every field of a file, vectors by their length."""
+    """Return name -> range of every field of a file, for vectors of their magnitude."""
     found: dict[str, list[tuple[float, float]]] = {}
     for block in _blocks(path).values():
         for data in (block.point_data, block.cell_data):
@@ -66,7 +66,7 @@ def fields_in(path: Path) -> dict[str, str]:
 
 
 def draw(path: Path, save: Path | None, look: tuple[str, float], *, window: bool) -> str:
-    """Draw a field on the deformed bodies: to a PNG file, or in a window where there is a display.
+    """Draw a field on the deformed bodies: to a PNG file, or in a window if there is a display.
 
     Args:
         path: The file.
@@ -75,7 +75,7 @@ def draw(path: Path, save: Path | None, look: tuple[str, float], *, window: bool
         window: Whether a window is wanted.
 
     Returns:
-        What was done, in words.
+        A message about what was done.
 
     Raises:
         InvalidInputError: If the file has no such field.
@@ -128,7 +128,7 @@ def _plotter(path: Path, look: tuple[str, float], *, off_screen: bool) -> Any:
     plotter.background_color = "white"
     flat = all(np.ptp(block.points[:, 2]) == 0 for block in blocks.values())
     plotter.view_xy() if flat else plotter.view_isometric()
-    plotter.camera.SetWindowCenter(0.15, 0.0)  # room for the bar on the right
+    plotter.camera.SetWindowCenter(0.15, 0.0)  # space for the bar on the right
     return plotter
 
 
@@ -143,7 +143,7 @@ _BAR = {
 
 
 def _range(blocks: dict[str, Any], field: str) -> tuple[float, float]:
-    """Return the range of the colours: all values but the largest few, which would leave one shade."""
+    """Return the range of the colours: all but the largest few values, which would leave one shade."""
     found = [np.asarray(block[field], dtype=float) for block in blocks.values() if field in block.array_names]
     sizes = [np.linalg.norm(values, axis=1) if values.ndim == 2 else values for values in found]
     values = np.concatenate([size.ravel() for size in sizes])

@@ -1,4 +1,4 @@
-"""`fenics-contact info`: what this machine computes and draws with, and what slows it down."""
+"""`fenics-contact info`: the software that this machine computes and draws with, and what slows it down."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def info(
     context: typer.Context,
     as_json: Annotated[bool, typer.Option("--json", help="Write JSON, for programs.")] = False,
 ) -> None:
-    """Tell versions, PETSc's packages, the BLAS in use and its speed, MPI, and whether pictures are drawn."""
+    """Show versions, PETSc's packages, the BLAS and its speed, MPI, and whether pictures can be drawn."""
     desk = desk_of(context)
     known = gathered(desk.comm)
     if as_json:
@@ -47,7 +47,7 @@ def _words(value: Any) -> str:
 
 
 def gathered(comm: MPI.Comm) -> dict[str, Any]:
-    """Return all that `info` tells. Collective."""
+    """Return the rows of `info`. Collective."""
     local = comm.Split_type(MPI.COMM_TYPE_SHARED)
     first = local.rank == 0
     local.Free()

@@ -1,4 +1,4 @@
-"""`fenics-contact optimize`: the shape optimisation that a scene file describes."""
+"""`fenics-contact optimize`: the shape optimisation of a scene file."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def optimize(
     dry_run: DryOption = False,
     python: PythonOption = True,
 ) -> None:
-    """Optimise the contact shape that the [design] of a scene file describes."""
+    """Optimise the contact shape described by the [design] of a scene file."""
     desk = desk_of(context)
     with show_progress(desk.comm):
         file = read(desk, scene, output, tolerance, settings, python)
@@ -85,7 +85,7 @@ def _minimised(desk: Desk, file: SceneFile, task: ShapeTask, resume: bool | None
         result = task.minimize(callback=follow, checkpoint=checkpoint)
     more = {"scene_file": file.source.name, "title": file.title}
     write_optimisation_result(result, task.problem, file.folder, more=more)
-    # A run that stopped at a limit goes on from its checkpoint with a larger one.
+    # A run that stopped at a limit can continue from its checkpoint with a larger one.
     if checkpoint is not None and result.reason.success and desk.comm.rank == 0:
         Path(checkpoint.path).unlink(missing_ok=True)
     return result

@@ -1,4 +1,4 @@
-"""Options that several commands have."""
+"""Options that several commands share."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ SetOption: TypeAlias = Annotated[
     ),
 ]
 PicturesOption: TypeAlias = Annotated[
-    bool, typer.Option("--pictures/--no-pictures", help="Draw the pictures that the file asks for.")
+    bool, typer.Option("--pictures/--no-pictures", help="Draw the pictures that the file requests.")
 ]
 ResumeOption: TypeAlias = Annotated[
     bool | None,
     typer.Option(
         "--resume/--fresh",
-        help="Demand a checkpoint, or start anew; by default go on where there is one.",
+        help="Require a checkpoint, or start anew; by default continue from one if it exists.",
         show_default=False,
     ),
 ]
@@ -53,7 +53,7 @@ DryOption: TypeAlias = Annotated[
     bool,
     typer.Option(
         "--dry-run",
-        help="Only say what would be built and written. Python files that the scene names are run.",
+        help="Only report what would be built and written. Python files that the scene names are run.",
     ),
 ]
 PythonOption: TypeAlias = Annotated[
@@ -70,7 +70,7 @@ def read(
     settings: list[str] | None,
     python: bool = True,
 ) -> SceneFile:
-    """Read a scene file with what the options say instead. Collective."""
+    """Read a scene file with the values that options override. Collective."""
     overrides = list(settings or ())
     if tolerance is not None:
         overrides.append(f"solver.tolerance={tolerance}")
@@ -82,7 +82,7 @@ def read(
 
 
 def checkpoint_of(file: SceneFile, resume: bool | None) -> Checkpoint | None:
-    """Return the checkpoint of a long run, None where the file wants none."""
+    """Return the checkpoint of a long run, None if the file requests none."""
     if not file.document.output.checkpoint:
         return None
     return Checkpoint(file.folder / "checkpoint.npz", resume=resume, comm=file.comm)

@@ -1,4 +1,4 @@
-"""Pictures of a run, where the libraries for them are there."""
+"""Pictures of a run, if the libraries for them are installed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def can_draw(desk: Desk) -> bool:
-    """Tell whether pictures can be drawn; say what is missing where not. Collective."""
+    """Return whether pictures can be drawn; report what is missing if not. Collective."""
     error: Exception | None = None
     try:
         from fenics_contact.viz import check_renderer
@@ -34,7 +34,7 @@ def can_draw(desk: Desk) -> bool:
 
 
 def units_of(file: SceneFile) -> Units:
-    """Return the names of units as pictures take them."""
+    """Return the names of units for pictures."""
     from fenics_contact.viz import Units
 
     names = file.document.units
@@ -42,13 +42,13 @@ def units_of(file: SceneFile) -> Units:
 
 
 def draw_state(desk: Desk, file: SceneFile, states: Mapping[str, State], suffix: str = "") -> list[Path]:
-    """Draw the pictures that a file asks for. Collective.
+    """Draw the pictures that a file requests. Collective.
 
     Args:
-        desk: Where to say what was left out.
+        desk: Output for messages about omitted pictures.
         file: The scene file.
         states: Name -> state; the last one is drawn, all of them in maps of the status.
-        suffix: What the files' names end with, before ".png".
+        suffix: End of the files' names, before ".png".
 
     Returns:
         The pictures that were drawn.

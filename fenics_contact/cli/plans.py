@@ -1,4 +1,4 @@
-"""What will be built and written, before it is."""
+"""Preview of what will be built and written."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from fenics_contact.scene_file import SceneFile
 
 
 def show_plan(desk: Desk, file: SceneFile, *, sensitivity: bool = False) -> None:
-    """Print what a scene calls for. Collective."""
+    """Print the plan of a scene. Collective."""
     plan = file.scene.plan(file.partitions, sensitivity=sensitivity)
     rows = {line[:15].strip(): line[16:] for line in str(plan).splitlines()}
     if file.steps and not sensitivity:
@@ -17,7 +17,7 @@ def show_plan(desk: Desk, file: SceneFile, *, sensitivity: bool = False) -> None
 
 
 def show_outputs(desk: Desk, file: SceneFile, *, draws: bool) -> None:
-    """Say what a run would write."""
+    """Report what a run would write."""
     output = file.document.output
     pictures = f", pictures of {', '.join(output.pictures)}" if draws and output.pictures else ""
     kinds = f", {', '.join(output.files)} files" if output.files else ""

@@ -1,4 +1,4 @@
-"""What an interrupted run leaves, and how it goes on."""
+"""Interruption and continuation of runs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInpu
 
 @contextmanager
 def resumable(desk: Desk, checkpoint: Checkpoint | None) -> Iterator[None]:
-    """Let signals stop the block where it can go on, and say how a run goes on that did not come to its end.
+    """Let signals stop the block where it can continue, and report how to continue an incomplete run.
 
     Collective.
     """

@@ -1,4 +1,4 @@
-"""`fenics-contact run`: find the equilibrium of a scene file, or go through its load steps."""
+"""`fenics-contact run`: compute the equilibrium of a scene file, or its load steps."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from fenics_contact.io import ResultSeries, only_run_in, write_result, write_vtu
 from fenics_contact.progress import show_progress
 from fenics_contact.scene_file import SceneFile
 
-#: Load steps of which maps of the status are drawn, at most.
+#: Largest number of load steps with maps of the status.
 MAPS = 6
 
 
@@ -51,7 +51,7 @@ def run(
     dry_run: DryOption = False,
     python: PythonOption = True,
 ) -> None:
-    """Find the equilibrium of a scene file, or go through its load steps."""
+    """Compute the equilibrium of a scene file, or its load steps."""
     desk = desk_of(context)
     with show_progress(desk.comm):
         file = read(desk, scene, output, tolerance, settings, python)
@@ -68,7 +68,7 @@ def run(
 
 
 def _files(file: SceneFile) -> list[str]:
-    """Return the names of files of fields that are to be opened."""
+    """Return the names of the files of fields to open."""
     kinds = file.document.output.files
     if file.steps:
         return ["history.pvd"] if kinds else []
@@ -94,7 +94,7 @@ def _at_once(desk: Desk, file: SceneFile) -> dict[str, State]:
 
 
 def _through_steps(desk: Desk, file: SceneFile, resume: bool | None) -> dict[str, State]:
-    """Go through all load steps and write every one. Collective.
+    """Solve all load steps and write each. Collective.
 
     Returns:
         Some of the states by name, the last one among them.
@@ -121,7 +121,7 @@ def _through_steps(desk: Desk, file: SceneFile, resume: bool | None) -> dict[str
 
 
 def _done(desk: Desk, checkpoint: Checkpoint | None) -> None:
-    """Remove the checkpoint of a run that is complete: the next one starts anew."""
+    """Remove the checkpoint of a complete run: the next one starts anew."""
     if checkpoint is not None and desk.comm.rank == 0:
         Path(checkpoint.path).unlink(missing_ok=True)
 

@@ -24,10 +24,10 @@ def schema(
         typer.Argument(metavar="FILE", help="File to write; stdout unless given.", show_default=False),
     ] = None,
 ) -> None:
-    """Write the JSON schema of scene files, with which editors complete and check them.
+    """Write the JSON schema of scene files, which editors use for completion and checks.
 
-    A scene file whose first line is "#:schema scene_file.schema.json" is checked while it is written, by
-    taplo or the extension Even Better TOML.
+    A scene file whose first line is "#:schema scene_file.schema.json" is checked while it is edited, by taplo
+    or the extension Even Better TOML.
     """
     desk = desk_of(context)
     if file is None:

@@ -1,4 +1,4 @@
-"""Where the demos and example scenes are: in a checkout beside the package, in an installed one inside it."""
+"""Location of the demos and example scenes: beside the package in a checkout, inside it if installed."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Shipped:
     """A demo or an example scene.
 
     Attributes:
-        name: How it is called.
+        name: Its name.
         path: Its file.
         title: Its first line of text, up to the first full stop.
     """
@@ -46,7 +46,7 @@ def folder_of_demos() -> Path:
 
 
 def shipped() -> dict[str, Shipped]:
-    """Return all demos and example scenes by name; scenes have their ending in the name."""
+    """Return all demos and example scenes by name; names of scenes include the suffix."""
     folder = folder_of_demos()
     demos = [
         Shipped(path.stem.removeprefix("demo_"), path, _title(path))
@@ -63,12 +63,12 @@ def _title(path: Path) -> str:
 
 
 def optimises(path: Path) -> bool:
-    """Tell whether a scene file describes an optimisation."""
+    """Return whether a scene file describes an optimisation."""
     return bool(re.search(r"^\[\[?design", path.read_text(encoding="utf-8"), re.MULTILINE))
 
 
 def takes(path: Path) -> list[str]:
-    """Return the options that a demo looks for among its arguments."""
+    """Return the options that a demo accepts."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     constants = (node.value for node in ast.walk(tree) if isinstance(node, ast.Constant))
     return sorted(

@@ -1,4 +1,4 @@
-"""Where the program writes: streams that may be closed by their reader, be full, or know few characters."""
+"""Output streams, which may be closed by their reader, be full, or support few characters."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fenics_contact.progress import visible
 
 
 def prepare_streams() -> None:
-    """Let no stream fail on a character that it does not know: it is written as an escape."""
+    """Write characters that a stream cannot encode as escapes."""
     _hear_no_broken_pipe()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
@@ -22,7 +22,7 @@ def prepare_streams() -> None:
 
 
 def say(text: str) -> None:
-    """Write to stdout; where nobody reads any more, nothing, and the command goes on.
+    """Write to stdout; if its reader has closed it, write nothing and continue.
 
     Raises:
         OutputError: If it cannot be written, for instance to a full disk.
@@ -38,7 +38,7 @@ def say(text: str) -> None:
 
 
 def unsaid(error: OSError) -> OutputError:
-    """Return the error of a command that cannot write to stdout; what is left of its words goes nowhere."""
+    """Return the error of a command that cannot write to stdout, whose further output is discarded."""
     _lead_nowhere(sys.stdout)
     return OutputError(
         f"what this command says must be written to stdout, which failed: {error.strerror or error}. Free "
@@ -47,7 +47,7 @@ def unsaid(error: OSError) -> OutputError:
 
 
 def complain(text: str) -> None:
-    """Write to stderr what a terminal shows and does not obey; where that fails there is nobody to tell."""
+    """Write to stderr with control characters escaped; a failure cannot be reported."""
     _hear_no_broken_pipe()
     with suppress(OSError):
         sys.stderr.write(visible(text))
@@ -55,13 +55,13 @@ def complain(text: str) -> None:
 
 
 def _hear_no_broken_pipe() -> None:
-    """Let a write fail where nobody reads, as Python does; PETSc ends the whole run with a page of words."""
+    """Let a write to a closed pipe raise, as in Python; PETSc's signal handler would end the whole run."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
 
 def _lead_nowhere(stream: TextIO) -> None:
-    """Let what a stream still holds go nowhere, so that it can be closed."""
+    """Discard the buffer of a stream, so that it can be closed."""
     with suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())

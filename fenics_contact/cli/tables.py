@@ -1,4 +1,4 @@
-"""Tables of what came out."""
+"""Tables of results."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def state_facts(state: State, units: UnitNames) -> dict[str, str]:
-    """Return what is worth knowing of a state, in words. Collective where it is balanced."""
+    """Return a summary of a state as text. Collective if it is balanced."""
     counts, energy = state.counts, f"{units.force} {units.length}"
     rows = {
         "unknowns": f"{counts['torn_unknowns']} in {counts['subdomains']} subdomains",
@@ -43,7 +43,7 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
 
 
 def pairs(state: State, units: UnitNames) -> list[str]:
-    """Return what happens at each contact pair."""
+    """Return a summary of each contact pair."""
     contact, found = state.contact, []
     for number, pair in enumerate(state.scene.contacts):
         mine = contact.on_pair(number)
@@ -57,7 +57,7 @@ def pairs(state: State, units: UnitNames) -> list[str]:
 
 
 def _kinds(pair: ContactPair, status: np.ndarray) -> str:
-    """Return how many points do what; without friction they are open or closed."""
+    """Return the numbers of points by status; without friction open or closed."""
     counts = {kind.name.lower(): int(np.count_nonzero(status == kind)) for kind in Status}
     if not pair.has_friction:
         counts = {"open": counts["open"], "closed": len(status) - counts["open"]}
@@ -65,7 +65,7 @@ def _kinds(pair: ContactPair, status: np.ndarray) -> str:
 
 
 def _place(pair: ContactPair) -> str:
-    """Return where a pair touches: "upper z0 on lower z1", "block z0 on rigid plane"."""
+    """Return the surfaces of a pair: "upper z0 on lower z1", "block z0 on rigid plane"."""
     slave, master = pair.slave, pair.master
     if isinstance(master, Surface):
         return f"{slave.body} {slave.name} on {master.body} {master.name}"
@@ -107,7 +107,7 @@ def step_table(rows: Sequence[tuple[str, ...]], file: SceneFile) -> Table:
 
 
 def _resultant(state: State) -> float:
-    """Return the size of the sum of all friction forces, [force]."""
+    """Return the magnitude of the sum of all friction forces, [force]."""
     contact = state.contact
     tangential = contact.force - contact.normal_force[:, None] * contact.points.normal
     return float(np.linalg.norm(tangential.sum(axis=0)))

@@ -13,12 +13,12 @@ from fenics_contact.cli.field_files import FIELD_FILES, draw, fields_in, newest_
 from fenics_contact.errors import InvalidInputError, MissingRequirementError, together
 from fenics_contact.io import read_result
 
-#: Entries of a result that are shown, in this order; others are long.
+#: Entries of a result that are shown, in this order; the others are long.
 SHOWN = (
     "kind", "written", "ranks", "solver", "counts", "residuals", "energies", "errors", "seconds", "contact",
     "optimisation", "more",
 )  # fmt: skip
-#: Longest list that is written out, and the most evaluations.
+#: Longest list that is printed in full, and largest number of evaluations.
 LONGEST, MOST = 8, 20
 
 
@@ -40,16 +40,16 @@ def view(
     save: Annotated[
         Path | None, typer.Option("--save", help="PNG file to draw to.", show_default=False)
     ] = None,
-    field: Annotated[str, typer.Option("--field", help="What the colours show.")] = "von_mises",
+    field: Annotated[str, typer.Option("--field", help="Field shown by the colours.")] = "von_mises",
     scale: Annotated[float, typer.Option("--scale", help="Factor of the displacement.")] = 1.0,
     window: Annotated[
         bool, typer.Option("--window/--no-window", help="Open a window where there is a display.")
     ] = True,
 ) -> None:
-    """Show what is in a result: its numbers, its fields, and a picture.
+    """Show a result: its numbers, its fields, and a picture.
 
-    With a display a window opens that can be turned; --save writes a PNG file instead. Without a display
-    nothing opens.
+    With a display an interactive window opens; --save writes a PNG file instead. Without a display nothing
+    opens.
     """
     desk = desk_of(context)
     with together(desk.comm):
@@ -130,7 +130,7 @@ def evaluations(history: dict[str, list[Any]]) -> Table:
 
 
 def _flat(value: Any, name: str = "") -> list[tuple[str, str]]:
-    """Return the parts of a nested entry by dotted name."""
+    """Return the parts of a nested entry by dotted names."""
     if isinstance(value, dict):
         parts = [_flat(part, f"{name}.{key}" if name else str(key)) for key, part in value.items()]
         return [row for rows in parts for row in rows]

@@ -1,4 +1,4 @@
-"""Results as files that ParaView and other programs open; whole or not at all.
+"""Results as files for ParaView and other programs, written atomically.
 
 On several ranks rank 0 writes (XDMF: all ranks together), and all raise if one fails.
 """

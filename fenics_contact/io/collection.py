@@ -1,4 +1,4 @@
-"""PVD files: which files of a series belong to which time, for ParaView."""
+"""PVD files: the files of a series by time, for ParaView."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ class Member:
     """One state of a series.
 
     Attributes:
-        value: Time, load factor or number of the design; no two members have the same.
+        value: Time, load factor or number of the design; unique among members.
         number: Number in the names of its files.
-        label: What it is, in words; ParaView keeps it as the field datum "Name".
+        label: Description; ParaView stores it as the field datum "Name".
     """
 
     value: float
@@ -28,12 +28,12 @@ class Member:
 
 
 def stem_of(name: str, number: int) -> str:
-    """Return what the files of a member are called."""
+    """Return the stem of a member's file names."""
     return f"{name}_{number:04d}"
 
 
 def collection(name: str, members: Sequence[Member]) -> str:
-    """Return the text of a PVD file that names the multi-block file of every member."""
+    """Return the text of a PVD file with the multi-block file of every member."""
     lines = "".join(
         f'    <DataSet timestep="{member.value!r}" group="" part="0" '
         f"file={quoteattr(f'{name}/{stem_of(name, member.number)}.vtm')}"
@@ -47,10 +47,10 @@ def collection(name: str, members: Sequence[Member]) -> str:
 
 
 def read_collection(path: Path) -> list[Member]:
-    """Return the members of a PVD file whose multi-block files are there.
+    """Return the members of a PVD file whose multi-block files exist.
 
     Raises:
-        InvalidInputError: If it cannot be read or is one that a `ResultSeries` did not write.
+        InvalidInputError: If it cannot be read or was not written by a `ResultSeries`.
     """
     name, found = path.stem, []
     try:

@@ -1,4 +1,4 @@
-"""What a scene consists of, in words and numbers that a JSON file can hold."""
+"""Description of a scene as plain data for JSON."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def described_scene(scene: Scene, subdomains: Mapping[str, int]) -> dict[str, An
         subdomains: Body name -> number of its subdomains.
 
     Returns:
-        See `fenics_contact.io.write_result`. Functions are told by their names, numbers as they are.
+        See `fenics_contact.io.write_result`. Functions are given by their names, numbers by their values.
     """
     return {
         "dimension": scene.dim,
@@ -53,7 +53,7 @@ def _materials(material: Material | Mapping[str, Material]) -> dict[str, Any]:
 
 
 def _material(material: Material) -> dict[str, Any]:
-    """Return the fields of a material, or its parameters where it is no dataclass."""
+    """Return the fields of a material, or its parameters if it is not a dataclass."""
     known = readable(material)
     return known if is_dataclass(material) else {**known, "parameters": readable(material.parameters)}
 

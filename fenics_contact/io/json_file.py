@@ -1,4 +1,4 @@
-"""JSON files of results, with NumPy's types converted and numbers that JSON does not have refused."""
+"""JSON files of results; NumPy's types are converted, numbers that JSON lacks are rejected."""
 
 from __future__ import annotations
 
@@ -27,15 +27,16 @@ def write_json(path: str | Path, data: Any, *, comm: MPI.Comm | None = None) -> 
     Args:
         path: File to write; its folder is created. A file of that name is replaced when the new one is
             complete.
-        data: Mappings, sequences, strings, numbers, truth values and None; also NumPy's arrays and numbers,
+        data: Mappings, sequences, strings, numbers, booleans and None; also NumPy's arrays and numbers,
             paths, dataclasses (by their fields) and enumerations (by their values).
-        comm: If given, only rank 0 writes, and all ranks learn of an error.
+        comm: If given, only rank 0 writes, and an error is raised on all ranks.
 
     Returns:
         The path.
 
     Raises:
-        InvalidInputError: If a number is NaN or infinite or something has no counterpart in JSON; says where.
+        InvalidInputError: If a number is NaN or infinite or something has no counterpart in JSON; states
+            where.
 
     Note:
         Collective on ``comm`` if given.
@@ -56,16 +57,16 @@ def json_text(data: Any) -> str:
 
 
 def plain(data: Any, place: str = "data", *, lenient: bool = False) -> Any:
-    """Convert data to what JSON knows.
+    """Convert data to JSON's types.
 
     Args:
         data: The data.
-        place: How error messages call it.
-        lenient: Tell in words what JSON does not know: dataclasses with their type, functions by their name,
-            other objects by their type, keys as text, and what is no number as None.
+        place: Its name in error messages.
+        lenient: Whether to replace what JSON lacks: dataclasses with their type, functions by their name,
+            other objects by their type, keys by text, and NaN and infinity by None.
 
     Raises:
-        InvalidInputError: If some part cannot be converted; says which.
+        InvalidInputError: If some part cannot be converted; states which.
     """
 
     def inside(part: Any, where: str) -> Any:
@@ -107,7 +108,7 @@ def _key(key: Any, place: str, lenient: bool) -> str:
 
 
 def _told(data: Any) -> dict[str, str]:
-    """Tell a function by its name, any other object by its type."""
+    """Describe a function by its name, any other object by its type."""
     if isinstance(data, partial):
         return _told(data.func)
     return {"function": data.__qualname__} if hasattr(data, "__qualname__") else {"type": type(data).__name__}

@@ -15,11 +15,11 @@ def file_of_each(bodies: Iterable[str], folder: Path, stem: str, suffix: str) ->
     Args:
         bodies: Names of the bodies, any text.
         folder: Folder of the files.
-        stem: What their names begin with.
-        suffix: What they end in, with the dot.
+        stem: Beginning of their names.
+        suffix: Suffix with the dot.
 
     Returns:
-        Body name -> file. Names that differ in special characters only get a number.
+        Body name -> file. Names that differ only in special characters are numbered.
     """
     files: dict[str, Path] = {}
     for body in bodies:
@@ -33,10 +33,10 @@ def file_of_each(bodies: Iterable[str], folder: Path, stem: str, suffix: str) ->
 
 
 def checked_name(folder: str | Path, name: str, suffix: str) -> Path:
-    """Return the file of a name in a folder.
+    """Return the path of a file name in a folder.
 
     Raises:
-        InvalidInputError: If the name is empty or holds a folder itself.
+        InvalidInputError: If the name is empty or contains a folder.
     """
     if not name.strip(".") or Path(name).name != name:
         raise InvalidInputError(

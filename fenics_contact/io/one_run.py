@@ -1,7 +1,7 @@
-"""One run at a time in a folder: a second one would take the files of the first for its own.
+"""One run at a time in a folder: a second one would mistake the files of the first for its own.
 
-A run holds a lock on a hidden file in its folder. The system takes the lock away from a run that dies,
-however it dies; what is left of the file stops nobody.
+A run holds a lock on a hidden file in its folder. The system releases the lock of a run that dies for any
+reason; the remaining file blocks no other run.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from fenics_contact.io.replacing import OutputError
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-#: Name of the file that a run locks.
+#: Name of the lock file.
 LOCK = ".fenics_contact.lock"
 
 _LOG = logging.getLogger(__name__)
@@ -32,15 +32,15 @@ _LOG = logging.getLogger(__name__)
 def only_run_in(folder: str | Path, comm: MPI.Comm) -> Iterator[None]:
     """Keep other runs out of a folder while the block writes its results there. Collective on ``comm``.
 
-    Rank 0 holds the lock, all ranks learn whether there is another run. Where the file system knows no locks
-    nobody is kept out, which is logged.
+    Rank 0 holds the lock, all ranks learn whether there is another run. On a file system without locks no run
+    is excluded, which is logged.
 
     Args:
         folder: Folder of the results; created, and removed again if nothing was written.
         comm: Communicator of the run.
 
     Raises:
-        InvalidInputError: On all ranks, if another run writes to the folder; says which.
+        InvalidInputError: On all ranks, if another run writes to the folder; states which.
         OutputError: On all ranks, if the folder cannot be made or written to.
 
     Example:
@@ -69,12 +69,12 @@ def only_run_in(folder: str | Path, comm: MPI.Comm) -> Iterator[None]:
             path.unlink(missing_ok=True)
             os.close(lock)
         if made:
-            with suppress(OSError):  # something was written
+            with suppress(OSError):  # not empty: something was written
                 path.parent.rmdir()
 
 
 def _taken(path: Path) -> int | None:
-    """Lock a file that is made if need be; None where there are no locks."""
+    """Lock a file, created if necessary; None where there are no locks."""
     while True:
         lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         try:
@@ -102,7 +102,7 @@ def _taken(path: Path) -> int | None:
 
 
 def _is_still(path: Path, descriptor: int) -> bool:
-    """Tell whether an open file is the one that a path leads to."""
+    """Return whether an open file is the one at a path."""
     try:
         return os.path.samestat(os.fstat(descriptor), path.stat())
     except FileNotFoundError:

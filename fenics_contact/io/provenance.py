@@ -1,4 +1,4 @@
-"""What a result was computed with."""
+"""Provenance of results."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _MODULES = ("numpy", "scipy", "mpi4py", "petsc4py", "gmsh", "clarabel", "pyvista
 def versions() -> dict[str, str]:
     """Return the versions of Python, of the libraries that computed and of this package, by name.
 
-    A library that is not installed, or that does not tell, says so instead.
+    A library that is not installed or does not report its version is marked as such.
     """
     found = {"fenics_contact": _installed("fenics_contact"), "python": platform.python_version()}
     found["dolfinx"] = _dolfinx.release()
@@ -26,7 +26,7 @@ def versions() -> dict[str, str]:
 
 
 def _installed(name: str) -> str:
-    """Return what the metadata say or, where a library was installed without, what the library says."""
+    """Return the version from the metadata or, without these, from the library itself."""
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:

@@ -1,4 +1,4 @@
-"""Files of results, read back with errors that say what is wrong with them."""
+"""Reading of result files, with errors that state what is wrong with them."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any
 
 from fenics_contact.errors import InvalidInputError
 
-#: What a file of `write_result` calls itself.
+#: Value of ``format`` in files of `write_result`.
 FORMAT = "fenics_contact result"
 FORMAT_VERSION = 1
 
 
 def read_result(path: str | Path) -> dict[str, Any]:
-    """Read what `write_result` or `write_optimisation_result` wrote.
+    """Read a file of `write_result` or `write_optimisation_result`.
 
     Args:
         path: The file, or a folder that holds a "result.json".
@@ -23,8 +23,8 @@ def read_result(path: str | Path) -> dict[str, Any]:
         The entries as described there.
 
     Raises:
-        InvalidInputError: If there is no such file, it cannot be read, it is no whole JSON, no result, or of
-            a newer format; says what to do.
+        InvalidInputError: If there is no such file, it cannot be read, is not complete JSON, not a result, or
+            of a newer format; states what to do.
 
     Example:
         >>> read_result("output/result.json")["energies"]["total_potential"]  # doctest: +SKIP

@@ -1,4 +1,4 @@
-"""Files of results appear whole, several at once, written by one rank or by all."""
+"""Atomic replacement of result files, also of several at once, written by one rank or by all."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 
 class OutputError(FenicsContactError, OSError):
-    """A file could not be written; what was there under its name is as it was."""
+    """A file could not be written; an existing one of its name is unchanged."""
 
 
 @contextmanager
 def replacing(*targets: Path) -> Iterator[tuple[Path, ...]]:
-    """Hand out paths to write to, and put what was written in the targets' place at the end.
+    """Yield paths to write to, and move the written files to the targets at the end.
 
-    If the block raises, the targets stay as they were. Each file is replaced at once. Of several the last
-    must be one that names the others: it is there only while all the others are.
+    If the block raises, the targets are unchanged. Each file is replaced atomically. Of several the last must
+    be one that refers to the others: it exists only while all the others do.
 
     Args:
         *targets: Files (or folders) to write, all in one folder, which is created.
@@ -47,7 +47,7 @@ def replacing(*targets: Path) -> Iterator[tuple[Path, ...]]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file whole or not at all; raises as `replacing` does."""
+    """Write a text file atomically; raises as `replacing` does."""
     with replacing(path) as (temporary,):
         temporary.write_text(text, encoding="utf-8")
 
@@ -60,15 +60,15 @@ def replacing_together(
     size: int,
     repair: Callable[[Path], None] | None = None,
 ) -> None:
-    """Let all ranks write the same files, and put them in their place when all are done. Collective.
+    """Let all ranks write the same files, and move them to their targets when all are done. Collective.
 
     Args:
         comm: Communicator.
         targets: Files to write, all in one folder, which is created; in the order in which they are replaced.
-        write: Takes the hidden folder and writes files of the targets' names into it. Collective.
-        size: About how many bytes that takes: less room is refused beforehand, as the libraries that write in
-            parallel end the whole run when they meet a full disk.
-        repair: Takes the hidden folder on rank 0 before the files are moved.
+        write: Writes files of the targets' names into the hidden folder it is given. Collective.
+        size: Approximate number of bytes: less free space is rejected beforehand, as libraries that write in
+            parallel end the whole run on a full disk.
+        repair: Called with the hidden folder on rank 0 before the files are moved.
 
     Raises:
         OutputError: On all ranks, if the disk is full or the folder cannot be written to.
@@ -80,7 +80,7 @@ def replacing_together(
         error: Exception | None = None
         try:
             write(hidden)
-        except (OSError, RuntimeError) as caught:  # HDF5 and ADIOS2 tell of a full disk in their own ways
+        except (OSError, RuntimeError) as caught:  # HDF5 and ADIOS2 report a full disk in their own ways
             error = _output_error(targets, caught)
         except Exception as caught:
             error = caught
@@ -104,7 +104,7 @@ def _require_room(targets: Sequence[Path], size: int) -> None:
 
 @contextmanager
 def _on_first_rank(comm: MPI.Comm, target: Path) -> Iterator[Path]:
-    """Make a hidden folder on rank 0 and tell all ranks its name. Collective."""
+    """Create a hidden folder on rank 0 and broadcast its name. Collective."""
     owner = hidden_folder(target.parent, target.stem)
     name: Path | None = None
     with together(comm):
@@ -120,7 +120,7 @@ def _on_first_rank(comm: MPI.Comm, target: Path) -> Iterator[Path]:
 
 
 def _output_error(targets: Sequence[Path], error: Exception) -> OutputError:
-    """Return the error that says which files could not be written, why, and what to do."""
+    """Return the error that states which files could not be written, why, and what to do."""
     reason = (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__
     names = ", ".join(repr(target.name) for target in targets[:3])
     more = f" and {len(targets) - 3} more" if len(targets) > 3 else ""

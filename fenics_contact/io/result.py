@@ -1,4 +1,4 @@
-"""What came out of a computation, in one JSON file that another program can read years later."""
+"""The result of a computation in one JSON file that other programs can read years later."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def write_result(
     more: Mapping[str, Any] | None = None,
     errors: bool = False,
 ) -> Path:
-    """Write what a state is, how it was found and what it was found with. Collective.
+    """Write a state, how it was computed and with which software. Collective.
 
     | entry | what it holds |
     |---|---|
@@ -56,28 +56,28 @@ that was read from a checkpoint says so and has no tolerance |
     | ``seconds`` | by phase |
     | ``residuals`` | ``gluing``, ``natural``, ``equilibrium``; recomputed, relative |
     | ``energies`` | ``strain``, ``load``, ``friction``, ``dual``, ``total_potential``, ``primal`` |
-    | ``errors`` | ``algebraic``, ``friction``, ``discretisation``, ``by_body``; None where not known |
-    | ``contact`` | one entry a pair: ``points``, ``open``, ``stick``, ``slip``, ``force`` on the slave, \
+    | ``errors`` | ``algebraic``, ``friction``, ``discretisation``, ``by_body``; None if unknown |
+    | ``contact`` | one entry per pair: ``points``, ``open``, ``stick``, ``slip``, ``force`` on the slave, \
 ``normal_force``, ``peak_pressure``, ``smallest_gap``, ``largest_slip`` in the last load step; without \
 friction closed points count as ``slip`` |
-    | ``unheld`` | rigid motions that nothing holds and nothing loads, in words; `State.unheld` |
-    | ``more`` | what the caller adds |
+    | ``unheld`` | rigid motions that nothing resists and nothing loads, in words; `State.unheld` |
+    | ``more`` | further results of the caller |
 
-    Entries may be added without a new version; none changes its meaning or goes without one.
+    Entries may be added without a new version; changing or removing one requires a new version.
 
     Args:
         state: The state.
-        folder: Where to write; created.
+        folder: Output folder; created.
         name: Name of the file without ".json". A file of that name is replaced when the new one is complete.
         more: Further results: numbers, text, arrays, by name.
-        errors: Ask the state for its errors also where it does not know them yet, which takes about as long
-            as some products; a state that was solved without a fixed tolerance knows them.
+        errors: Whether to compute the state's errors if they are not known yet, at the cost of a few
+            products; a state that was solved without a fixed tolerance knows them.
 
     Returns:
         The file; `read_result` reads it.
 
     Raises:
-        InvalidInputError: If the name holds a folder, or ``more`` what JSON does not know; says where.
+        InvalidInputError: If the name contains a folder, or ``more`` something that JSON lacks; states where.
 
     Example:
         >>> write_result(state, "output", more={"drop_percent": 12.4})  # doctest: +SKIP
@@ -99,7 +99,7 @@ def write_optimisation_result(
     name: str = "result",
     more: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Write what an optimisation found and how. Collective.
+    """Write the result of an optimisation. Collective.
 
     The file has the entries of `write_result` for the state of the best design, with ``kind``
     "optimisation", ``seconds`` and ``counts`` of the whole run, and
@@ -113,9 +113,9 @@ def write_optimisation_result(
 an evaluation; None where a trial point was rejected as invalid |
 
     Args:
-        result: What `minimize` returned.
-        problem: What it minimised.
-        folder: Where to write; created.
+        result: The result of `minimize`.
+        problem: The minimised problem.
+        folder: Output folder; created.
         name: Name of the file without ".json".
         more: Further results by name.
 
@@ -205,7 +205,7 @@ def _state_record(state: State, unheld: Sequence[UnheldMotion]) -> dict[str, Any
 
 
 def _pair(state: State, number: int) -> dict[str, Any]:
-    """Return what happens between the surfaces of one pair."""
+    """Return a summary of the contact of one pair."""
     contact = state.contact
     mine = contact.on_pair(number)
     known = {status.name.lower(): int(np.sum(contact.status[mine] == status)) for status in Status}
@@ -222,12 +222,12 @@ def _pair(state: State, number: int) -> dict[str, Any]:
 
 
 def _knows_errors(state: State) -> bool:
-    """Tell whether the errors are there already: to find them takes products with F."""
+    """Return whether the errors are known: computing them takes products with F."""
     return state.known_errors is not None or "errors" in vars(state)
 
 
 def _errors(state: State) -> dict[str, Any]:
-    """Return the errors of a state. Collective where it does not know them."""
+    """Return the errors of a state. Collective if they are not known."""
     found = state.errors
     return {
         "algebraic": readable(found.algebraic),

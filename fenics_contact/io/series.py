@@ -33,21 +33,21 @@ FORMATS = ("vtu", "xdmf", "vtx")
 
 
 class ResultSeries:
-    """States that follow one another, in files that ParaView plays as a film.
+    """A sequence of states in files that ParaView plays as an animation.
 
     | written | what to open |
     |---|---|
     | ``NAME.pvd``, with VTU files in the folder ``NAME/`` | always; all bodies, all fields of `write_vtu` |
     | ``NAME_BODY.xdmf``, with HDF5 files in ``NAME/`` | with "xdmf": displacement and von Mises stress |
-    | ``NAME/NAME_0000_BODY_FIELD.bp`` | with "vtx" (ADIOS2): one folder a state, body and field |
+    | ``NAME/NAME_0000_BODY_FIELD.bp`` | with "vtx" (ADIOS2): one folder per state, body and field |
 
-    Every member has its own mesh, so that designs may differ in shape. After each `add` all files are whole,
-    and the PVD and XDMF files name complete members alone; killed at any moment, a run leaves them so.
+    Every member has its own mesh, so that designs may differ in shape. After each `add` all files are
+    complete, and the PVD and XDMF files refer to complete members only, also if a run is killed at any
+    moment.
 
-    A run that goes on, from a checkpoint for example, goes on with the series: members are known by their
-    values. The first member that is added removes those that an earlier run has left at the same and at
-    higher values, which belong to a future that did not come to pass; those before stay. A value added twice
-    replaces its member.
+    A run that continues, for example from a checkpoint, continues the series: members are identified by their
+    values. The first member added removes those that an earlier run left at the same and higher values, as
+    they belong to a discarded continuation; earlier ones stay. A value added twice replaces its member.
 
     Attributes:
         path: The PVD file.
@@ -61,17 +61,17 @@ class ResultSeries:
     def __init__(
         self, folder: str | Path, name: str, comm: MPI.Comm, *, formats: Sequence[str] = ("vtu",)
     ) -> None:
-        """Look at what is there; nothing is written yet. Collective on ``comm``.
+        """Read existing members; nothing is written yet. Collective on ``comm``.
 
         Args:
-            folder: Where to write; created with the first member.
-            name: Name of the series, what all names begin with.
+            folder: Output folder; created with the first member.
+            name: Name of the series, the beginning of all file names.
             comm: Communicator of the states.
-            formats: Of "vtu", "xdmf" and "vtx"; VTU files are written in any case.
+            formats: Any of "vtu", "xdmf" and "vtx"; VTU files are always written.
 
         Raises:
-            InvalidInputError: If the name holds a folder, a format is unknown or not there, or a PVD file of
-                that name is none of a series.
+            InvalidInputError: If the name contains a folder, a format is unknown or unavailable, or a PVD
+                file of that name does not belong to a series.
         """
         inherited: list[Member] = []
         with together(comm):
@@ -88,7 +88,7 @@ class ResultSeries:
 
     @property
     def members(self) -> tuple[Member, ...]:
-        """All members in the order of their values, those of an earlier run included."""
+        """All members in the order of their values, including those of an earlier run."""
         return tuple(sorted([*self._inherited, *self._added]))
 
     def add(
@@ -103,16 +103,16 @@ class ResultSeries:
 
         Args:
             state: The state.
-            value: Time, load factor or number of the step or design; what ParaView shows as time.
-            label: What it is, in words: the name of the load step, for example.
+            value: Time, load factor or number of the step or design; shown by ParaView as time.
+            label: Description, for example the name of the load step.
             cell_fields: Further fields of the VTU files, as for `write_vtu`.
 
         Returns:
             The PVD file.
 
         Raises:
-            InvalidInputError: If the value is not finite or the label is no line of text.
-            OutputError: If a file cannot be written; the members before are as they were.
+            InvalidInputError: If the value is not finite or the label is not a line of text.
+            OutputError: If a file cannot be written; earlier members are unchanged.
         """
         value = _checked(value, label)
         number = self._make_room(value, state.scene.body_names)
@@ -134,7 +134,7 @@ class ResultSeries:
         Their values are the numbers of the evaluations, their labels the objectives.
 
         Args:
-            problem: What is minimised.
+            problem: The minimised problem.
 
         Example:
             >>> minimize(problem, start, callback=series.follow(problem))  # doctest: +SKIP
@@ -148,7 +148,7 @@ class ResultSeries:
         return add
 
     def _make_room(self, value: float, bodies: Sequence[str]) -> int:
-        """Take out the members that a value replaces and return the number of the new one. Collective."""
+        """Remove the members that a value replaces and return the number of the new one. Collective."""
         before = self.members
         later = [] if self._added else [member for member in self._inherited if member.value >= value]
         equal = [member for member in before if member.value == value]
@@ -159,7 +159,7 @@ class ResultSeries:
         with together(self._comm):
             if self._comm.rank == 0 and self.path.parent.is_dir():
                 remove_abandoned(self.path.parent)
-                if gone:  # first what names the files, then the files
+                if gone:  # first the index files, then the files
                     self._write_indices(bodies)
                 if not self._added:
                     self._remove_unnamed()
@@ -168,11 +168,11 @@ class ResultSeries:
         return 1 + max((member.number for member in self.members), default=-1)
 
     def _write_indices(self, bodies: Sequence[str]) -> None:
-        """Write what names the files of all members, the PVD file last."""
+        """Write the files that refer to those of all members, the PVD file last."""
         for body, target in file_of_each(bodies, self.path.parent, self._name, ".xdmf").items():
             if "xdmf" in self._formats or target.exists():
                 self._write_temporal(body, target, bodies)
-        if not self.members:  # readers know no series without members
+        if not self.members:  # readers reject a series without members
             self.path.unlink(missing_ok=True)
             return
         write_text(self.path, collection(self._name, self.members))
@@ -191,13 +191,13 @@ class ResultSeries:
             target.unlink(missing_ok=True)
 
     def _remove_unnamed(self) -> None:
-        """Remove the files of members that are no longer, or that a killed run did not complete."""
+        """Remove the files of removed members, and of those that a killed run did not complete."""
         folder = self.path.with_suffix("")
         if not folder.is_dir():
             return
         named = {member.number for member in self.members}
         pattern = re.compile(rf"{re.escape(self._name)}_(\d{{4,}})(_.*)?\.(vtm|vtu|xdmf|h5|bp)")
-        # What names other files goes before them.
+        # Index files are removed before the files to which they refer.
         for path in sorted(folder.iterdir(), key=lambda path: path.suffix not in (".vtm", ".xdmf")):
             match = pattern.fullmatch(path.name)
             if match and int(match.group(1)) not in named:

@@ -1,4 +1,4 @@
-"""XDMF files of a series: one grid a time, with mesh and fields taken from the file of each member."""
+"""XDMF files of a series: one grid per time, with mesh and fields from the file of each member."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ def grid_of(path: Path, prefix: str, value: float) -> ET.Element:
     """Return mesh and fields of an XDMF file as one grid with a time.
 
     Args:
-        path: File that `write_xdmf` wrote: a grid of the mesh and a collection with one grid for each field.
+        path: File of `write_xdmf`: a grid of the mesh and a collection with one grid for each field.
         prefix: Folder of its HDF5 file as seen from the file of the series, with a slash at the end.
         value: The time.
     """
@@ -31,7 +31,7 @@ def grid_of(path: Path, prefix: str, value: float) -> ET.Element:
 
 
 def temporal(name: str, grids: Sequence[ET.Element]) -> str:
-    """Return the text of an XDMF file with one grid a time."""
+    """Return the text of an XDMF file with one grid per time."""
     root = ET.Element("Xdmf", Version="3.0")
     domain = ET.SubElement(root, "Domain")
     collection = ET.SubElement(domain, "Grid", Name=name, GridType="Collection", CollectionType="Temporal")

@@ -1,4 +1,4 @@
-"""VTU files, one a body, gathered from all ranks, with an index that opens them together."""
+"""VTU files, one per body, gathered from all ranks, with an index that opens them together."""
 
 from __future__ import annotations
 
@@ -38,24 +38,24 @@ def write_vtu(
 ) -> Path:
     """Write a state for ParaView: a file for each body and a multi-block file to open. Collective.
 
-    On points and cells the fields of `contact.GatheredFields`, and on cells what is given. Plane bodies lie
-    in the plane z = 0, their vectors have no z component.
+    They hold the fields of `contact.GatheredFields`, and the given fields on cells. Plane bodies lie in the
+    plane z = 0, their vectors have zero z component.
 
     Args:
         state: The state.
-        folder: Where to write; created.
-        name: What the files' names begin with: "state" gives "state.vtm" and, for a body "link 1",
+        folder: Output folder; created.
+        name: Beginning of the files' names: "state" gives "state.vtm" and, for a body "link 1",
             "state_link_1.vtu". Files are replaced when the new ones are complete.
-        cell_fields: More fields: name -> body -> a number or a row for every cell, such as
+        cell_fields: Further fields: name -> body -> a number or a row for every cell, such as
             ``{"discretisation_error": {body: estimate.by_cell(body) for body in state.scene.bodies}}``.
 
     Returns:
         The multi-block file.
 
     Raises:
-        InvalidInputError: If the name holds a folder, or a field lacks a body or does not fit its cells.
+        InvalidInputError: If the name contains a folder, or a field lacks a body or does not fit its cells.
     """
-    import meshio  # costs a tenth of a second
+    import meshio  # takes a tenth of a second
 
     index = checked_name(folder, name, ".vtm")
     more = {body: _checked(state, body, cell_fields or {}) for body in state.scene.bodies}
@@ -64,7 +64,7 @@ def write_vtu(
     comm = state.torn.decomposition.comm
     with together(comm):
         if comm.rank == 0:
-            # The index last: whoever finds it finds what it names.
+            # The index last: when it exists, so do its files.
             with replacing(*files, index) as paths:
                 for path, mesh in zip(paths, meshes.values(), strict=False):
                     meshio.write(path, mesh, file_format="vtu")
@@ -81,8 +81,8 @@ def _checked(
         if found[name].shape[:1] != (count,):
             given = f"shape {found[name].shape}" if body in values else "none"
             raise InvalidInputError(
-                f"the cell field {name!r} must have {count} rows for body {body!r}, one a cell, got {given}: "
-                "give every body an array in the order of the cells of its mesh"
+                f"the cell field {name!r} must have {count} rows for body {body!r}, one per cell, got "
+                f"{given}: give every body an array in the order of the cells of its mesh"
             )
     return found
 

@@ -1,4 +1,4 @@
-"""VTX files, the parallel format of ADIOS2, where dolfinx was built with it."""
+"""VTX files, the parallel format of ADIOS2, if dolfinx was built with it."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def write_vtx(
 
     Args:
         state: The state.
-        folder: Where to write; created.
-        name: What the names begin with: "state" gives "state_link_1_displacement.bp" and
+        folder: Output folder; created.
+        name: Beginning of the names: "state" gives "state_link_1_displacement.bp" and
             "state_link_1_von_mises.bp" for a body "link 1". They are replaced when the new ones are complete.
         value: Time that ParaView shows.
 
@@ -33,7 +33,7 @@ def write_vtx(
         Body name -> its two folders.
 
     Raises:
-        InvalidInputError: If dolfinx was built without ADIOS2, or the name holds a folder.
+        InvalidInputError: If dolfinx was built without ADIOS2, or the name contains a folder.
     """
     comm = state.torn.decomposition.comm
     with together(comm):
@@ -52,10 +52,10 @@ def write_vtx(
 
 
 def require_vtx() -> None:
-    """Refuse to go on without ADIOS2.
+    """Raise if ADIOS2 is missing.
 
     Raises:
-        InvalidInputError: Says which formats there are instead.
+        InvalidInputError: Names the formats to use instead.
     """
     if not _dolfinx.has_vtx():
         version = ".".join(map(str, _dolfinx.version()))

@@ -17,12 +17,13 @@ from fenics_contact.io.replacing import replacing_together
 def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
     """Write displacement and von Mises stress of every body to XDMF, all ranks together. Collective.
 
-    The numbers are in HDF5 files beside them. ParaView opens them with its "Xdmf3 Reader S".
+    The data are in HDF5 files beside them. ParaView opens them with its "Xdmf3 Reader S".
 
     Args:
         state: The state.
-        path: Name to derive the files from: for the body "link 1" "chain.xdmf" becomes "chain_link_1.xdmf"
-            and "chain_link_1.h5". The folder is created; files are replaced when the new ones are complete.
+        path: Name from which those of the files are derived: for the body "link 1" "chain.xdmf" becomes
+            "chain_link_1.xdmf" and "chain_link_1.h5". The folder is created; files are replaced when the new
+            ones are complete.
 
     Returns:
         Body name -> its XDMF file.
@@ -41,14 +42,14 @@ def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
     return files
 
 
-#: The name by which readers know the rule that grids include the mesh, and what dolfinx 0.9 writes instead:
-#: ParaView finds no mesh then, and VTK's reader crashes.
+#: The standard name of the rule that grids include the mesh, and what dolfinx 0.9 writes instead, with which
+#: ParaView finds no mesh and VTK's reader crashes.
 _XINCLUDE, _UNKNOWN = "http://www.w3.org/2001/XInclude", "https://www.w3.org/2001/XInclude"
 
 
 def _write(comm: MPI.Comm, target: Path, displacement: Any, von_mises: Any) -> None:
     mesh = displacement.function_space.mesh
-    # The XDMF file names its HDF5 file: both keep their names and are written in a folder of their own.
+    # The XDMF file names its HDF5 file: both keep their names and are written in a separate folder.
     replacing_together(
         comm,
         [target.with_suffix(".h5"), target],
@@ -59,7 +60,7 @@ def _write(comm: MPI.Comm, target: Path, displacement: Any, von_mises: Any) -> N
 
 
 def parallel_size(mesh: Any) -> int:
-    """Return about how many bytes a mesh takes in a file with its displacement and a field on its cells."""
+    """Return the approximate bytes of a file with a mesh, its displacement and a field on its cells."""
     nodes = mesh.geometry.index_map().size_global
     cells = mesh.topology.index_map(mesh.topology.dim).size_global
     return int(8 * (6 * nodes + 28 * cells) + 2**16)

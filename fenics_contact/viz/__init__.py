@@ -1,9 +1,8 @@
 """Pictures of scenes, states and optimisations as PNG files, drawn without a display.
 
-Three-dimensional parts are rendered by pyvista, everything around them (titles, colour bars, diagrams) is set
-by matplotlib, which draws plane bodies as well. On several ranks the fields are gathered by all and drawn by
-rank 0. Every ``plot_`` function returns a `Picture`, which Jupyter shows and which is written where a path is
-given.
+Three-dimensional parts are rendered by pyvista; matplotlib adds titles, colour bars and diagrams, and draws
+plane bodies. On several ranks the fields are gathered by all and drawn by rank 0. Every ``plot_`` function
+returns a `Picture`, which Jupyter shows and which is written to a file if a path is given.
 """
 
 from fenics_contact.viz._libraries import check_libraries

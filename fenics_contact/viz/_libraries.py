@@ -6,7 +6,7 @@ from fenics_contact._requirements import require_extra
 
 
 def check_libraries() -> None:
-    """Make sure that pyvista and matplotlib are there.
+    """Make sure that pyvista and matplotlib are installed.
 
     Raises:
         MissingRequirementError: One of them is not installed.

@@ -1,4 +1,4 @@
-"""Picture of what an optimisation achieved: contact before and after, and the moved outlines."""
+"""Picture of the result of an optimisation: contact before and after, and the moved outlines."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ def plot_before_after(
     units: Units | None = None,
     width: int = 1600,
 ) -> Picture:
-    """Draw contact pressure before and after in the same colours, and how the outlines moved. Collective.
+    """Draw contact pressure before and after in the same colours, and the movement of outlines. Collective.
 
     The outlines are those of the undeformed bodies around the strongest contact: in space in two sections, in
-    the plane as they are. Their movement is magnified by a factor that is stated. The title says by how much
-    the objective fell, where design points are given, and how far the seat of the slave gave way: what it may
-    travel along its contact force until it touches, unloaded.
+    the plane directly. Their movement is magnified by a stated factor. The title reports the decrease of the
+    objective, if design points are given, and by how much the seat of the slave receded: the distance that
+    the unloaded slave may travel along its contact force until it touches.
 
     Args:
         first: State before, or the design point, for instance ``problem.first``.
@@ -63,12 +63,12 @@ def plot_before_after(
         clim: Range of the pressure, [force / length²]; from zero to the largest of both unless given.
         reach: How far pictures reach around the contact's middle, [length]; chosen unless given.
         label: Name of the objective with its unit.
-        title: What comes before the facts in the title.
+        title: Text before the facts in the title.
         units: Names of the units, mm, N and MPa unless given.
         width: Width of the picture in pixels.
 
     Returns:
-        The picture, which stands for its file where a path is needed.
+        The picture, which can be used like a path to its file.
 
     Raises:
         InvalidInputError: If the two do not belong to the same scene, it has no such pair, nothing touches
@@ -93,7 +93,7 @@ def plot_before_after(
 
 
 def _retreat(first: State, best: State, pair: int) -> float:
-    """Return how much farther the slave may travel against the force that the master exerts on it."""
+    """Return how much farther the slave may travel against the contact force on it."""
     resultant = first.contact.force[first.contact.on_pair(pair)].sum(axis=0)
     way = -resultant / np.linalg.norm(resultant)
     return best.contact.travel(way, pair) - first.contact.travel(way, pair)
@@ -124,7 +124,7 @@ def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> N
     frame = Frame(np.minimum(one.low, other.low), np.maximum(one.high, other.high))
     shown = look.clim or (0.0, peak or 1.0)
     found = profiles(first, best, look.reach)
-    # Sections are equally high and together as wide as the picture, but not too high.
+    # Sections have equal heights and together the width of the picture, but a limited height.
     wide = [profile.frame.proportion for profile in found]
     tall = [0.4 / frame.proportion + 0.08, min(0.8 / sum(wide), 0.45) + 0.13]
     size = look.width, round((sum(tall) + 0.03) * look.width)

@@ -1,4 +1,4 @@
-"""Scenes that a browser turns and zooms: one HTML page that needs no other file and no network."""
+"""Interactive scenes for a browser: a single HTML page that needs no other file and no network."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fenics_contact.viz.picture import written_path
 
 #: Height of the scene in a notebook, in units of its screen.
 HEIGHT = 520
-#: Words on a notebook's page and the patterns of the browser do not meet: the page is a frame of its own.
+#: The page is a frame of its own, so that its styles do not affect the notebook's.
 _FRAME = (
     '<iframe srcdoc="{page}" style="width: 100%; height: {height}px; border: 1px solid #dddddd"></iframe>'
 )
@@ -29,9 +29,9 @@ _ENTRY = '<span style="color: {colour}; margin-right: 0.3em">&#9679;</span>{name
 
 @dataclass(frozen=True, eq=False)
 class InteractiveScene:
-    """A scene that Jupyter shows where it is the value of a cell; the mouse turns, shifts and zooms it.
+    """A scene that Jupyter shows as the value of a cell; the mouse rotates, shifts and zooms it.
 
-    Where a path is needed it stands for its file. On ranks that did not draw it shows nothing.
+    It can be used like a path to its file. On ranks that did not draw it shows nothing.
 
     Attributes:
         html: The page on the rank that drew, None on the others.
@@ -50,7 +50,7 @@ class InteractiveScene:
         return written_path(self.path, "function interactive a path, such as path='stress.html'")
 
     def __str__(self) -> str:
-        """Return the path of the file, or say that there is none."""
+        """Return the path of the file, or a text if there is none."""
         return "scene without a file" if self.path is None else str(self.path)
 
     def _repr_mimebundle_(self, **_: Any) -> dict[str, str]:
@@ -63,8 +63,8 @@ class InteractiveScene:
 def exported(plotter: Any) -> str:
     """Return a plotter's scene as a page for the viewer of VTK.js, which it contains.
 
-    The scene is described by trame's serializers alone: pyvista's own export starts a server, which looks
-    for files on the network.
+    Only trame's serializers are used: pyvista's own export starts a server, which looks for files on the
+    network.
 
     Raises:
         ImportError: If trame-vtk is not installed.
@@ -95,5 +95,5 @@ def captioned(page: str, title: str, entries: Mapping[str, str]) -> str:
     """Put a title above a scene, and a legend: names and their colours."""
     listed = "".join(_ENTRY.format(colour=colour, name=html.escape(name)) for name, colour in entries.items())
     caption = _CAPTION.format(title=html.escape(title), entries=listed)
-    # The viewer empties what it is shown in: that must not be the whole page.
+    # The viewer clears its container, which therefore must not be the whole page.
     return page.replace("<body>", f'<body>\n{caption}\n<div class="content" style="height: 100%"></div>', 1)

@@ -1,4 +1,4 @@
-"""Colours that remain apart for colour-blind readers, and their assignment to neighbouring subdomains.
+"""Colours that colour-blind readers can distinguish, and their assignment to neighbouring subdomains.
 
 References:
     M. Okabe and K. Ito, Color universal design (2008), for symbols; P. Tol, Colour schemes, SRON technical
@@ -12,23 +12,23 @@ import scipy.sparse as sp
 from matplotlib import colormaps
 from matplotlib.colors import ListedColormap
 
-INK = "#222222"  #: Words and axes.
-GREY = "#9a9a9a"  #: What stands back.
+INK = "#222222"  #: Text and axes.
+GREY = "#9a9a9a"  #: Background elements.
 PALE = "#e3e6e8"
 BLUE = "#0072b2"  #: The first line of a diagram.
 ORANGE = "#d55e00"  #: The second one.
 GREEN = "#009e73"  #: The third one.
 
-#: Cool and warm colours for areas: bodies take turns, so that those in contact are told apart.
+#: Cool and warm colours for areas: bodies alternate, so that those in contact are distinguishable.
 FAMILIES = (
     ("#77aadd", "#44bb99", "#4466aa", "#99ddff"),
     ("#ee8866", "#eedd88", "#ffaabb", "#bbcc33"),
 )
-#: An area that belongs to nothing else.
+#: Any other area.
 SPARE = "#dddddd"
 
-#: Maps whose lightness only falls, readable in grey as well. The first stops short of black, on which no line
-#: would be seen; the last has zero in its middle.
+#: Maps with monotonic lightness, readable in grey as well. The first ends before black, on which no line
+#: would be visible; the last has zero in its middle.
 STRESS_MAP = ListedColormap(colormaps["magma_r"](np.linspace(0.04, 0.82, 256)), "stress")
 ERROR_MAP = colormaps["viridis_r"]
 PRESSURE_MAP = colormaps["YlGnBu"]
@@ -56,13 +56,13 @@ def neighbours(cells: np.ndarray, partition: np.ndarray) -> np.ndarray:
 def colour_subdomains(shared: np.ndarray, family: int) -> list[str]:
     """Choose a colour for each subdomain so that neighbours differ.
 
-    Subdomains with the fewest colours left choose first (Brélaz' rule). A body keeps to its family of colours
-    while it can; if a subdomain has more neighbours than there are colours, it repeats that of the neighbour
-    with which it shares the fewest nodes.
+    Subdomains with the fewest free colours choose first (Brélaz' rule). A body uses its family of colours as
+    far as possible; if a subdomain has more neighbours than there are colours, it repeats that of the
+    neighbour with which it shares the fewest nodes.
 
     Args:
         shared: Number of nodes that subdomains share, (S, S), see `neighbours`.
-        family: Which family of colours to prefer.
+        family: Preferred family of colours.
 
     Returns:
         S colours.

@@ -25,11 +25,11 @@ from fenics_contact.viz.words import checked_range, headline, nice_number, writt
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-#: Fraction of the surface's size that the largest movement appears to have.
+#: Apparent size of the largest movement relative to the surface.
 VISIBLE = 0.06
-#: How much of what lies behind it the surface hides.
+#: Opacity of the surface.
 OPACITY = 0.75
-#: Part of the width that each of the two pictures takes.
+#: Fraction of the width for each of the two pictures.
 PART = 0.45
 
 
@@ -46,7 +46,7 @@ def plot_control_net(
     width: int = 1600,
     comm: MPI.Comm | None = None,
 ) -> Picture:
-    """Draw the design surface with its control net before and after, coloured by how far it moved outwards.
+    """Draw the design surface with its control net before and after, coloured by its outward movement.
 
     Args:
         design: Nodes of the surface, their order and outward normals.
@@ -55,16 +55,16 @@ def plot_control_net(
         path: PNG file to write, None to write none.
         clim: Range of the colours, [length]; symmetric about zero unless given.
         magnify: Factor of the movement in the right picture; chosen and stated unless given.
-        title: What comes before the facts in the title.
+        title: Text before the facts in the title.
         units: Names of the units, mm, N and MPa unless given.
         width: Width of the picture in pixels.
-        comm: If given, only rank 0 draws, and all ranks learn of an error.
+        comm: If given, only rank 0 draws, and an error is raised on all ranks.
 
     Returns:
-        The picture, which stands for its file where a path is needed.
+        The picture, which can be used like a path to its file.
 
     Raises:
-        InvalidInputError: If arrays do not fit each other, are not finite, or an option cannot be used.
+        InvalidInputError: If arrays are inconsistent or not finite, or an option cannot be used.
         MissingRequirementError: If this machine cannot render.
 
     Note:
@@ -110,7 +110,7 @@ def _chosen_factor(start: np.ndarray, movement: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class _Change:
-    """What is drawn: surface (m_s, m_t, 3) and net (n_s, n_t, 3) before and after, magnified."""
+    """Surface (m_s, m_t, 3) and net (n_s, n_t, 3) before and after, magnified."""
 
     surfaces: tuple[np.ndarray, np.ndarray]
     nets: tuple[np.ndarray, np.ndarray]
@@ -140,7 +140,7 @@ def _draw(change: _Change, paper: BinaryIO, title: str, units: Units, width: int
 
 
 def _view(grid: np.ndarray) -> View:
-    """Look onto the middle of the surface from its outside, aslant, s running to the right."""
+    """Look obliquely at the middle of the surface from outside, with s to the right."""
     along = grid[-1].mean(axis=0) - grid[0].mean(axis=0)
     across = grid[:, -1].mean(axis=0) - grid[:, 0].mean(axis=0)
     along, across = along / np.linalg.norm(along), across / np.linalg.norm(across)

@@ -32,23 +32,23 @@ def plot_convergence(
     width: int = 1200,
     comm: MPI.Comm | None = None,
 ) -> Picture:
-    """Draw the objective of every evaluation: the start and serious steps connected, null steps beside them.
+    """Draw the objective of every evaluation: the start and serious steps connected, null steps as points.
 
     Args:
         values: Objective of each trial point in the order of evaluation, (n,); NaN where it was rejected.
-        kinds: What became of each: "start", "serious", "null", "rejected" or "refined".
+        kinds: Outcome of each: "start", "serious", "null", "rejected" or "refined".
         path: PNG file to write, None to write none.
         label: Name of the objective, with its unit.
-        title: What comes before the facts in the title.
-        logarithmic: Draw a positive objective logarithmically: a trial far off leaves the others their room.
+        title: Text before the facts in the title.
+        logarithmic: Draw a positive objective logarithmically, so that a trial far off does not dominate.
         width: Width of the picture in pixels.
-        comm: If given, only rank 0 draws, and all ranks learn of an error.
+        comm: If given, only rank 0 draws, and an error is raised on all ranks.
 
     Returns:
-        The picture, which stands for its file where a path is needed.
+        The picture, which can be used like a path to its file.
 
     Raises:
-        InvalidInputError: If the arrays do not belong together or hold no start.
+        InvalidInputError: If the arrays are inconsistent or hold no start.
 
     Note:
         Collective on ``comm`` if given.
@@ -104,7 +104,7 @@ def _draw(
         white = {"marker": "o", "facecolors": "white", "edgecolors": ORANGE, "linewidths": 1.8, "zorder": 3}
         if np.any(null):
             axes.scatter(number[null], values[null], label="null steps", s=64, **white)
-        if len(rejected):  # on the lower edge: such a point has no value
+        if len(rejected):  # on the lower edge, as such a point has no value
             low, places = np.full(len(rejected), 0.03), axes.get_xaxis_transform()
             crosses = {"marker": "x", "color": GREY, "transform": places}
             axes.scatter(rejected, low, label="rejected points", s=64, **crosses)

@@ -1,4 +1,4 @@
-"""A control net whose bars follow the surface it belongs to."""
+"""A control net whose bars follow its surface."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ PIECES = 8
 def curved_net(grid: np.ndarray, net: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the bars of a net as polylines that follow the surface instead of cutting through it.
 
-    Control point (i, j) belongs to the surface's parameters (i / (n_s - 1), j / (n_t - 1)). What a bar adds
-    to the surface there is linear along the bar, so that it ends at its control points wherever those are.
+    Control point (i, j) belongs to the surface's parameters (i / (n_s - 1), j / (n_t - 1)). The offset of a
+    bar from the surface is linear along the bar, so that it ends at its control points.
 
     Args:
         grid: Nodes of the surface in the order of its parameters, (m_s, m_t, 3), [length].
@@ -35,10 +35,10 @@ def curved_net(grid: np.ndarray, net: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _parameters(places: np.ndarray, count: int) -> np.ndarray:
-    """Return the surface's parameters at numbers of control points; a lone one sits in the middle."""
+    """Return the surface's parameters of control points; a single one lies in the middle."""
     return places / (count - 1) if count > 1 else np.full(len(places), 0.5)
 
 
 def _hats(places: np.ndarray, count: int) -> np.ndarray:
-    """Return the piecewise linear hat functions of the numbers 0 .. count - 1 at some places, (n, count)."""
+    """Return the piecewise linear hat functions of 0 .. count - 1 at some points, (n, count)."""
     return np.maximum(0.0, 1.0 - np.abs(places[:, None] - np.arange(count)))

@@ -1,4 +1,4 @@
-"""Diagram of curves: what was computed beside what theory says."""
+"""Diagram of curves: computed results and reference solutions."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from fenics_contact.viz.sheet import sheet
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-#: Places and values of one curve, (n,) each.
+#: Abscissas and ordinates of one curve, (n,) each.
 Curve: TypeAlias = tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]
 
-#: Colours and symbols of the series, told apart without colours too.
+#: Colours and symbols of the series, distinguishable also without colours.
 LOOKS = (
     (BLUE, "o"),
     (ORANGE, "^"),
@@ -48,22 +48,23 @@ def plot_curves(
     """Draw series of points, each in its colour and symbol, on top of dark reference curves.
 
     Args:
-        series: Name -> places and values, what was computed or measured. NaN leaves a gap.
+        series: Name -> abscissas and ordinates, computed or measured. NaN leaves a gap.
         path: PNG file to write, None to write none.
-        xlabel: Name of the places with their unit.
-        ylabel: Name of the values with their unit.
-        reference: Name -> places and values, what they are compared with.
-        connected: Connect the points of a series in their order.
-        logarithmic: Both axes logarithmic, for convergence.
+        xlabel: Label of the abscissas with unit.
+        ylabel: Label of the ordinates with unit.
+        reference: Name -> abscissas and ordinates of the reference curves.
+        connected: Whether to connect the points of a series in their order.
+        logarithmic: Whether both axes are logarithmic, for convergence.
         title: Title.
         width: Width of the picture in pixels.
-        comm: If given, only rank 0 draws, and all ranks learn of an error.
+        comm: If given, only rank 0 draws, and an error is raised on all ranks.
 
     Returns:
-        The picture, which stands for its file where a path is needed.
+        The picture, which can be used like a path to its file.
 
     Raises:
-        InvalidInputError: If there is nothing to draw or a curve has not as many places as values.
+        InvalidInputError: If there is nothing to draw, or a curve has different numbers of abscissas and
+            ordinates.
 
     Note:
         Collective on ``comm`` if given.
@@ -107,7 +108,7 @@ def _checked(name: str, curve: Curve) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _columns(names: Sequence[str]) -> int:
-    """Return how many names fit beside each other."""
+    """Return how many names fit side by side."""
     longest = max(len(name) for name in names)
     return max(1, min(len(names), 110 // (longest + 8)))
 

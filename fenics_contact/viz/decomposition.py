@@ -46,12 +46,12 @@ def plot_decomposition(
         scene: The bodies.
         partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
         path: PNG file to write, None to write none.
-        explode: How much each subdomain shrinks towards its centre, from 0 (whole bodies) to below 1.
+        explode: Shrinkage of each subdomain towards its centre, from 0 (whole bodies) to below 1.
         width: Width of the picture in pixels.
-        comm: If given, only rank 0 draws, and all ranks learn of an error.
+        comm: If given, only rank 0 draws, and an error is raised on all ranks.
 
     Returns:
-        The picture, which stands for its file where a path is needed.
+        The picture, which can be used like a path to its file.
 
     Raises:
         InvalidInputError: If a partition does not fit its body or ``explode`` is out of range.
@@ -72,7 +72,7 @@ def _check_partition(name: str, mesh: BodyMesh, partitions: Mapping[str, np.ndar
     shape = np.shape(partitions[name]) if name in partitions else "none"
     if shape != (mesh.n_cells,):
         raise InvalidInputError(
-            f"partitions[{name!r}] must have shape ({mesh.n_cells},), one subdomain a cell, got {shape}: "
+            f"partitions[{name!r}] must have shape ({mesh.n_cells},), one subdomain per cell, got {shape}: "
             "pass the partitions that the scene was cut with"
         )
 
@@ -133,19 +133,19 @@ def _draw_plane_body(axes: Any, mesh: BodyMesh, partition: np.ndarray, family: i
         cells = mesh.cells[partition == number]
         centre = mesh.points[np.unique(cells)].mean(axis=0)
         points = centre + (1.0 - explode) * (mesh.points - centre)
-        # Faces bordered in their own colour: else the white sheet shines through between them.
+        # Faces with borders in their own colour: otherwise the white background shows between them.
         axes.add_collection(PolyCollection(points[cells], color=colours[number], linewidths=0.4))
         draw_outline(axes, points, cells, width=2.0)
 
 
 def subdomain_layers(grid: Any, partition: np.ndarray, family: int, explode: float = 0.0) -> list[Layer]:
-    """Draw the subdomains of a body in colours that tell neighbours apart, and the seams between them.
+    """Draw the subdomains of a body, neighbours in different colours, and the seams between them.
 
     Args:
         grid: The body's linear cells, pyvista's UnstructuredGrid.
         partition: Subdomain of every cell, (n_cells,).
-        family: Which family of colours to prefer.
-        explode: How much each subdomain shrinks towards its centre.
+        family: Preferred family of colours.
+        explode: Shrinkage of each subdomain towards its centre.
     """
     colours = colour_subdomains(neighbours(cells_of(grid), partition), family)
     labelled, layers = grid.copy(deep=False), []

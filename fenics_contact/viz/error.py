@@ -1,4 +1,4 @@
-"""Picture of where the discretisation error of a state is."""
+"""Picture of the discretisation error of a state."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fenics_contact.viz.picture import Picture, png_path
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.words import checked_range, checked_reach, headline, written
 
-#: The colours reach down to this part of their upper end at most: what is below does not matter.
+#: Smallest lower end of the colours relative to their upper end: smaller errors do not matter.
 SPAN = 1e-4
 
 
@@ -38,9 +38,9 @@ def plot_error(
     """Draw each cell's part of the discretisation error, on a logarithmic scale. Collective.
 
     The squares of the cells' parts, relative to the energy norm √(uᵀK u) of the displacement, add up to the
-    square of the relative error that the title states. A mesh that spends its cells well shows one colour;
-    dark cells are those to refine. Bodies are shown in true deformation, with sections through the strongest
-    contact as in `plot_stress`.
+    square of the relative error in the title. An efficient mesh shows a uniform colour; dark cells should be
+    refined. Bodies are shown in true deformation, with sections through the strongest contact as in
+    `plot_stress`.
 
     Args:
         state: The state.
@@ -49,17 +49,18 @@ def plot_error(
             given, see `accuracy.discretisation_error`.
         clim: Range of the colours, positive; up to the largest part and down to a ten thousandth of it, or
             the smallest, unless given. Give two pictures the same range to compare them.
-        sections: Draw the sections too, if a contact carries force.
+        sections: Whether to draw the sections, if a contact carries force.
         reach: How far sections reach up and down from the contact's middle, [length]; chosen unless given.
-        title: What comes before the facts in the title.
+        title: Text before the facts in the title.
         units: Names of the units, mm, N and MPa unless given.
         width: Width of the picture in pixels.
 
     Returns:
-        The picture, which stands for its file where a path is needed.
+        The picture, which can be used like a path to its file.
 
     Raises:
-        InvalidInputError: If parts do not fit the cells, or an option or the name of the file cannot be used.
+        InvalidInputError: If the number of parts is not that of the cells, or an option or the name of the
+            file cannot be used.
         MissingRequirementError: If this machine cannot render.
     """
     target = png_path(path)
@@ -103,9 +104,9 @@ def _checked(state: State, by_cell: Mapping[str, np.ndarray]) -> dict[str, np.nd
         part = np.asarray(by_cell[name], dtype=np.float64) if name in by_cell else np.zeros(0)
         if part.shape != (body.mesh.n_cells,) or not np.all(np.isfinite(part) & (part >= 0)):
             raise InvalidInputError(
-                f"by_cell[{name!r}] must hold {body.mesh.n_cells} numbers, one a cell, finite and not "
-                f"negative, got {_described(part) if name in by_cell else 'none'}: give what by_cell(body) "
-                "of an estimate returns, divided by the norm of the displacement"
+                f"by_cell[{name!r}] must hold {body.mesh.n_cells} numbers, one per cell, finite and not "
+                f"negative, got {_described(part) if name in by_cell else 'none'}: give the by_cell(body) of "
+                "an estimate, divided by the norm of the displacement"
             )
         values[name] = part
     return values

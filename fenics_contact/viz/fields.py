@@ -1,4 +1,4 @@
-"""The bodies of a state as they are drawn: what `State.to_pyvista` returns, by name."""
+"""The bodies of a state for drawing: the blocks of `State.to_pyvista` by name."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fenics_contact.contact import State
 
 
 def drawn_bodies(state: State) -> dict[str, Any]:
-    """Return the bodies, not deformed and of linear cells, with all fields. Collective."""
+    """Return the undeformed bodies, with linear cells and all fields. Collective."""
     blocks = state.to_pyvista(linear=True)
     return {name: blocks[name] for name in blocks.keys()}
 
@@ -27,7 +27,7 @@ def points_of(bodies: Mapping[str, Any]) -> np.ndarray:
 
 
 def contact_places(state: State, bodies: Mapping[str, Any]) -> np.ndarray:
-    """Return where the slave nodes of the contact points of drawn bodies are, (n, dim), [length]."""
+    """Return the positions of the contact points' slave nodes on drawn bodies, (n, dim), [length]."""
     return np.asarray(points_of(bodies)[state.contact.points.slave, : state.scene.dim])
 
 
@@ -42,5 +42,5 @@ def nodal(body: Any, name: str) -> np.ndarray:
 
 
 def lengths(body: Any) -> np.ndarray:
-    """Return how far each node moves, (n_nodes,), [length]."""
+    """Return the magnitude of each node's displacement, (n_nodes,), [length]."""
     return np.linalg.norm(body["displacement"], axis=1)

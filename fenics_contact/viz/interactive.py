@@ -1,4 +1,4 @@
-"""A state to turn and zoom in a browser."""
+"""An interactive view of a state in a browser."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from fenics_contact.viz.words import checked_range, headline
 
 logger = logging.getLogger(__name__)
 
-#: Pixels for which camera and colour bar are set up; a browser shows them larger or smaller.
+#: Nominal size in pixels for camera and colour bar; a browser scales them.
 SIZE = (1000, 600)
 
 
@@ -40,11 +40,11 @@ def interactive(
     title: str = "",
     units: Units | None = None,
 ) -> InteractiveScene | Picture:
-    """Show a state that the mouse turns, shifts and zooms. Collective.
+    """Show a state that the mouse rotates, shifts and zooms. Collective.
 
-    The scene is one page of HTML that works in notebooks, in pages made of them and as a file in any
-    browser, without a server or a network. Fields of the contact are shown on the slave surfaces through
-    bodies of glass. Where the libraries that make such pages are not installed, it is the static picture.
+    The scene is a single HTML page that works in notebooks, in pages made from them and as a file in any
+    browser, without a server or a network. Contact fields are shown on the slave surfaces through transparent
+    bodies. Without the libraries for such pages, a static picture is returned.
 
     Args:
         state: The state.
@@ -52,15 +52,15 @@ def interactive(
         deformed: Factor of the displacement.
         path: HTML file to write, None to write none.
         clim: Range of the colours; chosen unless given.
-        title: What comes before the facts in the title.
+        title: Text before the facts in the title.
         units: Names of the units, mm, N and MPa unless given.
 
     Returns:
-        The scene; a picture where the libraries that make it are missing and no file was asked for.
+        The scene; a picture if the libraries for it are missing and no file was requested.
 
     Raises:
         InvalidInputError: If there is no such field, or an option cannot be used.
-        MissingRequirementError: If this machine cannot render, or a file is asked for and the libraries are
+        MissingRequirementError: If this machine cannot render, or a file is requested and the libraries are
             missing.
     """
     target = file_path(path, ".html", "interactive scenes are HTML files")
@@ -104,7 +104,7 @@ def _check(state: State, field: str, deformed: float) -> None:
 def _drawn(
     subject: Subject, field: str, title: str, deformed: float
 ) -> tuple[str | None, bytes | None, str | None]:
-    """Return the page, or a picture instead of it and what is missing to make it."""
+    """Return the page, or a picture instead and the name of what is missing."""
     content, points = CONTENTS[field](subject), points_of(subject.bodies)
     space = subject.state.scene.dim == 3
     view = oblique_view(points) if space else IN_PLANE

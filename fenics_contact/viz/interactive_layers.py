@@ -1,4 +1,4 @@
-"""What a scene for the browser is made of: coloured bodies, or contact surfaces seen through them."""
+"""Contents of a scene for the browser: coloured bodies, or contact surfaces seen through them."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from fenics_contact.viz.symbols import symbols_of
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.words import written
 
-#: Radius of the balls on contact points and length of the longest arrow, in sides of a square as large as the
-#: mean nodal area.
+#: Radius of the balls on contact points and length of the longest arrow, relative to the side of a square of
+#: the mean nodal area.
 BALL, ARROW = 0.22, 1.5
 _EDGES = {"show_edges": True, "edge_color": INK, "edge_opacity": 0.25, "line_width": 1}
 _LIGHT = {"ambient": 0.5, "diffuse": 0.55}
@@ -30,11 +30,11 @@ _BAR = {"vertical": True, "position_x": 0.87, "position_y": 0.15, "height": 0.7,
 
 @dataclass(frozen=True)
 class Content:
-    """What is shown and what is said of it.
+    """The layers of a scene and their description.
 
     Attributes:
-        layers: What to draw.
-        facts: Words for the title.
+        layers: Layers to draw.
+        facts: Text for the title.
         legend: Names and their colours.
     """
 
@@ -45,11 +45,11 @@ class Content:
 
 @dataclass(frozen=True)
 class Subject:
-    """What a scene for the browser is made from.
+    """The data from which a scene for the browser is built.
 
     Attributes:
         state: The state.
-        bodies: Its bodies as they are drawn, deformed.
+        bodies: Its deformed bodies for drawing.
         clim: Range of the colours, None to choose it.
         units: Names of the units.
     """
@@ -70,7 +70,7 @@ def stress_content(subject: Subject) -> Content:
 
 
 def displacement_content(subject: Subject) -> Content:
-    """Length of the displacement on the bodies."""
+    """Magnitude of the displacement on the bodies."""
     values = {name: lengths(body) for name, body in subject.bodies.items()}
     peak, unit = max(float(length.max()) for length in values.values()), subject.units.length
     look = {"cmap": PRESSURE_MAP, "clim": subject.clim or (0.0, peak or 1.0)}
@@ -79,7 +79,7 @@ def displacement_content(subject: Subject) -> Content:
 
 
 def subdomain_content(subject: Subject) -> Content:
-    """Subdomains in colours that tell neighbours apart."""
+    """Subdomains, neighbours in different colours."""
     layers, count = [], 0
     for family, body in enumerate(subject.bodies.values()):
         _, part = np.unique(body["subdomain"], return_inverse=True)
@@ -101,7 +101,7 @@ def pressure_content(subject: Subject) -> Content:
 
 
 def status_content(subject: Subject) -> Content:
-    """What contact points do, seen through the bodies, with arrows where they slip."""
+    """Status of contact points, seen through the bodies, with arrows where they slip."""
     contact, layers, legend = subject.state.contact, _glass(subject), {}
     places = in_space(contact_places(subject.state, subject.bodies))
     dim = contact.points.normal.shape[1]
@@ -151,7 +151,7 @@ def _coloured(
 
 
 def _bar(label: str, shown: bool) -> dict[str, Any]:
-    """One bar for all: pyvista makes one for each title."""
+    """A common bar: pyvista makes one for each title."""
     return {"show_scalar_bar": shown, "scalar_bar_args": {"title": label, **_BAR}}
 
 

@@ -1,4 +1,4 @@
-"""Rigid obstacles in pictures: the shaded half of the plane, and outlines in space where they are plain."""
+"""Rigid obstacles in pictures: shaded areas in the plane, outlines of simple shapes in space."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fenics_contact.viz.view import Frame, View
 SAMPLES = 400
 #: Pieces of a circle.
 PIECES = 180
-#: How far the shown part of a plane reaches beyond the bodies, relative to their size.
+#: Margin of the shown part of a plane around the bodies, relative to their size.
 BORDER = 0.06
 _LINE = {"color": GREY, "line_width": 3, "lighting": False}
 
@@ -32,12 +32,12 @@ def obstacles_of(scene: Scene) -> list[RigidObstacle]:
 
 
 def shade_obstacles(axes: Any, scene: Scene, frame: Frame) -> None:
-    """Shade what lies inside a plane scene's obstacles, whatever their shape: where the distance is negative.
+    """Shade the inside of a plane scene's obstacles of any shape, where the distance is negative.
 
     Args:
         axes: matplotlib Axes.
         scene: A scene in the plane.
-        frame: What is shown.
+        frame: The visible frame.
     """
     x, y = (np.linspace(a, b, SAMPLES) for a, b in zip(frame.low, frame.high, strict=True))
     grid = np.stack(np.meshgrid(x, y), axis=-1)
@@ -49,15 +49,15 @@ def shade_obstacles(axes: Any, scene: Scene, frame: Frame) -> None:
 
 
 def obstacle_layers(scene: Scene, points: np.ndarray, view: View) -> tuple[list[Layer], np.ndarray]:
-    """Draw planes as sheets, spheres and cylinders by their outlines; other shapes in space are left out.
+    """Draw planes as sheets, spheres and cylinders by their outlines; other shapes in space are omitted.
 
     Args:
         scene: A scene in space.
-        points: All nodes of the bodies as they are drawn, (n, 3).
-        view: From which side it is seen.
+        points: All nodes of the drawn bodies, (n, 3).
+        view: Direction of view.
 
     Returns:
-        What to draw, and points that the picture should hold, (n, 3).
+        Layers to draw, and points that the picture should contain, (n, 3).
     """
     layers: list[Layer] = []
     held = [np.zeros((0, 3))]

@@ -1,4 +1,4 @@
-"""Drawing a field on the bodies of a state: all of them, and where they touch at a larger scale."""
+"""Drawing a field on the bodies of a state: all of them, and the contact at a larger scale."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ from fenics_contact.viz.sheet import scale_bar, sheet, show_image
 from fenics_contact.viz.stage import Layer, render
 from fenics_contact.viz.view import IN_PLANE, Frame, View, axis_label, frame_around, oblique_view
 
-#: Half size of the detail of a plane picture, in half lengths of the closed part of the contact surface.
+#: Half size of the detail of a plane picture, relative to half the length of the closed contact.
 REACH = 2.5
-#: A detail in the plane that shows more than this part of the bodies is left out.
+#: A detail in the plane that shows more than this fraction of the bodies is omitted.
 LARGEST_DETAIL = 0.4
-#: Part of the width that pictures take; the rest is the colour bar's.
+#: Fraction of the width for pictures; the rest is for the colour bar.
 WIDE = 0.84
 
 _LOOK = {
     "show_edges": True, "edge_color": INK, "edge_opacity": 0.12, "line_width": 1,
-    # So much light from all sides that colours of faces in shade can be found on the bar.
+    # Enough ambient light that colours of shaded faces match the bar.
     "ambient": 0.75, "diffuse": 0.28, "smooth_shading": True, "split_sharp_edges": True, "feature_angle": 50,
 }  # fmt: skip
 
 
 @dataclass(frozen=True)
 class _Part:
-    """What a part of the picture shows, and what draws it on matplotlib's axes."""
+    """A part of the picture, and the function that draws it on matplotlib's axes."""
 
     frame: Frame
     draw: Callable[[Any], None]
@@ -52,10 +52,10 @@ def paint(
 
     Args:
         state: The state.
-        bodies: Its bodies, not deformed, see `drawn_bodies`.
+        bodies: Its undeformed bodies, see `drawn_bodies`.
         paints: The field.
         path: PNG file to write, or None.
-        sections: Draw the details too, if a contact carries force: in space two sections.
+        sections: Whether to draw the details, if a contact carries force: in space two sections.
     """
     painted = paints.on(bodies)
     touching = sections and bool(np.any(state.contact.normal_force > 0))
@@ -71,7 +71,7 @@ def paint(
 
 
 def _draw(parts: Sequence[_Part], paper: BinaryIO, paints: Paints, *, below: bool) -> None:
-    """Put details below the main part or beside it, all as wide together as the picture, not too high."""
+    """Place details below or beside the main part, together as wide as the picture and not too high."""
     main, *details = parts
     wide = [part.frame.proportion for part in details]
     if below:
@@ -93,7 +93,7 @@ def _draw(parts: Sequence[_Part], paper: BinaryIO, paints: Paints, *, below: boo
 
 
 def _in_plane(scene: Scene, bodies: Mapping[str, Any], spot: Spot | None, paints: Paints) -> list[_Part]:
-    """All bodies, and where they touch, if that is small."""
+    """All bodies, and the contact if it is small."""
     everything = moved(bodies, paints.scale)
     frame = frame_around(IN_PLANE, points_of(everything), 0.04)
     parts = [_Part(frame, partial(_draw_plane, scene, everything, frame, paints, ""))]

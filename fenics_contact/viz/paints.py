@@ -1,4 +1,4 @@
-"""A field on all bodies, ready to be drawn: values, their colours and the words around them."""
+"""A field on all bodies, ready for drawing: values, colours and labels."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from fenics_contact.viz.units import Units
 
 @dataclass(frozen=True)
 class Paints:
-    """What a picture of a field shows, apart from the bodies.
+    """The content of a picture of a field, apart from the bodies.
 
     Attributes:
         values: Body name -> values on its nodes or its cells.
         colours: matplotlib's colour map.
         norm: matplotlib's norm, from values to colours.
-        label: Words beside the colour bar, with the unit.
+        label: Label of the colour bar, with the unit.
         headline: The title.
         scale: Factor of the displacement in the main picture.
-        reach: How far details reach to each side of the contact's middle, [length], or None.
+        reach: Extent of details to each side of the contact's centre, [length], or None.
         units: Names of the units.
         width: Width of the picture in pixels.
     """
@@ -41,7 +41,7 @@ class Paints:
     width: int
 
     def shown(self, body: str) -> np.ndarray:
-        """Return the values of a body from 0 to 1, the range of the colours; below and above outside it."""
+        """Return the values of a body scaled to 0 to 1, the range of the colours."""
         return np.ma.filled(self.norm(self.values[body], clip=False), 0.0)
 
     def on(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
@@ -54,7 +54,7 @@ class Paints:
         return painted
 
     def add_bar(self, figure: Any, panels: Any) -> None:
-        """Put a colour bar beside axes; an end beyond which there are values is open."""
+        """Add a colour bar beside axes; its ends are pointed where values lie beyond."""
         low = min(float(values.min()) for values in self.values.values()) < self.norm.vmin
         high = max(float(values.max()) for values in self.values.values()) > self.norm.vmax
         extend = {(False, False): "neither", (True, False): "min", (False, True): "max"}.get(

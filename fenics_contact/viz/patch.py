@@ -1,4 +1,4 @@
-"""A contact surface laid flat as its master sees it."""
+"""A contact surface projected to a plane, seen from its master."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ContactPatch:
         slip: Of the contact points in the picture, (n_points, 2).
         force: Normal force of the pair.
         rubs: Whether the pair has friction.
-        frame: What is shown.
+        frame: The visible frame.
     """
 
     view: View
@@ -48,12 +48,12 @@ class ContactPatch:
 
     @property
     def largest_slip(self) -> float:
-        """By how much they do at most, [length]."""
+        """Their largest slip, [length]."""
         return float(np.linalg.norm(self.slip[self.slips], axis=1).max(initial=0.0))
 
 
 def checked_pair(state: State, pair: int) -> None:
-    """Refuse a number that no contact pair of the scene has."""
+    """Reject a number that no contact pair of the scene has."""
     if not 0 <= pair < len(state.scene.contacts):
         raise InvalidInputError(
             f"pair must number one of the scene's {len(state.scene.contacts)} contact pairs from 0, got "
@@ -62,12 +62,12 @@ def checked_pair(state: State, pair: int) -> None:
 
 
 def contact_patch(state: State, pair: int, reach: float | None) -> ContactPatch:
-    """Lay the slave surface of a pair flat; facets that turn their back to the viewer are left out.
+    """Project the slave surface of a pair to a plane; facets that face away from the viewer are omitted.
 
     Args:
         state: The state.
         pair: Number of the contact pair.
-        reach: How far the picture reaches around the contact's middle, [length], or None.
+        reach: Extent around the contact's centre, [length], or None.
     """
     contact, slave = state.contact, state.scene.contacts[pair].slave
     mesh, facets = state.scene.bodies[slave.body].mesh, state.scene.facets(slave)
@@ -95,9 +95,9 @@ def contact_patch(state: State, pair: int, reach: float | None) -> ContactPatch:
 def _frame(
     places: np.ndarray, points: np.ndarray, pressure: np.ndarray, area: np.ndarray, reach: float | None
 ) -> Frame:
-    """Return a square around the closed points with room for two facets beside them.
+    """Return a square around the closed points with a margin of two facets.
 
-    Unless its size is given, it ends a little beyond the surface.
+    Unless its size is given, it is limited to slightly more than the surface.
     """
     closed = pressure > 0 if np.any(pressure > 0) else np.ones(len(points), dtype=bool)
     low, high = places[points[closed]].min(axis=0), places[points[closed]].max(axis=0)

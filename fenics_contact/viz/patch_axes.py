@@ -1,4 +1,4 @@
-"""Axes that show a contact surface laid flat."""
+"""Axes for a projected contact surface."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def label_axes(axes: Any, patch: ContactPatch, units: Units, *, from_slave: bool
         axes: matplotlib Axes.
         patch: The surface.
         units: Names of the units.
-        from_slave: Mirror it, as it is seen from inside the slave, where that lets the axis run forwards.
+        from_slave: Mirror it, as seen from inside the slave, if the axis then runs forwards.
     """
     patch.frame.fit(axes)
     for axis, direction, word in ((axes.xaxis, patch.view.right, "right"), (axes.yaxis, patch.view.up, "up")):
@@ -32,7 +32,7 @@ def label_axes(axes: Any, patch: ContactPatch, units: Units, *, from_slave: bool
 
 
 def pressure_bar(axes: Any, clim: tuple[float, float], extend: str, units: Units) -> None:
-    """Put a colour bar beside axes, as high as they are."""
+    """Add a colour bar beside axes, of the same height."""
     key, label = ScalarMappable(Normalize(*clim), PRESSURE_MAP), f"contact pressure ({units.stress})"
     place = axes.inset_axes((1.03, 0.0, 0.04, 1.0))
     axes.figure.colorbar(key, cax=place, label=label, extend=extend)
@@ -44,7 +44,7 @@ def label_axis(axis: Any, name: str, word: str, units: Units) -> None:
     Args:
         axis: matplotlib's axis.
         name: What `axis_label` returns: "x", "−x" or "".
-        word: Name of an axis that runs along no coordinate.
+        word: Name for an axis that runs along no coordinate.
         units: Names of the units.
     """
     axis.set_label_text(f"{name.strip('−') or word} ({units.length})")

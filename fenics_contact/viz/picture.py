@@ -1,4 +1,4 @@
-"""A finished picture: what notebooks show and what was written into a file."""
+"""A finished picture, for notebooks and files."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from fenics_contact.errors import InvalidInputError, together
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-#: Width on the screen, in its own units, of pictures that have at least as many pixels.
+#: Largest width on the screen, in its own units.
 SHOWN_WIDTH = 900
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A picture that Jupyter shows where it is the value of a cell, and the file that holds it, if any.
+    """A picture that Jupyter shows as the value of a cell, and its file, if any.
 
-    Where a path is needed, as in ``open(picture)`` or ``Path(picture)``, the picture stands for its file. On
-    ranks that did not draw it knows its path and shows nothing.
+    It can be used like a path to its file, as in ``open(picture)`` or ``Path(picture)``. On ranks that did
+    not draw it has its path and shows nothing.
 
     Attributes:
         png: The PNG file's content on the rank that drew, None on the others.
@@ -51,7 +51,7 @@ class Picture:
         return written_path(self.path, "plot_ function a path, such as 'stress.png'")
 
     def __str__(self) -> str:
-        """Return the path of the file, or say that there is none."""
+        """Return the path of the file, or a text if there is none."""
         return "picture without a file" if self.path is None else str(self.path)
 
     def _repr_png_(self) -> bytes | None:
@@ -66,12 +66,12 @@ class Picture:
 
 
 def png_path(path: str | Path | None) -> Path | None:
-    """Return the path, refuse one that names no PNG file."""
+    """Return the path if it names a PNG file, else raise."""
     return file_path(path, ".png", "pictures are PNG files")
 
 
 def file_path(path: str | Path | None, suffix: str, what: str) -> Path | None:
-    """Return the path, refuse one that does not end as it must."""
+    """Return the path if it has the required suffix, else raise."""
     target = None if path is None else Path(path)
     if target is not None and target.suffix != suffix:
         raise InvalidInputError(f"{what}, got the name {target.name!r}: let it end in {suffix!r}")
@@ -98,7 +98,7 @@ def draw_picture(comm: MPI.Comm | None, path: Path | None, draw: Callable[[Binar
 
 
 def written_path(path: Path | None, remedy: str) -> str:
-    """Return the path of a picture's file, refuse one that was not written."""
+    """Return the path of a picture's file, or raise if none was written."""
     if path is None:
         raise InvalidInputError(
             f"this needs the file of a picture, but the picture was not written: give the {remedy}"

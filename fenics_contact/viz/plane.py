@@ -13,14 +13,14 @@ from fenics_contact.mesh import boundary_faces
 from fenics_contact.viz.colours import INK
 from fenics_contact.viz.view import Frame
 
-#: Edges closer than this, relative to the size of the picture, would blacken it, and fade.
+#: Edges closer than this, relative to the size of the picture, are faded, as they would blacken it.
 CLOSEST = 0.009
 
 
 def draw_field(
     axes: Any, points: np.ndarray, cells: np.ndarray, values: np.ndarray, look: dict[str, Any]
 ) -> None:
-    """Colour plane cells by values on their nodes or on themselves.
+    """Colour plane cells by nodal or cell values.
 
     Args:
         axes: matplotlib Axes.
@@ -39,7 +39,7 @@ def draw_field(
 
 
 def refined(points: np.ndarray, cells: np.ndarray, values: np.ndarray) -> tuple[Triangulation, np.ndarray]:
-    """Cut quadrilaterals into triangles so small that colours are bilinear and favour no diagonal.
+    """Cut quadrilaterals into small triangles, so that colours are bilinear and favour no diagonal.
 
     Returns:
         The triangulation and the values on its nodes.

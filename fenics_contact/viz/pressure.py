@@ -1,4 +1,4 @@
-"""Picture of a contact surface seen face on: pressure, and what its points do."""
+"""Picture of a contact surface seen face on: pressure and status."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ def plot_contact_pressure(
     units: Units | None = None,
     width: int = 1600,
 ) -> Picture:
-    """Draw a contact pair's slave surface as its master sees it. Collective.
+    """Draw a contact pair's slave surface seen from its master. Collective.
 
-    Left the nodal pressure, right the status of the points with the direction in which those that slip move
-    on the master. Of a plane scene the pressure along the slave surface, below it the tangential traction on
-    the slave between its bounds, with the status of the points.
+    Left the nodal pressure, right the status of the points with the direction of slip on the master. For a
+    plane scene the pressure along the slave surface, below it the tangential traction on the slave between
+    its bounds, with the status of the points.
 
     Args:
         state: The state.
@@ -45,12 +45,12 @@ def plot_contact_pressure(
         clim: Range of the pressure, [force / length²]; from zero to the largest pressure unless given. Give
             two pictures the same range to compare them.
         reach: How far the picture reaches around the contact's middle, [length]; chosen unless given.
-        title: What comes before the facts in the title.
+        title: Text before the facts in the title.
         units: Names of the units, mm, N and MPa unless given.
         width: Width of the picture in pixels.
 
     Returns:
-        The picture, which stands for its file where a path is needed.
+        The picture, which can be used like a path to its file.
 
     Raises:
         InvalidInputError: If the scene has no such pair, or a range or the name of the file cannot be used.
@@ -100,7 +100,7 @@ def _draw(
 
 
 def draw_pressure(axes: Any, patch: ContactPatch, clim: tuple[float, float]) -> None:
-    """Draw the pressure on facets laid flat."""
+    """Draw the pressure on projected facets."""
     look = {"cmap": PRESSURE_MAP, "vmin": clim[0], "vmax": clim[1]}
     draw_field(axes, patch.places, patch.facets, patch.pressure, look)
     outlines = {"facecolors": "none", "edgecolors": GREY, "linewidths": 0.5}

@@ -1,4 +1,4 @@
-"""Outlines of bodies where they touch, before and after a design moved them."""
+"""Outlines of bodies near their contact, before and after a design change."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from fenics_contact.viz.section import cut, section_frame, section_views, strong
 from fenics_contact.viz.view import IN_PLANE, Frame, View, axis_label, frame_around, oblique_view
 from fenics_contact.viz.words import nice_number
 
-#: Fraction of the picture's size that the largest movement appears to have.
+#: Apparent size of the largest movement relative to the picture.
 VISIBLE = 0.06
-#: Room around the bodies, relative to their size.
+#: Margin around the bodies, relative to their size.
 BORDER = 0.08
 
 
 @dataclass(frozen=True)
 class Profile:
-    """Outlines in a picture; lines are pairs of places, (n, 2 ends, 2).
+    """Outlines in a picture; lines are pairs of points, (n, 2 ends, 2).
 
     Attributes:
-        title: What is shown.
+        title: Title of the picture.
         axes: Names of the two axes, such as "x"; "" where they run along none.
         before: Body name -> lines before.
-        moves: Body name -> how the ends of these lines move.
-        inside: Body name -> places within it, (n, 2).
-        frame: What is shown.
+        moves: Body name -> displacement of the ends of these lines.
+        inside: Body name -> points within it, (n, 2).
+        frame: The visible frame.
     """
 
     title: str
@@ -44,7 +44,7 @@ class Profile:
 
     @property
     def largest(self) -> float:
-        """Largest movement that is seen, [length]."""
+        """Largest visible movement, [length]."""
         seen = 0.0
         for name, lines in self.before.items():
             inside = self.frame.holds(lines).all(axis=1)
@@ -58,7 +58,7 @@ class Profile:
         return max(1.0, nice_number(VISIBLE * size / self.largest)) if self.largest > 0 else 1.0
 
     def place_in(self, body: str) -> np.ndarray | None:
-        """Return where in a body, far from all outlines, its name fits; None if it is not seen."""
+        """Return a position for a body's name, far from all outlines; None if it is not visible."""
         places = self.inside[body][self.frame.holds(self.inside[body])]
         if not len(places):
             return None
@@ -72,9 +72,9 @@ def profiles(first: State, best: State, reach: float | None) -> list[Profile]:
     """Return the outlines around the strongest contact before: in the plane one, in space two sections.
 
     Args:
-        first: State before, some force acts on its contact.
+        first: State before, with some contact force.
         best: State after, on the same meshes with other coordinates.
-        reach: How far they reach from the contact's middle, [length], or None.
+        reach: Extent from the contact's centre, [length], or None.
     """
     bodies = {}
     for name, body in first.scene.bodies.items():

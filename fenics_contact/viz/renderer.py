@@ -1,4 +1,4 @@
-"""Can this machine render? Asked in a process of its own, because VTK without OpenGL dies by a signal."""
+"""Test whether this machine can render, in a separate process, as VTK without OpenGL dies by a signal."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from functools import lru_cache
 from fenics_contact.errors import MissingRequirementError
 from fenics_contact.launching import clean_environment
 
-#: Renders a window of four pixels. Where VTK finds OpenGL depends on environment and shared libraries only.
+#: Renders a window of four pixels. The result depends only on environment and shared libraries.
 _PROBE = """
 from vtkmodules.vtkRenderingCore import vtkRenderWindow
 import vtkmodules.vtkRenderingOpenGL2
@@ -22,7 +22,7 @@ window.SetSize(2, 2)
 window.Render()
 """
 
-#: What decides where VTK looks for OpenGL.
+#: Environment variables that decide where VTK looks for OpenGL.
 _CHOICE = "VTK_DEFAULT_OPENGL_WINDOW"
 _DECIDING = (_CHOICE, "VTK_DEFAULT_EGL_DEVICE_INDEX", "DISPLAY", "LD_LIBRARY_PATH")
 _EGL = "vtkEGLRenderWindow"
@@ -30,9 +30,9 @@ _EGL = "vtkEGLRenderWindow"
 
 @contextmanager
 def rendering() -> Iterator[None]:
-    """Let VTK draw by EGL within the block where there is no display and nobody has chosen otherwise.
+    """Let VTK use EGL within the block if there is no display and no other choice is set.
 
-    VTK itself tries X first and complains that there is none. The environment is as it was afterwards.
+    VTK itself tries X first and warns if there is none. The environment is restored afterwards.
 
     Raises:
         MissingRequirementError: If this machine cannot render.
@@ -79,7 +79,7 @@ def check_renderer() -> None:
 
 @lru_cache(maxsize=4)
 def _probe(environment: tuple[str | None, ...]) -> str:
-    """Return how the trial rendering ended, empty if well; all but the window only tells answers apart."""
+    """Return how a trial rendering failed, empty if it succeeded; the other entries are keys of the cache."""
     variables = {name: value for name, value in clean_environment().items() if name != _CHOICE}
     if environment[0]:
         variables[_CHOICE] = environment[0]

@@ -1,4 +1,4 @@
-"""Diagram of a solve: residuals against products with F, and what the contact points do meanwhile."""
+"""Diagram of a solve: residuals and contact statuses against products with F."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from fenics_contact.viz.words import headline, written
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-#: More outer steps than this are told apart by their stripes alone.
+#: More outer steps than this are marked by stripes only, without numbers.
 MOST_NUMBERS = 16
-#: Residuals so far below all that steers the iteration are rounding.
+#: Residuals this far below the others are rounding.
 FLOOR = 1e-2
 _RESIDUALS = {
     "natural": ("natural (contact)", BLUE, "o"),
@@ -40,21 +40,21 @@ def plot_residuals(
     width: int = 1200,
     comm: MPI.Comm | None = None,
 ) -> Picture:
-    """Draw how the residuals of a solve fell with the products with F, and below how many points are closed.
+    """Draw the residuals of a solve against products with F, and below the numbers of closed points.
 
-    Stripes tell outer steps apart: Tresca problems of the Coulomb fixed point or rounds with a smaller
-    tolerance. Where the solver changes its method, a line is drawn and the method is named.
+    Stripes separate outer steps: Tresca problems of the Coulomb fixed point or rounds with a smaller
+    tolerance. A change of method is marked by a line and its name.
 
     Args:
         history: ``state.solution.history``, or ``error.history`` of a `ConvergenceError`.
         path: PNG file to write, None to write none.
-        tolerance: The largest residual asked for, drawn as a line.
-        title: What comes before the facts in the title.
+        tolerance: The required tolerance, drawn as a line.
+        title: Text before the facts in the title.
         width: Width of the picture in pixels.
-        comm: If given, only rank 0 draws, and all ranks learn of an error.
+        comm: If given, only rank 0 draws, and an error is raised on all ranks.
 
     Returns:
-        The picture, which stands for its file where a path is needed.
+        The picture, which can be used like a path to its file.
 
     Raises:
         InvalidInputError: If there is no step to draw, or the history is not that of a dual solver.

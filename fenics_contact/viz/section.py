@@ -1,4 +1,4 @@
-"""Plane sections through deformed bodies where they touch."""
+"""Plane sections through deformed bodies at their contact."""
 
 from __future__ import annotations
 
@@ -13,25 +13,26 @@ from fenics_contact.viz.colours import INK
 from fenics_contact.viz.stage import Layer
 from fenics_contact.viz.view import Frame, View, frame_around, looking_along
 
-#: Half height of a section, in sizes of the contact.
+#: Half height of a section, relative to the size of the contact.
 REACH = 5.0
-#: Width of a section by its height, unless the bodies end before.
+#: Ratio of width to height of a section, unless the bodies are smaller.
 PROPORTION = 1.4
-#: Room around the bodies, relative to the half height.
+#: Margin around the bodies, relative to the half height.
 BORDER = 0.03
 
-#: Dark on a light border, to be seen on every colour.
+#: Dark on a light border, visible on every colour.
 _OUTLINE = (("white", 6), (INK, 3))
 
 
 @dataclass(frozen=True)
 class Spot:
-    """Where a pair of surfaces touches.
+    """Location and size of the contact of a pair.
 
     Attributes:
         centre: Force-weighted middle, (dim,).
         normal: Mean unit normal, from master to slave, (dim,).
-        radius: Of a disc, or half length of a line, as large as the closed part of the surface, [length].
+        radius: Radius of a disc, or half length of a line, of the size of the closed part of the surface,
+            [length].
     """
 
     centre: np.ndarray
@@ -40,17 +41,17 @@ class Spot:
 
 
 def strongest_contact(contact: ContactResult, places: np.ndarray) -> Spot:
-    """Return where the pair with the largest normal force touches.
+    """Return the contact of the pair with the largest normal force.
 
     Args:
-        contact: What happens on the contact points; some force must act.
-        places: Places of the contact points, (n, dim), [length].
+        contact: Result on the contact points; some force must act.
+        places: Positions of the contact points, (n, dim), [length].
     """
     force, points = contact.normal_force, contact.points
     pair = int(np.argmax(np.bincount(points.pair, weights=force)))
     weight = np.where(points.pair == pair, force, 0.0)
     normal = weight @ points.normal
-    # Around a pin the normals cancel: there the strongest point speaks for all.
+    # Around a pin the normals cancel: there the point of largest force is used.
     if np.linalg.norm(normal) < 1e-3 * weight.sum():
         normal = points.normal[int(np.argmax(weight))]
     area = float(points.area[weight > 0].sum())
@@ -61,7 +62,7 @@ def strongest_contact(contact: ContactResult, places: np.ndarray) -> Spot:
 def section_views(spot: Spot, main: View) -> list[View]:
     """Return the views onto two planes that hold the contact normal, perpendicular to each other.
 
-    Both are seen from the side of the main view, and what is horizontal there stays so where it can.
+    Both are seen from the side of the main view, and horizontal directions stay horizontal where possible.
     """
     helper = np.eye(3)[int(np.argmin(np.round(np.abs(spot.normal), 6)))]
     first = np.cross(spot.normal, helper)
@@ -76,13 +77,13 @@ def section_views(spot: Spot, main: View) -> list[View]:
 
 
 def section_frame(view: View, spot: Spot, points: np.ndarray, reach: float | None = None) -> Frame:
-    """Return the frame around a contact, not wider than what there is to see.
+    """Return the frame around a contact, limited to the visible bodies.
 
     Args:
         view: View onto the section.
-        spot: Middle and size of the contact.
+        spot: Centre and size of the contact.
         points: All nodes of the bodies, (n, 3).
-        reach: How far it reaches up and down, [length]; by default five times the radius of the contact.
+        reach: Extent up and down, [length]; by default five times the radius of the contact.
     """
     bodies = frame_around(view, points, 0.0)
     middle = view.project(spot.centre[None])[0]
@@ -94,9 +95,9 @@ def section_frame(view: View, spot: Spot, points: np.ndarray, reach: float | Non
 
 
 def cut(body: Any, view: View, origin: np.ndarray) -> Any:
-    """Cut a body, or its surface, by the plane through a point that a view looks onto.
+    """Cut a body, or its surface, by the plane through a point normal to a view.
 
-    A hair beside it: where it runs along faces of cells, both neighbours would be cut or none.
+    Slightly offset: where it runs along faces of cells, both neighbours would be cut or none.
     """
     beside = origin + 1e-6 * float(np.ptp(body.points)) * view.towards
     return body.slice(normal=view.towards, origin=beside)
@@ -105,7 +106,7 @@ def cut(body: Any, view: View, origin: np.ndarray) -> Any:
 def section_layers(
     bodies: Mapping[str, Any], view: View, origin: np.ndarray, look: Mapping[str, Any]
 ) -> list[Layer]:
-    """Cut all bodies by a plane through ``origin``, onto which the view looks, and draw the cut in colours.
+    """Cut all bodies by a plane through ``origin``, normal to the view, and draw the cut in colours.
 
     Args:
         bodies: The bodies, deformed, by name.

@@ -1,4 +1,4 @@
-"""The sheet of paper: a matplotlib figure with the house's fonts, and images and bars of length on it."""
+"""The sheet: a matplotlib figure with common fonts, with images and scale bars on it."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from fenics_contact.viz.colours import INK
 from fenics_contact.viz.view import Frame
 from fenics_contact.viz.words import nice_number, written
 
-#: Inches of every sheet's width: fonts and lines grow with the number of pixels.
+#: Width of every sheet in inches: fonts and lines scale with the number of pixels.
 INCHES = 16.0
-#: Size of the title, and the part of the width that it takes at most.
+#: Size of the title, and its largest width relative to the sheet.
 HEADLINE, WIDEST = 18, 0.97
 
 _STYLE = {
@@ -42,7 +42,7 @@ _STYLE = {
 
 @contextmanager
 def sheet(paper: BinaryIO, size: tuple[int, int], title: str) -> Iterator[Any]:
-    """Open an empty figure, in which matplotlib finds room for axes and labels, and save it at the end.
+    """Open an empty figure with automatic layout, and save it at the end.
 
     Args:
         paper: A file opened for bytes.
@@ -65,7 +65,7 @@ def sheet(paper: BinaryIO, size: tuple[int, int], title: str) -> Iterator[Any]:
 
 
 def show_image(axes: Any, image: np.ndarray, frame: Frame, title: str = "") -> None:
-    """Show an image of what a frame holds, in the frame's coordinates, without axes."""
+    """Show an image of a frame's content, in the frame's coordinates, without axes."""
     (left, low), (right, high) = frame.low, frame.high
     axes.imshow(image, extent=(left, right, low, high))
     axes.set_axis_off()
@@ -73,12 +73,12 @@ def show_image(axes: Any, image: np.ndarray, frame: Frame, title: str = "") -> N
 
 
 def add_colour_bar(figure: Any, panels: Any, key: Any, label: str, extend: str = "neither") -> None:
-    """Draw a bar of colours at the right of panels, which stay where they are in their room."""
+    """Draw a colour bar to the right of panels without moving them."""
     figure.colorbar(key, ax=panels, label=label, extend=extend, aspect=30, shrink=0.95, panchor=False)
 
 
 def scale_bar(axes: Any, frame: Frame, unit: str) -> None:
-    """Draw a bar of round length into the lower left corner of axes that show a frame."""
+    """Draw a scale bar of round length in the lower left corner of axes that show a frame."""
     length = nice_number(float(frame.size[0]) / 3)
     words, height = f"{written(length, 1)} {unit}", 0.012 * float(frame.size[1])
     look = {"label_top": True, "color": INK, "size_vertical": height, "pad": 0.4, "sep": 4}

@@ -1,4 +1,4 @@
-"""Renders meshes to an image array with pyvista, off screen, on white, in parallel projection."""
+"""Rendering of meshes to an image array with pyvista, off screen, on white, in parallel projection."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ import pyvista as pv
 from fenics_contact.viz.renderer import rendering
 from fenics_contact.viz.view import Frame, View
 
-#: So many times finer than asked for images are rendered: matplotlib smooths edges on every machine alike.
+#: Images are rendered at this multiple of the resolution: matplotlib then smooths edges alike on all
+#: machines.
 SUPERSAMPLING = 2
 
 
@@ -39,13 +40,13 @@ def render(layers: Iterable[Layer], view: View, frame: Frame, width: int) -> np.
     """Render one image.
 
     Args:
-        layers: What to draw.
-        view: From which side.
-        frame: Which part; its proportions are those of the image.
+        layers: Layers to draw.
+        view: Direction of view.
+        frame: Visible part; its proportions are those of the image.
         width: Width of the image in pixels.
 
     Returns:
-        Image, (height, width, 3) uint8, `SUPERSAMPLING` times finer than asked for.
+        Image, (height, width, 3) uint8, at `SUPERSAMPLING` times the resolution.
 
     Raises:
         MissingRequirementError: If this machine cannot render.
@@ -57,12 +58,12 @@ def render(layers: Iterable[Layer], view: View, frame: Frame, width: int) -> np.
 
 @contextmanager
 def staged(layers: Iterable[Layer], view: View, frame: Frame, size: tuple[int, int]) -> Iterator[Any]:
-    """Set meshes, lamp and camera up, and take them down at the end.
+    """Set up meshes, lamp and camera, and close them at the end.
 
     Args:
-        layers: What to draw.
-        view: From which side.
-        frame: Which part.
+        layers: Layers to draw.
+        view: Direction of view.
+        frame: Visible part.
         size: Width and height in pixels.
 
     Yields:
@@ -76,7 +77,7 @@ def staged(layers: Iterable[Layer], view: View, frame: Frame, size: tuple[int, i
         plotter = pv.Plotter(off_screen=True, window_size=list(size), theme=theme, lighting="none")
         try:
             plotter.background_color = "white"
-            # One lamp above the viewer's left shoulder: colours keep their brightness on all that is seen.
+            # One lamp above the viewer's left shoulder: colours keep their brightness on all visible faces.
             plotter.add_light(pv.Light(position=(-0.3, 0.35, 1.0), light_type="camera light"))
             middle = np.zeros(3)
             for layer in layers:

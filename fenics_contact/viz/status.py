@@ -1,4 +1,4 @@
-"""Maps of what contact points do, one for each state of a history."""
+"""Maps of the status of contact points, one for each state of a history."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from fenics_contact.viz.words import written
 
 #: Length of the longest arrow, relative to the map.
 ARROW = 0.07
-#: Maps in one row at most.
+#: Largest number of maps in a row.
 COLUMNS = 3
 
 
@@ -38,8 +38,8 @@ def plot_contact_status(
 ) -> Picture:
     """Draw where a contact pair is open, sticks and slips, in one map for each state. Collective.
 
-    Arrows show how points that slip moved on the master in the last load step. The surface is seen from the
-    master's side, or from inside the slave where that lets the axes run to the right.
+    Arrows show the slip on the master in the last load step. The surface is seen from the master's side, or
+    from inside the slave if the axes then run to the right.
 
     Args:
         states: Name -> state of a scene in space, for instance after each load step.
@@ -51,7 +51,7 @@ def plot_contact_status(
         width: Width of the picture in pixels.
 
     Returns:
-        The picture, which stands for its file where a path is needed.
+        The picture, which can be used like a path to its file.
 
     Raises:
         InvalidInputError: If there is no state, one has no such pair, or one is plane.
@@ -99,7 +99,7 @@ def _words(patch: ContactPatch, units: Units) -> str:
 
 
 def draw_status(axes: Any, patch: ContactPatch, *, counted: bool = True) -> None:
-    """Draw facets laid flat, a symbol on each contact point, and how those that slip move."""
+    """Draw projected facets, a symbol on each contact point, and arrows for slip."""
     axes.add_collection(PolyCollection(patch.places[patch.facets], facecolors=PALE, edgecolors="white"))
     places = patch.places[patch.points]
     for status, (name, look) in symbols_of(patch.rubs).items():
@@ -110,7 +110,7 @@ def draw_status(axes: Any, patch: ContactPatch, *, counted: bool = True) -> None
     if longest > 0:
         reach = ARROW * float(np.max(patch.frame.size)) / longest
         arrows = {"angles": "xy", "scale_units": "xy", "scale": 1, "color": INK, "width": 0.004, "zorder": 4}
-        # Short arrows stay arrows: dots would hide the symbols.
+        # Short arrows stay arrows, as dots would hide the symbols.
         arrows |= {"minlength": 0.0}
         shown = patch.slips & patch.frame.holds(places)
         drawn = axes.quiver(*places[shown].T, *(reach * patch.slip[shown]).T, clip_on=False, **arrows)

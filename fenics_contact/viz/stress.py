@@ -20,9 +20,10 @@ from fenics_contact.viz.picture import Picture, png_path
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.words import checked_range, checked_reach, headline, nice_number, written
 
-#: Fraction of the bodies' size that the largest displacement appears to have.
+#: Apparent size of the largest displacement relative to the bodies.
 VISIBLE = 0.03
-#: The colours end at this quantile of the cells: the peak under a contact would leave the rest in one shade.
+#: The colours end at this quantile of the cells, as the peak under a contact would leave the rest in one
+#: shade.
 QUANTILE = 0.995
 
 
@@ -41,10 +42,10 @@ def plot_stress(
 ) -> Picture:
     """Draw the von Mises stress on the deformed bodies. Collective.
 
-    Below, two sections through the middle of the strongest contact, in true deformation: bodies whose
-    displacement is exaggerated overlap where they touch. Plane bodies are shown in their plane, and beside
-    them where they touch, if that is small. Rigid obstacles are shaded in the plane; in space planes are
-    shown as sheets, spheres and cylinders by their outlines, others not at all.
+    Below, two sections through the centre of the strongest contact, in true deformation: with magnified
+    displacement bodies would overlap in contact. Plane bodies are shown in their plane, with a detail of the
+    contact if it is small. Rigid obstacles are shaded in the plane; in space planes are shown as sheets,
+    spheres and cylinders by their outlines, others not at all.
 
     Args:
         state: The state.
@@ -53,15 +54,15 @@ def plot_stress(
             pictures the same range to compare them.
         scale: Factor of the displacement in the upper picture; chosen and stated unless given, 1 where there
             are rigid obstacles.
-        sections: Draw the sections too, if a contact carries force.
+        sections: Whether to draw the sections, if a contact carries force.
         reach: How far sections reach up and down from the contact's middle, [length]; chosen unless given.
-        smooth: Show nodal means instead of the cells' own values.
-        title: What comes before the facts in the title.
+        smooth: Whether to show nodal means instead of cell values.
+        title: Text before the facts in the title.
         units: Names of the units, mm, N and MPa unless given.
         width: Width of the picture in pixels.
 
     Returns:
-        The picture, which stands for its file where a path is needed.
+        The picture, which can be used like a path to its file.
 
     Raises:
         InvalidInputError: If an option or the name of the file cannot be used.
@@ -79,7 +80,7 @@ def plot_stress(
     checked_reach(reach)
     given = None if clim is None else checked_range(clim)
     bodies = drawn_bodies(state)
-    # Exaggerated, bodies would enter rigid obstacles.
+    # With magnified displacement bodies would penetrate rigid obstacles.
     chosen = 1.0 if obstacles_of(state.scene) else chosen_scale(bodies)
     factor = chosen if scale is None else float(scale)
     shown, named = given or stress_range(bodies), units or Units()

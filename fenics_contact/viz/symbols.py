@@ -1,4 +1,4 @@
-"""How the status of contact points is drawn: symbols that differ in shape and colour."""
+"""Symbols for the status of contact points, which differ in shape and colour."""
 
 from __future__ import annotations
 

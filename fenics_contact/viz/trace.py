@@ -1,4 +1,4 @@
-"""A plane contact surface unrolled: its nodes one after the other, and what acts on them."""
+"""A plane contact surface unrolled: its nodes in order, and the contact quantities on them."""
 
 from __future__ import annotations
 
@@ -11,28 +11,29 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 from fenics_contact.contact import State
 from fenics_contact.viz.view import axis_label
 
-#: A surface whose edges turn less than this from their mean is shown over a coordinate, else over its length.
+#: A surface whose edges deviate less than this from their mean is shown over a coordinate, else over its
+#: length.
 STRAIGHT = np.cos(np.radians(60.0))
 
 
 @dataclass(frozen=True)
 class ContactTrace:
-    """What acts along the slave surface of a pair in the plane.
+    """Contact quantities along the slave surface of a pair in the plane.
 
     Attributes:
         name: Body and surface.
-        axis: What the places are: "x", "−y", or "along the surface".
-        places: Of all nodes of the surface, ascending, (n,), [length].
+        axis: Label of the positions: "x", "−y", or "along the surface".
+        places: Positions of all nodes of the surface, ascending, (n,), [length].
         breaks: Numbers of nodes after which the surface is interrupted.
         pressure: On all nodes, zero where there is no contact point, (n,), [force / length²].
-        traction: Tangential traction on the slave in the direction of the places, (n,).
-        bound: The largest that friction allows, (n,).
+        traction: Tangential traction on the slave in the direction of increasing positions, (n,).
+        bound: Friction bound of the traction, (n,).
         points: Numbers of the nodes that are contact points.
-        status: Of the contact points.
-        slip: Of the contact points on the master in the last load step, in the direction of the places,
-            [length].
-        force: Normal force of the pair, a unit of thickness.
-        shear: Sum of the tangential forces on the slave, a unit of thickness.
+        status: Status of the contact points.
+        slip: Slip of the contact points on the master in the last load step, in the direction of increasing
+            positions, [length].
+        force: Normal force of the pair, per unit of thickness.
+        shear: Sum of the tangential forces on the slave, per unit of thickness.
         rubs: Whether the pair has friction.
     """
 
@@ -51,11 +52,11 @@ class ContactTrace:
     rubs: bool
 
     def broken(self, values: np.ndarray) -> np.ndarray:
-        """Put a gap into values on all nodes where the surface is interrupted."""
+        """Insert a gap into nodal values where the surface is interrupted."""
         return np.insert(values, self.breaks + 1, np.nan)
 
     def window(self, reach: float | None) -> tuple[float, float]:
-        """Return the range of places to show: what is closed with room beside it, or as far as told."""
+        """Return the visible range of positions: the closed part with a margin, or the given extent."""
         closed = np.flatnonzero(self.pressure > 0)
         closed = closed if len(closed) else np.arange(len(self.places))
         low, high = float(self.places[closed].min()), float(self.places[closed].max())
@@ -93,13 +94,13 @@ def contact_trace(state: State, pair: int) -> ContactTrace:
 
 
 def walk(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Order the nodes of directed edges one after the other.
+    """Order the nodes of directed edges along the curve.
 
     Args:
         edges: Pairs of nodes, (n, 2); every node begins and ends at most one of them.
 
     Returns:
-        The nodes in their order, piece by piece, and where the pieces begin, (n_pieces,). Of a closed curve
+        The nodes in order, piece by piece, and the first index of each piece, (n_pieces,). For a closed curve
         the first node is not repeated.
     """
     nodes, local = np.unique(edges, return_inverse=True)
@@ -119,21 +120,21 @@ def walk(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _steps(points: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ways from node to node, and which of them do not lead from one piece to the next."""
+    """Return the vectors from node to node, and which of them lie within a piece."""
     inside = np.ones(len(points) - 1, dtype=bool)
     inside[starts[1:] - 1] = False
     return np.diff(points, axis=0), inside
 
 
 def _runs_backwards(points: np.ndarray, starts: np.ndarray) -> bool:
-    """Whether a surface runs against the axis that it follows most: bodies lie left of their surfaces."""
+    """Whether a surface runs against its dominant axis: bodies lie left of their surfaces."""
     steps, inside = _steps(points, starts)
     total = steps[inside].sum(axis=0)
     return bool(total[int(np.argmax(np.abs(total)))] < 0)
 
 
 def _unrolled(points: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, str, np.ndarray]:
-    """Return the direction along the surface at each node, what the places are called, and the places."""
+    """Return the direction along the surface at each node, the label of the positions, and the positions."""
     steps, inside = _steps(points, starts)
     length = np.linalg.norm(steps, axis=1)
     unit = steps / np.where(length, length, 1.0)[:, None]
@@ -150,7 +151,7 @@ def _unrolled(points: np.ndarray, starts: np.ndarray) -> tuple[np.ndarray, str, 
 
 
 def _over_a_coordinate(points: np.ndarray, mean: np.ndarray) -> tuple[np.ndarray, str, np.ndarray]:
-    """Show a surface that is nearly straight over x or y where it runs along one, else over its direction."""
+    """Show a nearly straight surface over x or y if it is parallel to one, else over its direction."""
     axis = int(np.argmax(np.abs(mean)))
     plain = abs(mean[axis]) > np.cos(np.radians(20.0))
     direction = np.eye(2)[axis] if plain else mean

@@ -1,4 +1,4 @@
-"""Picture of a plane contact surface: pressure and tangential traction along it, and what its points do."""
+"""Picture of a plane contact surface: pressure, tangential traction and status along it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fenics_contact.viz.trace import ContactTrace
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.words import headline, written
 
-#: Length of the longest arrow, relative to the width, and how many are drawn at most.
+#: Length of the longest arrow, relative to the width, and the largest number of arrows.
 ARROW, MOST_ARROWS = 0.03, 40
 
 
@@ -29,7 +29,7 @@ def draw_traction(
 ) -> None:
     """Draw the pressure above and, where friction acts, the tangential traction on the slave below.
 
-    ``window`` holds the range of the pressure and how far the picture reaches, None where they are chosen.
+    ``window`` holds the range of the pressure and the extent of the picture, None for automatic ones.
     """
     (clim, reach), rubs = window, trace.rubs
     facts = f"largest pressure {written(float(trace.pressure.max()))} {units.stress}, "
@@ -75,7 +75,7 @@ def _draw_friction(axes: Any, trace: ContactTrace, units: Units) -> None:
 
 
 def _draw_slip(axes: Any, trace: ContactTrace, longest: float) -> None:
-    """Draw by arrows how far and which way points slip, of many points each so many."""
+    """Draw slip by arrows, at a subset of the points if these are many."""
     low, high = trace.window(None)
     places = trace.places[trace.points]
     seen = np.flatnonzero((trace.status == Status.SLIP) & (places > low) & (places < high))

@@ -1,4 +1,4 @@
-"""Names of the units in which a scene is written; the numbers themselves carry none."""
+"""Names of the units of a scene; the numbers themselves have none."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Units:
-    """What titles and colour bars call the scene's units.
+    """Names of the scene's units in titles and colour bars.
 
     Attributes:
         length: Unit of coordinates and displacements.

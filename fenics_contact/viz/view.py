@@ -1,4 +1,4 @@
-"""From which side a picture is taken, and what part of it is seen; parallel projection."""
+"""Direction of view and visible part of a picture, in parallel projection."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ class View:
         return np.cross(self.up, self.towards)
 
     def project(self, points: np.ndarray) -> np.ndarray:
-        """Return places in the picture, (n, 2): right and up."""
+        """Return picture coordinates, (n, 2): right and up."""
         return points @ np.column_stack([self.right, self.up])
 
 
-#: Onto the plane of plane bodies.
+#: View of the plane of plane bodies.
 IN_PLANE = View(np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]))
 
 
 @dataclass(frozen=True)
 class Frame:
-    """The rectangle of a view that a picture shows.
+    """The visible rectangle of a view.
 
     Attributes:
         low: Lower left corner in picture coordinates, (2,).
@@ -57,7 +57,7 @@ class Frame:
         return self.high - self.low
 
     def holds(self, places: np.ndarray) -> np.ndarray:
-        """Tell which places, (..., 2), are seen."""
+        """Return which points, (..., 2), are visible."""
         return np.asarray(np.all((places > self.low) & (places < self.high), axis=-1))
 
     def fit(self, axes: Any) -> None:
@@ -71,7 +71,7 @@ class Frame:
 
 
 def frame_around(view: View, points: np.ndarray, margin: float = 0.02) -> Frame:
-    """Return the frame that holds all points, wider by a fraction of its larger side."""
+    """Return the frame that contains all points, with a margin as a fraction of its larger side."""
     places = view.project(points)
     low, high = places.min(axis=0), places.max(axis=0)
     border = margin * float(np.max(high - low))
@@ -92,9 +92,9 @@ def looking_along(towards: np.ndarray, horizontal: np.ndarray) -> View:
 
 
 def oblique_view(points: np.ndarray) -> View:
-    """Look from the front, somewhat from above and from the left, the longer of x and y horizontal.
+    """View from the front, slightly from above and from the left, with the longer of x and y horizontal.
 
-    The turn about the vertical axis is small: both a ring that lies and one that stands show their openings.
+    The rotation about the vertical axis is small: a lying as well as a standing ring shows its opening.
     """
     extent = np.ptp(points, axis=0)
     front = np.array([-0.30, -1.0, 0.72])
@@ -104,7 +104,7 @@ def oblique_view(points: np.ndarray) -> View:
 
 
 def face_on(normal: np.ndarray) -> View:
-    """Look straight onto a plane: z up where the plane is upright, else y up.
+    """View a plane at right angles: z up if the plane is upright, else y up.
 
     Args:
         normal: From the plane to the viewer, (3,), any length.

@@ -1,4 +1,4 @@
-"""Numbers and titles as readers like them."""
+"""Formatting of numbers and titles."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from fenics_contact.errors import InvalidInputError
 
 
 def checked_range(clim: tuple[float, float]) -> tuple[float, float]:
-    """Return a colour range, refuse one that is empty or not finite."""
+    """Return a colour range if it is finite and not empty, else raise."""
     low, high = (float(value) for value in clim)
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise InvalidInputError(
@@ -18,11 +18,11 @@ def checked_range(clim: tuple[float, float]) -> tuple[float, float]:
 
 
 def written(value: float, digits: int = 4) -> str:
-    """Write a number for readers: 79 713, −0.138, 1.2e−05; thousands apart, a true minus.
+    """Format a number for readers: 79 713, −0.138, 1.2e−05; with separated thousands and a true minus sign.
 
     Args:
         value: The number.
-        digits: Significant digits of what is not an integer.
+        digits: Significant digits of non-integers.
     """
     size = abs(value)
     if isinstance(value, int | np.integer):
@@ -36,13 +36,13 @@ def written(value: float, digits: int = 4) -> str:
 
 
 def checked_reach(reach: float | None) -> None:
-    """Refuse a reach of a picture that is given and not positive."""
+    """Reject an extent of a picture that is not positive."""
     if reach is not None and not 0 < reach < np.inf:
         raise InvalidInputError(f"reach must be positive, got {reach}: leave it out to have it chosen")
 
 
 def nice_number(value: float) -> float:
-    """Round down to 1, 2 or 5 times a power of ten; 1 for what is not positive."""
+    """Round down to 1, 2 or 5 times a power of ten; 1 for non-positive values."""
     if not value > 0:
         return 1.0
     power = 10.0 ** np.floor(np.log10(value))
@@ -50,7 +50,7 @@ def nice_number(value: float) -> float:
 
 
 def change(first: float, last: float) -> str:
-    """Return "first → last", and by how much lower or higher that is."""
+    """Return "first → last" with the relative change."""
     words = f"{written(first, 6)} → {written(last, 6)}"
     if first == 0:
         return words
@@ -58,5 +58,5 @@ def change(first: float, last: float) -> str:
 
 
 def headline(title: str, facts: str) -> str:
-    """Return "title: facts", or the facts with a capital letter where there is no title."""
+    """Return "title: facts", or the capitalised facts without a title."""
     return f"{title}: {facts}" if title else facts[:1].upper() + facts[1:]

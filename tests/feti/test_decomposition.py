@@ -24,7 +24,7 @@ def test_a_body_without_partition_is_refused() -> None:
 
 def test_a_partition_of_another_mesh_is_refused() -> None:
     scene, partitions = lone_block("hexahedron")
-    message = r"the partition of body 'block' must have shape \(64,\), one subdomain a cell, got \(63,\)"
+    message = r"the partition of body 'block' must have shape \(64,\), one subdomain per cell, got \(63,\)"
     with pytest.raises(InvalidInputError, match=message):
         decompose(scene, {"block": partitions["block"][1:]}, MPI.COMM_SELF)
 

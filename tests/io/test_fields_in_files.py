@@ -78,8 +78,8 @@ def test_vtu_files_hold_further_fields_of_the_cells(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("field", "message"),
     [
-        ({}, r"the cell field 'error' must have 192 rows for body 'block', one a cell, got none: give every"),
-        ({"block": np.zeros(3)}, r"must have 192 rows for body 'block', one a cell, got shape \(3,\)"),
+        ({}, r"the cell field 'error' must have 192 rows for body 'block', one per cell, got none: give every"),
+        ({"block": np.zeros(3)}, r"must have 192 rows for body 'block', one per cell, got shape \(3,\)"),
     ],
 )
 def test_a_field_that_does_not_fit_the_cells_is_refused(

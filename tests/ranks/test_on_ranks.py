@@ -69,7 +69,7 @@ EXPECTED = {
         "InvalidInputError",
         f"{SAME}the order of entries (scene.bodies['block'],",
     ),
-    "scene_is_refused": ("InvalidInputError", "must have shape (27,), one subdomain a cell, got (26,)"),
+    "scene_is_refused": ("InvalidInputError", "must have shape (27,), one subdomain per cell, got (26,)"),
     "checkpoint_cannot_be_written": ("CheckpointError", "'here.npz' could not be written: No such file"),
     "checkpoint_on_one_rank_only": ("InvalidInputError", f"{SAME}steps['checkpoint (every, resume)'] (None,"),
     "steps_differ": ("InvalidInputError", f"{SAME}scene.loads[0].value[2] (-2.0, -3.0)"),

@@ -63,7 +63,7 @@ def test_a_body_at_rest_is_drawn_too(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("by_cell", "options", "message"),
     [
-        ({}, {}, r"by_cell\['block'\] must hold 192 numbers, one a cell, .* got none: give what by_cell"),
+        ({}, {}, r"by_cell\['block'\] must hold 192 numbers, one per cell, .* got none: give the by_cell"),
         ({"block": np.ones(3)}, {}, r"must hold 192 numbers, .* got shape \(3,\), the smallest 1.0"),
         ({"block": np.full(192, -1.0)}, {}, r"finite and not negative, got shape \(192,\), the smallest -1"),
         (None, {"clim": (0.0, 1.0)}, r"clim of a logarithmic scale must be positive, got \(0.0, 1.0\)"),
