@@ -1,4 +1,4 @@
-"""Bodies built from a few numbers: blocks, links, rings, Hertz bodies, bolted joints."""
+"""Parametric bodies: blocks, links, rings, Hertz bodies, bolted joints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A box of structured hexahedra or tetrahedra: the plainest body there is."""
+"""A box of structured hexahedra or tetrahedra."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def block(
 
 
 def checked_corners(lower: ArrayLike, upper: ArrayLike, axes: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners of a box along the axes, (dim,) each, that span one.
+    """Return the corners of a box along the axes, (dim,) each, if they span one.
 
     Raises:
         InvalidInputError: If they do not.
@@ -72,10 +72,10 @@ def checked_corners(lower: ArrayLike, upper: ArrayLike, axes: str) -> tuple[np.n
 
 
 def checked_counts(counts: Sequence[int], axes: str) -> list[int]:
-    """Return the numbers of cells along every axis, of which there is room for all.
+    """Return the numbers of cells along every axis, if the mesh fits into memory.
 
     Raises:
-        InvalidInputError: If one is no count, or they are too many.
+        InvalidInputError: If one is not a count, or they are too large.
     """
     known = np.ndim(counts) == 1 or isinstance(counts, str)
     if not known or len(counts) != len(axes):
@@ -96,10 +96,11 @@ def _listed(axes: str) -> str:
 def checked_ticks(
     lower: ArrayLike, upper: ArrayLike, counts: Sequence[int], grading: Sequence[float], axes: str
 ) -> list[np.ndarray]:
-    """Return the coordinates of the ends of cells along every axis, as `block` takes its arguments.
+    """Return the coordinates of the ends of cells along every axis; arguments as for `block`.
 
     Raises:
-        InvalidInputError: If there is no box, a count is none or cells would be too many or too unlike.
+        InvalidInputError: If there is no box, a count is invalid, or cells would be too many or too
+            different.
     """
     low, high = checked_corners(lower, upper, axes)
     whole = checked_counts(counts, axes)
@@ -113,7 +114,7 @@ def checked_ticks(
 
 
 def _ticks(low: float, high: float, count: int, grading: float) -> np.ndarray:
-    """Divide an interval into cells that grow, or, where the grading is negative, shrink."""
+    """Divide an interval into cells that grow or, with negative grading, shrink."""
     if grading == 0.0:
         return np.linspace(low, high, count + 1)
     share = graded(count, abs(grading))
@@ -157,7 +158,7 @@ def box_lattice(ticks: Sequence[np.ndarray], cell: str = "hexahedron") -> BodyMe
 
 
 def box_sides(points: np.ndarray, cells: np.ndarray) -> dict[str, np.ndarray]:
-    """Sort the boundary faces of a box or rectangle by the direction they face.
+    """Sort the boundary faces of a box or rectangle by their direction.
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2).

@@ -1,4 +1,4 @@
-"""The bodies of a bolted joint, cut in half at the plane y = 0: plates with a hole, and bolts."""
+"""The bodies of a bolted joint, halved at the plane y = 0: plates with a hole, and bolts."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def bolt(
 
 
 def _bolt_surfaces(swept: BodyMesh, shank: float, grip: tuple[float, float]) -> dict[str, np.ndarray]:
-    """Tell the bearing faces of head and nut from the ends of the bolt, and the shank from their sides."""
+    """Separate bearing faces of head and nut from the ends of the bolt, and the shank from their sides."""
     faces, _ = boundary_faces(swept.cells)
     x, y, z = np.moveaxis(swept.points[faces], -1, 0)
     size = np.ptp(swept.points)

@@ -1,4 +1,4 @@
-"""A chain of interlocked links, every link turned by 90 degrees against the one before."""
+"""A chain of interlocked links, every link rotated by 90 degrees relative to the one before."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
 _QUARTER_TURN = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""About the pull axis."""
+"""Rotation about the pull axis."""
 
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Links in touch, one after the other along +x.
+    """Links in contact, one after the other along +x.
 
     Attributes:
         links: The first, third, ... ring lies in the x-z plane, the others in the x-y plane. Every link bears
@@ -43,7 +43,7 @@ class Chain:
 def chain(shapes: Sequence[LinkShape], *, gap: float = 0.0, comm: MPI.Comm | None = None) -> Chain:
     """Build a straight chain of links.
 
-    Neighbours are placed as `two_links` places them: each touches the one before at one spot.
+    Neighbours are placed as by `two_links`: each touches the one before at one point.
 
     Args:
         shapes: The links in their order; equal shapes are meshed once.

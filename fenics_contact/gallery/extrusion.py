@@ -23,12 +23,12 @@ def extrude(section: BodyMesh, heights: ArrayLike, *, present: ArrayLike | None 
 
     Returns:
         Hexahedra, layer by layer. Surfaces are "bottom" and "top", which face along z wherever cells end, and
-        the section's, swept. Walls that arise inside the section, where a cell is there and its neighbour is
-        not, are in no surface. The section's regions and the shapes of its curves, swept. No grid.
+        the section's, swept. Walls inside the section, where a cell is present and its neighbour is not, are
+        in no surface. The section's regions and the shapes of its curves are swept, too. No grid.
 
     Raises:
-        InvalidInputError: If the section is no mesh of quadrilaterals, heights do not ascend, or ``present``
-            has another shape.
+        InvalidInputError: If the section is not a mesh of quadrilaterals, heights do not ascend, or
+            ``present`` has another shape.
     """
     if section.cell_type != "quadrilateral":
         raise InvalidInputError(
@@ -69,14 +69,14 @@ def _checked_presence(present: ArrayLike | None, shape: tuple[int, int]) -> np.n
     there = np.asarray(present, dtype=bool)
     if there.shape != shape or not there.any():
         raise InvalidInputError(
-            f"present must have shape {shape}, one row a layer and one column a cell of the section, and "
+            f"present must have shape {shape}, one row per layer and one column per cell of the section, and "
             f"hold some cell, got shape {there.shape}: say for each layer which cells are there"
         )
     return there
 
 
 def _surfaces(section: BodyMesh, used: np.ndarray, cells: np.ndarray, layers: int) -> dict[str, np.ndarray]:
-    """Name boundary faces: flat ones by where they face, the others as the edge they were swept from."""
+    """Name boundary faces: flat ones by their direction, the others by the edge that was swept."""
     faces, _ = boundary_faces(cells)
     old = used[faces]
     height = old // section.n_nodes
@@ -84,7 +84,7 @@ def _surfaces(section: BodyMesh, used: np.ndarray, cells: np.ndarray, layers: in
     low, high = cells[:, :4], cells[:, 4:]
     named = {"bottom": faces[match_faces(faces, low) >= 0], "top": faces[match_faces(faces, high) >= 0]}
     walls = faces[~flat]
-    # The two lower nodes of a wall are the edge it was swept from.
+    # The two lower nodes of a wall are the edge from which it was swept.
     order = np.argsort(height[~flat], axis=1, kind="stable")[:, :2]
     edges = np.take_along_axis(old[~flat], order, axis=1) % section.n_nodes
     for name, swept in section.surfaces.items():

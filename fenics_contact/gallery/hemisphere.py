@@ -1,8 +1,8 @@
 """The bodies of Hertz: half balls and half cylinders on the plane z = 0, graded towards the origin.
 
-A box of cells in the middle (the core) is wrapped on its round sides in a shell whose layers end on the true
-sphere or cylinder. Both have good cells everywhere, also on the rim, which a single box bent into a ball does
-not.
+A box of cells in the middle (the core) is surrounded on its round sides by a shell whose layers end on the
+true sphere or cylinder. Cells are well shaped everywhere, also on the rim, unlike in a single box mapped to a
+ball.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ class _Frame:
         return Cylinder(centre, (0.0, 1.0, 0.0), self.radius) if self.flat else Sphere(centre, self.radius)
 
     def sphere(self, cube: np.ndarray) -> np.ndarray:
-        """Map cube coordinates, (n, 3), to the round surface: angles, not lengths, follow the coordinates."""
+        """Map cube coordinates, (n, 3), to the round surface: angles, not lengths, follow them."""
         reach = self._reach(cube)
         bent = cube.copy()
         bent[:, self.flat] = 0.0
         rays = np.tan(np.pi / 4.0 * bent / np.maximum(reach, np.finfo(float).tiny))
         length = np.linalg.norm(rays, axis=1, keepdims=True)
-        length[length == 0.0] = 1.0  # the middle of the body, which has no direction
+        length[length == 0.0] = 1.0  # the centre of the body, which has no direction
         return self._straight(cube, self.radius * rays / length)
 
     def core(self, cube: np.ndarray) -> np.ndarray:
@@ -127,7 +127,7 @@ def half_cylinder(
 
 
 def _wrap(core: BodyMesh, round_sides: list[str], frame: _Frame, layers: int, grading: float) -> BodyMesh:
-    """Bend a box in cube coordinates into the core and grow the shell on its round sides.
+    """Map a box in cube coordinates to the core and add the shell on its round sides.
 
     Args:
         core: The box; u from -1 or 0 to 1, likewise v unless straight, w from -1 to 0.

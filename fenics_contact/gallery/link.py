@@ -40,10 +40,10 @@ class DesignSurface:
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A chain link ready for a scene.
+    """A chain link for a scene.
 
     Attributes:
-        shape: The proportions it was built from.
+        shape: Its proportions.
         mesh: The mesh with surfaces "contact" (inner side of the contact crown) and "grip" (inner side of the
             far crown, where the chain's next link would bear), pieces of tori, and grid index (around, a, b).
         crown: The contact surface as a design surface.
@@ -61,7 +61,7 @@ class Link:
             translation: Displacement, (3,).
 
         Returns:
-            The link at its new place; design directions turn with it.
+            The link at its new place; design directions rotate with it.
         """
         mesh = self.mesh.placed(rotation, translation)
         return replace(
@@ -73,8 +73,8 @@ def chain_link(shape: LinkShape | None = None, comm: MPI.Comm | None = None) -> 
     """Build a chain link with gmsh.
 
     The ring lies in the x-z plane, the middle of the contact crown's inner side at the origin and the link on
-    the -x side of its contact crown, see `fenics_contact.gallery.ring`. The same shape gives the same mesh,
-    bit for bit.
+    the -x side of its contact crown, see `fenics_contact.gallery.ring`. The same shape gives bitwise the same
+    mesh.
 
     Args:
         shape: Proportions and mesh size; `LinkShape()` unless given.
@@ -108,11 +108,11 @@ def chain_link(shape: LinkShape | None = None, comm: MPI.Comm | None = None) -> 
 
 
 def _lattice_from_gmsh(shape: LinkShape) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Mesh with gmsh and renumber the nodes as the structured lattice has them.
+    """Mesh with gmsh and renumber the nodes in the order of the structured lattice.
 
-    gmsh divides an arc to about nine digits, not quite alike from version to version, and into equal pieces;
-    the coordinates returned are the lattice's own, graded where the link is. Those of equal pieces gmsh's
-    were found to be.
+    gmsh divides an arc into equal pieces to about nine digits, slightly different between versions; the
+    returned coordinates are those of the lattice, graded if the link is. For equal pieces gmsh's are checked
+    against them.
 
     Returns:
         Coordinates, (n_nodes, 3), and facets by name, (n_facets, 4), in the numbering of `structured_cells`.
@@ -146,7 +146,7 @@ def _mirrored(grid: np.ndarray, shape: LinkShape) -> np.ndarray:
 
 
 def _same_cells(cells: np.ndarray, expected: np.ndarray) -> bool:
-    """Compare two lists of cells as sets of node sets, whatever the order."""
+    """Compare two lists of cells as sets of node sets, in any order."""
     if cells.shape != expected.shape:
         return False
     ours, theirs = np.sort(cells, axis=1), np.sort(expected, axis=1)

@@ -1,4 +1,4 @@
-"""Meshes that this machine has no room for are refused before they are built."""
+"""Meshes that do not fit into memory are rejected before they are built."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from pathlib import Path
 
 from fenics_contact.errors import InvalidInputError
 
-#: Memory that a structured mesh takes while it is built and checked, by its dimension, in bytes a cell.
+#: Memory for building and checking a structured mesh, by its dimension, in bytes per cell.
 BYTES_A_CELL = {2: 550, 3: 1200}
-#: Where Linux keeps the limits of containers, of both versions.
+#: Files of the memory limits of Linux containers, of both versions.
 _LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
 
 
 def require_room(*counts: int) -> None:
-    """Refuse a mesh that does not fit into the memory of this machine.
+    """Reject a mesh that does not fit into the memory of this machine.
 
     Args:
         *counts: Cells along each of the two or three directions.
 
     Raises:
-        InvalidInputError: Saying how many cells that are, how much memory they take and how much there is.
+        InvalidInputError: States the number of cells, the memory they take and the available memory.
     """
     cells = math.prod(map(int, counts))
     needed, there = cells * BYTES_A_CELL[len(counts)], memory()
@@ -35,7 +35,7 @@ def require_room(*counts: int) -> None:
 
 
 def memory() -> int:
-    """Return the memory that this process may use, in bytes: of the machine, the container or its own."""
+    """Return the memory that this process may use, in bytes: limited by machine, container or process."""
     found = [os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")]
     own, _ = resource.getrlimit(resource.RLIMIT_AS)
     if own != resource.RLIM_INFINITY:

@@ -1,4 +1,4 @@
-"""A rectangle of structured quadrilaterals or triangles: the plainest body of two dimensions."""
+"""A rectangle of structured quadrilaterals or triangles."""
 
 from __future__ import annotations
 
@@ -69,10 +69,10 @@ def split_quadrilaterals(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> 
             to vertex 2; nowhere unless given.
 
     Returns:
-        The triangles on the same nodes, surfaces as they were, grid index repeated, regions split alike.
+        The triangles on the same nodes, surfaces unchanged, grid index repeated, regions split alike.
 
     Raises:
-        InvalidInputError: If the cells are no quadrilaterals, or one is not convex on that diagonal.
+        InvalidInputError: If the cells are not quadrilaterals, or one is not convex at that diagonal.
     """
     if mesh.cell_type != "quadrilateral":
         raise InvalidInputError(

@@ -19,9 +19,9 @@ from fenics_contact.gallery.section import WireSection
 from fenics_contact.gallery.structured import check_cell_type
 from fenics_contact.surface_shapes import Torus
 
-#: How many times one size of a link may be another: gmsh meshes no other ring.
+#: Largest ratio of two sizes of a link: gmsh does not mesh others.
 ALIKE = 1000
-#: Least roundness of its section, whose arcs would be straight lines to gmsh.
+#: Smallest roundness of its section, below which gmsh treats its arcs as straight lines.
 FLATTEST = 1e-6
 
 
@@ -43,11 +43,11 @@ class LinkShape:
         n_a: Cells through the thickness.
         n_b: Cells across the width.
         grading: Logarithm of the ratio of the largest to the smallest cell along the crowns, whose cells
-            shrink towards the spots where links touch; 0 for uniform. Across the wire and through its
-            thickness they shrink to the size that they have there along the ring. The number of cells stays,
-            also around the ring: legs hand some over to the crowns. 2.1 puts eight cells of the default
-            shape, in both directions, across the circle of 2.95 mm radius in which links of steel touch
-            under 80 kN (uniform: 2 along the ring).
+            shrink towards the contacts of links; 0 for uniform. Across the wire and through its thickness
+            they shrink to the size that they have there along the ring. The number of cells is unchanged,
+            also around the ring: some are moved from the legs to the crowns. 2.1 puts eight cells of the
+            default shape, in both directions, across the circle of 2.95 mm radius in which links of steel
+            touch under 80 kN (uniform: 2 along the ring).
         cell: ``"hexahedron"`` or ``"tetrahedron"``.
     """
 
@@ -63,7 +63,7 @@ class LinkShape:
     cell: str = "hexahedron"
 
     def __post_init__(self) -> None:
-        """Refuse what is not a ring."""
+        """Reject sizes that do not form a ring."""
         given = {name: getattr(self, name) for name in ("inner_radius", "straight", "thickness", "width")}
         check_numbers(**given)
         for name in ("inner_radius", "straight"):
@@ -101,7 +101,7 @@ class LinkShape:
 
     @property
     def spacing(self) -> Spacing:
-        """How closely the nodes lie along the three directions of the lattice."""
+        """Spacing of the nodes along the three directions of the lattice."""
         return _spacing(self)
 
     @property
@@ -123,8 +123,8 @@ class LinkShape:
 def _spacing(shape: LinkShape) -> Spacing:
     """Choose the spacing for a link's `grading`.
 
-    Legs hand cells over to graded crowns, those that make the cells on both sides of their border most alike
-    along the centre line.
+    Cells are moved from the legs to graded crowns such that the cells on both sides of their border are most
+    similar along the centre line.
 
     Args:
         shape: The link.
@@ -153,7 +153,7 @@ def crown_start(shape: LinkShape) -> int:
     """Index around the ring of the first node of the contact crown, counted back from the crown's middle.
 
     The middle of the contact crown has the index ``n_around // 16``: half a subdomain when the ring is cut
-    into eight, so that no cut across the ring meets the spot where links touch.
+    into eight, so that no cut across the ring meets the contact of links.
     """
     return shape.n_around // 16 - shape.spacing.quarter
 
@@ -174,7 +174,8 @@ def stations(shape: LinkShape, spacing: Spacing | None = None) -> tuple[np.ndarr
     angles = np.linspace(-np.pi / 2.0, np.pi / 2.0, turning + 1)
     half_turn = drawn_together(angles, 0.0, spacing.along)[:-1]
     leg = np.linspace(0.0, shape.straight, n_leg, endpoint=False)
-    # Crown, leg, far crown, leg: direction a turns in the crowns only, the centre moves along the legs only.
+    # Crown, leg, far crown, leg: direction a rotates in the crowns only, the centre moves along the legs
+    # only.
     turn = np.concatenate([half_turn, np.full(n_leg, np.pi / 2.0)])
     turn = np.concatenate([turn, turn + np.pi])
     moved = np.concatenate([np.zeros(turning), leg, np.full(turning, shape.straight), shape.straight - leg])
@@ -211,7 +212,7 @@ def crown_indices(shape: LinkShape) -> np.ndarray:
 
 
 def crown_shapes(shape: LinkShape) -> dict[str, Torus]:
-    """Return the tori that the inner sides of the crowns are pieces of, by the names of the surfaces."""
+    """Return the tori of the inner sides of the crowns, by the names of the surfaces."""
     tube = shape.section.crown_radius
     middles = {"contact": -shape.inner_radius, "grip": -shape.inner_radius - shape.straight}
     return {

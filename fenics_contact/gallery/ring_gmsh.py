@@ -1,4 +1,4 @@
-"""The ring of a chain link as gmsh builds it: a transfinite section swept through six pieces."""
+"""The ring of a chain link in gmsh: a transfinite section swept through six pieces."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _HEXAHEDRON, _QUADRILATERAL = 5, 3
 
 
 def mesh_ring(shape: LinkShape) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
-    """Mesh the ring with hexahedra that are equal on each piece of it.
+    """Mesh the ring with hexahedra that are uniform on each piece.
 
     The geometry has six volumes with the physical name "volume"; the inner side of the crown at the origin is
     named "contact", that of the far crown "grip". Surfaces are read back by these names.
@@ -47,7 +47,7 @@ def _elements(gmsh: ModuleType, dim: int, tag: int, kind: int) -> np.ndarray:
 
 
 def _build_ring(gmsh: ModuleType, shape: LinkShape) -> None:
-    """Sweep the section from the foot of the contact crown once around and name what is needed."""
+    """Sweep the section from the foot of the contact crown once around and name the volume and surfaces."""
     geo, spacing = gmsh.model.geo, shape.spacing
     near, far = -shape.inner_radius, -shape.inner_radius - shape.straight
 

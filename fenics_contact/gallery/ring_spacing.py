@@ -1,12 +1,12 @@
-"""How closely the nodes of a ring lie along its three directions: denser where links touch.
+"""Spacing of the nodes of a ring along its three directions: finer where links touch.
 
-A direction's nodes are drawn together by the map
+The nodes along a direction are concentrated by the map
 
     x -> sinh(κ x) / sinh(κ)
 
-of [-1, 1] with the spot at 0, which is smooth there: cells beside the spot are next to equal, and those at
+of [-1, 1] with the contact at 0, which is smooth there: cells near the contact are almost equal, and those at
 the ends cosh κ times as large. The strength κ of the crowns comes from `LinkShape.grading`; across the wire
-and through its thickness it is the one that makes the cell at the spot as small as it is along the ring.
+and through its thickness it is chosen such that the cell at the contact is as small as along the ring.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Spacing:
         leg: Cells on a leg, all of one length.
         along: Strength κ on the crowns, 0 for equal cells.
         across: Strength across the wire.
-        through: Strength through its thickness, whose spot is its inner side.
+        through: Strength through its thickness, towards its inner side.
     """
 
     quarter: int
@@ -37,20 +37,20 @@ class Spacing:
 
     @property
     def uniform(self) -> Spacing:
-        """As many cells, but equal ones."""
+        """The same numbers of cells, but uniform."""
         return Spacing(self.quarter, self.leg)
 
 
 def drawn_together(places: np.ndarray, spot: float, strength: float) -> np.ndarray:
-    """Move places on an interval towards the spot in its middle or at its start.
+    """Concentrate points of an interval towards its middle or its start.
 
     Args:
-        places: Ascending, (n,), from the start of the interval, or evenly about its middle, to its end.
-        spot: Where they are drawn to.
-        strength: κ; 0 returns the places as they are.
+        places: Ascending points, (n,), from the start of the interval, or symmetric about its middle, to its
+            end.
+        spot: Point of concentration. strength: κ; 0 returns the points unchanged.
 
     Returns:
-        Places, (n,), with the ends where they were.
+        Points, (n,), with the same ends.
     """
     if strength == 0.0:
         return places
@@ -59,7 +59,7 @@ def drawn_together(places: np.ndarray, spot: float, strength: float) -> np.ndarr
 
 
 def strength_for(smallest: float) -> float:
-    """Find κ with κ / sinh κ = ``smallest``, the smallest cell over the mean; 0 where it is no smaller."""
+    """Find κ with κ / sinh κ = ``smallest``, the smallest cell over the mean; 0 if that is not below 1."""
     if smallest >= 1.0:
         return 0.0
     # x / sinh x falls from 1 and is about 2 x exp(-x), which lies below at the end of the interval.

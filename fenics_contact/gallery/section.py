@@ -36,7 +36,7 @@ class WireSection:
     roundness: float
 
     def __post_init__(self) -> None:
-        """Refuse what has no such shape."""
+        """Reject sizes that have no such shape."""
         check_numbers(thickness=self.thickness, width=self.width, roundness=self.roundness)
         if not (0.0 < self.thickness and 0.0 < self.width):
             raise InvalidInputError(
@@ -88,7 +88,7 @@ class WireSection:
 
         Args:
             n: Number of pieces.
-            strength: How much shorter those in the middle are, see `drawn_together`; 0 for equal pieces.
+            strength: Concentration towards the middle, see `drawn_together`; 0 for equal pieces.
 
         Returns:
             Points (a, b), from negative to positive b, and unit normals out of the section, both (n + 1, 2).
@@ -103,7 +103,7 @@ class WireSection:
 
         Args:
             n: Number of pieces.
-            strength: How much shorter those on the inner side are; 0 for equal pieces.
+            strength: Concentration towards the inner side; 0 for equal pieces.
         """
         start = -self.half_angle
         angle = drawn_together(np.linspace(start, self.half_angle, n + 1), start, strength)
@@ -116,8 +116,8 @@ class WireSection:
         Args:
             n_a: Number of cells along a.
             n_b: Number of cells along b.
-            through: Strength with which cells become smaller towards the inner side, see `drawn_together`.
-            across: Strength with which they become smaller towards b = 0.
+            through: Concentration of cells towards the inner side, see `drawn_together`.
+            across: Concentration of cells towards b = 0.
 
         Returns:
             Points (a, b), (n_a + 1, n_b + 1, 2).

@@ -20,7 +20,7 @@ REFLECTIONS = np.array(
 
 
 def check_cell_type(cell: str, dim: int = 3) -> None:
-    """Refuse a cell type that the structured meshes do not offer."""
+    """Reject a cell type that the structured meshes do not support."""
     known = tuple(name for name, kind in CELL_TYPES.items() if kind.dim == dim)
     if not isinstance(cell, str) or cell not in known:
         raise InvalidInputError(f"cell must be one of {known}, got {brief(cell)}: choose one of them")
@@ -75,8 +75,7 @@ def split_hexahedra(mesh: BodyMesh, mirrored: np.ndarray | None = None) -> BodyM
         The tetrahedra on the same nodes, surfaces and regions split alike, grid index repeated.
 
     Raises:
-        InvalidInputError: If the cells are no hexahedra, or neighbours are numbered so that their diagonals
-            do not meet.
+        InvalidInputError: If the cells are not hexahedra, or the diagonals of neighbours do not meet.
     """
     if mesh.cell_type != "hexahedron":
         raise InvalidInputError(
@@ -109,7 +108,7 @@ def _split_cells(cells: np.ndarray, mirrored: np.ndarray | None) -> np.ndarray:
 
 
 def _split_facets(facets: np.ndarray, boundary: np.ndarray) -> np.ndarray:
-    """Cut quadrilaterals along that diagonal which the tetrahedra's boundary has."""
+    """Cut quadrilaterals along the diagonal of the tetrahedra's boundary."""
     first = match_faces(facets[:, [0, 1, 2]], boundary) >= 0
     turned = np.where(first[:, None], facets, np.roll(facets, -1, axis=1))
     return turned[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)

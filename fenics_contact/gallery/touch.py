@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
 PULL_AXIS = np.array([1.0, 0.0, 0.0])
-"""Link 2 is pulled along this direction, away from link 1."""
+"""Direction in which link 2 is pulled, away from link 1."""
 
 _TURN = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
-"""Half a turn about the diagonal of y and z: reverses the pull axis and swaps the other two."""
+"""Rotation by 180 degrees about the diagonal of y and z: reverses the pull axis and swaps the other two."""
 
 
 @dataclass(frozen=True, eq=False)
 class TwoLinks:
-    """Two links in touch.
+    """Two links in contact.
 
     Attributes:
         first: The link to be held at its "grip"; on the -x side, ring in the x-z plane.
@@ -42,16 +42,16 @@ def two_links(
     gap: float = 0.0,
     comm: MPI.Comm | None = None,
 ) -> TwoLinks:
-    """Build two interlocked links, the second turned by 90 degrees about the pull axis.
+    """Build two interlocked links, the second rotated by 90 degrees about the pull axis.
 
-    Near the spot where they touch, link 1 is concave along its ring (radius R) and convex across (radius r)
-    and link 2 the same, turned. The gap between them is, with y and z across the pull axis,
+    Near their contact, link 1 is concave along its ring (radius R) and convex across (radius r) and link 2
+    the same, rotated. The gap between them is, with y and z across the pull axis,
 
         g = gap + y² (1/r1 - 1/R2) / 2 + z² (1/r2 - 1/R1) / 2,
 
-    so they touch at one spot only where r1 < R2 and r2 < R1: the middles of the crowns, at the origin. The
-    flat facets of their meshes may overlap there, or stand apart, by a little: contact is measured between
-    the smooth crowns, whose shapes the meshes carry.
+    so they touch at a single point only if r1 < R2 and r2 < R1: the middles of the crowns, at the origin. The
+    flat facets of their meshes may slightly overlap there or be separated: contact uses the smooth crowns,
+    whose shapes the meshes carry.
 
     Args:
         shape: Link 1; `LinkShape()` unless given.
@@ -76,10 +76,10 @@ def two_links(
 
 
 def check_gap(gap: float) -> None:
-    """Refuse a clearance that is none.
+    """Reject an invalid clearance.
 
     Raises:
-        InvalidInputError: If it is negative or no number.
+        InvalidInputError: If it is negative or not a number.
     """
     check_numbers(gap=gap)
     if gap < 0.0:
@@ -90,15 +90,15 @@ def check_gap(gap: float) -> None:
 
 
 def check_fit(first: LinkShape, second: LinkShape, names: tuple[str, str] = ("link 1", "link 2")) -> None:
-    """Refuse links that cannot be interlocked or would not touch at one spot.
+    """Reject links that cannot be interlocked or would not touch at a single point.
 
     Args:
         first: A link.
         second: Its neighbour.
-        names: What messages call them.
+        names: Their names in messages.
 
     Raises:
-        InvalidInputError: Naming the wire that is too large.
+        InvalidInputError: Names the wire that is too large.
     """
     for wire, ring, one, two in ((first, second, *names), (second, first, *names[::-1])):
         if wire.width >= 2.0 * ring.inner_radius or wire.thickness >= ring.opening:

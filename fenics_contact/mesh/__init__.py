@@ -1,4 +1,4 @@
-"""Meshes of bodies: cells, faces, named sides, quality. Knows no finite elements."""
+"""Meshes of bodies: cells, faces, named sides, quality; independent of finite elements."""
 
 from __future__ import annotations
 

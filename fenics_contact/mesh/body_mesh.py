@@ -1,4 +1,4 @@
-"""The mesh of one body: coordinates, cells, named surfaces; checked once, then passed around as a value."""
+"""The mesh of one body: coordinates, cells, named surfaces; checked once, then an immutable value."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from fenics_contact.surface_shapes import SurfaceShape, placed
 class BodyMesh:
     """Cells of one body, replicated on all ranks.
 
-    Three coordinates make hexahedra or tetrahedra of it, two quadrilaterals or triangles. The arrays are
-    copied and made read-only; a body that moves is a new value, see `moved`.
+    Hexahedra or tetrahedra with three coordinates, quadrilaterals or triangles with two. The arrays are
+    copied and read-only; a moved body is a new value, see `moved`.
 
     Attributes:
         points: Coordinates, (n_nodes, 3 | 2) float64, in the scene's unit of length.
@@ -40,15 +40,15 @@ class BodyMesh:
             VTK, Jacobian positive (in two dimensions: counter-clockwise).
         surfaces: Name to facets, (n_facets, 4 | 3) int64 node numbers in cyclic order, the right-hand
             normal pointing out of the body. In two dimensions (n_facets, 2) edges with the body on their
-            left: run through in their direction, the boundary goes round the body counter-clockwise. Facets
+            left: run through in their direction, the boundary runs counter-clockwise around the body. Facets
             of quadratic cells have their midpoints after the corners, 9 or 3 nodes in all.
         grid: Structured index of every cell, (n_cells, 3 | 2) int64, or None. The simplices that a cell was
             split into share its index.
-        regions: Name to ascending cell numbers, int64, of the parts of the body that differ, in their
-            material for instance; no part unless given, else every cell belongs to exactly one.
-        coincident_nodes: Whether nodes may lie at the same place, as on the two sides of a crack.
-        shapes: Name of a surface to the true shape that its facets stand for, such as a `Cylinder`; contact
-            asks it for gaps and normals. Those of other surfaces are reconstructed from their nodes.
+        regions: Name to ascending cell numbers, int64, of parts of the body that differ, for instance in
+            their material; by default none, else every cell belongs to exactly one.
+        coincident_nodes: Whether nodes may coincide, as on the two sides of a crack.
+        shapes: Name of a surface to the true shape that its facets approximate, such as a `Cylinder`; contact
+            uses it for gaps and normals. Other surfaces are reconstructed from their nodes.
 
     Raises:
         InvalidInputError: If an array has the wrong shape or type, a coordinate is not finite, a node
@@ -57,7 +57,7 @@ class BodyMesh:
             lie on its shape.
 
     Example:
-        A square of two triangles, whose lower edge is named.
+        A square of two triangles with a named lower edge.
 
         >>> corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
         >>> mesh = BodyMesh(corners, [[0, 1, 2], [0, 2, 3]], {"bottom": [[0, 1]]})
@@ -76,7 +76,7 @@ class BodyMesh:
     _off_shapes: Mapping[str, np.ndarray] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check everything, cheap things first."""
+        """Check everything, in order of cost."""
         points = checked_points(self.points)
         cells = checked_cells(self.cells, *points.shape)
         self._set(
@@ -138,17 +138,17 @@ class BodyMesh:
 
     @property
     def off_shapes(self) -> Mapping[str, np.ndarray]:
-        """Name of a surface with a shape to how far each of its nodes, ascending, lies off the shape.
+        """Name of a surface with a shape to the distance of its nodes, ascending, from the shape.
 
-        Relative to the shortest edge around the node, as found when the mesh got its shapes.
+        Relative to the shortest edge around the node, computed when the shapes were given.
         """
         return self._off_shapes
 
     def with_shapes(self, shapes: Mapping[str, SurfaceShape]) -> BodyMesh:
-        """Return the same mesh with these shapes of its surfaces and no others.
+        """Return the mesh with exactly these shapes of its surfaces.
 
         Args:
-            shapes: Name of a surface -> its shape in the present place.
+            shapes: Name of a surface -> its shape in the present position.
 
         Raises:
             InvalidInputError: If there is no such surface, or its nodes do not lie on the shape.
@@ -159,7 +159,7 @@ class BodyMesh:
         return result
 
     def placed(self, rotation: np.ndarray, translation: np.ndarray, scale: float = 1.0) -> BodyMesh:
-        """Return the mesh scaled and turned about the origin of coordinates, then moved; so are its shapes.
+        """Return the mesh with its shapes scaled and rotated about the origin, then moved.
 
         Args:
             rotation: Proper rotation matrix, (3, 3) or (2, 2).
@@ -176,9 +176,9 @@ class BodyMesh:
     def moved(self, points: np.ndarray) -> BodyMesh:
         """Return the same mesh at new coordinates.
 
-        Cells, surfaces, grid and regions are shared with this mesh and not checked again, nor is whether
-        nodes coincide. Its shapes come along where the mesh is only scaled, turned and shifted; where it is
-        deformed, they are not known any more.
+        Cells, surfaces, grid and regions are shared with this mesh and not checked again, nor is coincidence
+        of nodes. Its shapes are kept if the mesh is only scaled, rotated and shifted; a deformed mesh has
+        none.
 
         Args:
             points: New coordinates, (n_nodes, 3 | 2).
@@ -199,8 +199,8 @@ class BodyMesh:
     def reshaped(self, points: np.ndarray) -> BodyMesh:
         """Return the mesh at slightly different coordinates, as `moved`; its shapes follow the nodes.
 
-        What a surface is between its nodes, and how its normals differ from those of its facets, stays as it
-        was; so gaps are smooth functions of the coordinates.
+        The offset of a surface from its facets, and of its normals from theirs, is unchanged, so that gaps
+        are smooth functions of the coordinates.
 
         Args:
             points: New coordinates, (n_nodes, 3 | 2).
@@ -225,8 +225,8 @@ class BodyMesh:
     def linear(self) -> BodyMesh:
         """The linear cells through the same nodes; the mesh itself unless its cells are quadratic.
 
-        Contact is searched and pictures are drawn on them. Each cell of order two makes 2^dim of them, one
-        after the other; facets in the same way. There is no grid.
+        Contact search and pictures use them. Each cell of order two is split into 2^dim consecutive ones;
+        facets likewise. There is no grid.
         """
         kind = cell_type_of(self.cells, self.dim)
         if kind.order == 1:

@@ -1,4 +1,4 @@
-"""The types of cells and what is known of each: nodes, faces, edges. Nodes come in the order of VTK."""
+"""Cell types with their nodes, faces and edges. Nodes are in the order of VTK."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ class CellType:
     """One type of cells.
 
     Attributes:
-        name: The name of the linear ones is dolfinx's.
-        plural: How a message speaks of such cells.
+        name: Its name; that of linear cells is dolfinx's.
+        plural: Plural for messages.
         dim: Dimension of the cell, and of the space it lies in unless it is a facet.
         nodes: Reference coordinates of the nodes, vertices first, (n_nodes, dim).
         faces: Local nodes of the faces, outward: in 3D the right-hand normal points out of the cell, in 2D,
             where a face is an edge, the cell lies to the left of it; (n_faces, nodes of a face), corners in
             cyclic order first, then the midpoints of the edges that follow them, then the centre.
-        edges: Other ends of the edges at every vertex, right-handed, (n_vertices, dim).
+        edges: Far ends of the edges at every vertex, right-handed, (n_vertices, dim).
         reference_volume: Volume (area) of the reference cell.
         pieces: Local nodes of the linear cells of the same shape that make up the cell, (n_pieces,
             n_vertices).
@@ -82,7 +82,7 @@ def _linear(
 def _quadratic(
     linear: CellType, name: str, plural: str, extra: list[list[float]], pieces: list[list[int]]
 ) -> CellType:
-    """Return the quadratic cells of a shape; the nodes of their faces are found by where they lie."""
+    """Return the quadratic cells of a shape; the nodes of their faces are identified by position."""
     nodes = np.concatenate([linear.nodes, np.array(extra)])
     number = {tuple(place): index for index, place in enumerate(nodes)}
     faces = []
@@ -108,7 +108,7 @@ _HALF = [[0.5, 0.0], [1.0, 0.5], [0.5, 1.0], [0.0, 0.5]]
 _QUARTERS = [[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]]
 
 EDGE = _linear("edge", "edges", [[0.0], [1.0]], [[0], [1]], [[1], [0]], 1.0)
-"""A facet of plane cells; no cell."""
+"""A facet of plane cells, not a cell."""
 TRIANGLE = _linear(
     "triangle",
     "triangles",
@@ -204,7 +204,7 @@ CELL_TYPES = {
     cell.name: cell
     for cell in (TRIANGLE, QUADRILATERAL, TETRAHEDRON, HEXAHEDRON, TRIANGLE6, QUADRILATERAL9, HEXAHEDRON27)
 }
-"""Name to type, all there are."""
+"""Name to type, for all types."""
 
 
 QUADRATIC = (
@@ -212,18 +212,18 @@ QUADRATIC = (
     "forces that are positive under a uniform pressure, which those of their facets are not; use linear "
     "cells, which `quadratic` gives 27 nodes (hexahedra), in the plane 9 (quadrilaterals) or 6 (triangles)"
 )
-"""Why, and what to do."""
+"""Reason and remedy."""
 QUADRATIC_FILE = (
     "such quadratic cells are not read: write the mesh with linear ones (gmsh: Mesh.ElementOrder = 1), "
     "which `quadratic` makes quadratic where they are hexahedra or plane cells"
 )
-"""What to do."""
+"""Remedy."""
 
 _QUADRATIC_NODES = (10, 20)
 
 
 def cell_type_of(cells: np.ndarray, dim: int) -> CellType:
-    """Return the type of cells; those of four nodes need the dimension to be told apart.
+    """Return the type of cells; for four nodes it depends on the dimension.
 
     Args:
         cells: Node numbers, (n_cells, nodes of a cell).

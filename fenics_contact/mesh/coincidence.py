@@ -1,4 +1,4 @@
-"""Nodes at the same place: where they are by mistake, the body falls apart there unseen."""
+"""Coincident nodes: if unintended, the body is silently disconnected there."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.rounding import coordinate_rounding
 
 TOLERANCE = 1e-10
-"""Nodes coincide that are closer than this part of the bounding box's diagonal, and their rounding."""
+"""Nodes coincide if their distance is below this fraction of the bounding box's diagonal, plus rounding."""
 
 
 def coincident_pairs(points: np.ndarray, tolerance: float = TOLERANCE) -> np.ndarray:
-    """Find the pairs of nodes that coincide.
+    """Return the pairs of nodes that coincide.
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2).
@@ -31,13 +31,13 @@ def coincident_pairs(points: np.ndarray, tolerance: float = TOLERANCE) -> np.nda
 
 
 def check_no_coincident_nodes(points: np.ndarray) -> None:
-    """Refuse a mesh with different nodes at the same place.
+    """Reject a mesh with coincident nodes.
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2).
 
     Raises:
-        InvalidInputError: Saying how many, naming the first pair and its place.
+        InvalidInputError: States their number, the first pair and its position.
     """
     pairs = coincident_pairs(points)
     if pairs.shape[0] == 0:
@@ -55,7 +55,7 @@ def check_no_coincident_nodes(points: np.ndarray) -> None:
 def merge_duplicate_nodes(
     points: np.ndarray, cells: np.ndarray, tolerance: float = TOLERANCE
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Join nodes that coincide, also through a chain of others. The two sides of a crack grow together.
+    """Merge coincident nodes, also through chains of others. The two sides of a crack are merged.
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2).
@@ -63,7 +63,7 @@ def merge_duplicate_nodes(
         tolerance: Distance over the diagonal of the bounding box up to which nodes coincide.
 
     Returns:
-        The remaining points (of nodes joined the first one's), (m, 3 | 2), in their old order; the cells with
+        The remaining points (of merged nodes the first one), (m, 3 | 2), in their old order; the cells with
         their numbers; and the new number of every old node, (n_nodes,), with which facets are renumbered:
         ``new[facets]``.
 

@@ -5,7 +5,7 @@ that points out of the cell. In two dimensions faces are edges, listed such that
 them. Faces of quadratic cells list their corners first, then the midpoints of the edges that follow the
 corners, then the centre. Two faces are the same when they have the same corners.
 
-Cells of four nodes are tetrahedra unless the caller says ``dim=2``.
+Cells of four nodes are tetrahedra unless ``dim=2``.
 """
 
 from __future__ import annotations
@@ -51,13 +51,13 @@ def face_keys(faces: np.ndarray) -> np.ndarray:
 
 
 def number_faces(faces: np.ndarray) -> np.ndarray:
-    """Number faces so that those with the same nodes get the same number.
+    """Number faces so that those with the same nodes have the same number.
 
     Args:
         faces: Node numbers, as in `face_keys`.
 
     Returns:
-        (n,) int64 numbers from 0 without holes.
+        (n,) int64 consecutive numbers from 0.
     """
     if faces.shape[0] == 0:
         return np.zeros(0, dtype=np.int64)
@@ -70,7 +70,7 @@ def number_faces(faces: np.ndarray) -> np.ndarray:
 
 
 def boundary_faces(cells: np.ndarray, dim: int = 3) -> tuple[np.ndarray, np.ndarray]:
-    """Extract the faces that belong to one cell only.
+    """Extract the faces that belong to only one cell.
 
     Args:
         cells: Node numbers, as in `cell_faces`.
@@ -136,7 +136,7 @@ def match_faces(faces: np.ndarray, candidates: np.ndarray) -> np.ndarray:
 
 
 def orient(cells: np.ndarray, facets: np.ndarray, dim: int = 3) -> np.ndarray:
-    """Write boundary facets as the cells have them: cyclic and outward.
+    """Return boundary facets in the cells' order: cyclic and outward.
 
     Args:
         cells: Node numbers, as in `cell_faces`.
@@ -161,7 +161,7 @@ def orient(cells: np.ndarray, facets: np.ndarray, dim: int = 3) -> np.ndarray:
 
 
 def start_at_smallest(facets: np.ndarray) -> np.ndarray:
-    """Rotate every facet so that it starts at its smallest node; equal cycles become equal rows.
+    """Rotate every facet so that it starts at its smallest node, so that equal cycles become equal rows.
 
     Edges stay as they are: both directions would be one cycle, but differ in the side the normal points to.
 
@@ -182,8 +182,8 @@ def vector_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
     """Integrate the outward normal over every facet.
 
     The vector area of a bilinear facet is half the cross product of its diagonals, exactly. In two dimensions
-    it is the chord turned clockwise by a right angle, whatever the edge between its ends. Quadratic facets in
-    space are looked at as four bilinear ones. Over a closed surface the vector areas add up to zero.
+    it is the chord rotated clockwise by a right angle, also for curved edges. Quadratic facets in space are
+    treated as four bilinear ones. Over a closed surface the vector areas add up to zero.
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2).

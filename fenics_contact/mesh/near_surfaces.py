@@ -1,4 +1,4 @@
-"""Which parts of the boundaries may touch, where a mesh file does not say: those that face each other."""
+"""Surfaces that may touch, if a mesh file does not name them: facets that face each other."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.faces import boundary_faces, corners_of, vector_areas
 
 OPPOSED = -0.5
-"""Facets face each other whose normals have a smaller product: they are within 60 degrees of opposite."""
+"""Facets face each other if the product of their normals is below this: within 60 degrees of opposite."""
 _NEIGHBOURS = 8
 
 
@@ -23,8 +23,8 @@ def near_surfaces(
 ) -> tuple[dict[str, BodyMesh], list[tuple[str, str]]]:
     """Name the facets of bodies that face another body within a distance.
 
-    Facets are looked at as pieces of planes: two of them are near if they lie over each other, at most so far
-    apart, within 60 degrees of parallel. Look at what was found before you trust it.
+    Facets are treated as plane: two of them are near if they overlap, within the distance and 60 degrees of
+    parallel. Inspect the result before using it.
 
     Example:
         >>> meshes, pairs = near_surfaces(read_mesh("press.inp"), 0.5)  # doctest: +SKIP
@@ -37,8 +37,8 @@ def near_surfaces(
         distance: Largest distance across the gap, [length].
 
     Returns:
-        The bodies with a surface "near B" on A and "near A" on B for every pair that was found, and the pairs
-        of names, each in the order of the bodies.
+        The bodies with a surface "near B" on A and "near A" on B for every pair, and the pairs of names, each
+        in the order of the bodies.
 
     Raises:
         InvalidInputError: If the distance is not positive, or a surface of that name is there already.
@@ -78,11 +78,11 @@ class _Side:
         self.low, self.high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
 
     def may_meet(self, other: _Side, distance: float) -> bool:
-        """Whether the boxes around both are near each other."""
+        """Whether the bounding boxes of both are near each other."""
         return bool(np.all((self.low <= other.high + distance) & (other.low <= self.high + distance)))
 
     def over(self, other: _Side, distance: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return which facets have their centre over one of the other body's, and which these are, bool."""
+        """Return masks of the facets whose centre lies over one of the other body's, and of the latter."""
         count = min(_NEIGHBOURS, len(other.centre))
         _, nearest = cKDTree(other.centre).query(self.centre, count)
         nearest = nearest.reshape(len(self.centre), count)

@@ -1,4 +1,4 @@
-"""Plane meshes that come with three coordinates, and cells whose vertices are listed the other way round."""
+"""Plane meshes with three coordinates, and cells with reversed vertices."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fenics_contact.mesh.quality import jacobians
 from fenics_contact.mesh.rounding import coordinate_rounding
 
 FLAT = 1e-10
-"""A mesh is plane whose z coordinates differ by less than this part of its size and their rounding."""
+"""A mesh is plane if its z coordinates differ by less than this fraction of its size, plus rounding."""
 
 _MIRRORED = {
     "triangle": [0, 2, 1],
@@ -26,7 +26,7 @@ _MIRRORED = {
         *(20, 21, 22, 23, 25, 24, 26),
     ],
 }
-"""The same cell with its Jacobian's sign changed."""
+"""The cell with the opposite sign of its Jacobian."""
 
 
 def flattened(points: np.ndarray, used: np.ndarray, source: str) -> np.ndarray:
@@ -34,8 +34,8 @@ def flattened(points: np.ndarray, used: np.ndarray, source: str) -> np.ndarray:
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2).
-        used: Numbers of the nodes that cells have; others may lie anywhere.
-        source: Where the mesh comes from, for the message.
+        used: Numbers of the nodes of cells; others are ignored.
+        source: Source of the mesh, for the message.
 
     Returns:
         Coordinates, (n_nodes, 2).
@@ -55,14 +55,14 @@ def flattened(points: np.ndarray, used: np.ndarray, source: str) -> np.ndarray:
 
 
 def turned_counter_clockwise(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Turn the cells of one plane surface if all of them run clockwise: its normal was chosen to be -z.
+    """Reverse the cells of one plane surface if all of them run clockwise: its normal was chosen as -z.
 
     Args:
         points: Coordinates, (n_nodes, 2).
         cells: Node numbers, (n_cells, nodes of a cell).
 
     Returns:
-        The cells; untouched if only some run clockwise, which is a mistake in the mesh.
+        The cells; unchanged if only some run clockwise, which is a mistake in the mesh.
     """
     if np.all(jacobians(points, cells).max(axis=1) < 0.0):
         return cells[:, _MIRRORED[cell_type_of(cells, 2).name]]
@@ -70,7 +70,7 @@ def turned_counter_clockwise(points: np.ndarray, cells: np.ndarray) -> np.ndarra
 
 
 def turned_right_handed(points: np.ndarray, cells: np.ndarray, source: str) -> np.ndarray:
-    """Turn every cell whose Jacobian is negative, in meshes that leave the order of vertices open.
+    """Reverse every cell with negative Jacobian, in meshes without a prescribed order of vertices.
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2).
@@ -81,7 +81,7 @@ def turned_right_handed(points: np.ndarray, cells: np.ndarray, source: str) -> n
         The cells.
 
     Raises:
-        InvalidInputError: If cells that share a face then lie on the same side of it: one is flipped over.
+        InvalidInputError: If cells that share a face then lie on the same side of it, as one is flipped.
     """
     dim = points.shape[1]
     negative = jacobians(points, cells).max(axis=1) < 0.0

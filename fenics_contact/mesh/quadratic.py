@@ -20,10 +20,10 @@ def quadratic(mesh: BodyMesh) -> BodyMesh:
 
     The new nodes are the midpoints of edges, faces and cells; on surfaces whose shape the mesh carries, the
     closest points of the shape. Displacements, and such surfaces, become piecewise quadratic. The numbers of
-    the old nodes, cells and facets stay.
+    the old nodes, cells and facets are unchanged.
 
     Args:
-        mesh: Hexahedra, quadrilaterals or triangles. Quadratic tetrahedra are refused: under a uniform
+        mesh: Hexahedra, quadrilaterals or triangles. Quadratic tetrahedra are rejected: under a uniform
             pressure the nodal forces of their facets vanish at the corners.
 
     Raises:
@@ -65,8 +65,8 @@ def quadratic(mesh: BodyMesh) -> BodyMesh:
 def _with_more_nodes(
     points: np.ndarray, cells: np.ndarray, linear: CellType, kind: CellType
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Add a node in the middle of all vertices that lie around it, once for all cells that share it."""
-    # Those whose linear shape functions are not zero there.
+    """Add a node at the mean of the vertices around it, once for all cells that share it."""
+    # The vertices whose linear shape functions are not zero there.
     weights = shape_values(linear, kind.nodes[len(linear.nodes) :])
     parents = [np.flatnonzero(values > 0.1) for values in weights]
     result = np.concatenate([cells, np.empty((len(cells), len(parents)), dtype=np.int64)], axis=1)
@@ -81,10 +81,10 @@ def _with_more_nodes(
 
 
 def _follow(points: np.ndarray, cells: np.ndarray, kind: CellType, placed: np.ndarray) -> None:
-    """Move the centres of faces and cells after the midpoints of edges, so that thin cells keep their shape.
+    """Move the centres of faces and cells with the midpoints of edges, so that thin cells keep their shape.
 
-    A centre lies where serendipity functions have it: ½ Σ midpoints − ¼ Σ corners of a face, ¼ Σ midpoints
-    − ¼ Σ corners of a hexahedron.
+    A centre is placed by serendipity functions: ½ Σ midpoints − ¼ Σ corners of a face, ¼ Σ midpoints − ¼ Σ
+    corners of a hexahedron.
     """
     if kind is TRIANGLE6:
         return

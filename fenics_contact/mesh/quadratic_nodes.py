@@ -1,8 +1,8 @@
 """Quadratic cells of mesh files: their midpoints in the order of VTK, missing centres added.
 
-Programs agree on the order of the corners, not on that of the other nodes, so these are told by where they
-lie. Cells of the serendipity family, 20 or 8 nodes, get the centres of their faces and their own where their
-shape functions have them: the geometry stays, the displacements become richer.
+Programs agree on the order of the corners, not on that of the other nodes, so these are identified by
+position. Serendipity cells, 20 or 8 nodes, are completed by the centres of their faces and of the cell,
+placed by their shape functions: the geometry is unchanged, the displacements become richer.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from fenics_contact.mesh.faces import number_faces
 from fenics_contact.mesh.shape_functions import shape_values
 
 QUADRATIC = {6: TRIANGLE6, 8: QUADRILATERAL9, 9: QUADRILATERAL9, 20: HEXAHEDRON27, 27: HEXAHEDRON27}
-"""Number of nodes of a quadratic cell in a file to the type that is made of it."""
+"""Number of nodes of a quadratic cell in a file to the resulting type."""
 
 _LINEAR = {TRIANGLE6.name: TRIANGLE, QUADRILATERAL9.name: QUADRILATERAL, HEXAHEDRON27.name: HEXAHEDRON}
 _ENOUGH = 1000
-"""So many cells tell the order of their nodes."""
+"""Number of cells from which the order of nodes is determined."""
 
 
 def in_vtk_order(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -54,8 +54,8 @@ def in_vtk_order(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def _ordered(points: np.ndarray, cells: np.ndarray, kind: CellType) -> np.ndarray:
-    """Find the order in which all cells together have their nodes nearest to where VTK expects them."""
-    from scipy.optimize import linear_sum_assignment  # loads what few runs need
+    """Return the order in which the nodes of all cells are nearest to the positions that VTK expects."""
+    from scipy.optimize import linear_sum_assignment  # needed by few runs only
 
     corners = len(kind.edges)
     sample = cells[:: max(1, len(cells) // _ENOUGH)]

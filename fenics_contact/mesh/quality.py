@@ -1,7 +1,7 @@
 """Jacobians, volumes and shape quality of cells, for all cells at once.
 
 Points with three coordinates belong to hexahedra or tetrahedra, points with two to quadrilaterals or
-triangles; "volume" is the area then.
+triangles, for which "volume" is the area.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from fenics_contact.mesh.cell_types import CellType, cell_type_of
 from fenics_contact.mesh.shape_functions import quadrature, shape_gradients
 
 HEXAHEDRON_LATTICE = np.stack(np.meshgrid(*3 * [[0.0, 0.5, 1.0]], indexing="ij"), axis=-1).reshape(-1, 3)
-"""Vertices, edge and face midpoints and centre: where the Jacobian of a hexahedron is looked at.
+"""Vertices, edge and face midpoints and centre: points at which the Jacobian of a hexahedron is evaluated.
 
-The determinant is quadratic in each coordinate, so these 27 values fix it everywhere."""
+The determinant is quadratic in each coordinate, so these 27 values determine it everywhere."""
 
 FLAT = 1e-14
-"""A Jacobian below this part of the bounding box's diagonal to the power of the dimension is rounding."""
+"""A Jacobian below this fraction of the bounding box's diagonal to the power of the dimension is rounding."""
 
 _BEST_CORNER = {3: np.sqrt(2.0), 2: 2.0 / np.sqrt(3.0)}
 """One over the corner determinant of unit edge vectors in a regular simplex, by dimension."""
@@ -37,10 +37,11 @@ def determinants(matrices: np.ndarray) -> np.ndarray:
 
 
 def _critical_positions(cell: CellType) -> np.ndarray:
-    """Where the Jacobian is looked at.
+    """Points at which the Jacobian is evaluated.
 
-    That of a quadrilateral is linear, so its vertices fix it; that of a hexahedron is fixed by the lattice.
-    On quadratic cells, where no few values bound it, it is looked at in the nodes and in the Gauss points.
+    That of a quadrilateral is linear and determined by its vertices; that of a hexahedron by the lattice. On
+    quadratic cells, where no small set of values bounds it, it is evaluated at the nodes and the Gauss
+    points.
     """
     if cell.order == 2:
         return np.concatenate([cell.nodes, quadrature(cell)[0]])
@@ -68,14 +69,14 @@ def jacobians(points: np.ndarray, cells: np.ndarray, positions: np.ndarray | Non
         positions = _critical_positions(cell)
     columns = np.ascontiguousarray(corners.transpose(0, 2, 1)).reshape(-1, cells.shape[1])
     values = np.empty((cells.shape[0], positions.shape[0]))
-    # A few positions, all cells at once: keeps the arrays small.
+    # A few positions, all cells at once, which keeps the arrays small.
     for m, gradients in enumerate(shape_gradients(cell, positions)):
         values[:, m] = determinants((columns @ gradients).reshape(-1, cell.dim, cell.dim))
     return values
 
 
 def jacobian_ratio(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Compare the smallest with the largest Jacobian inside every cell.
+    """Return the ratio of the smallest to the largest Jacobian in every cell.
 
     Returns:
         (n_cells,) values in [-1, 1]: 1 for a parallelepiped, a parallelogram or a proper simplex, 0 or less
@@ -124,10 +125,10 @@ def volume(points: np.ndarray, cells: np.ndarray) -> float:
 
 
 def thickness(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Compare the smallest Jacobian of every cell with the area (length) of its bounding box's diagonal.
+    """Return the smallest Jacobian of every cell over the area (length) of its bounding box's diagonal.
 
     Returns:
-        (n_cells,) [length]; 0 where a cell is inverted or flat, else a part of the diagonal.
+        (n_cells,) [length]; 0 where a cell is inverted or flat, else a fraction of the diagonal.
     """
     corners = points[cells]
     size = np.linalg.norm(corners.max(axis=1) - corners.min(axis=1), axis=1)

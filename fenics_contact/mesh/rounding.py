@@ -1,15 +1,15 @@
-"""How far coordinates can be trusted: they are rounded the more, the farther a body lies from the origin."""
+"""Accuracy of coordinates: their rounding grows with the distance of a body from the origin."""
 
 from __future__ import annotations
 
 import numpy as np
 
 LAST_BITS = 8.0
-"""A coordinate that was turned and shifted is off by a few units in its last place; two of them by twice."""
+"""A rotated and shifted coordinate is off by a few units in the last place; a difference by twice as many."""
 
 
 def coordinate_rounding(points: np.ndarray) -> float:
-    """Return how far apart nodes may be that are meant to be at the same place, [length].
+    """Return the largest distance of nodes that are meant to coincide, [length].
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2).

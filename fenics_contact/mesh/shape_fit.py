@@ -1,4 +1,4 @@
-"""Whether the nodes of surfaces lie on the shapes that they are said to have."""
+"""Check that the nodes of surfaces lie on the given shapes."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.faces import corners_of
 from fenics_contact.surface_shapes import SurfaceShape, asked
 
-#: How far nodes may lie off their shape, relative to the shortest edge of a facet around them.
+#: Largest distance of nodes from their shape, relative to the shortest edge of a facet around them.
 FARTHEST = 0.1
 
 
 def distance_in_edges(points: np.ndarray, facets: np.ndarray, shape: SurfaceShape) -> np.ndarray:
-    """Return how far the nodes of a surface lie off a shape, relative to the shortest edge around each.
+    """Return the distance of a surface's nodes from a shape, relative to the shortest edge around each.
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2), [length].
@@ -38,7 +38,7 @@ def distance_in_edges(points: np.ndarray, facets: np.ndarray, shape: SurfaceShap
 def check_shapes(
     points: np.ndarray, surfaces: Mapping[str, np.ndarray], shapes: Mapping[str, SurfaceShape]
 ) -> dict[str, np.ndarray]:
-    """Refuse shapes that surfaces do not have.
+    """Reject shapes on which a surface does not lie.
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2), [length].
@@ -46,7 +46,7 @@ def check_shapes(
         shapes: Name of a surface to its shape.
 
     Returns:
-        Name of each of these surfaces to how far its nodes lie off, see `distance_in_edges`.
+        Name of each of these surfaces to the distances of its nodes, see `distance_in_edges`.
 
     Raises:
         InvalidInputError: If there is no such surface, the shape is of another dimension, or nodes lie off it

@@ -1,4 +1,4 @@
-"""Shape functions of all cells and the rules that integrate their Jacobians exactly, as basix has them."""
+"""Shape functions of all cells and rules that integrate their Jacobians exactly, from basix."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def shape_gradients(cell: CellType, positions: np.ndarray) -> np.ndarray:
 def quadrature(cell: CellType) -> tuple[np.ndarray, np.ndarray]:
     """Return a rule that integrates squares of shape functions, and the Jacobian of curved cells, exactly.
 
-    Two Gauss points a direction on linear and three on quadratic edges, quadrilaterals and hexahedra; rules
+    Two Gauss points per direction on linear and three on quadratic edges, quadrilaterals and hexahedra; rules
     of degree two on linear and of degree five on quadratic simplices.
 
     Returns:
@@ -66,7 +66,7 @@ def _tabulated(cell: CellType, positions: np.ndarray, derivatives: int) -> np.nd
 
 @cache
 def _element(cell: CellType) -> tuple[Any, np.ndarray]:
-    """Return basix's element and which of its functions belongs to each node of the cell."""
+    """Return basix's element and the number of its function for each node of the cell."""
     import basix
 
     equispaced = basix.LagrangeVariant.equispaced
@@ -76,6 +76,6 @@ def _element(cell: CellType) -> tuple[Any, np.ndarray]:
 
 
 def _shape(cell: CellType) -> Any:
-    import basix  # costs a tenth of a second
+    import basix  # takes a tenth of a second
 
     return getattr(basix.CellType, (_SIMPLICES if cell.is_simplex else _OTHERS)[cell.dim - 1])

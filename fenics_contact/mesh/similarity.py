@@ -1,4 +1,4 @@
-"""Whether a motion only scales, turns and shifts."""
+"""Detection of similarities: motions that only scale, rotate and shift."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from fenics_contact.mesh.rounding import coordinate_rounding
 
-#: What a similarity may leave, in roundings of the coordinates: some operations lie between the two.
+#: Largest deviation from a similarity in roundings of the coordinates, due to the operations in between.
 ROUNDINGS = 8.0
 
 
@@ -14,11 +14,11 @@ def similarity(points: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.nd
     """Return rotation, translation and scale that move points, x -> scale · rotation x + translation.
 
     Args:
-        points: Where they were, (n, dim).
-        moved: Where they are, (n, dim).
+        points: Old positions, (n, dim).
+        moved: New positions, (n, dim).
 
     Returns:
-        (dim, dim), (dim,) and a positive number; None if the motion is none of the kind.
+        (dim, dim), (dim,) and a positive number; None if the motion is not a similarity.
 
     References:
         Umeyama, S.: Least-squares estimation of transformation parameters between two point patterns. IEEE
@@ -31,7 +31,7 @@ def similarity(points: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.nd
     sign[-1] = np.sign(np.linalg.det(left) * np.linalg.det(right))
     scale = float((stretch * sign).sum() / (away**2).sum())
     rotation = (left * sign) @ right
-    # Shifts alone, and half turns and the like, are exact.
+    # Pure shifts, and half turns and the like, are exact.
     scale = 1.0 if abs(scale - 1.0) < 1e-14 else scale
     rotation = np.where(np.abs(rotation - np.round(rotation)) < 1e-14, np.round(rotation), rotation)
     shift = there - scale * rotation @ centre

@@ -1,4 +1,4 @@
-"""Checks of mesh arrays. Each returns the array in the package's type or says what is wrong with it."""
+"""Checks of mesh arrays. Each returns the array in the package's type or raises."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fenics_contact.mesh.quality import jacobian_ratio, thickness
 from fenics_contact.mesh.rounding import coordinate_rounding
 
 RESOLVED = 1e3
-"""Cells must be so many times thicker than their coordinates are rounded."""
+"""Smallest ratio of a cell's thickness to the rounding of its coordinates."""
 
 
 def checked_points(points: ArrayLike, shape: tuple[int, ...] | None = None) -> np.ndarray:
@@ -78,15 +78,15 @@ def checked_cells(cells: ArrayLike, n_nodes: int, dim: int) -> np.ndarray:
 
 
 def check_jacobians(points: np.ndarray, cells: np.ndarray, remedy: str) -> None:
-    """Refuse a mesh with an inverted or degenerate cell, or so far from the origin that rounding bends cells.
+    """Reject a mesh with an inverted or degenerate cell, or so far from the origin that rounding bends cells.
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2).
         cells: Node numbers, (n_cells, nodes of a cell).
-        remedy: What to do about it; ends the message.
+        remedy: Remedy; ends the message.
 
     Raises:
-        InvalidInputError: Naming how many cells, the worst one and its Jacobian ratio or its place.
+        InvalidInputError: States the number of cells, the worst one and its Jacobian ratio or its position.
     """
     thick = thickness(points, cells)
     inverted = np.flatnonzero(thick <= 0.0)
@@ -131,14 +131,14 @@ def checked_surfaces(
             )
         _check_range(array, n_nodes, f"surface '{name}'")
         found = _facets_found(name, array, boundary, dim)
-        # Midpoints follow from the corners; from here on they stand where `boundary_faces` has them.
+        # Midpoints follow from the corners; from here on they are in the order of `boundary_faces`.
         checked[name] = array if boundary.shape[1] == corners_of(boundary, dim).shape[1] else boundary[found]
         checked[name].setflags(write=False)
     return checked
 
 
 def _facets_found(name: str, facets: np.ndarray, boundary: np.ndarray, dim: int) -> np.ndarray:
-    """Return which boundary faces the facets are, (n_facets,)."""
+    """Return the numbers of the boundary faces that the facets are, (n_facets,)."""
     found = match_faces(corners_of(facets, dim), corners_of(boundary, dim))
     lost = np.flatnonzero(found < 0)
     if lost.size:
@@ -170,7 +170,7 @@ def _facets_found(name: str, facets: np.ndarray, boundary: np.ndarray, dim: int)
 
 
 def _check_once(name: str, facets: np.ndarray, found: np.ndarray) -> None:
-    """Refuse a facet that is listed twice, also in another order: its area would count twice."""
+    """Reject a facet that is listed twice, also in another order: its area would count twice."""
     _, first, counts = np.unique(found, return_index=True, return_counts=True)
     twice = np.flatnonzero(counts > 1)
     if twice.size:
@@ -195,7 +195,7 @@ def checked_grid(grid: ArrayLike | None, n_cells: int, dim: int) -> np.ndarray |
 
 
 def checked_regions(regions: Mapping[str, ArrayLike], n_cells: int) -> dict[str, np.ndarray]:
-    """Return named ascending cell numbers, int64 each; every cell is in exactly one if there is any."""
+    """Return named ascending cell numbers, int64 each; every cell is in exactly one if there are any."""
     checked: dict[str, np.ndarray] = {}
     owner = np.full(n_cells, -1, dtype=np.int64)
     for number, (name, cells) in enumerate(regions.items()):

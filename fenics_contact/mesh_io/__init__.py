@@ -1,4 +1,4 @@
-"""Meshes that other programs made: gmsh, CAD, meshio, dolfinx, XDMF."""
+"""Meshes of other programs: gmsh, CAD, meshio, dolfinx, XDMF."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Element sets that an Abaqus file names where it lists the elements: meshio may misplace them."""
+"""Element sets that an Abaqus file names with its elements: meshio may assign them wrongly."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _ELSET = re.compile(r",\s*elset\s*=\s*([^,\n]+)", re.IGNORECASE)
 
 
 def with_element_sets(mesh: meshio.Mesh, path: Path) -> meshio.Mesh:
-    """Return the mesh with the sets of ``*ELEMENT, ELSET=name`` as the file has them.
+    """Return the mesh with the sets of ``*ELEMENT, ELSET=name`` as in the file.
 
-    meshio 5.3 takes the n-th of these names for the n-th block, also where a block has none or two blocks
-    have the same.
+    meshio 5.3 assigns the n-th of these names to the n-th block, even if a block has none or two blocks have
+    the same.
 
     Args:
-        mesh: What meshio read; its sets of those names are replaced.
-        path: The file; others than Abaqus's, and those that include others, are passed by.
+        mesh: meshio's mesh; its sets of those names are replaced.
+        path: The file; files of other formats, and those that include others, are skipped.
 
     Returns:
         The same mesh.

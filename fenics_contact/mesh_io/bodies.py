@@ -1,4 +1,4 @@
-"""From a mesh file's labels to bodies: who owns which cells, and on whose boundary which facets lie."""
+"""From a mesh file's labels to bodies: the cells of each body, and the facets on its boundary."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from fenics_contact.mesh_io.tagged_mesh import (
 )
 
 Facets = Mapping[str, SurfaceParts]
-"""Name of a surface to what makes it up."""
+"""Name of a surface to its parts."""
 
 
 def bodies_of(mesh: TaggedMesh, bodies: Any = None, surfaces: Any = None) -> dict[str, BodyMesh]:
-    """Make bodies of a mesh with labels.
+    """Build bodies from a mesh with labels.
 
-    Every body gets nodes of its own: those on a boundary that two bodies share are there twice afterwards.
+    Every body has its own nodes: those on a boundary that two bodies share are duplicated.
 
     Args:
         mesh: The mesh.
-        bodies: Which groups make up which bodies, see `chosen_bodies`.
-        surfaces: Which labels of facets become surfaces, see `chosen_surfaces`.
+        bodies: The groups of each body, see `chosen_bodies`.
+        surfaces: The facet labels of each surface, see `chosen_surfaces`.
 
     Returns:
-        Name to body. A surface is a part of every body on whose boundary some of its facets lie.
+        Name to body. A surface belongs to every body on whose boundary some of its facets lie.
 
     Raises:
-        InvalidInputError: If a label is not there, cells belong to two bodies or regions, a body has cells of
-            several types or does not make a sound mesh, or a facet lies inside a body or on no cell at all.
+        InvalidInputError: If a label does not exist, cells belong to two bodies or regions, a body has cells
+            of several types or an invalid mesh, or a facet lies inside a body or on no cell at all.
     """
     chosen, facets = chosen_bodies(mesh, bodies), chosen_surfaces(mesh, surfaces)
     _check_facets_belong(mesh, facets)
@@ -60,7 +60,7 @@ def bodies_of(mesh: TaggedMesh, bodies: Any = None, surfaces: Any = None) -> dic
 
 
 def _cells_of(mesh: TaggedMesh, name: str, parts: BodyParts) -> tuple[str, np.ndarray, np.ndarray]:
-    """Return the cell type of a body, its ascending cells, and which of its groups each belongs to."""
+    """Return the cell type of a body, its ascending cells, and the group of each."""
     found = [
         (kind, cells, n) for n, label in enumerate(parts.labels) for kind, cells in mesh.groups[label].items()
     ]
@@ -129,7 +129,7 @@ def _body(
 def _check_none_inside(
     mesh: TaggedMesh, name: str, surface: str, facets: np.ndarray, cells: np.ndarray
 ) -> None:
-    """Refuse facets between two cells of one body; those that are none of its faces are another body's."""
+    """Reject facets between two cells of one body; facets that are not faces of it belong to other bodies."""
     faces = cell_faces(cells, mesh.dim)
     inside = (
         np.count_nonzero(match_faces(facets, corners_of(faces.reshape(-1, faces.shape[2]), mesh.dim)) >= 0)
@@ -146,7 +146,7 @@ def _check_none_inside(
 
 
 def _check_nodes_make_facets(mesh: TaggedMesh, facets: Facets, bodies: Mapping[str, BodyMesh]) -> None:
-    """Refuse a wanted surface that is a set of nodes, but not all nodes of any facet."""
+    """Reject a requested surface that is a set of nodes without all nodes of any facet."""
     for name, parts in facets.items():
         if parts.nodes and not any(name in body.surfaces for body in bodies.values()):
             count = sum(len(nodes) for nodes in parts.nodes)
@@ -158,7 +158,7 @@ def _check_nodes_make_facets(mesh: TaggedMesh, facets: Facets, bodies: Mapping[s
 
 
 def _check_facets_belong(mesh: TaggedMesh, surfaces: Facets) -> None:
-    """Refuse facets that are the face of no cell."""
+    """Reject facets that are not faces of cells."""
     known: dict[int, list[np.ndarray]] = {}
     for cells in mesh.cells.values():
         faces = cell_faces(cells, mesh.dim)

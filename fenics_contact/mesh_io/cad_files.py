@@ -1,4 +1,4 @@
-"""Bodies from CAD files: gmsh meshes them, and their surfaces keep their true shapes."""
+"""Bodies from CAD files, meshed by gmsh; their surfaces keep their true shapes."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from fenics_contact.mesh_io.gmsh_session import gmsh_model
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-#: What gmsh reads as geometry.
+#: Formats that gmsh reads as geometry.
 SUFFIXES = (".step", ".stp", ".iges", ".igs", ".brep", ".geo", ".geo_unrolled")
-#: Where no name was given, the library that writes STEP files puts its own.
+#: Default name of the library that writes STEP files.
 NO_NAME = "Open CASCADE"
 _SIZE = "Mesh.MeshSizeMax"
 
@@ -33,9 +33,9 @@ def read_cad(
 ) -> dict[str, BodyMesh]:
     """Read a CAD file, mesh it with gmsh, and return its bodies with the true shapes of their surfaces.
 
-    Physical groups of a .geo file say what is what, as in `from_gmsh_model`. Where a file has none, every
-    volume (of a plane part: every surface) is a body and every surface (curve) a surface of it, called by the
-    names that a STEP file gives them, else by their numbers, as text: the ones that gmsh shows.
+    Physical groups of a .geo file define bodies and surfaces, as in `from_gmsh_model`. Without groups, every
+    volume (of a plane part: every surface) is a body and every surface (curve) a surface of it, named as in a
+    STEP file, else by their numbers in gmsh, as text.
 
     Args:
         path: A file .step, .stp, .iges, .igs, .brep, .geo or .geo_unrolled; .geo is a script: gmsh runs it.
@@ -45,7 +45,7 @@ def read_cad(
         comm: If given, rank 0 reads the file and all ranks receive the bodies.
 
     Returns:
-        Name to body, with `BodyMesh.shapes`. STEP and IGES files count in millimetres, as gmsh reads them.
+        Name to body, with `BodyMesh.shapes`. gmsh reads STEP and IGES files in millimetres.
 
     Raises:
         InvalidInputError: As `read_msh`, or if gmsh cannot read or mesh the file.
@@ -100,7 +100,7 @@ def _read(
 
 
 def _name(gmsh: ModuleType, dim: int, *, unique: bool) -> None:
-    """Put entities into physical groups where there are none of their dimension."""
+    """Add physical groups of entities if there are none of their dimension."""
     if dim < 1 or gmsh.model.getPhysicalGroups(dim):
         return
     names = {}

@@ -17,11 +17,12 @@ from fenics_contact.mesh_io.gmsh_session import running_gmsh
 from fenics_contact.surface_shapes import Joined, SplinePatch, SurfaceShape
 
 _LOGGER = logging.getLogger(__name__)
-#: How far nodes may lie off a face that is theirs, relative to the shortest edge of the surface.
+#: Largest distance of nodes from their face, relative to the shortest edge of the surface.
 FAR = 0.01
-#: Middles of facets are the same when they are closer than this part of that edge.
+#: Middles of facets coincide if they are closer than this fraction of that edge.
 SAME = 1e-6
-#: Two faces have one shape if on one of them their shapes differ by less than this part of its extent.
+#: Two faces have a common shape if on one of them their shapes differ by less than this fraction of its
+#: extent.
 ALIKE = 1e-8
 
 
@@ -30,18 +31,18 @@ def cad_shapes(
 ) -> dict[str, SurfaceShape]:
     """Return the true shapes of a body's surfaces from the geometry of gmsh's current model.
 
-    Planes, spheres, cylinders, cones and tori are known again, also where the model holds them as splines;
-    other faces become splines through points of theirs. So the shapes need gmsh no more, and can be sent to
-    other ranks. A surface of several faces is `Joined`.
+    Planes, spheres, cylinders, cones and tori are recognised, also if the model represents them as splines;
+    other faces become splines through their points. The shapes no longer need gmsh, and can be sent to other
+    ranks. A surface of several faces is `Joined`.
 
     Args:
-        mesh: A body of the model, with the nodes of gmsh's mesh: from `from_gmsh_model`, not moved since.
+        mesh: A body of the model with the nodes of gmsh's mesh, from `from_gmsh_model`, not moved.
         surfaces: Name of a surface of the body to the physical groups (by name, or number), or named
-            entities, that it is made of. All surfaces that are called as such a group unless given.
+            entities, of which it consists. All surfaces with the name of such a group unless given.
 
     Returns:
         Name of the surface to its shape. Surfaces whose faces have no geometry, as in a mesh that was read
-        from a file, and those whose nodes have left it are not among them.
+        from a file, and those whose nodes have left it are omitted.
 
     Raises:
         InvalidInputError: If gmsh is not initialised, or the body or the model does not have a surface.
@@ -125,7 +126,7 @@ def _shape(
 def _on_entity(
     gmsh: ModuleType, entity: tuple[int, int], nodes: np.ndarray, middles: np.ndarray, edge: float
 ) -> np.ndarray:
-    """Tell which facets are elements of an entity: those with the same middle, (n,)."""
+    """Return which facets are elements of an entity, by equal middles, (n,)."""
     on = np.zeros(len(middles), dtype=bool)
     types, _, elements = gmsh.model.mesh.getElements(*entity)
     for kind, found in zip(types, elements, strict=True):
@@ -138,7 +139,7 @@ def _on_entity(
 def _add(
     shapes: list[SurfaceShape], parts: list[np.ndarray], shape: SurfaceShape, corners: np.ndarray
 ) -> None:
-    """Add the shape of a part, or the part to a shape that goes on in it: halves of a hole, of a torus."""
+    """Add the shape of a part, or the part to a shape that it continues: halves of a hole, of a torus."""
     middles = corners.mean(axis=1)
     for number, other in enumerate(shapes):
         if isinstance(other, SplinePatch) or isinstance(shape, SplinePatch):

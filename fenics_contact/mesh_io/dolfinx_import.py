@@ -1,4 +1,4 @@
-"""Bodies from XDMF files, and from meshes that dolfinx has in memory; numeric tags say what is what.
+"""Bodies from XDMF files and from dolfinx meshes in memory, by numeric tags.
 
 By default every cell tag is a body and every facet tag a surface, called by its number, as text. Without cell
 tags the whole mesh is one body called "mesh".
@@ -42,11 +42,11 @@ def read_xdmf(
     facet_file: str | Path | None = None,
     comm: MPI.Comm | None = None,
 ) -> dict[str, BodyMesh]:
-    """Read bodies from an XDMF file that dolfinx or meshio wrote.
+    """Read bodies from an XDMF file of dolfinx or meshio.
 
-    The mesh and its tags are grids of the file. Those that dolfinx's ``write_meshtags`` wrote are found by
-    their cells and facets, and so is meshio's only grid, whose first cell data are the tags. Nodes and cells
-    keep the file's order. Cells may be listed left-handed, which these files leave open.
+    The mesh and its tags are grids of the file. Those of dolfinx's ``write_meshtags`` are identified by their
+    cells and facets, and so is meshio's only grid, whose first cell data are the tags. Nodes and cells keep
+    the file's order. Cells may be left-handed, as these files do not prescribe an orientation.
 
     Example:
         ``read_xdmf("press.xdmf", bodies={"tool": 1, "sheet": {"steel": 2, "copper": 3}})``
@@ -61,7 +61,7 @@ def read_xdmf(
         mesh: Name of the grid with the mesh; needed where there are several.
         cell_tags: Name of the grid with the tags of the cells; needed where there are several.
         facet_tags: Name of the grid with the tags of the facets; needed where there are several.
-        facet_file: Another file that holds the facets, as meshio writes them, on the same nodes.
+        facet_file: Separate file with the facets, as meshio writes them, on the same nodes.
         comm: If given, rank 0 reads the file and all ranks receive the bodies.
 
     Returns:
@@ -93,7 +93,7 @@ def from_dolfinx(
     bodies: Bodies | None = None,
     surfaces: Surfaces | None = None,
 ) -> dict[str, BodyMesh]:
-    """Take bodies from a dolfinx mesh that lives on one rank.
+    """Build bodies from a dolfinx mesh on one rank.
 
     Args:
         mesh: A `dolfinx.mesh.Mesh` on a communicator of one rank.

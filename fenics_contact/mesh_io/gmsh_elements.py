@@ -16,16 +16,16 @@ _TYPES = {
     2: "triangle", 3: "quadrilateral", 4: "tetrahedron", 5: "hexahedron",
     9: "triangle6", 10: "quadrilateral9", 12: "hexahedron27",
 }  # fmt: skip
-"""gmsh's numbers of the cells that a body may have."""
+"""gmsh's numbers of the supported cell types."""
 _INCOMPLETE = (16, 17)
 
 
 def tagged_mesh_of(gmsh: ModuleType, source: str) -> TaggedMesh:
-    """Take the cells of the highest dimension and the physical groups out of gmsh's current model.
+    """Return the cells of the highest dimension and the physical groups of gmsh's current model.
 
     Args:
         gmsh: The module, initialised.
-        source: What the model is, for messages.
+        source: Name of the model, for messages.
 
     Returns:
         Nodes in the order of their tags, cells in the order of entities, labels by name.
@@ -124,7 +124,7 @@ def physical_groups(gmsh: ModuleType, dim: int) -> dict[Label, list[int]]:
 def _numbered(
     by_entity: Mapping[int, Mapping[str, np.ndarray]],
 ) -> tuple[dict[str, np.ndarray], dict[int, dict[str, np.ndarray]]]:
-    """Join the cells of all entities by type; say which numbers those of every entity got."""
+    """Concatenate the cells of all entities by type, and return the numbers of those of every entity."""
     blocks: dict[str, list[np.ndarray]] = {}
     numbers: dict[int, dict[str, np.ndarray]] = {}
     for entity, kinds in by_entity.items():
@@ -146,7 +146,7 @@ def _facets(
     row: np.ndarray,
     elements: Mapping[int, Mapping[int, Mapping[str, np.ndarray]]],
 ) -> dict[Label, list[np.ndarray]]:
-    """Node rows of the corners of the facets of every physical group."""
+    """Corner nodes of the facets of every physical group, as row numbers."""
     facets: dict[Label, list[np.ndarray]] = {}
     for label, entities in physical_groups(gmsh, dim).items():
         blocks: list[Any] = []

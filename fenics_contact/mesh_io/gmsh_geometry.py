@@ -1,4 +1,4 @@
-"""A face or curve of gmsh's geometry as a shape that needs gmsh no more."""
+"""A face or curve of gmsh's geometry as a shape that is independent of gmsh."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 
 from fenics_contact.surface_shapes import SplinePatch, SurfaceShape, recognised
 
-#: Points along each parameter: from the fewest, doubled up to the most until the spline through them is this
+#: Smallest and largest number of points along each parameter, doubled until the spline through them is this
 #: close to the face, relative to its extent.
 FEWEST, MOST, CLOSE = 33, 129, 1e-9
-#: Tangents whose area is smaller than this part of the largest make no normal.
+#: Tangents whose cross product is below this fraction of the largest define no normal.
 POLE = 1e-6
 
 
@@ -25,11 +25,11 @@ def shape_of_entity(
         gmsh: The module, initialised.
         entity: Dimension and tag.
         middles: Points on or close to it, (n, 3 | 2), [length].
-        outwards: Directions there that lead out of the body, (n, 3 | 2).
+        outwards: Directions out of the body there, (n, 3 | 2).
 
     Returns:
-        A plane, sphere, cylinder, cone or torus where it is one, else a spline through points of it; None
-        where the model has no geometry, but a mesh alone.
+        A plane, sphere, cylinder, cone or torus if it is one, else a spline through its points; None if the
+        model has only a mesh and no geometry.
     """
     if gmsh.model.getType(*entity).startswith("Discrete"):
         return None
@@ -47,7 +47,7 @@ def _leads_out(shape: SurfaceShape, middles: np.ndarray, outwards: np.ndarray) -
 
 
 def _normals(gmsh: ModuleType, entity: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return points of an entity and the normals there, to either side, where it has any."""
+    """Return points of an entity and the normals there, to either side, where these exist."""
     parameters = _parameters(gmsh, entity, FEWEST)
     points = _values(gmsh, entity, parameters)
     slopes = np.reshape(gmsh.model.getDerivative(*entity, parameters.ravel()), (len(points), -1, 3))
@@ -59,7 +59,7 @@ def _normals(gmsh: ModuleType, entity: tuple[int, int]) -> tuple[np.ndarray, np.
 
 
 def _grid(gmsh: ModuleType, entity: tuple[int, int]) -> np.ndarray:
-    """Return a grid of points, (n, n, 3) or (n, 2), so fine that a spline through every second is close."""
+    """Return a grid of points, (n, n, 3) or (n, 2), such that a spline through every second is accurate."""
     count = FEWEST
     while True:
         count = 2 * count - 1
@@ -88,7 +88,7 @@ def _values(gmsh: ModuleType, entity: tuple[int, int], parameters: np.ndarray) -
 
 
 def _periodic(grid: np.ndarray) -> tuple[bool, ...]:
-    """Tell in which directions a grid comes round, smoothly: it bends there no more than elsewhere."""
+    """Return in which directions a grid is smoothly periodic: bent there no more than elsewhere."""
     found = []
     for axis in range(grid.ndim - 1):
         steps = np.diff(np.moveaxis(grid, axis, 0), axis=0)

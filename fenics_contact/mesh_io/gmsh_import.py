@@ -1,8 +1,8 @@
 """Bodies from gmsh: from a .msh file of any version, or from the model in memory.
 
-Physical groups say what is what. By default every physical volume (in two dimensions: physical surface) is a
-body of that name, and every physical surface (curve) a surface of each body on whose boundary it lies. A
-group without a name goes by its number, as text.
+Physical groups define bodies and surfaces. By default every physical volume (in two dimensions: physical
+surface) is a body of that name, and every physical surface (curve) a surface of each body on whose boundary
+it lies. A group without a name is named by its number, as text.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ def read_msh(
 ) -> dict[str, BodyMesh]:
     """Read bodies from a .msh file of any version.
 
-    Every body gets nodes of its own; those that bodies share in the file are there once for each of them.
-    Plane meshes lose their constant z coordinate. Quadratic hexahedra and plane cells stay so.
+    Every body has its own nodes; those that bodies share in the file are duplicated. The constant z
+    coordinate of plane meshes is dropped. Quadratic hexahedra and plane cells stay quadratic.
 
     Example:
         ``read_msh("press.msh")`` makes a body of every physical volume. ``read_msh("press.msh",
@@ -49,10 +49,10 @@ def read_msh(
 
     Args:
         path: The file.
-        bodies: Which physical volumes make up which bodies: names of groups that are bodies; or name of the
-            body to a group, to several groups, which become its regions, or to name of the region to a group.
-            Every group is a body unless given.
-        surfaces: Which physical surfaces are wanted: their names, or name of the surface to a group or to
+        bodies: The physical volumes of each body: names of groups that are bodies; or name of the body to a
+            group, to several groups, which become its regions, or to name of the region to a group. Every
+            group is a body unless given.
+        surfaces: The requested physical surfaces: their names, or name of the surface to a group or to
             several. All unless given.
         comm: If given, rank 0 reads the file and all ranks receive the bodies.
 
@@ -60,9 +60,9 @@ def read_msh(
         Name to body.
 
     Raises:
-        InvalidInputError: If the file is missing or cannot be read, a group is not in it, a volume has no
+        InvalidInputError: If the file is missing or cannot be read, a group does not exist, a volume has no
             group, cells are quadratic tetrahedra, prisms or pyramids, of several types in one body, flipped,
-            or do not hang together, a cell is in two bodies, or a surface lies inside a body.
+            or disconnected, a cell is in two bodies, or a surface lies inside a body.
         MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
 
     Note:
@@ -79,13 +79,13 @@ def read_msh(
 def from_gmsh_model(
     bodies: Bodies | None = None, surfaces: Surfaces | None = None, *, shapes: bool = True
 ) -> dict[str, BodyMesh]:
-    """Take bodies from gmsh's current model, which has been meshed and stays as it is.
+    """Build bodies from gmsh's current model, which must be meshed and is not changed.
 
     Args:
         bodies: As in `read_msh`.
         surfaces: As in `read_msh`.
-        shapes: Whether surfaces keep the true shapes that the model's geometry, where it has one, gives them,
-            see `cad_shapes`; else they are their facets.
+        shapes: Whether surfaces keep their true shapes from the model's geometry, if it has one, see
+            `cad_shapes`; else they are their facets.
 
     Returns:
         Name to body.
@@ -108,7 +108,7 @@ def from_gmsh_model(
 
 
 def _with_shapes(mesh: BodyMesh, groups: Mapping[str, str | Sequence[str]]) -> BodyMesh:
-    """Give a body the shapes of its surfaces, which are made of these groups or those of their names."""
+    """Add the shapes of a body's surfaces, which consist of these groups or those of their names."""
     return mesh.with_shapes(cad_shapes(mesh, {name: groups.get(name, name) for name in mesh.surfaces}))
 
 

@@ -1,4 +1,4 @@
-"""A gmsh model of one's own that leaves the caller's gmsh, terminal and signal handlers as they were."""
+"""A separate gmsh model that leaves the caller's gmsh, terminal and signal handlers unchanged."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ _OPTIONS = {
     "Mesh.MeshOnlyVisible": 0.0,
     "Mesh.SubdivisionAlgorithm": 0.0,
 }
-"""What the meshes of this package rely on: gmsh's defaults, silent."""
+"""Options on which the meshes of this package rely: gmsh's defaults, without output."""
 
 
 @contextmanager
 def gmsh_model(name: str) -> Iterator[ModuleType]:
     """Open an empty gmsh model and remove it afterwards.
 
-    Where gmsh is already initialised the caller's models, current model and options are put back; where it is
-    not, it is initialised without configuration files and finalised.
+    If gmsh is already initialised the caller's models, current model and options are restored; if not, it is
+    initialised without configuration files and finalised.
 
     Args:
         name: Name of the model.
@@ -88,9 +88,9 @@ def _import_gmsh() -> ModuleType:
 
 @contextmanager
 def _interrupt_handler_kept() -> Iterator[None]:
-    """Put the handler of SIGINT back.
+    """Restore the handler of SIGINT.
 
-    gmsh takes it at import, at initialisation or at finalisation, depending on the version.
+    gmsh replaces it at import, at initialisation or at finalisation, depending on the version.
     """
     handler = signal.getsignal(signal.SIGINT)
     try:
@@ -104,7 +104,7 @@ def _interrupt_handler_kept() -> Iterator[None]:
 def _is_initialised(gmsh: ModuleType) -> bool:
     if hasattr(gmsh, "isInitialized"):
         return bool(gmsh.isInitialized())
-    # Older versions cannot be asked: a call fails once gmsh is finalised, and says so on the terminal.
+    # Older versions have no query: a call fails once gmsh is finalised, with a message on the terminal.
     with _standard_error_closed():
         try:
             return len(gmsh.model.list()) > 0

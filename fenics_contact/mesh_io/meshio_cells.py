@@ -1,4 +1,4 @@
-"""The cells of a meshio mesh that bodies are made of, in the order of VTK and right-handed."""
+"""The cells of a meshio mesh that bodies can have, in the order of VTK and right-handed."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ _SERENDIPITY_OR_LAGRANGE = {
     "triangle6": "triangle", "quad8": "quad", "quad9": "quad",
     "hexahedron20": "hexahedron", "hexahedron27": "hexahedron", "tetra10": "tetra",
 }  # fmt: skip
-"""meshio's name of a quadratic cell to that with the same corners."""
+"""meshio's name of a quadratic cell to that of the linear cell."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """What a block of a meshio mesh is to the bodies.
+    """The role of a block of a meshio mesh.
 
     Attributes:
         kind: Type of cells, None for a block that holds no cells of the bodies.
         start: Number of its first cell among those of its type.
         facets: Corners of its facets, (n, 4 | 3 | 2), None for a block that holds none.
-        size: Number of its cells, of whatever kind.
+        size: Number of its cells of any kind.
     """
 
     kind: str | None
@@ -47,10 +47,11 @@ def cells_of(
     Args:
         mesh: The mesh.
         source: Where it comes from, for messages.
-        corners_only: Whether quadratic cells are cut down to their corners.
+        corners_only: Whether quadratic cells are reduced to their corners.
 
     Returns:
-        Coordinates, (n_nodes, 3 | 2), what each block is, and cell type to nodes, (n_cells, nodes of a cell).
+        Coordinates, (n_nodes, 3 | 2), the role of each block, and cell type to nodes, (n_cells, nodes of a
+        cell).
 
     Raises:
         InvalidInputError: If there are no cells, or prisms, pyramids or others that bodies cannot have.

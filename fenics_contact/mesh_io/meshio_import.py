@@ -1,8 +1,8 @@
 """Bodies from every mesh file that meshio reads: Abaqus, Nastran, VTK, Exodus, MED, Medit and others.
 
-What a file says of its cells becomes bodies, what it says of facets and nodes becomes surfaces: cell sets by
-name, tags (numbers, by the name that the file gives them), node sets. `read_msh` reads gmsh's files and
-`read_xdmf` those of dolfinx; `read_mesh` takes them too and passes them on.
+Labels of cells become bodies, labels of facets and nodes become surfaces: cell sets by name, tags (numbers,
+by their names in the file if any), node sets. `read_msh` reads gmsh's files and `read_xdmf` those of dolfinx;
+`read_mesh` delegates to them.
 """
 
 from __future__ import annotations
@@ -40,44 +40,41 @@ def read_mesh(
     file_format: str | None = None,
     comm: MPI.Comm | None = None,
 ) -> dict[str, BodyMesh]:
-    """Read bodies from a mesh file of any format that meshio knows.
+    """Read bodies from a mesh file of any format that meshio supports.
 
     By default every cell set (or tag) of the file is a body of that name, and every set (or tag) of facets
-    and every set of nodes a surface of each body on whose boundary it lies. Each body gets nodes of its own.
-    Nodes without a cell are dropped, cells with negative volume turned. Coordinates stay in the file's unit
-    of length; ``mesh.moved(1e3 * mesh.points)`` makes millimetres of metres.
+    and every set of nodes a surface of each body on whose boundary it lies. Each body has its own nodes.
+    Nodes without a cell are dropped, cells with negative volume reversed. Coordinates stay in the file's unit
+    of length; ``mesh.moved(1e3 * mesh.points)`` converts metres to millimetres.
 
-    Quadratic cells stay so where the package has them: hexahedra of 20 or 27 nodes, in the plane
-    quadrilaterals of 8 or 9 and triangles of 6. What is missing to 27 or 9 is added without changing the
-    geometry.
+    Quadratic cells stay quadratic where supported: hexahedra of 20 or 27 nodes, in the plane quadrilaterals
+    of 8 or 9 and triangles of 6. Missing nodes of 27 or 9 are added without changing the geometry.
 
     Example:
         ``read_mesh("press.inp")`` makes a body of every element set. ``read_mesh("press.vtu",
         bodies={"tool": 1, "sheet": {"steel": 2, "copper": 3}}, labels="material")`` takes the bodies from the
-        cell data "material"; ``labels="pieces"`` makes a body of every piece that hangs together, "piece 1"
-        and so on.
+        cell data "material"; ``labels="pieces"`` makes a body of every connected piece, "piece 1" and so on.
 
     Args:
         path: The file. Files of gmsh go to `read_msh`, XDMF files to `read_xdmf`.
-        bodies: Which labels make up which bodies: labels that are bodies; or name of the body to a label, to
-            several, which become its regions, or to name of the region to a label. Every label is a body
-            unless given.
+        bodies: The labels of each body: labels that are bodies; or name of the body to a label, to several,
+            which become its regions, or to name of the region to a label. Every label is a body unless given.
         surfaces: Which labels are surfaces: labels, or name of the surface to a label or several. All unless
             given.
-        labels: What says which cells belong together: ``"sets"``, ``"blocks"``, ``"pieces"``, or the name
-            of cell data with integers. Unless given: cell sets where there are any, else the only integer
-            cell data, else the whole mesh is one body "mesh".
+        labels: What groups the cells: ``"sets"``, ``"blocks"``, ``"pieces"``, or the name of cell data with
+            integers. Unless given: cell sets where there are any, else the only integer cell data, else the
+            whole mesh is one body "mesh".
         corners_only: Drop all nodes but the corners of quadratic cells; needed for quadratic tetrahedra.
-        file_format: Name of meshio's format, where the file's ending does not tell.
+        file_format: Name of meshio's format, if the file's suffix does not determine it.
         comm: If given, rank 0 reads the file and all ranks receive the bodies.
 
     Returns:
         Name to body.
 
     Raises:
-        InvalidInputError: If the file is missing or cannot be read, a label is not in it, a cell has none or
-            several, cells are prisms, pyramids, quadratic tetrahedra, or of several types in one body, are
-            degenerate or do not hang together, or a surface lies inside a body.
+        InvalidInputError: If the file is missing or cannot be read, a label does not exist, a cell has none
+            or several, cells are prisms, pyramids, quadratic tetrahedra, or of several types in one body, are
+            degenerate or disconnected, or a surface lies inside a body.
 
     Note:
         Collective on ``comm`` if given.
@@ -103,13 +100,13 @@ def from_meshio(
     labels: str | None = None,
     corners_only: bool = False,
 ) -> dict[str, BodyMesh]:
-    """Take bodies from a meshio mesh, every rank from its own.
+    """Build bodies from a meshio mesh, on every rank from its own.
 
     Example:
         ``from_meshio(meshio.read("press.vtu"), {"tool": 1, "table": 2})``
 
     Args:
-        mesh: The mesh; stays as it is.
+        mesh: The mesh; not changed.
         bodies: As in `read_mesh`.
         surfaces: As in `read_mesh`.
         labels: As in `read_mesh`.
@@ -126,7 +123,7 @@ def from_meshio(
 
 
 def _other_reader(path: Path, labels: str | None) -> Callable[..., dict[str, BodyMesh]] | None:
-    """Return the reader of gmsh's or dolfinx's own files; every rank looks at the ending alone."""
+    """Return the reader of gmsh's or dolfinx's own files, by the suffix only."""
     ending = path.suffix.lower()
     if ending == ".msh" and labels is None:
         return read_msh
@@ -151,7 +148,7 @@ def _read(path: Path, tagged: Callable[..., TaggedMesh], file_format: str | None
 
 
 def _read_by_meshio(path: Path, file_format: str | None) -> meshio.Mesh:
-    """Read a file; meshio tells of what it cannot read by any exception, by text, or by leaving Python."""
+    """Read a file; meshio reports errors by various exceptions, by text, or by exiting Python."""
     import meshio
 
     said = io.StringIO()

@@ -1,4 +1,4 @@
-"""What a meshio mesh says of its cells, facets and nodes: sets by name, and numbers that may have names."""
+"""Labels of a meshio mesh on cells, facets and nodes: named sets, and numbers that may have names."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Groups = dict[Label, dict[str, np.ndarray]]
 Facets = dict[Label, list[np.ndarray]]
 
 _USUAL = ("gmsh:physical", "medit:ref", "nastran:ref", "cell_tags", "avsucd:material", "MaterialIDs")
-"""Cell data that say what a cell is part of, in the formats that have a name for that."""
+"""Cell data of labels, by their names in various formats."""
 _NO_LABELS = ("gmsh:geometrical", "gmsh:bounding_entities")
 
 
@@ -35,11 +35,11 @@ def labels_of(
     source: str,
     everything: bool,
 ) -> tuple[Groups, Facets, dict[Label, np.ndarray]]:
-    """Find out which cells belong together, and which facets and nodes have a name.
+    """Return the labels of cells, facets and nodes.
 
     Args:
         mesh: The mesh.
-        blocks: What its blocks are.
+        blocks: The roles of its blocks.
         cells: Cell type to nodes.
         labels: What groups the cells, see `read_mesh`.
         source: Where the mesh comes from, for messages.
@@ -49,8 +49,8 @@ def labels_of(
         Label to cell type to cells, label to corners of facets, label to nodes.
 
     Raises:
-        InvalidInputError: If what ``labels`` asks for is not there, it is needed and not given, a set does
-            not fit the mesh, or a cell has no label.
+        InvalidInputError: If ``labels`` does not exist or is needed and not given, a set does not fit the
+            mesh, or a cell has no label.
     """
     sets = _sets(mesh, blocks, source)
     node_sets = {name: np.asarray(nodes, dtype=np.int64) for name, nodes in _node_sets(mesh).items()}
@@ -71,7 +71,7 @@ def labels_of(
 
 
 def _sets(mesh: meshio.Mesh, blocks: Sequence[Block], source: str) -> dict[Label, Members]:
-    """Cell sets, an array a block."""
+    """Cell sets, one array per block."""
     sets: dict[Label, Members] = {}
     for name, given in mesh.cell_sets.items():
         if name in _NO_LABELS:
@@ -101,7 +101,7 @@ def _node_sets(mesh: meshio.Mesh) -> dict[Label, Iterable[int]]:
 
 
 def _families(names: Mapping[int, Sequence[str]]) -> dict[str, list[int]]:
-    """Name to the families of a MED file that have it."""
+    """Name to the families of a MED file with that name."""
     found: dict[str, list[int]] = {}
     for tag, several in names.items():
         for name in several:
@@ -112,7 +112,7 @@ def _families(names: Mapping[int, Sequence[str]]) -> dict[str, list[int]]:
 def _tag_array(
     mesh: meshio.Mesh, blocks: Sequence[Block], labels: str | None, have_sets: bool, source: str
 ) -> str | None:
-    """Return the name of the cell data that are the labels; None where sets are, or nothing is."""
+    """Return the name of the cell data used as labels; None if sets are used, or nothing."""
     whole = [name for name, data in mesh.cell_data.items() if _holds_integers(data, blocks)]
     if labels in ("sets", "blocks", "pieces"):
         if labels == "sets" and not have_sets:
@@ -140,7 +140,7 @@ def _tag_array(
 
 
 def _holds_integers(data: Sequence[np.ndarray], blocks: Sequence[Block]) -> bool:
-    """Whether one integer is there for every cell; some formats write it as a floating-point number."""
+    """Whether there is one integer for every cell; some formats write it as a floating-point number."""
     parts = [np.asarray(part) for part, block in zip(data, blocks, strict=True) if block.size]
     return all(
         part.dtype.kind in "iuf" and part.size == len(part) and bool(np.all(np.mod(part, 1) == 0))
@@ -149,7 +149,7 @@ def _holds_integers(data: Sequence[np.ndarray], blocks: Sequence[Block]) -> bool
 
 
 def _by_tag(mesh: meshio.Mesh, name: str) -> dict[Label, Members]:
-    """Make sets of cell data; numbers go by the names that gmsh and MED files have for them."""
+    """Convert cell data to sets; numbers are replaced by their names in gmsh and MED files."""
     data = [np.asarray(part).ravel().astype(np.int64) for part in mesh.cell_data[name]]
     found: dict[Label, Members] = {}
     if name == "cell_tags" and (families := _families(getattr(mesh, "cell_tags", {}))):
@@ -209,7 +209,7 @@ def _by_block(blocks: Sequence[Block]) -> Groups:
 
 
 def _pieces(cells: Mapping[str, np.ndarray]) -> Groups:
-    """Cells that hang together by nodes, in the order of their first cells."""
+    """Cells that are connected by nodes, in the order of their first cells."""
     kinds = list(cells)
     count = 1 + max(int(nodes.max()) for nodes in cells.values())
     first = np.concatenate([np.repeat(nodes[:, 0], nodes.shape[1]) for nodes in cells.values()])
@@ -230,7 +230,7 @@ def _pieces(cells: Mapping[str, np.ndarray]) -> Groups:
 
 
 def _check_all_labelled(groups: Groups, cells: Mapping[str, np.ndarray], word: str, source: str) -> None:
-    """Refuse a mesh some cells of which are in no group: they would be lost unseen."""
+    """Reject a mesh with cells in no group: they would be lost silently."""
     for kind, nodes in cells.items():
         there = [group[kind] for group in groups.values() if kind in group]
         left = np.setdiff1d(np.arange(len(nodes)), np.concatenate(there) if there else [])

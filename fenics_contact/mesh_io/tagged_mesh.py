@@ -1,4 +1,4 @@
-"""What a mesh file holds, whichever it was: points, cells, and labels on cells and facets."""
+"""Content of a mesh file of any format: points, cells, and labels on cells and facets."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class TaggedMesh:
         cells: Cell type to node numbers in VTK order, (n_cells, nodes of a cell).
         groups: Label to cell type to the numbers of its cells.
         facets: Label to the corners of facets, arrays of (n, 4 | 3 | 2) node numbers; in any order.
-        words: What its labels are called, for messages: ``"physical volume"``, ``"physical surface"``.
+        words: Names of its labels, for messages: ``"physical volume"``, ``"physical surface"``.
         node_sets: Label to node numbers, in any order: the facets on the boundary of a body all of whose
             corners are among them.
     """
@@ -45,11 +45,11 @@ class TaggedMesh:
 
 @dataclass(frozen=True)
 class BodyParts:
-    """Which groups make up a body.
+    """The groups of a body.
 
     Attributes:
         labels: The groups.
-        regions: The names they get as regions, or None for a body without regions.
+        regions: Their names as regions, or None for a body without regions.
     """
 
     labels: tuple[Label, ...]
@@ -58,7 +58,7 @@ class BodyParts:
 
 @dataclass(frozen=True, eq=False)
 class SurfaceParts:
-    """What makes up a surface.
+    """The parts of a surface.
 
     Attributes:
         facets: Corners of facets, arrays of (n, 4 | 3 | 2) node numbers.
@@ -70,7 +70,7 @@ class SurfaceParts:
 
 
 def chosen_bodies(mesh: TaggedMesh, bodies: Any) -> dict[str, BodyParts]:
-    """Resolve what the caller says about bodies.
+    """Resolve the caller's choice of bodies.
 
     Args:
         mesh: The mesh with its groups.
@@ -102,7 +102,7 @@ def chosen_bodies(mesh: TaggedMesh, bodies: Any) -> dict[str, BodyParts]:
 
 
 def chosen_surfaces(mesh: TaggedMesh, surfaces: Any) -> dict[str, SurfaceParts]:
-    """Resolve what the caller says about surfaces, in the same forms but without regions.
+    """Resolve the caller's choice of surfaces, in the same forms but without regions.
 
     Returns:
         Name of the surface to its facets and sets of nodes.
@@ -138,7 +138,7 @@ def _parts(wanted: Any) -> BodyParts:
 def _known(
     labels: Iterable[Label], known: Mapping[Label, object], what: str, word: str, source: str
 ) -> tuple[Label, ...]:
-    """Return the labels as the mesh has them; a number may also be given as text."""
+    """Return the labels as in the mesh; a number may also be given as text."""
     by_text = {str(label): label for label in known}
     for label in labels:
         if not isinstance(label, Hashable) or str(label) not in by_text:

@@ -1,4 +1,4 @@
-"""What an XDMF file says about its grids, before anybody reads the numbers."""
+"""Metadata of the grids of an XDMF file, without reading the data."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _FACETS = {
     "triangle": ("polyline", "edge"),
     "quadrilateral": ("polyline", "edge"),
 }
-"""What XDMF calls the facets of each type of cell."""
+"""XDMF's names of the facets of each cell type."""
 
 
 @dataclass(frozen=True)
@@ -26,10 +26,10 @@ class Grid:
 
     Attributes:
         name: Its name.
-        topology: What XDMF calls its cells, in small letters.
+        topology: XDMF's name of its cells, in lower case.
         has_points: Whether it has coordinates of its own.
         has_values: Whether it has values on its cells.
-        inline: Whether its numbers are in the file itself and not in an HDF5 file beside it.
+        inline: Whether its data are in the file itself and not in an HDF5 file beside it.
     """
 
     name: str
@@ -56,8 +56,8 @@ def grids_of(path: Path) -> list[Grid]:
     """List the grids of an XDMF file.
 
     Raises:
-        InvalidInputError: If the file is missing, is no XDMF file, or its cells are no linear ones of one
-            type.
+        InvalidInputError: If the file is missing, is not an XDMF file, or its cells are not linear ones of
+            one type.
     """
     require_file(path)
     try:
@@ -115,13 +115,13 @@ def chosen_grid(
     path: Path,
     optional: bool = False,
 ) -> Grid | None:
-    """Find the grid of a name, or the only one that suits.
+    """Return the grid of a name, or the only suitable one.
 
     Args:
         grids: The grids of the file.
         name: Its name, or None.
-        argument: What the caller calls it.
-        suits: Whether a grid can be it.
+        argument: Its name among the caller's arguments.
+        suits: Whether a grid is suitable.
         path: The file, for messages.
         optional: Whether there may be none.
 

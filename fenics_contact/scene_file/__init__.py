@@ -1,8 +1,8 @@
-"""Scenes as TOML files, checked line by line, and the same form as dictionaries of a program.
+"""Scenes as TOML files, checked line by line, or as dictionaries of the same form.
 
 `read_scene_file` reads and checks, `SceneFile` builds the scene, its load steps and its shape optimisation;
-`json_schema` is for editors. Of mistakes a `SceneFileError` lists all, each with line, key, what is allowed
-and what was given.
+`json_schema` is for editors. A `SceneFileError` lists all mistakes, each with line, key, what is allowed and
+what was given.
 """
 
 from fenics_contact.scene_file import _libraries  # noqa: F401

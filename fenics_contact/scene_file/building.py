@@ -1,4 +1,4 @@
-"""From a checked scene file to meshes, bodies and a scene; what cannot be built leads back to its key."""
+"""From a checked scene file to meshes, bodies and a scene; errors refer to their keys."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from fenics_contact.scene_file.source import Source
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-#: Where parts have formulas.
+#: Keys that may hold formulas.
 _FORMULAS = {"supports": ("value",), "loads": ("value",), "contacts": ("master", "formula")}
 
 
 class Builder:
-    """Builds the parts one after the other and collects what is wrong with them.
+    """Builds the parts in order and collects their mistakes.
 
-    What reads meshes or runs gmsh agrees by itself on errors; Python files are read by every rank.
+    Functions that read meshes or run gmsh agree on errors themselves; Python files are read by every rank.
     """
 
     def __init__(self, source: Source, document: Document, comm: MPI.Comm) -> None:
-        """Begin with nothing built.
+        """Start with nothing built.
 
         Args:
-            source: Where the document comes from.
+            source: Source of the document.
             document: The checked file.
             comm: Communicator on which meshes are built.
         """
@@ -42,7 +42,7 @@ class Builder:
         self._mistakes: list[Mistake] = []
 
     def bodies(self) -> tuple[dict[str, Body], dict[str, Shaped]]:
-        """Return the bodies, and what is known of their shapes. Collective.
+        """Return the bodies with their shapes. Collective.
 
         Raises:
             SceneFileError: Naming every mesh, material and body that cannot be built.
@@ -119,7 +119,7 @@ class Builder:
         return located(self._source, path, self._mistakes)
 
     def _check(self) -> None:
-        """Raise on all ranks if one met a mistake, as in a file that it alone cannot read. Collective."""
+        """Raise on all ranks if one has a mistake, such as a file that only it cannot read. Collective."""
         with together(self._comm):
             if self._mistakes:
                 raise SceneFileError(self._source.name, self._mistakes)
@@ -130,9 +130,9 @@ def located(source: Source, path: Path, mistakes: list[Mistake] | None = None) -
     """Make an error of the block a mistake at a key.
 
     Args:
-        source: Where the key stands.
+        source: Source of the key.
         path: The key.
-        mistakes: Takes what went wrong, which is raised unless given.
+        mistakes: Collects the mistake, which is raised unless given.
     """
     try:
         yield
@@ -148,5 +148,5 @@ def located(source: Source, path: Path, mistakes: list[Mistake] | None = None) -
 
 
 def _refuse(empty: Scene, part: dict[str, Any]) -> None:
-    """Refuse a part that does not suit the bodies of a scene."""
+    """Reject a part that does not suit the bodies of a scene."""
     replace(empty, **part)

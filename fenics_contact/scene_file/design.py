@@ -1,4 +1,4 @@
-"""Shape optimisation: what moves, what is minimised, what must hold."""
+"""Shape optimisation: moving surfaces, objective, constraints."""
 
 from __future__ import annotations
 

@@ -11,10 +11,10 @@ from fenics_contact.scene_file.placing import Shaped
 
 
 def design_surface(shape: Shaped, surface: str, body: str) -> DesignSurface:
-    """Return the smooth coordinates of a surface.
+    """Return a surface with its smooth coordinates.
 
     Args:
-        shape: The body's mesh, and what is known of its shape.
+        shape: The body's mesh with its shape.
         surface: "contact" of a chain link, or a flat side of a structured box.
         body: Name of the body, for messages.
 
@@ -35,11 +35,11 @@ def design_surface(shape: Shaped, surface: str, body: str) -> DesignSurface:
 
 
 def _flat(mesh: BodyMesh, facets: np.ndarray) -> DesignSurface | None:
-    """Return the lattice of nodes of a flat side; None where it is none."""
+    """Return the lattice of nodes of a flat side; None for other surfaces."""
     areas = vector_areas(mesh.points, facets)
     normal = areas.sum(axis=0) / np.linalg.norm(areas, axis=1).sum()
     if np.linalg.norm(normal) < 1 - 1e-9 or np.abs(normal).max() < 1 - 1e-9:
-        return None  # curved, or turned against the axes
+        return None  # curved, or not parallel to the axes
     nodes = np.unique(facets)
     axes = [axis for axis in range(3) if axis != int(np.argmax(np.abs(normal)))]
     places = mesh.points[nodes][:, axes]

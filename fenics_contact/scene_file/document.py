@@ -86,7 +86,7 @@ class Document(Part):
 
 
 def references(document: Document) -> Iterator[tuple[Keys, str]]:
-    """Yield what a scene file takes from Python files, with its keys: all of them are run."""
+    """Yield the references of a scene file to Python files, with their keys: all of these files are run."""
     for name, material in document.materials.items():
         if is_reference(material.model):
             yield ("materials", name, "model"), material.model
@@ -95,7 +95,7 @@ def references(document: Document) -> Iterator[tuple[Keys, str]]:
 
 
 def refused_python(source: Source, document: Document) -> list[Mistake]:
-    """Return a mistake for everything that a scene file takes from a Python file."""
+    """Return a mistake for every reference of a scene file to a Python file."""
     return [
         source.mistake(
             path,

@@ -1,4 +1,4 @@
-"""Formulas are evaluated at the nodes before anything is solved, so that errors lead back to their keys."""
+"""Evaluation of formulas at the nodes before anything is solved, so that errors refer to their keys."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from fenics_contact.scene_file.expression import Expression, VectorExpression
 
 
 def check_formulas(part: Any, bodies: Mapping[str, Body]) -> None:
-    """Evaluate the formulas of a support, load or pair where solvers will: at the nodes.
+    """Evaluate the formulas of a support, load or pair at the nodes, as solvers will.
 
     Args:
-        part: What was built from the file.
+        part: A part built from the file.
         bodies: The bodies by name.
 
     Raises:

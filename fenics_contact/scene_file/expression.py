@@ -1,4 +1,4 @@
-"""Formulas in x, y, z as text, evaluated at points; nothing but arithmetic is understood, nothing is run."""
+"""Formulas in x, y, z as text, evaluated at points; only arithmetic is accepted, no code is run."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ _COMPARED: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Gt: np.greater,
     ast.GtE: np.greater_equal,
 }
-#: Longest formula that is read, and how many operations may lie inside of each other; those of a sum or a
-#: product, which are done from left to right, lie beside each other.
+#: Longest accepted formula, and largest depth of nested operations; those of a sum or a product, which are
+#: evaluated from left to right, are not nested.
 LONGEST, DEEPEST = 2000, 50
 ALLOWED = (
     f"numbers, {', '.join(COORDINATES)}, {', '.join(CONSTANTS)}, + - * / **, comparisons with < <= > >=, and "
@@ -56,13 +56,13 @@ ALLOWED = (
 
 @dataclass(frozen=True)
 class Expression:
-    """A number at every point, given by a formula: a value that compares equal where the text does.
+    """A number at every point, given by a formula; equal to another if the texts are equal.
 
     Attributes:
         text: The formula, for instance ``"0.1 * (1 - x**2)"``; where(condition, a, b) chooses.
 
     Raises:
-        InvalidInputError: If the text holds anything but arithmetic.
+        InvalidInputError: If the text contains anything but arithmetic.
 
     Example:
         >>> Expression("2 * x + y")(np.array([[1.0, 0.5]]))
@@ -72,7 +72,7 @@ class Expression:
     text: str
 
     def __post_init__(self) -> None:
-        """Refuse what is no formula."""
+        """Reject text that is not a formula."""
         _check(self._tree, self.text, 0)
 
     @cached_property
@@ -107,7 +107,7 @@ class Expression:
             points: Coordinates, shape (n, dim), [length].
 
         Returns:
-            A number for each, shape (n,).
+            One number per point, shape (n,).
 
         Raises:
             InvalidInputError: If the formula depends on z and the points lie in the plane, or has no finite
@@ -154,7 +154,7 @@ class VectorExpression:
 
 
 def between(start: float | Expression, end: float | Expression, share: float) -> float | Expression:
-    """Return the value on the way from ``start`` (share 0) to ``end`` (share 1), number or formula."""
+    """Return the value between ``start`` (share 0) and ``end`` (share 1), number or formula."""
     if share == 1.0:
         return end
     if isinstance(start, Expression) or isinstance(end, Expression):
@@ -167,7 +167,7 @@ def _text(value: float | Expression) -> str:
 
 
 def is_finite(value: float) -> bool:
-    """Tell whether a number is finite, also an integer that no float can hold."""
+    """Return whether a number is finite; False for an integer that exceeds a float."""
     try:
         return math.isfinite(value)
     except OverflowError:

@@ -1,4 +1,4 @@
-"""On which lines of a TOML text its keys stand."""
+"""Line numbers of the keys of a TOML text."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _BASIC, _LITERAL = r'"(?:[^"\\\n]|\\.)*"', r"'[^'\n]*'"
 _PART = rf"(?:{_BARE}|{_BASIC}|{_LITERAL})"
 _KEY = re.compile(rf"{_PART}(?:[ \t]*\.[ \t]*{_PART})*")
 _BARE_KEY = re.compile(rf"{_BARE}(?:\.{_BARE})*")
-#: Strings over several lines come first: they begin as the others do.
+#: Multi-line strings come first: they begin like the others.
 _STRING = re.compile(rf"\"{{3}}(?:[^\\]|\\.)*?\"{{3,5}}|'{{3}}.*?'{{3,5}}|{_BASIC}|{_LITERAL}", re.DOTALL)
 _NUMBER_OR_DATE = re.compile(r"[^,\]}#\n]*")
 _OPEN_HEAD, _CLOSED_HEAD = re.compile(r"\[+[ \t]*"), re.compile(r"[ \t]*\]+")
@@ -28,20 +28,20 @@ def lines_of(text: str) -> dict[Path, int]:
     """Return the line, from 1, on which every key, table and entry of a list begins.
 
     Args:
-        text: A text that is TOML; of any other the answer means nothing.
+        text: A valid TOML text; for any other the result is meaningless.
     """
     return _Scanner(text).found
 
 
 def nearest(lines: Mapping[Path, int], path: Path) -> int:
-    """Return the line of a key, or of the nearest table around it; 0 where none of them is there."""
+    """Return the line of a key, or of the nearest enclosing table; 0 if there is none."""
     while path and path not in lines:
         path = path[:-1]
     return lines.get(path, 0)
 
 
 class _Scanner:
-    """Goes through a text once, from statement to statement."""
+    """Scans a text once, statement by statement."""
 
     def __init__(self, text: str) -> None:
         """Scan the text."""
@@ -58,7 +58,7 @@ class _Scanner:
             else:
                 self._assignment(table)
             self._skip(_BLANK)
-            if self._at == before:  # no TOML
+            if self._at == before:  # not TOML
                 return
 
     def _skip(self, pattern: re.Pattern[str]) -> str:
@@ -72,7 +72,7 @@ class _Scanner:
         self.found.setdefault(path, bisect_left(self._ends, self._at) + 1)
 
     def _head(self) -> Path:
-        """Take in [a.b] or [[a.b]]; return its path, with the number of the present entry of every list."""
+        """Read [a.b] or [[a.b]]; return its path, with the number of the present entry of every list."""
         several = self._text.startswith("[[", self._at)
         self._skip(_OPEN_HEAD)
         path: Path = ()
@@ -89,7 +89,7 @@ class _Scanner:
         return path
 
     def _assignment(self, table: Path) -> None:
-        """Take in key = value."""
+        """Read key = value."""
         path, start = table, self._at
         parts = key_parts(self._skip(_KEY))
         after, self._at = self._at, start
@@ -110,7 +110,7 @@ class _Scanner:
             self._skip(_NUMBER_OR_DATE)
 
     def _entries(self, path: Path, end: str) -> None:
-        """Take in what stands between brackets or braces."""
+        """Read the content of brackets or braces."""
         self._at += 1
         number = 0
         self._skip(_BLANK_OR_COMMA)
@@ -123,13 +123,13 @@ class _Scanner:
                 self._value((*path, number))
                 number += 1
             self._skip(_BLANK_OR_COMMA)
-            if self._at == before:  # no TOML
+            if self._at == before:  # not TOML
                 self._at = len(self._text)
         self._at += 1
 
 
 def key_parts(key: str) -> list[str]:
-    """Return the names of a dotted key of TOML, none where the text is no such key."""
+    """Return the names of a dotted key of TOML, none if the text is not such a key."""
     if _BARE_KEY.fullmatch(key):
         return key.split(".")
     names: list[str] = []

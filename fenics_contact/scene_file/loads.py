@@ -1,4 +1,4 @@
-"""Loads on surfaces and volumes, and displacements that are prescribed."""
+"""Loads on surfaces and volumes, and prescribed displacements."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fenics_contact.scene_file.values import FREE, Components, Scalar, one_of
 
 
 class _Named(Part):
-    """What load steps change.
+    """A part that load steps change.
 
     Attributes:
         changed: The argument that they change.
@@ -25,7 +25,7 @@ class _Named(Part):
 
     @property
     def size(self) -> Any:
-        """What load steps change."""
+        """A part that load steps change."""
         return getattr(self, self.changed)
 
 

@@ -1,4 +1,4 @@
-"""What bodies are made of: the materials of the package by their constants, and classes of one's own."""
+"""Materials of bodies: those of the package by their constants, and user-defined classes."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class OrthotropicPlate(_Material):
 
 
 def _frozen(value: Any) -> Any:
-    """Make tuples of lists: materials are hashable."""
+    """Convert lists to tuples: materials are hashable."""
     return tuple(map(_frozen, value)) if isinstance(value, list) else value
 
 
@@ -86,7 +86,7 @@ class OwnMaterial(Part):
         """Return the material; runs the file.
 
         Raises:
-            InvalidInputError: If the class is not there or does not take these parameters.
+            InvalidInputError: If the class does not exist or does not take these parameters.
         """
         kind = load(self.model, folder)
         with running(f"{self.model!r} with the parameters {sorted(self.parameters)}"):

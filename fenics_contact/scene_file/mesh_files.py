@@ -17,7 +17,7 @@ from fenics_contact.scene_file.values import PlaceOfFile, Read, said
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-#: CAD files that only say what is there; a .geo file is a program, which is for Python to run.
+#: CAD files that only contain data; a .geo file is a program, to be run from Python.
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 
 _Label = str | int
@@ -73,7 +73,7 @@ class MeshFile(Placed):
         """Read the file on rank 0. Collective.
 
         Raises:
-            InvalidInputError: If it is missing, of no known format, or does not hold what is asked for.
+            InvalidInputError: If it is missing, of unknown format, or lacks the requested groups.
         """
         return {name: Shaped(mesh) for name, mesh in self._read(folder / self.file, comm).items()}
 

@@ -1,4 +1,4 @@
-"""Meshes of shapes that the package builds: keys are the arguments of what builds them."""
+"""Meshes of built-in shapes: keys are the arguments of their functions."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def _plate(
     n: int,
     n_radial: int | None = None,
 ) -> BodyMesh:
-    """Mesh a drilled plate with even layers.
+    """Mesh a drilled plate with layers of equal height.
 
     Args:
         hole: Radius of the hole, [length].

@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene_file.places import Path
 
-#: Mistakes that a message lists.
+#: Largest number of mistakes in a message.
 MOST_TOLD = 50
 
 
@@ -18,9 +18,9 @@ class Mistake:
     """One mistake.
 
     Attributes:
-        path: Keys that lead to it.
+        path: Path of keys.
         line: Line of the file, from 1; 0 where there is none.
-        place: How the message names the place: "line 12", "--set solver.tolerance", "" for a dictionary.
+        place: Name of the place in messages: "line 12", "--set solver.tolerance", "" for a dictionary.
         words: What is needed, what was given, what to do.
     """
 
@@ -35,17 +35,17 @@ class Mistake:
 
 
 class SceneFileError(InvalidInputError):
-    """A scene file cannot be used; all mistakes that were found are listed, the first fifty in the message.
+    """A scene file cannot be used; all mistakes are listed, the first fifty in the message.
 
     Attributes:
         mistakes: The mistakes in the order of their lines.
     """
 
     def __init__(self, name: str, mistakes: Iterable[Mistake] | str = ()) -> None:
-        """Put the mistakes into words.
+        """Build the message from the mistakes.
 
         Args:
-            name: Name of the file; or the whole message where mistakes are left out.
+            name: Name of the file; or the whole message if there are no mistakes.
             mistakes: The mistakes.
         """
         found = () if isinstance(mistakes, str) else tuple(sorted(mistakes, key=lambda mistake: mistake.line))
@@ -61,11 +61,11 @@ class SceneFileError(InvalidInputError):
 
 
 def suggestion(given: str, allowed: Iterable[str]) -> str:
-    """Return "did you mean ...? " where a name that is allowed is close to the one given, else nothing."""
+    """Return "did you mean ...? " if an allowed name is close to the one given, else ""."""
     close = get_close_matches(given, list(allowed), n=1, cutoff=0.6)
     return f"did you mean {close[0]!r}? " if close else ""
 
 
 def listed(names: Iterable[str]) -> str:
-    """Return names in quotes, one after the other; "none" for no name."""
+    """Return a list of names in quotes; "none" for no name."""
     return ", ".join(repr(name) for name in names) or "none"

@@ -1,4 +1,4 @@
-"""Names that parts of a scene file use of each other must be there."""
+"""Checks that names to which parts of a scene file refer exist."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from fenics_contact.scene_file.values import FREE
 
 
 def unknown(source: Source, path: Path, given: str, what: str, known: Iterable[str]) -> Mistake:
-    """Return the mistake of a name that is not known.
+    """Return the mistake of an unknown name.
 
     Args:
-        source: Where the scene comes from.
-        path: Where the name stands.
+        source: Source of the scene.
+        path: Path of the name.
         given: The name.
-        what: What it must be a name of.
-        known: The names that there are.
+        what: What it must name.
+        known: Existing names.
     """
     names = list(known)
     words = f"{written(path)} must be {what}, one of {listed(names)}, got {as_toml(given)}"
@@ -31,7 +31,7 @@ def unknown(source: Source, path: Path, given: str, what: str, known: Iterable[s
 
 
 def wrong_names(source: Source, document: Document) -> list[Mistake]:
-    """Return every name that leads nowhere, as far as no mesh need be built to know it."""
+    """Return every unresolved name that can be detected without building meshes."""
     known: dict[str, Collection[str]] = {
         "a mesh": document.meshes,
         "a material": document.materials,
@@ -51,7 +51,7 @@ def _names(parts: Iterable[Any]) -> list[str]:
 
 
 def _references(document: Document) -> Iterator[tuple[Path, str, str]]:
-    """Yield every name that is used, with where it stands and what it must be a name of."""
+    """Yield every name that is used, with its path and what it must name."""
     for name, body in document.bodies.items():
         yield ("bodies", name, "mesh"), body.mesh, "a mesh"
         made_of: Any = body.material
@@ -90,7 +90,7 @@ def _twice(source: Source, document: Document) -> Iterator[Mistake]:
 
 
 def _unlike(source: Source, document: Document) -> Iterator[Mistake]:
-    """Yield values of load steps that have another form than those of their supports and loads."""
+    """Yield values of load steps whose form differs from that of their supports and loads."""
     for number, step in enumerate(document.steps):
         for key in ("supports", "loads"):
             own = {part.name: part.size for part in getattr(document, key) if part.size is not None}
@@ -110,7 +110,7 @@ def _form(value: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as the file has it."""
+    """Return a value as in the file."""
     if isinstance(value, tuple):
         return [FREE if entry is None else _plain(entry) for entry in value]
     return value.text if isinstance(value, Expression) else value

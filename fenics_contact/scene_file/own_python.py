@@ -14,13 +14,13 @@ _NOTHING = object()
 
 
 def is_reference(text: object) -> bool:
-    """Tell whether a text has the form "file.py:Name"."""
+    """Return whether a text has the form "file.py:Name"."""
     file, colon, name = text.rpartition(":") if isinstance(text, str) else ("", "", "")
     return bool(colon) and file.endswith(".py") and name.isidentifier()
 
 
 def load(reference: str, folder: Path) -> Any:
-    """Return what a Python file calls by a name; the file is run.
+    """Return the object of a name in a Python file; the file is run.
 
     Args:
         reference: "file.py:Name".
@@ -37,7 +37,7 @@ def load(reference: str, folder: Path) -> Any:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules[module_name] = module  # dataclasses of the file look themselves up there
+    sys.modules[module_name] = module  # dataclasses of the file are looked up there
     with running(f"the Python file '{path}'"):
         spec.loader.exec_module(module)
         found = getattr(module, name, _NOTHING)

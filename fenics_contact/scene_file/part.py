@@ -1,4 +1,4 @@
-"""Tables of a scene file, whose keys are the arguments of what is built from them."""
+"""Tables of a scene file, whose keys are the arguments of a class or function."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from fenics_contact.scene_file.values import (
 )
 
 _FORMULAS = "; numbers, or formulas in x, y, z in quotes"
-#: What files have where arguments are declared so, and what is said of it; others are read as declared.
+#: Types in files for declared types of arguments, with their descriptions; others are read as declared.
 IN_FILES: list[tuple[Any, Any, str]] = [
     (Sequence[float], Vector, ""),
     (tuple[float, ...], Vector, ""),
@@ -43,8 +43,8 @@ class Part(BaseModel):
     """A table of a scene file.
 
     Attributes:
-        of: What is built from it.
-        given: The arguments of that which are keys.
+        of: The class or function that is called with it.
+        given: Those of its arguments that are keys.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
@@ -52,7 +52,7 @@ class Part(BaseModel):
     given: ClassVar[tuple[str, ...]] = ()
 
     def made(self, **other: Any) -> Any:
-        """Return what the table is of, with other values for some arguments."""
+        """Build the object of the table, with other values for some arguments."""
         own = {name: getattr(self, name) for name in self.given}
         parts = {name: value.made() for name, value in own.items() if isinstance(value, Part)}
         return type(self).of(**{**own, **parts, **other})
@@ -60,7 +60,7 @@ class Part(BaseModel):
     @model_validator(mode="wrap")
     @classmethod
     def _explained(cls, data: Any, handler: ModelWrapValidatorHandler[Any]) -> Any:
-        """Add to errors what this table knows: which keys there are, and what the wrong one means."""
+        """Add the table's keys and the meaning of the wrong one to errors."""
         try:
             return handler(data)
         except ValidationError as error:
@@ -83,14 +83,14 @@ class Part(BaseModel):
 def keys_of(
     of: Any, *, without: Collection[str] = (), only: Collection[str] = ()
 ) -> Callable[[Table], Table]:
-    """Give a table the arguments of a class or function as keys, with their types, defaults and meaning.
+    """Add the arguments of a class or function to a table as keys, with their types, defaults and meaning.
 
-    What the table itself declares of a key stays: another type, a default, a description, or an alias, which
-    is then the key.
+    The table's own declaration of a key takes precedence: another type, a default, a description, or an
+    alias, which is then the key.
 
     Args:
-        of: What is built from the table.
-        without: Arguments that are no keys.
+        of: The class or function.
+        without: Arguments that are not keys.
         only: Arguments that are keys; all unless given.
     """
 
@@ -110,7 +110,7 @@ def keys_of(
 
 
 def _field(own: FieldInfo | None, hint: Any, argument: inspect.Parameter, words: str) -> tuple[Any, Any]:
-    """Return type and further facts of a key, the table's own ones where there are some."""
+    """Return type and field data of a key, the table's own if there are any."""
     default = ... if argument.default is argument.empty else argument.default
     found = ((read, beside) for declared, read, beside in IN_FILES if declared == hint)
     kind, beside = next(found, (hint, ""))

@@ -15,14 +15,14 @@ from fenics_contact.progress import visible
 #: Keys and positions from the top of the file: ("contacts", 0, "friction").
 Path: TypeAlias = tuple[str | int, ...]
 
-#: Longest value that a message repeats.
+#: Largest length of a value in messages.
 LONGEST = 60
 _MOST_BITS = 3322
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def written(path: Path) -> str:
-    """Return a path as `--set` takes it: ``contacts.0.friction``."""
+    """Return a path in the form of `--set`: ``contacts.0.friction``."""
     return ".".join(
         str(part) if isinstance(part, int) or _BARE.fullmatch(part) else f'"{shortened(visible(part))}"'
         for part in path
@@ -30,12 +30,12 @@ def written(path: Path) -> str:
 
 
 def shortened(text: str) -> str:
-    """Return a text, cut where it is longer than messages repeat."""
+    """Return a text, cut to the length allowed in messages."""
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
 
 
 def as_toml(value: Any) -> str:
-    """Return a value as a scene file would have it, shortened where it is long."""
+    """Return a value in TOML's form, shortened if it is long."""
     if isinstance(value, Mapping):
         text = f"a table with {', '.join(map(str, value))}" if value else "an empty table"
     elif value is None:
@@ -49,7 +49,7 @@ def _as_toml(value: Any) -> str:
     if isinstance(value, str | list | tuple):
         value = value[:LONGEST]
     if isinstance(value, int) and value.bit_length() > _MOST_BITS:
-        return "an integer of more than 1000 digits"  # Python refuses to write it
+        return "an integer of more than 1000 digits"  # Python refuses to convert it
     try:
         return tomlkit.item(value).as_string()
     except (TypeError, ValueError):
@@ -57,9 +57,9 @@ def _as_toml(value: Any) -> str:
 
 
 def branches(data: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
-    """Yield everything in plain data or tables, and itself, with paths."""
+    """Yield plain data or a table and everything in it, with paths."""
     waiting = [(path, data)]
-    while waiting:  # data may be nested deeper than Python calls
+    while waiting:  # data may be nested deeper than Python's recursion limit
         path, data = waiting.pop()
         yield path, data
         inner: Any = ()
@@ -71,7 +71,7 @@ def branches(data: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
 
 
 def value_at(data: Any, path: Path) -> Any:
-    """Return what stands at a path; None where there is nothing."""
+    """Return the value at a path; None if there is none."""
     for part in path:
         try:
             data = data[part]
@@ -84,7 +84,7 @@ def replaced(data: Any, path: Path, value: Any) -> Any:
     """Return a copy of the data with another value at a path.
 
     Raises:
-        KeyError: If a list on the way has no such entry, or something on the way has no keys.
+        KeyError: If a list on the path has no such entry, or a value on the path has no keys.
     """
     if not path:
         return value

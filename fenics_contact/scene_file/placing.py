@@ -1,4 +1,4 @@
-"""Where a mesh is put: scaled, turned, moved."""
+"""Placement of meshes: scaled, rotated, moved."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Shaped:
-    """A mesh, and what is known of its shape.
+    """A mesh with its shape.
 
     Attributes:
         mesh: The mesh.
@@ -34,7 +34,7 @@ class Shaped:
     crown: DesignSurface | None = None
 
     def placed(self, rotation: np.ndarray, translation: np.ndarray, scale: float) -> Shaped:
-        """Return the shape scaled and turned about the origin, then moved."""
+        """Return the shape scaled and rotated about the origin, then moved."""
         mesh = self.mesh.placed(rotation, translation, scale)
         crown = self.crown
         if crown is not None:
@@ -43,7 +43,7 @@ class Shaped:
 
 
 class Placed(Part):
-    """A mesh, and keys that every mesh may have."""
+    """Keys that every mesh may have."""
 
     quadratic: bool = Field(False, description="cells of second order (not for tetrahedra)")
     scale: PositiveFloat = Field(
@@ -64,11 +64,11 @@ class Placed(Part):
         return {name: self.arranged(shape) for name, shape in self.shapes(folder, comm).items()}
 
     def shapes(self, folder: Path, comm: MPI.Comm) -> Mapping[str, Shaped]:
-        """Return the bodies before they are placed. Collective."""
+        """Return the bodies before placement. Collective."""
         return {"": Shaped(self.made())}
 
     def arranged(self, shape: Shaped) -> Shaped:
-        """Return a shape as the keys ask for it.
+        """Return a shape placed by the keys.
 
         Raises:
             InvalidInputError: If its cells have no quadratic counterpart, or a vector does not fit.
@@ -92,4 +92,4 @@ def _rotation(axis: tuple[float, ...], degrees: float) -> np.ndarray:
     if length == 0.0:
         raise InvalidInputError(f"axis must not be zero, got {list(axis)}: (0, 0, 1) turns about z")
     turn = Rotation.from_rotvec(degrees / length * np.array(axis), degrees=True)
-    return np.asarray(np.round(turn.as_matrix(), 15))  # quarter turns are exact
+    return np.asarray(np.round(turn.as_matrix(), 15))  # makes quarter turns exact

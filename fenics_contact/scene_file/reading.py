@@ -1,4 +1,4 @@
-"""Read a scene file: what it says, as objects that scripts use."""
+"""Reading of scene files as objects for scripts."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ from fenics_contact.scene_file.validation import validated
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-#: Largest scene file that is read, in bytes.
+#: Largest size of a scene file, in bytes.
 LARGEST = 10_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class SceneFile:
-    """A scene file that was read and checked. Meshes are built when they are first asked for.
+    """A scene file that was read and checked. Meshes are built on first access.
 
     Attributes:
-        source: Where it comes from.
-        document: What it says, part by part.
+        source: Its source.
+        document: Its content, part by part.
         comm: Communicator on which it was read, and on which everything is built.
     """
 
@@ -49,7 +49,7 @@ class SceneFile:
 
     @property
     def name(self) -> str:
-        """The file's name without its ending; "scene" for a dictionary."""
+        """The file's name without suffix; "scene" for a dictionary."""
         return Path(self.source.name).stem if self.source.text else "scene"
 
     @property
@@ -103,10 +103,10 @@ class SceneFile:
         )
 
     def solve(self) -> State:
-        """Find the equilibrium, of the last load step where there are some. Collective.
+        """Compute the equilibrium, of the last load step if there are any. Collective.
 
         Raises:
-            InfeasibleError: If nothing holds some body against its load.
+            InfeasibleError: If some body is not held against its load.
             ConvergenceError: If the solver does not reach its tolerance.
         """
         if self.steps:
@@ -118,12 +118,12 @@ class SceneFile:
         """Return the history of the scene before its first load step. Collective.
 
         Args:
-            checkpoint: File from which an interrupted history goes on, or None.
+            checkpoint: File from which an interrupted history continues, or None.
         """
         return LoadSequence(self.problem, checkpoint=checkpoint, count=len(self.steps))
 
     def require_design(self) -> None:
-        """Refuse a file without an optimisation.
+        """Reject a file without an optimisation.
 
         Raises:
             SceneFileError: If it describes none.
@@ -159,17 +159,17 @@ def read_scene_file(
 ) -> SceneFile:
     """Read and check a scene file, or a dictionary of the same form. Collective on ``comm``.
 
-    Rank 0 reads, all ranks receive the text and meet the same mistakes.
+    Rank 0 reads, all ranks receive the text and raise the same mistakes.
 
     Args:
-        scene: A TOML file, or what one would hold.
-        comm: Communicator on which meshes will be built and states found.
+        scene: A TOML file, or a dictionary of its content.
+        comm: Communicator on which meshes will be built and states computed.
         overrides: Other values for some keys, ``"contacts.0.friction.coefficient=0.2"``.
         python: Whether the file may name Python code ("file.py:Name"), which is run when the scene is built.
-            Say False for a file that you do not trust.
+            Use False for an untrusted file.
 
     Returns:
-        The file, checked as far as no mesh need be built.
+        The file, checked as far as possible without building meshes.
 
     Raises:
         SceneFileError: Naming all mistakes, each with line, key, what is allowed and what was given.

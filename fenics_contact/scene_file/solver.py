@@ -52,15 +52,15 @@ class SolverPart(Part):
     )
 
     def accuracy(self) -> Tolerance:
-        """Return the tolerance as solvers take it."""
+        """Return the tolerance for solvers."""
         if isinstance(self.tolerance, float):
             return self.tolerance
-        from fenics_contact.accuracy import Balanced  # a fixed tolerance does not load it
+        from fenics_contact.accuracy import Balanced  # not imported for a fixed tolerance
 
         return Balanced()
 
     def chosen(self, scene: Scene, partitions: Mapping[str, np.ndarray]) -> DualSolver | None:
-        """Return the dual solver that the keys ask for, None for the default one."""
+        """Return the dual solver given by the keys, None for the default one."""
         kinds: dict[str, DualSolver] = {
             "face_newton": FaceNewton(),
             "smalse": Smalse(),
@@ -79,7 +79,7 @@ class SolverPart(Part):
 
         Args:
             scene: The scene.
-            ranks: Number of ranks, each of which needs a subdomain where the number is left open.
+            ranks: Number of ranks, each of which needs a subdomain if no number is given.
 
         Raises:
             InvalidInputError: If a body has fewer cells than subdomains or is not structured.

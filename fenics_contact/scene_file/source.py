@@ -1,4 +1,4 @@
-"""The text of a scene file: what it holds, and on which line."""
+"""The text of a scene file: its data and their lines."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from fenics_contact.scene_file.mistakes import Mistake, SceneFileError
 from fenics_contact.scene_file.places import Path, replaced, shortened, value_at
 
 _OPEN = "; a bracket or quote may be open on a line before"
-#: What some editors put before the text: TOML has none.
+#: Byte-order mark of some editors, which TOML forbids.
 BYTE_ORDER_MARK = "\ufeff"
 
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """Where a scene comes from.
+    """The source of a scene.
 
     Attributes:
-        name: How messages call it.
-        folder: Folder to which files that it names are relative.
-        data: What it holds, overrides included.
+        name: Its name in messages.
+        folder: Folder to which its file names are relative.
+        data: Its data, including overrides.
         text: The file's text, "" for a scene that came as a dictionary.
-        overrides: Keys that were given elsewhere -> how.
+        overrides: Overridden keys -> how they were given.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Source:
     overrides: Mapping[Path, str] = field(default_factory=dict)
 
     def place(self, path: Path) -> tuple[int, str]:
-        """Return the line of a key, 0 where there is none, and how messages name the place."""
+        """Return the line of a key, 0 if there is none, and the name of the place in messages."""
         for given, words in self.overrides.items():
             if path[: len(given)] == given:
                 return 0, words
@@ -63,11 +63,11 @@ class Source:
         """Return the source with other values for some keys.
 
         Args:
-            overrides: ``KEY=VALUE``, such as ``contacts.0.friction.coefficient=0.2``; a value that is no TOML
-                is a text.
+            overrides: ``KEY=VALUE``, such as ``contacts.0.friction.coefficient=0.2``; a value that is not
+                TOML is a string.
 
         Raises:
-            SceneFileError: If one has another form or its key leads nowhere.
+            SceneFileError: If one has another form or its key does not exist.
         """
         data, places = dict(self.data), dict(self.overrides)
         for override in overrides:
@@ -90,7 +90,7 @@ def parse(text: str, name: str, folder: FilePath) -> Source:
     """Read the text of a scene file.
 
     Raises:
-        SceneFileError: If it is no TOML, with the line.
+        SceneFileError: If it is not TOML, with the line.
     """
     if text.startswith(BYTE_ORDER_MARK):
         words = (
@@ -105,7 +105,7 @@ def parse(text: str, name: str, folder: FilePath) -> Source:
 
 
 def _no_toml(text: str, error: Exception) -> Mistake:
-    """Put into words why a text is no TOML, in those of tomlkit where it finds a reason: they say more."""
+    """Describe why a text is not TOML, by tomlkit's message if it has one, which is more precise."""
     reason, line = str(error), 0
     if isinstance(error, RecursionError):
         reason = "brackets are nested too deeply"
@@ -113,7 +113,7 @@ def _no_toml(text: str, error: Exception) -> Mistake:
         tomlkit.parse(text)
     except tomlkit.exceptions.ParseError as better:
         reason, line = str(better).partition(" at line ")[0], better.line
-    except Exception:  # what it cannot tell is told by the first one
+    except Exception:  # otherwise the first parser's message is used
         reason, _, place = reason.partition(" (at ")
         found = re.match(r"line (\d+)", place)
         line = int(found.group(1)) if found else 0
@@ -139,7 +139,7 @@ def _parsed(override: str) -> tuple[Path, Any]:
 
 
 def _resolved(data: Any, path: Path) -> Path:
-    """Return a path with numbers for the entries of lists."""
+    """Return a path with numbers for list entries."""
     found: list[str | int] = []
     for part in path:
         numbered = isinstance(data, Sequence) and not isinstance(data, str) and str(part).isdecimal()

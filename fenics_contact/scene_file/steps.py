@@ -1,4 +1,4 @@
-"""Load steps, many at once: values go from where they are to where a step takes them."""
+"""Load steps, several at once: values change linearly to those at the end."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fenics_contact.scene_file.values import Components, Line, LoadValue
 if TYPE_CHECKING:
     from fenics_contact.scene_file.loads import AnyLoad, SupportPart
 
-#: Load steps of a file in all; longer histories are driven from Python, step by step.
+#: Largest total number of load steps of a file; longer histories are driven from Python.
 MOST = 100_000
 
 
@@ -40,15 +40,15 @@ def load_steps(
 ) -> tuple[LoadStep, ...]:
     """Return all load steps, in their order.
 
-    A support or load that a step does not name keeps its value; one that it names goes linearly from the
-    value before, which is its own before the first step, to the one given.
+    A support or load that a step does not name keeps its value; a named one changes linearly from the value
+    before, initially its own, to the one given.
 
     Args:
         steps: The steps of the file.
         supports: All supports.
         loads: All loads.
         bodies: The bodies by name.
-        at: Takes keys and returns a context that leads errors of its block back to them.
+        at: Takes keys and returns a context that refers errors of its block to them.
 
     Raises:
         InvalidInputError: If there are too many, or one has a value that cannot be used.
@@ -94,7 +94,7 @@ def _on_the_way(before: Mapping[str, Any], after: Mapping[str, Any], share: floa
 
 
 def way(start: Any, end: Any, share: float) -> Any:
-    """Return the value, numbers or formulas, on the way from ``start`` to ``end``."""
+    """Return the value, numbers or formulas, between ``start`` and ``end``."""
     if isinstance(end, tuple):
         return tuple(way(one, other, share) for one, other in zip(start, end, strict=True))
     return None if start is None or end is None else between(start, end, share)

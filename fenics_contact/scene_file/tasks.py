@@ -23,7 +23,7 @@ from fenics_contact.shape import AdaptiveTolerance, Objective, ShapeProblem, Sur
 
 @dataclass(frozen=True, eq=False)
 class ShapeTask:
-    """A shape optimisation, ready to be run.
+    """A shape optimisation, ready to run.
 
     Attributes:
         problem: J(α) with its subgradient.
@@ -40,11 +40,11 @@ class ShapeTask:
     method: BundleTrust
 
     def minimize(self, *, callback: Callback | None = None, checkpoint: Checkpoint | None = None) -> Result:
-        """Run it. Collective; a stop before the tolerance is met is told by the result's reason.
+        """Run it. Collective; a stop before the tolerance is met is reported by the result's reason.
 
         Args:
             callback: Called after every evaluation, see `fenics_contact.optimize.minimize`.
-            checkpoint: File from which an interrupted run goes on, or None.
+            checkpoint: File from which an interrupted run continues, or None.
         """
         return minimize(
             self.problem,
@@ -66,10 +66,10 @@ def shape_task(
     """Pose the optimisation of a scene file. Collective.
 
     Args:
-        source: Where the document comes from.
+        source: Source of the document.
         document: The file; it has a design.
-        contact: What finds the states of its scene.
-        shapes: Body name -> what is known of its shape.
+        contact: Problem that computes the states of its scene.
+        shapes: Body name -> its mesh with its shape.
 
     Raises:
         InvalidInputError: If a surface cannot be designed or numbers do not fit the number of variables.

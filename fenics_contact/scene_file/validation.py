@@ -1,4 +1,4 @@
-"""From what pydantic says to sentences of ours."""
+"""Conversion of pydantic's errors to messages."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fenics_contact.scene_file.places import Path, as_toml, branches, value_at, 
 from fenics_contact.scene_file.source import Source
 from fenics_contact.scene_file.values import MARK, SEPARATOR
 
-#: What is needed, by pydantic's name of the error; braces are filled from its context.
+#: What is needed, by pydantic's error type; braces are filled from its context.
 NEEDED = {
     "float_type": "a number",
     "int_type": "an integer",
@@ -36,10 +36,10 @@ NEEDED = {
 
 
 def validated(source: Source) -> Document:
-    """Return what a source holds, checked.
+    """Return the checked document of a source.
 
     Raises:
-        SceneFileError: Naming everything that is wrong.
+        SceneFileError: Naming all mistakes.
     """
     unseen = invisible_texts(source)
     if unseen:
@@ -52,7 +52,7 @@ def validated(source: Source) -> Document:
 
 
 def invisible_texts(source: Source) -> list[Mistake]:
-    """Return the names and texts that hold what a terminal would obey instead of showing it."""
+    """Return the names and texts that contain control characters."""
     shown = "must be text that can be shown, got {}: leave out control characters"
     return [
         source.mistake(path, f"{written(path)} {shown.format(as_toml(text))}")
@@ -63,7 +63,7 @@ def invisible_texts(source: Source) -> list[Mistake]:
 
 
 def _told_once(errors: Sequence[Any]) -> list[Any]:
-    """Leave out keys that are missing only because they are misspelt."""
+    """Omit missing keys that are only misspelt."""
     misspelt = [tuple(error["loc"]) for error in errors if error["ctx"]["kind"] == "extra_forbidden"]
 
     def explained(error: Any) -> bool:

@@ -1,4 +1,4 @@
-"""Values of a scene file: numbers in rows, formulas, places of files; each says what it needs."""
+"""Types of values in a scene file: rows of numbers, formulas, file names; each with its requirement."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from fenics_contact.checks import MOST
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene_file.expression import Expression
 
-#: What a support's component is called that it leaves alone.
+#: Value of a free component of a support.
 FREE = "free"
-#: Stands in the message of an error of kind "choice" between the key and the values that it may have.
+#: Separates the key and its possible values in the message of an error of kind "choice".
 SEPARATOR = "|"
-#: Begins what pydantic puts among the keys of an error's place and is none: files hold no such characters.
+#: Prefix of tags that pydantic adds to the path of an error: it does not occur in files.
 MARK = "\0"
-#: What Linux allows, in bytes.
+#: Limits of Linux, in bytes.
 LONGEST_NAME, LONGEST_PATH = 255, 4000
 
 
 @dataclass(frozen=True, eq=False)
 class Read:
-    """Lets pydantic read a key by another annotation than the one that type checkers see.
+    """Lets pydantic use another annotation for a key than type checkers.
 
     Attributes:
-        annotation: What pydantic reads.
+        annotation: The annotation for pydantic.
     """
 
     annotation: Any
@@ -42,12 +42,12 @@ class Read:
 
 
 def needs(needed: str) -> PydanticCustomError:
-    """Return the error of a value that is not what is ``needed``."""
+    """Return the error of a value that does not meet ``needed``."""
     return PydanticCustomError("needed", "must be {needed}", {"needed": needed})
 
 
 def said(needed: str) -> WrapValidator:
-    """Say of what is refused what is ``needed``, unless a formula in it says that itself."""
+    """Report what is ``needed`` for a rejected value, unless a formula in it has its own message."""
 
     def check(value: Any, handler: Callable[[Any], Any]) -> Any:
         try:
@@ -68,15 +68,15 @@ def one_of(
     when: Callable[[Any], bool] | None = None,
     called: str = "",
 ) -> Read:
-    """Tell tables apart by the value of one key.
+    """Discriminate tables by the value of one key.
 
     Args:
         key: The key, a `Literal` of every table.
         *tables: The tables.
         default: Its value where the key is missing.
         other: Table without such a key.
-        when: Tells from the data whether they are that table.
-        called: What messages call the key's value in that table.
+        when: Returns from the data whether they are that table.
+        called: Name of the key's value in that table for messages.
     """
     kinds = {kind: table for table in tables for kind in get_args(table.model_fields[key].annotation)}
 
@@ -96,7 +96,7 @@ def one_of(
 
 
 def _row(kind: Any, least: int, most: int | None, needed: str) -> Read:
-    """Read a list with so many entries, which becomes a tuple."""
+    """Read a list with a given number of entries as a tuple."""
     length = Field(min_length=least, max_length=most, strict=False)
     return Read(Annotated[list[kind], length, AfterValidator(tuple), said(needed)])
 
@@ -109,7 +109,7 @@ def _formula(text: str) -> Expression:
 
 
 def _place_of_file(value: str) -> str:
-    """Check a path as far as that can be without looking whether it is there."""
+    """Check a path without testing whether it exists."""
     if not value.strip():
         raise needs("the path of a file or folder, in quotes")
     longest = max(len(os.fsencode(part)) for part in value.split("/"))

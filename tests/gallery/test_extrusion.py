@@ -60,5 +60,5 @@ def test_heights_that_do_not_ascend_are_refused(heights: list[float]) -> None:
 
 @pytest.mark.parametrize("present", [[[True]], [[False, False]] * 2])
 def test_presence_of_another_shape_or_of_nothing_is_refused(present: list[list[bool]]) -> None:
-    with pytest.raises(InvalidInputError, match=r"present must have shape \(2, 2\), one row a layer"):
+    with pytest.raises(InvalidInputError, match=r"present must have shape \(2, 2\), one row per layer"):
         extrude(rectangle((0, 0), (2, 1), (2, 1)), HEIGHTS, present=present)
