@@ -1,4 +1,4 @@
-"""Which slave node meets the master where, by nodes or by mortar."""
+"""Contact search: slave nodes and their counterparts on the master, nodal or mortar."""
 
 from __future__ import annotations
 

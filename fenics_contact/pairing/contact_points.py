@@ -1,4 +1,4 @@
-"""Contact points: places where a node of one surface meets another surface or an obstacle."""
+"""Contact points: nodes of one surface with their counterparts on another surface or an obstacle."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-#: Weights of nodes below this part of all are rounding: what supports hold but for them is held.
+#: Weights of nodes below this fraction of all are rounding, which must not keep a supported point free.
 HELD = 1e-6
 
 
@@ -20,18 +20,18 @@ class ContactPoints:
     Attributes:
         pair: Contact pair of the scene, shape (n,).
         slave: Slave node among all bodies' nodes, shape (n,).
-        master: Weights of the nodes of all bodies in the point of the master that the node meets, shape
-            (n, n_nodes); a row sums to one, and is empty on a rigid obstacle.
+        master: Weights of the nodes of all bodies in the node's counterpart on the master, shape (n,
+            n_nodes); a row sums to one, and is empty on a rigid obstacle.
         normal: Unit normal from master to slave, shape (n, dim).
         tangents: Unit tangents, shape (n, dim - 1, dim).
         gap: Distance along the normal, positive when open, shape (n,), [length].
         area: Area of the slave surface that belongs to the node, shape (n,), [length^(dim - 1)].
         facet: Facet of the master surface that a node projects on; −1 on a rigid obstacle and where a point
-            stands for a mean over facets, shape (n,).
+            represents a mean over facets, shape (n,).
         local: Local coordinates on it, shape (n, dim - 1).
-        axes: Coordinate axis that the first tangent leans to, as a unit vector, shape (n, dim).
-        symmetric: Components across a plane of symmetry that cuts both surfaces there: what the mirror images
-            do is equal and opposite, and neither slips across the plane, shape (n, dim).
+        axes: Coordinate axis nearest to the first tangent, as a unit vector, shape (n, dim).
+        symmetric: Components normal to a plane of symmetry that cuts both surfaces there: the mirror images
+            move opposite, so that there is no slip across the plane, shape (n, dim).
     """
 
     pair: np.ndarray
@@ -60,7 +60,7 @@ class ContactPoints:
 
 
 def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> ContactPoints:
-    """Return the points of several pairs in their order; none at all where there is no part."""
+    """Concatenate the points of several pairs; empty if there are no parts."""
     if not parts:
         integer = np.zeros(0, dtype=np.int64)
         return ContactPoints(
@@ -86,7 +86,7 @@ def reference_axes(normals: np.ndarray) -> np.ndarray:
 
 
 def movable(points: ContactPoints, fixed: np.ndarray) -> np.ndarray:
-    """Return which components of the relative displacement supports leave free, shape (n_points, dim).
+    """Return the components of the relative displacement that supports leave free, shape (n_points, dim).
 
     Args:
         points: The points.
@@ -98,12 +98,12 @@ def movable(points: ContactPoints, fixed: np.ndarray) -> np.ndarray:
 
 
 def in_free_frames(points: ContactPoints, fixed: np.ndarray) -> ContactPoints:
-    """Return points whose second tangent is the way that they can slip where supports leave but one.
+    """Return points whose second tangent is the only direction of slip where supports leave one.
 
-    Where one component is held, closed points slip across that axis and the normal alone.
+    Where one component is held, closed points can slip only normal to that axis and the normal.
 
     Args:
-        points: Points in frames of the normals alone.
+        points: Points in frames that depend only on the normals.
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
     """
     if points.normal.shape[1] == 2:
@@ -121,7 +121,7 @@ def tangent_frames(normals: np.ndarray, axes: np.ndarray | None = None) -> np.nd
 
     Args:
         normals: Unit normals, shape (n, dim).
-        axes: Axes that the first tangents lean to, shape (n, dim); `reference_axes` by default.
+        axes: Axes nearest to the first tangents, shape (n, dim); `reference_axes` by default.
     """
     if normals.shape[1] == 2:
         return np.stack([normals[:, 1], -normals[:, 0]], axis=1)[:, None]

@@ -1,4 +1,4 @@
-"""Contact points of a scene: which slave node meets the master where, in which direction, how far away."""
+"""Contact points of a scene: the counterpart on the master, normal and gap of each slave node."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie
 from fenics_contact.surface_shapes import asked
 from fenics_contact.surfaces import FacetedSurface, Geometry, Projection, join, project, shape_functions
 
-#: A gap of so many roundings of coordinates is none: a few operations lie between the two.
+#: Gaps below this many roundings of the coordinates count as zero, as a few operations lie in between.
 ROUNDING = 8
 
 _LOG = logging.getLogger(__name__)
@@ -35,19 +35,19 @@ _LOG = logging.getLogger(__name__)
 def find_contact_points(
     scene: Scene, fixed: np.ndarray, comm: MPI.Comm | None = None, *, finer: bool = False
 ) -> ContactPoints:
-    """Find where the slave surface of every contact pair meets its master. Collective on ``comm``.
+    """Find the contact points of every contact pair. Collective on ``comm``.
 
-    Each rank does a share of the search, and all receive all points. Nodes whose displacement is prescribed
-    in all components cannot move and are left out.
+    Each rank searches a share of the nodes, and all receive all points. Nodes whose displacement is
+    prescribed in all components cannot move and are omitted.
 
     Args:
         scene: The scene.
         fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
         comm: Communicator of the ranks that share the work; this rank alone by default.
-        finer: Take surfaces that are known better than those the scene asks for, see `true_surface`.
+        finer: Use better representations of surfaces than requested by the scene, see `true_surface`.
 
     Raises:
-        InvalidInputError: If no node of a slave surface finds its master.
+        InvalidInputError: If no node of a slave surface faces its master.
     """
     return _points_of_pairs(scene, scene.contacts, fixed, comm or MPI.COMM_SELF, finer)
 
@@ -55,14 +55,14 @@ def find_contact_points(
 def find_tied_points(
     scene: Scene, fixed: np.ndarray, comm: MPI.Comm | None = None
 ) -> ContactPoints:
-    """Find where tied surfaces meet, as `find_contact_points` does; ``pair`` counts the ties. Collective."""
+    """Find the points of tied surfaces, as `find_contact_points`; ``pair`` numbers the ties. Collective."""
     return _points_of_pairs(scene, scene.ties, fixed, comm or MPI.COMM_SELF)
 
 
 def without_rounding(gap: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return gaps, zero where surfaces touch but for the rounding of their coordinates.
+    """Return gaps, zero where surfaces touch up to the rounding of their coordinates.
 
-    Bodies that only touch would else press each other apart by that rounding, in units of their own.
+    Otherwise bodies that only touch would be pressed apart by that rounding.
 
     Args:
         gap: Gaps, shape (n,), [length].
@@ -73,7 +73,7 @@ def without_rounding(gap: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Side:
-    """One of two surfaces that meet.
+    """One of two surfaces of a pair.
 
     Attributes:
         surface: The surface.
@@ -103,7 +103,7 @@ def _points_of_pairs(
 ) -> ContactPoints:
     parts, numbers = [], NodeNumbers.of(scene)
     for index, pair in enumerate(pairs):
-        # What lies between tied surfaces stays as it is; their gaps count for nothing.
+        # The gap between tied surfaces stays as it is and is not used.
         geometry = pair.geometry if isinstance(pair, ContactPair) else "faceted"
         slave = _Side.of(scene, pair.slave, geometry, numbers, finer)
         movable = ~fixed[slave.nodes].all(axis=1)
@@ -141,7 +141,7 @@ def _points_of_pairs(
 
 
 def _symmetric(points: ContactPoints, slave: _Side, master: _Side) -> np.ndarray:
-    """Return the components across planes of symmetry that cut both surfaces at a point, (n_points, dim)."""
+    """Return the components normal to symmetry planes that cut both surfaces at a point, (n_points, dim)."""
     place = np.zeros((slave.n_nodes, points.normal.shape[1]))
     cut = np.zeros(place.shape, dtype=bool)
     for side in (slave, master):
@@ -155,7 +155,7 @@ def _symmetric(points: ContactPoints, slave: _Side, master: _Side) -> np.ndarray
 
 
 def _by_projection(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm) -> ContactPoints:
-    """Let each slave node meet the master facet that it projects on. Collective."""
+    """Pair each slave node with the master facet on which it projects. Collective."""
     candidates = np.flatnonzero(movable)
     hit = _shared_projection(slave.surface, candidates, master.surface, comm)
     if len(hit.lost) and comm.rank == 0:
@@ -182,16 +182,16 @@ def _tell_of_lost(places: np.ndarray, count: int) -> None:
 def _by_mortar(
     slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm, share: float
 ) -> ContactPoints:
-    """Let each slave node meet the mean of the master under its dual basis function. Collective.
+    """Pair each slave node with the mean of the master weighted by its dual basis function. Collective.
 
     Args:
         slave: Side whose nodes carry multipliers.
         movable: Which of them can move.
         master: The other side.
         comm: Communicator of the ranks that share the work.
-        share: The master's share of what closes the gap.
+        share: The master's share of the motion that closes the gap.
     """
-    from fenics_contact.pairing.mortar import mortar_coupling  # not before a pair asks for it
+    from fenics_contact.pairing.mortar import mortar_coupling  # only imported if a pair needs it
 
     found = mortar_coupling(slave.surface, master.surface, comm)
     kept = np.flatnonzero(movable[found.node])
@@ -217,9 +217,9 @@ def _closable(
     """Return the gaps between true surfaces that linear displacements can close, shape (n,). Collective.
 
     Where the gap g closes, the slave moves by (1 − s) g and the master by s g, s its share of the compliance,
-    but for rigid motions. The constraint has linear interpolants of that, I g on the slave and J g on the
-    master: (1 − s) g(x_i) + s ∫ ψ_i J g is what it can close. The mean of g itself bends between nodes.
-    Nodes of which a part lies beside the other surface keep that mean.
+    up to rigid motions. The constraint contains linear interpolants of that, I g on the slave and J g on the
+    master: it can close (1 − s) g(x_i) + s ∫ ψ_i J g. The mean of g itself includes its curvature between
+    nodes. Nodes that are partly beside the other surface keep that mean.
     """
     nodes = np.flatnonzero(np.bincount(weight.indices, minlength=weight.shape[1]))
     here = _shared_projection(slave.surface, chosen, master.surface, comm)
@@ -233,7 +233,7 @@ def _closable(
 
 
 def _on_obstacle(slave: _Side, movable: np.ndarray, obstacle: RigidObstacle) -> ContactPoints:
-    """Let each slave node that faces a rigid obstacle meet it."""
+    """Pair each slave node that faces a rigid obstacle with it."""
     candidates = np.flatnonzero(movable)
     normals = asked(obstacle, "normals", slave.surface.points[candidates])
     facing = np.einsum("nd,nd->n", slave.surface.normals[candidates], normals) < 0
@@ -245,7 +245,7 @@ def _on_obstacle(slave: _Side, movable: np.ndarray, obstacle: RigidObstacle) -> 
 def _points(
     slave: _Side, chosen: np.ndarray, normal: np.ndarray, gap: np.ndarray, weight: sp.csr_matrix
 ) -> ContactPoints:
-    """Return points on chosen nodes of a slave, not yet numbered by pair and on no facet."""
+    """Return points on chosen nodes of a slave, not yet numbered by pair and without facets."""
     count, axes = len(chosen), reference_axes(normal)
     return ContactPoints(
         np.zeros(count, dtype=np.int64), slave.nodes[chosen], weight, normal, tangent_frames(normal, axes),
@@ -257,7 +257,7 @@ def _points(
 def _shared_projection(
     slave: FacetedSurface, movable: np.ndarray, master: FacetedSurface, comm: MPI.Comm
 ) -> Projection:
-    """Project the movable nodes, each rank every so manieth. Collective."""
+    """Project the movable nodes, distributed round-robin over the ranks. Collective."""
     mine = np.arange(comm.rank, len(movable), comm.size)
     found: Projection | None = None
     with together(comm):

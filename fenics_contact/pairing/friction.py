@@ -1,4 +1,4 @@
-"""Which friction each contact point has."""
+"""The friction law of each contact point."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fenics_contact.scene import ContactPair, Coulomb, Tresca
 def friction_data(
     pairs: Sequence[ContactPair], points: ContactPoints
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what friction each contact point has.
+    """Return the friction data of each contact point.
 
     Returns:
         Whether it has friction, shape (n,); its Coulomb coefficient (zero under Tresca), shape (n,); its

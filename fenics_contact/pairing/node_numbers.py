@@ -1,4 +1,4 @@
-"""Nodes of all bodies of a scene, numbered together."""
+"""Common numbering of the nodes of all bodies of a scene."""
 
 from __future__ import annotations
 

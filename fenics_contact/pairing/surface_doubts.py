@@ -1,4 +1,4 @@
-"""What a user should know of the surfaces that gaps are measured between."""
+"""Warnings about the surfaces between which gaps are measured."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fenics_contact.errors import tell
 from fenics_contact.scene import Scene, Surface
 from fenics_contact.surfaces import FacetedSurface, Geometry
 
-#: Nodes lie on their shape that are off it by no more than this part of an edge.
+#: Nodes count as on their shape if their distance is no more than this fraction of an edge.
 ON_SHAPE = 1e-6
 
 _LOG = logging.getLogger(__name__)
@@ -25,9 +25,9 @@ def tell_of_surface(
     Args:
         scene: The scene.
         surface: Slave or master of a pair.
-        geometry: What the pair takes for it.
-        found: What that is.
-        comm: Communicator; rank 0 tells.
+        geometry: Its representation in the pair.
+        found: The resulting surface.
+        comm: Communicator; rank 0 logs.
     """
     mesh = scene.bodies[surface.body].mesh.origin
     away = mesh.off_shapes.get(surface.name) if geometry == "best" else None

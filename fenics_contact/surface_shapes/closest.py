@@ -1,4 +1,4 @@
-"""What follows from a signed distance: closest points and principal curvatures."""
+"""Closest points and principal curvatures from a signed distance."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from fenics_contact.surface_shapes.protocol import SurfaceShape, asked
 
-#: Most steps onto a surface: one where the distance is exact, a few where it is close to exact.
+#: Largest number of steps onto a surface: one if the distance is exact, a few if it is nearly exact.
 STEPS = 8
 #: Points this close to the surface, relative to their coordinates, lie on it.
 ROUNDING = 16 * float(np.finfo(float).eps)
@@ -15,18 +15,18 @@ ROUNDING = 16 * float(np.finfo(float).eps)
 def closest_points(shape: SurfaceShape, points: np.ndarray) -> np.ndarray:
     """Return the points of a surface that are closest to given ones.
 
-    x − d(x) n(x), repeated where the distance is not exact, until the points lie on the surface or come no
+    x − d(x) n(x), repeated if the distance is not exact, until the points lie on the surface or do not come
     closer.
 
     Args:
         shape: The shape.
-        points: Where, shape (n, dim), [length].
+        points: Points, shape (n, dim), [length].
 
     Returns:
-        One point of the surface each, shape (n, dim); of several closest ones any.
+        One point of the surface each, shape (n, dim); any of several closest ones.
 
     Raises:
-        InvalidInputError: If the shape answers with NaN or arrays of other shapes.
+        InvalidInputError: If the shape returns NaN or arrays of other shapes.
         UserCodeError: If it raises.
     """
     closest = np.array(points, dtype=np.float64)
@@ -52,7 +52,7 @@ def principal_curvatures(shape: SurfaceShape, points: np.ndarray) -> np.ndarray:
         Shape (n, dim − 1), ascending, [1 / length].
 
     Raises:
-        InvalidInputError: If the shape answers with NaN or arrays of other shapes.
+        InvalidInputError: If the shape returns NaN or arrays of other shapes.
         UserCodeError: If it raises.
     """
     tangents = tangent_bases(asked(shape, "normals", points))
@@ -61,9 +61,9 @@ def principal_curvatures(shape: SurfaceShape, points: np.ndarray) -> np.ndarray:
 
 
 def tangent_bases(normals: np.ndarray) -> np.ndarray:
-    """Return an orthonormal basis of the plane across each unit normal, (n, dim) -> (n, dim − 1, dim).
+    """Return an orthonormal basis of the plane normal to each unit normal, (n, dim) -> (n, dim − 1, dim).
 
-    The reflection that takes ∓e_dim to the normal takes the other axes there.
+    The reflection that maps ∓e_dim to the normal maps the other axes to it.
     """
     dim = normals.shape[1]
     mirror = normals + np.where(normals[:, -1:] >= 0, 1.0, -1.0) * np.eye(dim)[-1]

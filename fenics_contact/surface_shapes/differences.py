@@ -1,4 +1,4 @@
-"""Central differences whose step suits where the points lie."""
+"""Central differences with a step adapted to the position of the points."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 #: Step of a central difference, relative to the extent of the points: the smallest one. Far from the origin
-#: it is the one at which the rounding of the values is as large as what the difference leaves out.
+#: it balances the rounding of the values and the truncation error.
 DIFFERENCE = 1e-5
 
 
@@ -16,7 +16,7 @@ def differences(function: Callable[[np.ndarray], np.ndarray], points: np.ndarray
 
     Args:
         function: Vectorised, (n, dim) -> (n, ...).
-        points: Where, shape (n, dim).
+        points: Points, shape (n, dim).
     """
     if len(points) == 0:
         return np.zeros((*np.shape(function(points)), points.shape[1]))

@@ -1,4 +1,4 @@
-"""Prisms: a profile in the plane drawn along an axis."""
+"""Prisms: a profile in the plane extruded along an axis."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from fenics_contact.surface_shapes.protocol import SurfaceShape
 @dataclass(frozen=True)
 @checked()
 class Extruded:
-    """An endless prism: what a profile covers when it moves along an axis.
+    """An infinite prism: a profile extruded along an axis.
 
     A point x has the coordinates ((x − point)·across, (x − point)·(axis × across)) in the profile's plane, so
     that across, axis × across and axis are right-handed: with the axis z and across x they are x and y.
 
     Attributes:
         profile: A shape in the plane.
-        point: Where the origin of the profile's plane lies, [length].
-        axis: Direction in which the profile moves; scaled to unit length.
+        point: Origin of the profile's plane, [length].
+        axis: Direction of extrusion; scaled to unit length.
         across: Direction of the profile's first coordinate; made perpendicular to the axis, scaled.
 
     Example:
@@ -41,7 +41,7 @@ class Extruded:
     across: GivenVector
 
     def __post_init__(self) -> None:
-        """Make the directions perpendicular, refuse parallel ones and a profile that is not in the plane."""
+        """Make the directions perpendicular; reject parallel ones and a profile that is not in the plane."""
         name = type(self).__name__
         require_plane(self, self.profile)
         require_place(self, self.point, (3,))
@@ -70,7 +70,7 @@ class Extruded:
         return np.asarray(self.profile.normals(self._flat(points)) @ self._plane)
 
     def curvatures(self, points: np.ndarray) -> np.ndarray:
-        """Return the profile's curvatures in space; along the axis there are none."""
+        """Return the profile's curvatures in space; zero along the axis."""
         return np.asarray(self._plane.T @ self.profile.curvatures(self._flat(points)) @ self._plane)
 
     @property

@@ -1,4 +1,4 @@
-"""Feet of perpendiculars on a parametrised surface, and what its derivatives there make of distances.
+"""Feet of perpendiculars on a parametrised surface, and the derivatives of the distance there.
 
 With the foot X(u) of a point x, tangents J = ∂X/∂u, normal n, first and second fundamental forms G = JᵀJ and
 B = −n·∂²X/∂u², the distance is d = n·(x − X), its gradient n and its Hessian J G⁻¹ B (G + d B)⁻¹ Jᵀ.
@@ -13,23 +13,23 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 
-#: Tangents whose area, relative to the product of their lengths, is smaller are no basis.
+#: Tangents are degenerate if their area, relative to the product of their lengths, is below this.
 FLAT = 1e-10
-#: Below this part of det G, the determinant of G + d B is that of a centre of curvature.
+#: Fraction of det G below which the determinant of G + d B indicates a centre of curvature.
 FOCAL = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class Feet:
-    """Where perpendiculars meet a surface, and its derivatives there.
+    """Feet of perpendiculars on a surface, and its derivatives there.
 
     Attributes:
-        points: What was projected, (n, dim).
+        points: The projected points, (n, dim).
         position: Feet, (n, dim).
         tangents: First derivatives of the parametrisation there, (n, dim, dim − 1).
         bends: Second derivatives, (n, dim, dim − 1, dim − 1).
-        free: Which parameters are not held at the border, (n, dim − 1); beyond it all is straight.
-        sign: 1, or −1 where the normal that the parametrisation gives points into the body; or one a point.
+        free: Which parameters are not held at the border, (n, dim − 1); the continuation beyond is straight.
+        sign: 1, or −1 where the normal that the parametrisation gives points into the body; or one per point.
     """
 
     points: np.ndarray
@@ -51,7 +51,7 @@ class Feet:
         sizes = np.linalg.norm(self.tangents, axis=1)
         if not (
             length > FLAT * sizes.max(axis=1, initial=0.0) ** sizes.shape[1]
-        ).all():  # NaN is none, either
+        ).all():  # also catches NaN
             worst = self.position[int(np.argmin(length))]
             raise InvalidInputError(
                 "a parametrised surface needs derivatives that are not zero and not parallel, got such at "
@@ -83,7 +83,7 @@ class Feet:
         return np.asarray(np.swapaxes(self.tangents, 1, 2) @ self.tangents)
 
     def steps(self) -> np.ndarray:
-        """Return Newton steps of the parameters to the closest points, Gauss's where theirs lead away."""
+        """Return Newton steps of the parameters to the closest points, Gauss-Newton's where these fail."""
         off = self.points - self.position
         slope = np.einsum("nda,nd->na", self.tangents, off) * self.free
         gram = self.gram

@@ -15,18 +15,18 @@ from fenics_contact.surface_shapes.protocol import Quantity, SurfaceShape
 
 #: Samples on each edge of a border.
 SAMPLES = 4
-#: How much a way along a shape beyond its part counts. Beside a ridge two parts are equally far away; by this
-#: the one that a point is higher above is taken, whose distance is closer to that from the ridge.
+#: Weight of the distance along a shape beyond its part. Near a ridge two parts are equally far away; this
+#: selects the one above which a point is higher, whose distance is closer to that from the ridge.
 BEYOND = 2.0
 
 
 @dataclass(frozen=True)
 @checked("facets")
 class Joined:
-    """A surface of several shapes, each as far as its facets reach; what is nearest answers.
+    """A surface of several shapes, each limited to its facets; the nearest one is evaluated.
 
     Attributes:
-        shapes: The shapes; each may go on beyond its part of the surface.
+        shapes: The shapes; each may extend beyond its part of the surface.
         facets: For each shape the corners of facets of its part, (n_facets, 4 | 3 | 2, dim), [length].
     """
 
@@ -34,7 +34,7 @@ class Joined:
     facets: Sequence[np.ndarray]
 
     def __post_init__(self) -> None:
-        """Refuse shapes without facets."""
+        """Reject shapes without facets."""
         if not self.shapes or len(self.shapes) != len(self.facets) or not all(map(len, self.facets)):
             raise InvalidInputError(
                 f"Joined.facets must hold facets for each of the {len(self.shapes)} shapes, got "
@@ -63,7 +63,7 @@ class Joined:
         return np.argmin([self._away(number, points) for number in range(len(self.shapes))], axis=0)
 
     def _of_nearest(self, what: Quantity, points: np.ndarray) -> np.ndarray:
-        """Ask each shape for the points to which it is the nearest."""
+        """Evaluate each shape at the points to which it is the nearest."""
         nearest = self.nearest(points)
         order = ("distance", "normals", "curvatures").index(what)
         answer = np.zeros((len(points), *[points.shape[1]] * order))
@@ -74,7 +74,7 @@ class Joined:
         return answer
 
     def _away(self, number: int, points: np.ndarray) -> np.ndarray:
-        """Return how far points are from a shape's part of the surface, (n,)."""
+        """Return the distance of points from a shape's part of the surface, (n,)."""
         shape = self.shapes[number]
         distance = shape.distance(points)
         if (border := self._borders[number]) is None:
@@ -87,12 +87,12 @@ class Joined:
 
     @cached_property
     def _borders(self) -> list[tuple[cKDTree, np.ndarray] | None]:
-        """For each shape samples of its part's border and directions out of it; None where it is closed."""
+        """For each shape samples of its part's border and directions out of it; None if it is closed."""
         return [_border(shape, part) for shape, part in zip(self.shapes, self.facets, strict=True)]
 
 
 def _border(shape: SurfaceShape, facets: np.ndarray) -> tuple[cKDTree, np.ndarray] | None:
-    """Return samples of the sides that one facet alone has, and tangents that leave the part across them."""
+    """Return samples of the sides of only one facet, and tangents that leave the part across them."""
     alone = _alone(facets)
     if not alone.any():
         return None
@@ -112,10 +112,10 @@ def _border(shape: SurfaceShape, facets: np.ndarray) -> tuple[cKDTree, np.ndarra
 
 
 def _alone(facets: np.ndarray) -> np.ndarray:
-    """Tell which sides of facets no other facet has: each from a corner to the next; in the plane corners."""
+    """Return which sides of facets are not shared: each from a corner to the next; in the plane corners."""
     count, corners, dim = facets.shape
     lengths = np.linalg.norm(np.roll(facets, -1, axis=1) - facets, axis=2)
-    # Corners are the same where they differ by less than a millionth of the shortest side.
+    # Corners coincide if they differ by less than a millionth of the shortest side.
     rounded = np.round(facets.reshape(-1, dim) / (1e-6 * lengths.min()))
     number = np.unique(rounded, axis=0, return_inverse=True)[1].reshape(count, corners, 1)
     sides = number if dim == 2 else np.concatenate([number, np.roll(number, -1, axis=1)], axis=2)

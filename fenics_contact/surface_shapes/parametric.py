@@ -21,17 +21,18 @@ class Parametric(Patch):
     """A surface X(u) over a rectangle of parameters; in the plane a curve over an interval.
 
     The body lies behind the normal X₁ × X₂ of the parameters' tangents; in the plane to the left of the
-    direction in which the curve runs, as of a circle that runs counterclockwise. Beyond its border the
-    surface goes on straight. Tangents must not vanish: leave out poles.
+    curve's direction, as for a counterclockwise circle. Beyond its border the surface continues straight.
+    Tangents must not vanish: leave out poles.
 
     Attributes:
         position: X, vectorised, (n, dim − 1) -> (n, dim), [length].
-        lower: Least parameters, dim − 1 of them.
+        lower: Smallest parameters, dim − 1 of them.
         upper: Largest parameters.
         derivative: ∂X/∂u, (n, dim − 1) -> (n, dim, dim − 1); central differences if it is None.
-        periodic: Which parameters come round, one truth value each; none unless given.
+        periodic: Which parameters are periodic, one boolean each; none unless given.
         flipped: Whether the body lies on the other side.
-        samples: Along each parameter, to start from: more where the surface turns within one of them.
+        samples: Number of starting points along each parameter: more if the surface turns within one
+            interval.
 
     Example:
         >>> import numpy as np
@@ -50,7 +51,7 @@ class Parametric(Patch):
     samples: int = 64
 
     def __post_init__(self) -> None:
-        """Refuse an empty range, and a position that is none.
+        """Reject an empty range, and an invalid position.
 
         Raises:
             InvalidInputError: If the range is empty, or the samples are not finite points.
@@ -64,15 +65,15 @@ class Parametric(Patch):
             )
         if len(self.periodic) not in (0, count) or self.samples < 3:
             raise InvalidInputError(
-                f"Parametric.periodic must hold {count} truth values and samples be at least 3, got "
-                f"{self.periodic!r} and {self.samples}: one truth value a parameter"
+                f"Parametric.periodic must hold {count} booleans and samples be at least 3, got "
+                f"{self.periodic!r} and {self.samples}: one boolean per parameter"
             )
         starts = self._starts()
         values = np.asarray(self.position(starts), dtype=np.float64)
         if values.shape != (len(starts), count + 1) or not np.isfinite(values).all():
             raise InvalidInputError(
                 f"Parametric.position must return finite numbers of shape {(len(starts), count + 1)} for "
-                f"parameters of shape {starts.shape}, got shape {values.shape} or NaN: a row a point"
+                f"parameters of shape {starts.shape}, got shape {values.shape} or NaN: one row per point"
             )
 
     @property
@@ -92,7 +93,7 @@ class Parametric(Patch):
 
     @cached_property
     def _rounding(self) -> float:
-        """Rounding of the surface's coordinates relative to its size, large far from the origin."""
+        """Rounding of the surface's coordinates relative to its size, which is large far from the origin."""
         points = self._samples[1].data
         return float(np.finfo(float).eps * np.abs(points).max() / np.ptp(points, axis=0).max())
 
@@ -126,11 +127,11 @@ class Parametric(Patch):
         return np.stack(slopes, axis=-1)
 
     def _steps(self, power: float) -> np.ndarray:
-        """Return the steps at which rounding is as large as what a difference leaves out, (k,)."""
+        """Return the steps that balance rounding and truncation error, (k,)."""
         low, high, _ = self._range
         return np.asarray(0.1 * self._rounding**power * (high - low))
 
     def _away(self, u: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """Move parameters so far into the range that differences do not leave it."""
+        """Move parameters into the range so that differences do not leave it."""
         low, high, periodic = self._range
         return np.where(periodic, u, np.clip(u, low + step, high - step))

@@ -10,11 +10,12 @@ from scipy.spatial import cKDTree
 
 from fenics_contact.surface_shapes.foot import Feet
 
-#: Most steps to a closest point, and the last one relative to the range of the parameters.
+#: Largest number of steps to a closest point, and size of the last one relative to the range of the
+#: parameters.
 STEPS, LAST = 60, 1e-10
 #: Relative rounding of distances.
 ROUNDING = 16 * float(np.finfo(float).eps)
-#: A closest point is held at the border if its parameter would leave the range by more than this part of it.
+#: A closest point is held at the border if its parameter would leave the range by more than this fraction.
 HELD = 1e-8
 
 
@@ -47,7 +48,7 @@ class Patch(ABC):
 
     @abstractmethod
     def _starts(self) -> np.ndarray:
-        """Return the parameters of samples that are dense enough to tell where closest points are, (m, k)."""
+        """Return the parameters of samples that are dense enough to locate closest points, (m, k)."""
 
     def distance(self, points: np.ndarray) -> np.ndarray:
         """Return the distance to the closest point, beyond the border to the tangents there."""
@@ -95,7 +96,7 @@ class Patch(ABC):
         position, tangents = self._position(u), self._tangents(u)
         (low, high), (_, _, periodic) = self._borders, self._range
         pull = np.einsum("nda,nd->na", tangents, points - position)
-        # What lies above the very border is held by nothing, but rounding.
+        # Points exactly above the border are held only by rounding.
         strong = np.abs(pull) > HELD * np.einsum("nda,nda->na", tangents, tangents) * (high - low)
         held = strong & ~periodic & np.where(pull > 0, u >= high, u <= low)
         return Feet(points, position, tangents, self._bends(u), ~held, -1.0 if self.flipped else 1.0)

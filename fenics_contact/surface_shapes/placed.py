@@ -1,4 +1,4 @@
-"""Shapes that are turned, scaled and moved."""
+"""Shapes that are rotated, scaled and moved."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from fenics_contact.surface_shapes.joined import Joined
 from fenics_contact.surface_shapes.places import require_place
 from fenics_contact.surface_shapes.protocol import SurfaceShape
 
-#: By how much the columns of a rotation may miss being orthonormal.
+#: Tolerance of the orthonormality of a rotation's columns.
 ORTHOGONAL = 1e-9
 
 
 @dataclass(frozen=True)
 @checked()
 class Placed:
-    """A shape whose points x have moved to scale R x + translation; built by `placed`.
+    """A shape whose points x are mapped to scale R x + translation; built by `placed`.
 
     Attributes:
-        shape: What is placed.
-        rotation: The orthogonal matrix R by rows; it may mirror, too.
-        translation: Where the origin goes, [length].
+        shape: The shape.
+        rotation: The orthogonal matrix R by rows; it may be a reflection.
+        translation: Image of the origin, [length].
         scale: Factor > 0 on all lengths.
     """
 
@@ -35,7 +35,7 @@ class Placed:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no motion and no positive scale."""
+        """Reject a matrix that is not orthogonal and a scale that is not positive."""
         dim = len(self.translation)
         require_place(self, self.translation)
         turn = np.array([[float(entry) for entry in row] for row in self.rotation if len(row) == dim])
@@ -65,11 +65,11 @@ class Placed:
         return np.asarray(self.scale * self.shape.distance(self._back(points)))
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Return the shape's normals, turned."""
+        """Return the shape's normals, rotated."""
         return np.asarray(self.shape.normals(self._back(points)) @ self._turn.T)
 
     def curvatures(self, points: np.ndarray) -> np.ndarray:
-        """Return the shape's curvatures, turned and divided by the scale."""
+        """Return the shape's curvatures, rotated and divided by the scale."""
         return np.asarray(self._turn @ self.shape.curvatures(self._back(points)) @ self._turn.T / self.scale)
 
     @property
@@ -83,16 +83,16 @@ class Placed:
 def placed(
     shape: SurfaceShape, rotation: np.ndarray | None, translation: Sequence[float], scale: float = 1.0
 ) -> SurfaceShape:
-    """Move a shape: its points x go to scale R x + translation.
+    """Move a shape: its points x are mapped to scale R x + translation.
 
     Args:
         shape: Any shape.
-        rotation: The orthogonal matrix R, shape (dim, dim); None does not turn.
-        translation: Where the origin goes, dim entries, [length].
+        rotation: The orthogonal matrix R, shape (dim, dim); None for no rotation.
+        translation: Image of the origin, dim entries, [length].
         scale: Factor > 0 on all lengths.
 
     Returns:
-        The moved shape; of one that was placed before, both motions in one; of joined ones, them moved.
+        The moved shape; a placed shape gets the combined motion, the parts of a joined one are moved.
 
     Raises:
         InvalidInputError: If the matrix is not orthogonal, the scale not positive, or the dimensions differ.

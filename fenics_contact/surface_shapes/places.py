@@ -1,4 +1,4 @@
-"""Where shapes lie and how large they are: what is no place or no radius is refused by the class's name."""
+"""Checks of the position and size of shapes, with the class's name in messages."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fenics_contact.errors import InvalidInputError
 
 
 def require_place(shape: object, point: GivenVector, dims: tuple[int, ...] = (2, 3)) -> None:
-    """Refuse a point without so many finite coordinates.
+    """Reject a point without ``dim`` finite coordinates.
 
     Raises:
         InvalidInputError: Names the shape's class.
@@ -23,7 +23,7 @@ def require_place(shape: object, point: GivenVector, dims: tuple[int, ...] = (2,
 
 
 def require_radius(shape: object, radius: float, name: str = "radius") -> None:
-    """Refuse a radius that is not positive.
+    """Reject a radius that is not positive.
 
     Raises:
         InvalidInputError: Names the shape's class.
@@ -41,7 +41,7 @@ def outer(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def require_plane(shape: object, profile: object) -> None:
-    """Refuse a profile that is a shape in space.
+    """Reject a profile that is a shape in space.
 
     Raises:
         InvalidInputError: Names the shape's class and the profile's.

@@ -17,14 +17,14 @@ class Plane:
 
     Attributes:
         point: Any point of its surface, [length].
-        normal: Direction from the body into the free side; scaled to unit length.
+        normal: Outward direction from the body; scaled to unit length.
     """
 
     point: GivenVector
     normal: GivenVector
 
     def __post_init__(self) -> None:
-        """Scale the normal, refuse one without direction."""
+        """Scale the normal; reject a zero one."""
         require_place(self, self.point)
         direction = unit_vector(f"{type(self).__name__}.normal", self.normal, len(self.point))
         object.__setattr__(self, "normal", direction)

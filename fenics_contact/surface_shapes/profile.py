@@ -22,12 +22,12 @@ SAMPLES = 8
 class Profile(Patch):
     """A cubic spline through points of the plane, with continuous curvature; for `Extruded` and `Revolved`.
 
-    The body lies to the left of the direction in which the points run: counterclockwise around it. Beyond its
-    ends the curve goes on straight.
+    The body lies to the left of the curve's direction: counterclockwise around it. Beyond its ends the curve
+    continues straight.
 
     Attributes:
         points: At least three points, two coordinates each, in the order of the curve, [length].
-        closed: Whether the curve goes on from the last point to the first.
+        closed: Whether the curve continues from the last point to the first.
         flipped: Whether the body lies on the other side.
 
     Example:
@@ -43,10 +43,10 @@ class Profile(Patch):
     flipped: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse points that make no curve.
+        """Reject points that do not define a curve.
 
         Raises:
-            InvalidInputError: If they are too few, not of the plane, or some of them follow on themselves.
+            InvalidInputError: If they are too few, not in the plane, or consecutive ones coincide.
         """
         known = all(len(point) == 2 for point in self.points) and np.isfinite(self.points).all()
         if len(self.points) < 3 or not known or not self._lengths.all():

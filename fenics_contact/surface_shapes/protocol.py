@@ -1,4 +1,4 @@
-"""What a surface's true shape has to answer, and how it is asked."""
+"""The protocol of a surface's true shape, and its checked evaluation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fenics_contact.errors import InvalidInputError, calling
 class SurfaceShape(Protocol):
     """The true surface of a body, given by its signed distance; write a class with these members to add one.
 
-    A class that serves one dimension alone says so by an attribute ``dim``.
+    A class for only one dimension declares it by an attribute ``dim``.
     """
 
     def distance(self, points: np.ndarray) -> np.ndarray:
@@ -30,18 +30,18 @@ Quantity: TypeAlias = Literal["distance", "normals", "curvatures"]
 
 
 def asked(shape: SurfaceShape, what: Quantity, points: np.ndarray) -> np.ndarray:
-    """Ask a shape, and refuse what it must not answer.
+    """Evaluate a member of a shape, and check the result.
 
     Args:
         shape: The shape of a surface, or a rigid obstacle.
-        what: Which of its members.
-        points: Where, shape (n, dim), [length].
+        what: Name of the member.
+        points: Points, shape (n, dim), [length].
 
     Returns:
-        Its answer, shape (n,), (n, dim) or (n, dim, dim).
+        The result, shape (n,), (n, dim) or (n, dim, dim).
 
     Raises:
-        InvalidInputError: If the answer has another shape or is not finite.
+        InvalidInputError: If the result has another shape or is not finite.
         UserCodeError: If it raises.
     """
     name = f"the {what} of {type(shape).__name__}"
@@ -53,6 +53,6 @@ def asked(shape: SurfaceShape, what: Quantity, points: np.ndarray) -> np.ndarray
         given = f"shape {values.shape}" if values.shape != needed else "NaN or infinity"
         raise InvalidInputError(
             f"{name} must be finite numbers of shape {needed} for points of shape {points.shape}, got "
-            f"{given}: it gets all points at once, a row each"
+            f"{given}: it receives all points at once, one row each"
         )
     return values

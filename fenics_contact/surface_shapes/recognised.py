@@ -1,4 +1,4 @@
-"""Planes, spheres, cylinders, cones and tori known again by points and normals of theirs."""
+"""Recognition of planes, spheres, cylinders, cones and tori from points and normals."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from fenics_contact.surface_shapes.revolved import Revolved
 from fenics_contact.surface_shapes.round import Cylinder, Sphere
 from fenics_contact.surface_shapes.torus import Torus
 
-#: How far points may lie off a shape that is theirs, relative to their extent.
+#: Largest distance of points from their shape, relative to their extent.
 CLOSE = 1e-9
 
 
 def recognised(points: np.ndarray, normals: np.ndarray) -> SurfaceShape | None:
-    """Return the plane, sphere, cylinder, cone or torus that points lie on; in the plane the line or circle.
+    """Return the plane, sphere, cylinder, cone or torus on which points lie; in the plane the line or circle.
 
     Args:
-        points: Points of the surface, (n, 3 | 2), many more than a shape has numbers, [length].
+        points: Points of the surface, (n, 3 | 2), many more than a shape has parameters, [length].
         normals: Their unit normals out of the body, (n, 3 | 2).
 
     Returns:
-        The shape, or None where points lie off all of them by more than a billionth of their extent.
+        The shape, or None if points lie off all of them by more than a billionth of their extent.
     """
     size = float(np.ptp(points, axis=0).max())
     for fit in (_plane, _sphere, _about_an_axis):
         try:
             shape = fit(points, normals)
-        except (InvalidInputError, np.linalg.LinAlgError):  # no radius, no direction: another shape
+        except (InvalidInputError, np.linalg.LinAlgError):  # invalid radius or direction: another shape
             continue
         if shape is not None and np.abs(shape.distance(points)).max() <= CLOSE * size:
             return shape
@@ -78,14 +78,14 @@ def _about_an_axis(points: np.ndarray, normals: np.ndarray) -> SurfaceShape | No
 
 
 def _axis(points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return a point and the direction of the line that all normals meet, as well as any does.
+    """Return a point and the direction of the line that all normals meet, in the sense of least squares.
 
     A line through x along n meets the one through c along a where (x × n)·a + n·(c × a) = 0.
     """
     middle, size = points.mean(axis=0), float(np.ptp(points, axis=0).max())
     off = (points - middle) / size
     *_, flattest = np.linalg.svd(normals, full_matrices=False)[2]
-    if np.abs(normals @ flattest).max() < CLOSE:  # a prism: a circle across it has a centre
+    if np.abs(normals @ flattest).max() < CLOSE:  # a prism: its circular cross-section has a centre
         across = np.linalg.svd(flattest[None])[2][1:]
         circle = _sphere(off @ across.T, normals @ across.T)
         assert isinstance(circle, Sphere)

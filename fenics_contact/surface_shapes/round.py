@@ -9,12 +9,12 @@ import numpy as np
 from fenics_contact.checks import GivenVector, checked, unit_vector
 from fenics_contact.surface_shapes.places import outer, require_place, require_radius
 
-#: Arms shorter than this, relative to the radius, count as so long: in the middle all directions are normal.
+#: Smallest length of arms relative to the radius: at the centre all directions are normal.
 SHORTEST = float(np.finfo(float).eps)
 
 
 class _Round:
-    """The distance to a point or an axis less a radius, its sign turned where hollow."""
+    """The distance to a point or an axis less a radius, with the opposite sign if hollow."""
 
     radius: float
     hollow: bool
@@ -24,7 +24,7 @@ class _Round:
         return self._sign * (np.linalg.norm(self._arm(points), axis=1) - self.radius)
 
     def normals(self, points: np.ndarray) -> np.ndarray:
-        """Return ± the direction of the arm; in the middle any."""
+        """Return ± the direction of the arm; arbitrary at the centre."""
         return self._sign * self._out(points)[0]
 
     def curvatures(self, points: np.ndarray) -> np.ndarray:
@@ -42,7 +42,7 @@ class _Round:
         """Return direction and length of the arm."""
         arm = self._arm(points)
         length = np.linalg.norm(arm, axis=1)
-        # The column that the projection shortens least is a direction of the arm, whichever that is.
+        # The column that the projection shortens least is a possible direction of the arm.
         across = self._across(points.shape[1])
         any_way = across[np.argmax(np.diag(across))]
         arm[length == 0] = any_way
@@ -64,7 +64,7 @@ class Sphere(_Round):
     Attributes:
         centre: Its centre, [length].
         radius: Its radius > 0, [length].
-        hollow: Whether the body is all that lies outside the radius: a socket.
+        hollow: Whether the body is everything outside the radius: a socket.
     """
 
     centre: GivenVector
@@ -72,7 +72,7 @@ class Sphere(_Round):
     hollow: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse a radius that is not positive."""
+        """Reject a radius that is not positive."""
         require_place(self, self.centre)
         require_radius(self, self.radius)
 
@@ -88,13 +88,13 @@ class Sphere(_Round):
 @dataclass(frozen=True)
 @checked()
 class Cylinder(_Round):
-    """An endless round bar in space; or everything outside it.
+    """An infinite round bar in space; or everything outside it.
 
     Attributes:
         point: Any point of its axis, [length].
         axis: Direction of the axis; scaled to unit length.
         radius: Its radius > 0, [length].
-        hollow: Whether the body is all that lies outside the radius: a hole.
+        hollow: Whether the body is everything outside the radius: a hole.
     """
 
     point: GivenVector
@@ -103,7 +103,7 @@ class Cylinder(_Round):
     hollow: bool = False
 
     def __post_init__(self) -> None:
-        """Scale the axis, refuse a radius that is not positive."""
+        """Scale the axis; reject a radius that is not positive."""
         object.__setattr__(self, "axis", unit_vector(f"{type(self).__name__}.axis", self.axis, 3))
         require_place(self, self.point, (3,))
         require_radius(self, self.radius)

@@ -11,7 +11,7 @@ from fenics_contact.checks import checked
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.surface_shapes.differences import differences
 
-#: By how much the gradient of a distance may miss the length one.
+#: Tolerance of the length of a distance's gradient, which is one.
 SLOPE_TOLERANCE = 0.05
 
 
@@ -32,12 +32,12 @@ class SignedDistance:
         """Return the function's values.
 
         Raises:
-            InvalidInputError: If they are not one finite number a point.
+            InvalidInputError: If they are not one finite number per point.
         """
         values = np.asarray(self.function(points), dtype=np.float64)
         if values.shape != (len(points),) or not np.isfinite(values).all():
             raise InvalidInputError(
-                f"the distance of {type(self).__name__} must be one finite number a point, shape "
+                f"the distance of {type(self).__name__} must be one finite number per point, shape "
                 f"({len(points)},), got shape {values.shape} or NaN: write it for an array of points, "
                 "(n, dim) -> (n,)"
             )
@@ -47,7 +47,8 @@ class SignedDistance:
         """Return the gradient at unit length.
 
         Raises:
-            InvalidInputError: If its length is not one: the function is no distance; or of another shape.
+            InvalidInputError: If its length is not one, as the function is not a distance, or its shape is
+                wrong.
         """
         slope = differences(self.distance, points) if self.gradient is None else self.gradient(points)
         slope = np.asarray(slope, dtype=np.float64)
@@ -57,7 +58,7 @@ class SignedDistance:
                 f"{slope.shape}: write it for an array of points, (n, dim) -> (n, dim)"
             )
         length = np.linalg.norm(slope, axis=1)
-        if len(length) and not np.abs(length - 1.0).max() <= SLOPE_TOLERANCE:  # NaN is none, either
+        if len(length) and not np.abs(length - 1.0).max() <= SLOPE_TOLERANCE:  # also catches NaN
             worst = int(np.argmax(np.abs(length - 1.0)))
             raise InvalidInputError(
                 f"{type(self).__name__} needs the signed distance to its surface, whose gradient has length "

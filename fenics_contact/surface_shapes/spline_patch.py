@@ -11,7 +11,8 @@ from scipy.interpolate import BSpline, RectBivariateSpline, make_interp_spline
 from fenics_contact.surface_shapes.patch import Patch
 
 DEGREE = 5
-#: How far from a side that is one point, as those of a sphere are, relative to the range, normals are taken.
+#: Distance, relative to the range, from sides that degenerate to a point (poles) at which normals are
+#: evaluated.
 OFF_POLES = 1e-4
 
 
@@ -19,13 +20,13 @@ OFF_POLES = 1e-4
 class SplinePatch(Patch):
     """A smooth surface through a grid of points, in the plane a curve through a row.
 
-    The parameters count the points from 0. The body lies behind the normal X₁ × X₂, in the plane to the left
-    of the direction of the points. Beyond its border the surface goes on straight.
+    The parameters are the indices of the points. The body lies behind the normal X₁ × X₂, in the plane to the
+    left of the direction of the points. Beyond its border the surface continues straight.
 
     Attributes:
-        grid: Points of the surface, (n₁, n₂, 3) or (n₁, 2), of each periodic direction the first at the end
-            again.
-        periodic: Which directions come round, smoothly, one truth value each.
+        grid: Points of the surface, (n₁, n₂, 3) or (n₁, 2), in periodic directions with the first repeated at
+            the end.
+        periodic: Which directions are smoothly periodic, one boolean each.
         flipped: Whether the body lies on the other side.
     """
 
@@ -35,7 +36,7 @@ class SplinePatch(Patch):
     _poles: tuple[np.ndarray, np.ndarray] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Find the sides that are one point."""
+        """Detect the sides that degenerate to a point."""
         grid, counts = self.grid, self.grid.shape[:-1]
         small = 1e-9 * np.ptp(grid.reshape(-1, self.dim), axis=0).max()
         low, high = np.zeros(len(counts)), np.array(counts, dtype=float) - 1
@@ -57,11 +58,11 @@ class SplinePatch(Patch):
 
     @property
     def _borders(self) -> tuple[np.ndarray, np.ndarray]:
-        # Behind a pole the surface goes on.
+        # Beyond a pole the surface continues.
         return np.zeros(self.dim - 1), np.array(self.grid.shape[:-1]) - 1.0
 
     def _starts(self) -> np.ndarray:
-        # Between the points: at poles one of two parameters is any.
+        # Between the points: at poles one of two parameters is arbitrary.
         axes = [np.arange(count - 1) + 0.5 for count in self.grid.shape[:-1]]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, self.dim - 1)
 

@@ -1,4 +1,4 @@
-"""Tori: what the crowns of rings and of wires are."""
+"""Tori, such as the crowns of rings and links."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Torus:
         axis: Direction about which it is round; scaled to unit length.
         ring_radius: Radius of the circle that the middle of the wire forms, [length].
         tube_radius: Radius of the wire, above zero and below the ring's, [length].
-        hollow: Whether the body is all that lies outside the wire: a groove.
+        hollow: Whether the body is everything outside the wire: a groove.
     """
 
     centre: GivenVector
@@ -34,7 +34,7 @@ class Torus:
     hollow: bool = False
 
     def __post_init__(self) -> None:
-        """Scale the axis, refuse radii that make no ring."""
+        """Scale the axis; reject radii that do not form a ring."""
         object.__setattr__(self, "axis", unit_vector(f"{type(self).__name__}.axis", self.axis, 3))
         require_place(self, self.centre, (3,))
         require_radius(self, self.tube_radius, "tube_radius")
@@ -51,7 +51,7 @@ class Torus:
         return 3
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """Return the distance from the circle less the tube's radius, its sign turned where hollow."""
+        """Return the distance from the circle less the tube's radius, with the opposite sign if hollow."""
         return self._revolved.distance(points)
 
     def normals(self, points: np.ndarray) -> np.ndarray:

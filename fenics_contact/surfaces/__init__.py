@@ -1,4 +1,4 @@
-"""Surfaces of meshes: facets, the true surfaces that they stand for, and where points project on them."""
+"""Surfaces of meshes: facets, the true surfaces that they approximate, and projections on them."""
 
 from fenics_contact.surfaces.facet_areas import nodal_areas, quadrature_areas
 from fenics_contact.surfaces.facets import (

@@ -1,4 +1,4 @@
-"""Areas of facets, linear and quadratic, integrated as the load forms integrate them."""
+"""Areas of facets, linear and quadratic, with the quadrature of the load forms."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ def quadrature_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
 
     Args:
         points: Coordinates, shape (n_nodes, 3 or 2), [length].
-        facets: Node numbers as `BodyMesh.surfaces` has them, shape (n_facets, nodes of a facet).
+        facets: Node numbers as in `BodyMesh.surfaces`, shape (n_facets, nodes of a facet).
 
     Returns:
         Shape (n_facets,), [length²] or [length].
@@ -21,9 +21,9 @@ def quadrature_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
 
 
 def nodal_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
-    """Integrate the shape functions over every facet: forces of a unit pressure on its nodes.
+    """Integrate the shape functions over every facet: nodal forces of a unit pressure.
 
-    Two Gauss points a direction on linear facets, three on quadratic ones.
+    Two Gauss points per direction on linear facets, three on quadratic ones.
 
     Returns:
         Shape (n_facets, nodes of a facet), [length²] or [length].

@@ -12,12 +12,12 @@ from fenics_contact.errors import InvalidInputError
 #: Local coordinates of the corners of quadrilaterals.
 _S, _T = np.array([-1.0, 1.0, 1.0, -1.0]), np.array([-1.0, -1.0, 1.0, 1.0])
 
-#: A surface is cut by a plane of symmetry if so much of its normal lies in that plane.
+#: A plane of symmetry cuts a surface if this fraction of its normal lies in that plane.
 CUT = 0.5
 
 
 def facet_shape_values(local: np.ndarray, corners: int) -> np.ndarray:
-    """Evaluate the shape functions alone, at points of any leading shape; see `shape_functions`.
+    """Evaluate only the values of the shape functions, at points of any leading shape; see `shape_functions`.
 
     Args:
         local: Local coordinates, shape (..., dim − 1).
@@ -79,7 +79,7 @@ def edge_distance(local: np.ndarray, corners: int) -> np.ndarray:
 def corner_products(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
     """Return the cross product of the two edges at each corner, outward, shape (n_facets, corners, dim).
 
-    In the plane both ends of an edge get the edge itself turned clockwise: the body lies on its left.
+    In the plane it is at both ends of an edge the edge rotated clockwise: the body lies on its left.
     """
     x = points[facets]
     if facets.shape[1] == 2:
@@ -94,18 +94,18 @@ class Relief:
     """The true surface over facets, as a height along the interpolated normals of the nodes.
 
     On each facet the height is a cubic polynomial whose slopes at the corners lie in the true tangent planes
-    (Hermite interpolation along the edges, blended in between), plus what that leaves at the midpoints of the
+    (Hermite interpolation along the edges, blended in between), plus corrections at the midpoints of the
     edges and in the middle of the facet. The error is of the fourth order in the size of the facets, of the
-    sixth along arcs of circles. All entries are differences from what the facets tell, so that they stay as
-    they are when the nodes move a little: then normals turn as those of the facets do.
+    sixth along arcs of circles. All entries are relative to the facets, so that they are unchanged when the
+    nodes move slightly: normals then rotate with those of the facets.
 
     Attributes:
         normals: True unit normals of the nodes less the averaged ones, shape (n, dim).
         corners: The same for each corner of the facets, which differ where the surface has a crease, shape
             (n_facets, corners, dim).
-        rest: What the cubics leave at the midpoints of the edges, from each corner to the next, and in the
-            middle, shape (n_facets, corners + 1); in the plane at the midpoint, (n_facets, 1), [length].
-        flattened: How many facets were left flat, as the surface over them would fold.
+        rest: Corrections of the cubics at the midpoints of the edges, from each corner to the next, and in
+            the middle, shape (n_facets, corners + 1); in the plane at the midpoint, (n_facets, 1), [length].
+        flattened: Number of facets left flat, as the surface over them would fold.
     """
 
     normals: np.ndarray
@@ -116,7 +116,7 @@ class Relief:
 
 @dataclass(frozen=True)
 class FacetedSurface:
-    """Facets with the unit normals of their nodes, and what is known of the surface that they stand for.
+    """Facets with unit nodal normals and, if known, the true surface that they approximate.
 
     The normal field interpolated between the nodes is continuous across facets, unlike the facets' own.
 
@@ -128,7 +128,7 @@ class FacetedSurface:
         averaged: Outward unit normals at the nodes, averaged over the facets around each, shape (n, dim).
         areas: Area, in the plane length, that belongs to each node, shape (n,), [length²] or [length].
         mirrored: Components that the normals lack on planes of symmetry, shape (n, dim).
-        relief: What the true surface has and the facets lack; None if they are all that is known, or flat.
+        relief: The true surface relative to the facets; None if it is unknown or coincides with them.
     """
 
     nodes: np.ndarray
@@ -141,7 +141,7 @@ class FacetedSurface:
 
     @cached_property
     def normals(self) -> np.ndarray:
-        """Outward unit normals at the nodes, the true ones where they are known, shape (n, dim)."""
+        """Outward unit normals at the nodes, the true ones if known, shape (n, dim)."""
         if self.relief is None:
             return self.averaged
         true = self.averaged + self.relief.normals
@@ -163,13 +163,13 @@ def faceted_surface(
 ) -> FacetedSurface:
     """Build the surface from the coordinates of a body and rows of its node numbers.
 
-    On a plane of symmetry the facets of the mirror image belong to the average, too: the normals lie in it.
+    On a plane of symmetry the average includes the facets of the mirror image: the normals lie in it.
 
     Args:
         points: Coordinates, shape (n_nodes, 3), or (n_nodes, 2) where the facets are edges, [length].
         facets: Node numbers of triangles, quadrilaterals or edges, shape (n_facets, 3, 4 or 2).
-        mirrored: Which nodes lie on a plane of symmetry across each axis, shape (n_nodes, dim); by default
-            none does.
+        mirrored: Which nodes lie on a plane of symmetry normal to each axis, shape (n_nodes, dim); by default
+            none.
 
     Raises:
         InvalidInputError: If coordinates and facets are not of the same dimension.
@@ -188,7 +188,7 @@ def faceted_surface(
     np.add.at(summed, local, products)
     flat = np.zeros(own.shape, dtype=bool) if mirrored is None else mirrored[nodes]
     within = np.where(flat, 0.0, summed)
-    # A surface that lies in the plane itself is none that the plane cuts.
+    # A surface that lies in the plane itself is not cut by it.
     flat &= (np.linalg.norm(within, axis=1) > CUT * np.linalg.norm(summed, axis=1))[:, None]
     summed[flat] = 0.0
     areas = np.zeros(len(nodes))

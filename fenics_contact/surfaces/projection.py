@@ -14,33 +14,33 @@ from fenics_contact.surfaces.relief import heights
 
 #: Facets tried for each point in the first round, nearest centroids first.
 NEAREST = 9
-#: A facet is tried in the second round if its ball comes as near as the nearest centroid, times this factor.
+#: A facet is tried in the second round if its bounding ball is as near as the nearest centroid times this.
 REACH = 1.1
 NEWTON_STEPS = 25
-#: After so many steps a point that is still a facet's width away belongs to another facet.
+#: Number of steps after which a point still a facet's width away belongs to another facet.
 PATIENCE = 8
-#: How far outside a facet a projection may lie, in local coordinates: rounding on shared edges, no more. Far
-#: from the origin the rounding of coordinates is added.
+#: Tolerance of a projection outside a facet, in local coordinates, for rounding on shared edges. Far from the
+#: origin the rounding of coordinates is added.
 EDGE_TOLERANCE = 1e-9
-#: What Newton's method may leave, relative to the facet and the gap.
+#: Residual tolerance of Newton's method, relative to the facet and the gap.
 RESIDUAL = 1e-10
-#: How far beyond the outer edges of the surface. Where a plane of symmetry cuts two round bodies the averaged
-#: normals lean a little out of that plane, and nodes of one body would just miss the other.
+#: Tolerance beyond the outer edges of the surface. Where a plane of symmetry cuts two round bodies the
+#: averaged normals are slightly inclined to that plane, and nodes of one body would just miss the other.
 MARGIN = 0.1
 
 
 @dataclass(frozen=True)
 class Projection:
-    """Where points project to. Only points that have a projection are listed.
+    """Projections of points. Only points that have a projection are listed.
 
     Attributes:
-        point: Which of the given points, ascending, shape (n,).
+        point: Numbers of the points, ascending, shape (n,).
         facet: Facet hit, shape (n,).
         local: Local coordinates on it, shape (n, dim − 1).
         gap: Signed distance from the true surface along the normal, positive outside, shape (n,), [length].
         normal: Interpolated outward unit normal there, shape (n, dim).
-        beside: How far outside its facet it lies, in local coordinates, shape (n,); 0 for rounding.
-        lost: Points that look at a facet without a projection being found, ascending, shape (n_lost,).
+        beside: Distance outside its facet, in local coordinates, shape (n,); 0 for rounding.
+        lost: Points that face a facet but have no projection, ascending, shape (n_lost,).
     """
 
     point: np.ndarray
@@ -52,7 +52,7 @@ class Projection:
     lost: np.ndarray
 
     def part(self, chosen: np.ndarray) -> Projection:
-        """Return some of the projections, by number or by a mask."""
+        """Return some of the projections, by indices or a mask."""
         return replace(self, **{name: getattr(self, name)[chosen] for name in _EACH})
 
 
@@ -95,10 +95,10 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
     """Project points onto a surface: find ξ, g with x(ξ) + (h(ξ) + g) n(ξ) = point.
 
     x(ξ) is the (bi)linear facet, in the plane a straight edge, and n(ξ) the interpolated, normalised nodal
-    normal; h is what the true surface stands over the facet. Because n is continuous, so are gap, normal and
-    weights while a point slides from facet to facet. Of several projections the one with the smallest
-    ``|h + g|`` counts; surfaces that face the same way do not touch. Points without any that lie beside the
-    surface by no more than a twentieth of a facet's width meet the facet's continuation.
+    normal; h is the height of the true surface over the facet. Because n is continuous, so are gap, normal
+    and weights while a point slides from facet to facet. Of several projections that with the smallest ``|h +
+    g|`` is used; surfaces that face the same way do not touch. Points without any that lie beside the surface
+    by no more than a twentieth of a facet's width are projected on the facet's continuation.
 
     Args:
         points: Slave nodes, shape (n, dim), [length].
@@ -128,7 +128,7 @@ def _nearest(tree: cKDTree, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 def _within_reach(
     tree: cKDTree, radius: np.ndarray, points: np.ndarray, waiting: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pair the waiting points with all facets that can be closest, whatever the grading of the mesh."""
+    """Pair the remaining points with all facets that can be closest, for any grading of the mesh."""
     if len(waiting) == 0:
         return waiting, waiting
     nearest, _ = tree.query(points[waiting])
@@ -148,19 +148,19 @@ def _solve(
     facet: np.ndarray,
     rounding: float,
 ) -> Projection:
-    """Solve for each (point, facet) pair by Newton's method; keep answers in a facet or barely beside it."""
+    """Solve for each (point, facet) pair by Newton's method; keep those in a facet or barely beside it."""
     nodes = master.facets[facet]
-    # Seen from the facet's own corner all is as exact far from the origin as near it.
+    # Relative to the facet's own corner it is as exact far from the origin as near it.
     start = master.points[nodes[:, 0]]
     corners, target = master.points[nodes] - start[:, None], points[point] - start
     corner_normals = master.normals[nodes]
     size = np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).max(axis=1)
     local = np.full((len(point), master.dim - 1), 1 / 3 if master.corners == 3 else 0.0)
     gap = np.zeros(len(point))
-    at = np.arange(len(point))  # the pairs still iterated
+    at = np.arange(len(point))  # the pairs still iterating
     for count in range(NEWTON_STEPS):
         step = _newton_step(corners[at], corner_normals[at], target[at], local[at], gap[at], size[at])
-        # A point far beyond the facet belongs to another one; keeping it near keeps its iterates finite.
+        # A point far beyond the facet belongs to another one; limiting it keeps its iterates finite.
         local[at] = np.clip(local[at] + step[:, :-1], -3, 3)
         gap[at] += step[:, -1]
         moving = np.abs(step[:, :-1]).max(axis=1) > 1e-8  # quadratic convergence: next comes rounding
@@ -183,8 +183,8 @@ def _solve(
 
 
 def _local_rounding(matrix: np.ndarray, rounding: float) -> np.ndarray:
-    """Return how far rounding moves local coordinates at most, shape (n,)."""
-    # No entry of the inverse is larger than the product of the columns but one over the determinant.
+    """Return a bound of the rounding of local coordinates, shape (n,)."""
+    # Entries of the inverse are bounded by the product of all but one column norms over the determinant.
     tangents = np.linalg.norm(matrix[:, :, :-1], axis=1)
     cofactor = tangents.max(axis=1) if matrix.shape[1] == 3 else np.ones(len(matrix))
     return np.asarray(rounding * cofactor / np.maximum(np.abs(np.linalg.det(matrix)), 1e-300))
@@ -198,7 +198,7 @@ def _newton_step(
     gap: np.ndarray,
     size: np.ndarray,
 ) -> np.ndarray:
-    """Return the changes of (ξ, g), shape (n, dim); none where the facet and its normals are degenerate."""
+    """Return the changes of (ξ, g), shape (n, dim); zero where the facet and its normals are degenerate."""
     values, derivatives = shape_functions(local, corners.shape[1])
     normal, length = interpolated_normal(values, normals)
     residual = np.einsum("nk,nkd->nd", values, corners) + gap[:, None] * normal - target
@@ -209,16 +209,16 @@ def _newton_step(
 
 
 def _best(found: Projection, rounding: float) -> Projection:
-    """Keep of each point what lies least beside its facet; then the smallest |gap|, then the lowest facet.
+    """Keep the projection least beside its facet for each point; then by smallest |gap|, then facet.
 
     Args:
         found: Projections, several of a point.
-        rounding: By how much coordinates are rounded; gaps over an edge of two facets are alike but for it.
+        rounding: Rounding of coordinates, within which gaps at an edge of two facets agree.
     """
     distance = np.abs(found.gap)
     order = np.lexsort((distance, found.beside, found.point))
     _, first, group = np.unique(found.point[order], return_index=True, return_inverse=True)
-    nearest = order[first][group.ravel()]  # of the same point, for each in their order
+    nearest = order[first][group.ravel()]  # of the same point, for each in order
     alike = distance[order] - distance[nearest] <= rounding + coordinate_rounding(distance)
     order = order[alike & (found.beside[order] == found.beside[nearest])]
     order = order[np.lexsort((found.facet[order], found.point[order]))]

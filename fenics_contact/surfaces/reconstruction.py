@@ -1,4 +1,4 @@
-"""The true surface that facets stand for, reconstructed from its nodes where it is smooth."""
+"""Reconstruction of the true surface from the nodes of its facets where it is smooth."""
 
 from __future__ import annotations
 
@@ -15,29 +15,28 @@ from fenics_contact.surfaces.relief import edges_at_corners, slopes
 
 #: Angle between the normals of neighbouring facets above which their common edge is a crease, in degrees.
 CREASE = 40.0
-#: A crease turns by so many times as much as a smooth surface does at the next edges.
+#: Ratio of a crease's angle to those of a smooth surface at the next edges.
 SEVERAL = 3.0
-#: Edges run alike if the cosine of the angle between them is above this.
+#: Edges are parallel if the cosine of the angle between them is above this.
 ALIKE = 0.9
-#: Angles below this one are none, in radians.
+#: Angles below this count as zero, in radians.
 ROUNDING = 1e-6
-#: Surfaces that rise by more than this much of an edge at its end have a cusp there, or fold.
+#: Surfaces with a slope above this at the end of an edge have a cusp there, or fold.
 STEEPEST = 1.0
-#: Directions of the fit that the neighbours tell less about than this part of the best known one stay as the
-#: facets have them.
+#: Directions of the fit whose singular value is below this fraction of the largest are left as in the facets.
 UNKNOWN = 1e-6
 
 
 def reconstructed(surface: FacetedSurface, order: int = 2) -> FacetedSurface:
-    """Return a surface with the relief that the positions of its nodes suggest.
+    """Return a surface with the relief reconstructed from its nodes.
 
     At every node a quadratic polynomial is fitted to the nodes within two rings of facets, which gives its
-    normal with an error of the second order, also at the rim; cubics with these normals miss the surface by
-    an error of the third order. Creases stay, where the surface turns by more than `CREASE` degrees from
-    facet to facet or by several times as much as beside: on their two sides nodes have different normals.
+    normal with an error of the second order, also at the rim; the error of cubics with these normals is of
+    the third order. Creases are kept, where the surface turns by more than `CREASE` degrees from facet to
+    facet or by several times as much as nearby: nodes have different normals on their two sides.
 
-    With cubic polynomials over three rings, and with what Hermite's cubics leave in the middle of an arc of
-    their curvature, the error is of the fourth order: the difference tells how far the former are off.
+    With cubic polynomials over three rings, and with the error of Hermite's cubics in the middle of an arc of
+    their curvature, the error is of the fourth order: the difference estimates that of the former.
 
     Args:
         surface: Facets without relief.
@@ -57,12 +56,12 @@ def reconstructed(surface: FacetedSurface, order: int = 2) -> FacetedSurface:
         edges = 1 if surface.corners == 2 else surface.corners
         points, of_corner = surface.points[surface.facets], wedges.of_corner
         along = (np.roll(points, -1, axis=1) - points)[:, :edges]
-        # An arc of curvature κ over the edge d stands κ³ d⁴ / 128 higher in its middle than the cubic.
+        # An arc of curvature κ over the edge d is κ³ d⁴ / 128 higher in its middle than the cubic.
         ends = (bends[of_corner[:, :edges]], bends[np.roll(of_corner, -1, axis=1)[:, :edges]])
         curved = sum(np.einsum("nki,nkij,nkj->nk", along, bend, along) for bend in ends) / 2
         rest[:, :edges] = -(curved**3) / (128.0 * np.einsum("nkd,nkd->nk", along, along))
     at_nodes = np.zeros_like(surface.averaged)
-    # On creases the averaged normals stay, also where a surface makes one with its mirror image.
+    # On creases the averaged normals are kept, also where a surface forms one with its mirror image.
     whole = np.bincount(wedges.node)[wedges.node] == 1
     whole &= (wedges.mirrored == surface.mirrored[wedges.node]).all(axis=1)
     at_nodes[wedges.node[whole]] = normals[whole] - surface.averaged[wedges.node[whole]]
@@ -95,7 +94,7 @@ class _Joints:
     Attributes:
         facets: The facets on both sides, shape (n, 2).
         corners: Their corners that meet there, numbered facet by facet, shape (n, 2, ends).
-        angle: By how much the surface turns from one to the other, shape (n,), in radians.
+        angle: Angle between the two, shape (n,), in radians.
     """
 
     facets: np.ndarray
@@ -112,7 +111,7 @@ class _Wedges:
     Attributes:
         of_corner: Wedge of each corner, shape (n_facets, corners).
         node: Node of each wedge, shape (n_wedges,).
-        mirrored: Across which planes of symmetry it goes on smoothly, shape (n_wedges, dim).
+        mirrored: Planes of symmetry across which it continues smoothly, shape (n_wedges, dim).
     """
 
     of_corner: np.ndarray
@@ -143,7 +142,7 @@ def _wedges(surface: FacetedSurface) -> _Wedges:
 
 
 def _joints_with_images(surface: FacetedSurface) -> list[_Joints]:
-    """Find the joints of a surface with its mirror images across each axis."""
+    """Return the joints of a surface with its mirror images across each axis."""
     count, corners = surface.facets.shape
     corner, found = np.arange(count * corners).reshape(count, corners), []
     summed = corner_products(surface.points, surface.facets).sum(axis=1)
@@ -162,10 +161,10 @@ def _joints_with_images(surface: FacetedSurface) -> list[_Joints]:
 
 
 def _is_crease(surface: FacetedSurface, joints: _Joints) -> np.ndarray:
-    """Tell which joints are creases.
+    """Return which joints are creases.
 
-    A smooth surface turns by similar angles at the next joints on both sides that run alike; where it turns
-    by several times as much as on one of them, and by more than at the others there, it has a crease, however
+    A smooth surface turns by similar angles at the next parallel joints on both sides; where it turns by
+    several times as much as at one of them, and by more than at the others there, it has a crease, however
     shallow.
     """
     nodes = surface.facets.ravel()[joints.corners[:, 0]]
@@ -175,7 +174,7 @@ def _is_crease(surface: FacetedSurface, joints: _Joints) -> np.ndarray:
     along = surface.points[nodes[:, -1]] - surface.points[nodes[:, 0]]
     along = along / np.maximum(np.linalg.norm(along, axis=1), np.finfo(float).tiny)[:, None]
     rim = at_node.getnnz(axis=1) < np.bincount(surface.facets.ravel(), minlength=size)
-    expected = np.full(count, np.inf)  # beyond the rim nothing is known
+    expected = np.full(count, np.inf)  # unknown beyond the rim
     for side in (0, 1):
         beside = surface.facets[joints.facets[:, side]]
         apart = (beside[..., None] != nodes[:, None]).all(axis=-1)
@@ -186,7 +185,7 @@ def _is_crease(surface: FacetedSurface, joints: _Joints) -> np.ndarray:
         alike |= surface.dim == 2
         share = np.where(alike, 1.0, 1.0 / SEVERAL)
         turned, known = np.zeros(count), np.bincount(pairs.row, alike, count) > 0
-        if surface.corners == 3:  # at the rim, the joint that runs alike may be missing
+        if surface.corners == 3:  # at the rim, the parallel joint may be missing
             known &= across @ rim == 0
         np.maximum.at(turned, pairs.row, share * joints.angle[pairs.col])
         expected = np.minimum(expected, np.where(known, turned, np.inf))
@@ -195,7 +194,7 @@ def _is_crease(surface: FacetedSurface, joints: _Joints) -> np.ndarray:
 
 
 def _joints(surface: FacetedSurface) -> _Joints:
-    """Find the joints of a surface."""
+    """Return the joints of a surface."""
     count, corners = surface.facets.shape
     corner = np.arange(count * corners).reshape(count, corners)
     if corners == 2:
@@ -217,7 +216,7 @@ def _joints(surface: FacetedSurface) -> _Joints:
 
 
 def _matches(keys: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return where wanted keys stand among the keys, and which of the wanted ones do."""
+    """Return the positions of wanted keys among the keys, and which of them exist."""
     order = np.argsort(keys)
     place = order[np.clip(np.searchsorted(keys[order], wanted), 0, len(keys) - 1)]
     met = np.flatnonzero(keys[place] == wanted)
@@ -236,7 +235,7 @@ def _fitted(surface: FacetedSurface, wedges: _Wedges, order: int) -> tuple[np.nd
 
     Returns:
         Their normals, shape (n_wedges, dim), and their second derivatives along the surface, positive where
-        it is hollow, shape (n_wedges, dim, dim), [1 / length].
+        it is concave, shape (n_wedges, dim, dim), [1 / length].
     """
     node, mirrored = wedges.node, wedges.mirrored
     count, dim = len(node), surface.dim
@@ -274,7 +273,7 @@ def _powers(dim: int, order: int) -> list[tuple[int, ...]]:
 
 
 def _rings(wedge: np.ndarray, count: int, rings: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return which wedges lie within so many rings of facets around each, as pairs without itself."""
+    """Return the wedges within a number of rings of facets around each, as pairs without itself."""
     facet = np.repeat(np.arange(len(wedge)), wedge.shape[1])
     of_facet = sp.csr_matrix((np.ones(wedge.size), (wedge.ravel(), facet)), shape=(count, len(wedge)))
     ring = within = (of_facet @ of_facet.T).tocsr()

@@ -1,4 +1,4 @@
-"""By how much a true surface stands over its flat facets, see `fenics_contact.surfaces.facets.Relief`."""
+"""Heights of a true surface over its flat facets, see `fenics_contact.surfaces.facets.Relief`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Heights:
 
 
 def heights(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> Heights:
-    """Return by how much the true surface stands over points of facets, along the interpolated normals.
+    """Return the heights of the true surface over points of facets, along the interpolated normals.
 
     Args:
         surface: The surface.
@@ -61,7 +61,7 @@ def slopes(surface: FacetedSurface, facet: np.ndarray) -> np.ndarray:
 
 
 def corner_normals(surface: FacetedSurface, facet: np.ndarray) -> np.ndarray:
-    """Return the true normals at the corners of facets, of a length near one, shape (n, corners, dim)."""
+    """Return the true normals at the corners of facets, of length close to one, shape (n, corners, dim)."""
     assert surface.relief is not None
     return surface.averaged[surface.facets[facet]] + surface.relief.corners[facet]
 
@@ -74,7 +74,7 @@ def edges_at_corners(points: np.ndarray) -> np.ndarray:
 def height_functions(
     local: np.ndarray, corners: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Evaluate the polynomials that slopes and rests are multiplied with, and their derivatives.
+    """Evaluate the polynomials that multiply slopes and rests, and their derivatives.
 
     Args:
         local: Local coordinates as for `shape_functions`, shape (n, dim − 1).

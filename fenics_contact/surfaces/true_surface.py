@@ -1,4 +1,4 @@
-"""The surface that facets stand for: of a known shape, reconstructed, or the facets themselves."""
+"""The surface that facets represent: of a known shape, reconstructed, or the facets themselves."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from fenics_contact.surfaces.projection import interpolated_normal
 from fenics_contact.surfaces.reconstruction import reconstructed
 from fenics_contact.surfaces.relief import edges_at_corners, heights, slopes
 
-#: What is taken for a surface between its nodes, see `fenics_contact.scene.ContactPair`.
+#: Representation of a surface between its nodes, see `fenics_contact.scene.ContactPair`.
 Geometry: TypeAlias = Literal["best", "reconstructed", "faceted"]
 
 _KNOWN: WeakKeyDictionary[BodyMesh, dict[Hashable, Relief | None]] = WeakKeyDictionary()
-"""Reliefs of the surfaces of meshes, which those that are reshaped share."""
+"""Reliefs of the surfaces of meshes, shared with reshaped meshes."""
 
-#: Steps of Newton's method along a ray to a shape; distances are nearly linear there.
+#: Newton steps along a ray to a shape; distances are nearly linear there.
 STEPS = 12
-#: Directions along a shape: the cosine of their angle to its normal is less than this.
+#: Directions count as tangential to a shape if the cosine of their angle to its normal is below this.
 ALONG = 0.02
-#: By how much normals of shapes that meet may differ, in radians, where they meet smoothly.
+#: Largest angle in radians between the normals of shapes that meet smoothly.
 CREASE = 0.02
-#: A true surface has no relief if it stands over its facets by less than so many times their size.
+#: A true surface has no relief if its height over the facets is below this multiple of their size.
 FLAT = 1e-12
 
 
@@ -47,10 +47,10 @@ def true_surface(
     Args:
         mesh: The mesh.
         name: Name of the surface.
-        geometry: What is taken for it between its nodes.
-        mirrored: Which nodes lie on a plane of symmetry across each axis, shape (n_nodes, dim).
-        finer: Take what is known better than that, to tell the error: the shape, or what is reconstructed
-            with an error of the next order.
+        geometry: Its representation between the nodes.
+        mirrored: Which nodes lie on a plane of symmetry normal to each axis, shape (n_nodes, dim).
+        finer: Use a better representation, to estimate the error: the shape, or a reconstruction of the next
+            order.
     """
     marks = np.zeros(mesh.points.shape, dtype=bool) if mirrored is None else mirrored
     found = faceted_surface(mesh.points, mesh.linear.surfaces[name], marks)
@@ -69,7 +69,7 @@ def true_surface(
 
 
 def _with_areas(surface: FacetedSurface, mesh: BodyMesh, name: str) -> FacetedSurface:
-    """Put the area of a quadratic facet where a unit pressure puts forces, which linear facets do not say."""
+    """Distribute the area of quadratic facets like the nodal forces of a unit pressure."""
     if mesh.order == 1:
         return surface
     facets = mesh.surfaces[name]
@@ -86,7 +86,7 @@ def _relief(
 
 
 def _is_flat(surface: FacetedSurface) -> bool:
-    """Tell whether the facets are the surface, but for rounding."""
+    """Return whether the facets coincide with the surface, up to rounding."""
     relief = surface.relief
     assert relief is not None
     edges = np.linalg.norm(edges_at_corners(surface.points[surface.facets]), axis=3)
@@ -96,10 +96,10 @@ def _is_flat(surface: FacetedSurface) -> bool:
 
 
 def by_shape(surface: FacetedSurface, shape: SurfaceShape) -> FacetedSurface:
-    """Return a surface with the relief of the shape that its nodes lie on.
+    """Return a surface with the relief of the shape on which its nodes lie.
 
-    Nodes that lie off the shape by a little stay where they are; the heights between them are taken from
-    there. Where several shapes meet in a crease, or one its mirror image, each facet keeps to its own.
+    Nodes slightly off the shape are not moved; the heights between them are relative to them. Where several
+    shapes meet in a crease, or one its mirror image, each facet uses its own.
 
     Args:
         surface: Facets without relief.
@@ -123,7 +123,7 @@ def by_shape(surface: FacetedSurface, shape: SurfaceShape) -> FacetedSurface:
 
 
 def _parts(shape: SurfaceShape, middles: np.ndarray) -> list[tuple[SurfaceShape, np.ndarray]]:
-    """Return the shapes that a shape is joined of, and which facets have which, by their middles."""
+    """Return the parts of a joined shape, and the facets of each, by their middles."""
     if not isinstance(shape, Joined):
         return [(shape, np.ones(len(middles), dtype=bool))]
     nearest = shape.nearest(middles)
@@ -140,7 +140,7 @@ def _fitted(
     normals: np.ndarray,
     corners: np.ndarray,
 ) -> FacetedSurface:
-    """Return a surface with the normals of nodes and of corners, and the heights that parts have over it."""
+    """Return a surface with the normals of nodes and of corners, and the heights of parts over it."""
     samples = sample_points(surface.corners)
     count, nodes = len(surface.facets), surface.facets
     relief = Relief(
@@ -152,7 +152,7 @@ def _fitted(
         _height_over_parts(fitted.points[nodes[:, k]], fitted.normals[nodes[:, k]], parts)
         for k in range(surface.corners)
     ]
-    # The middle last: what the midpoints of the edges leave there counts.
+    # The middle last: its correction is relative to that of the midpoints of the edges.
     for number, sample in enumerate(samples):
         local = np.broadcast_to(sample, (count, len(sample)))
         values = facet_shape_values(local, surface.corners)
@@ -166,7 +166,7 @@ def _fitted(
 def _height_over_parts(
     points: np.ndarray, directions: np.ndarray, parts: list[tuple[SurfaceShape, np.ndarray]]
 ) -> np.ndarray:
-    """Return how far it is from a point on each facet to the shape of the facet, shape (n,)."""
+    """Return the distance from a point on each facet to the shape of the facet, shape (n,)."""
     height = np.zeros(len(points))
     for part, mine in parts:
         height[mine] = height_over(points[mine], directions[mine], part)
@@ -183,7 +183,7 @@ def sample_points(corners: int) -> np.ndarray:
 
 
 def height_over(points: np.ndarray, directions: np.ndarray, shape: SurfaceShape) -> np.ndarray:
-    """Return how far it is from points along directions to a shape, shape (n,), [length].
+    """Return the distances from points along directions to a shape, shape (n,), [length].
 
     Args:
         points: Points near the shape, shape (n, dim), [length].
@@ -191,7 +191,7 @@ def height_over(points: np.ndarray, directions: np.ndarray, shape: SurfaceShape)
         shape: The shape.
 
     Raises:
-        InvalidInputError: If a direction runs along the shape, where no point of it is the one above.
+        InvalidInputError: If a direction is tangential to the shape, so that no unique point lies above.
     """
     height = np.zeros(len(points))
     for _ in range(STEPS):
@@ -207,7 +207,7 @@ def height_over(points: np.ndarray, directions: np.ndarray, shape: SurfaceShape)
 
 
 def _check_across(cosine: np.ndarray, place: np.ndarray, shape: SurfaceShape) -> None:
-    """Refuse directions that run along a shape."""
+    """Reject directions that are tangential to a shape."""
     along = np.abs(cosine) < ALONG
     if along.any():
         where = ", ".join(f"{x:.6g}" for x in place[np.argmax(along)])

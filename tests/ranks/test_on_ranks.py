@@ -33,7 +33,7 @@ EXPECTED = {
     "distance_raises": ("UserCodeError", f"the normals of DistanceObstacle {BUG}"),
     "distance_is_nan": (
         "InvalidInputError",
-        "the distance of DistanceObstacle must be one finite number a point",
+        "the distance of DistanceObstacle must be one finite number per point",
     ),
     "distance_differs": ("InvalidInputError", f"{SAME}what ContactPair 0 asks its obstacle, Distance"),
     "gradient_raises": ("UserCodeError", f"the normals of DistanceObstacle {BUG}"),

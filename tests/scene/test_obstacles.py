@@ -187,7 +187,7 @@ def test_a_distance_that_is_no_number_a_point_is_refused(
     function: Callable[[np.ndarray], np.ndarray], given: str
 ) -> None:
     message = (
-        r"the distance of DistanceObstacle must be one finite number a point, shape \(200,\), .*: write it "
+        r"the distance of DistanceObstacle must be one finite number per point, shape \(200,\), .*: write it "
         r"for an array of points"
     )
     with np.errstate(all="ignore"):

@@ -1,4 +1,4 @@
-"""Mortar coupling: surfaces whose meshes do not match, joined in weighted means by dual multipliers."""
+"""Mortar coupling: surfaces with non-matching meshes, coupled in weighted means by dual multipliers."""
 
 from fenics_contact.pairing.mortar.coupling import MortarCoupling, mortar_coupling
 

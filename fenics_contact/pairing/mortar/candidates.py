@@ -7,21 +7,21 @@ from scipy.spatial import cKDTree
 
 from fenics_contact.pairing.mortar.planes import Planes
 
-#: Facets face each other if their normals are opposite within 60 degrees: least cosine of that angle.
+#: Facets face each other if their normals are opposite within 60 degrees: smallest cosine of that angle.
 FACING = 0.5
-#: Steps along a normal towards the master; planes are reached in one.
+#: Number of steps along a normal towards the master; one suffices for planes.
 STEPS = 5
-#: Among so many nearest master facets the first that faces the slave shows the way.
+#: Number of nearest master facets, the first of which that faces the slave determines the step.
 NEAREST = 4
 
 
 def candidate_pairs(slave: Planes, master: Planes) -> tuple[np.ndarray, np.ndarray]:
-    """Pair slave facets with all master facets that they can overlap with when seen along their normals.
+    """Pair slave facets with all master facets that they may overlap along their normals.
 
-    From the centre of every slave facet a search along its normal, in both directions, finds the place where
-    the master is, at whatever distance; of several layers of the master that is the nearest one. Facets near
-    that place are candidates: further away from it along the normal than twice the sum of both facets' radii
-    (the most that an inclination of 60 degrees explains) lies another layer.
+    From the centre of every slave facet a search along its normal, in both directions, finds the master at
+    any distance; of several layers of the master the nearest one. Facets near that point are candidates:
+    facets further away along the normal than twice the sum of both radii (the maximum for an inclination of
+    60 degrees) belong to another layer.
 
     Args:
         slave: Planes of the slave facets.
@@ -38,12 +38,12 @@ def candidate_pairs(slave: Planes, master: Planes) -> tuple[np.ndarray, np.ndarr
 
 
 def _feet(slave: Planes, master: Planes) -> np.ndarray:
-    """Return where the normals through the centres of slave facets come to the master, shape (n, dim)."""
+    """Return where the normals through the centres of slave facets reach the master, shape (n, dim)."""
     tree, feet = cKDTree(master.origin), slave.origin.copy()
     for _ in range(STEPS):
         _, nearest = tree.query(feet, k=np.arange(min(NEAREST, tree.n)) + 1)
         cosine = np.einsum("nd,nkd->nk", slave.normal, master.normal[nearest])
-        # The nearest one that faces the slave, or the very nearest where none does.
+        # The nearest one that faces the slave, or the nearest of all if none does.
         choice = np.argmax(cosine < -FACING, axis=1)[:, None]
         facet = np.take_along_axis(nearest, choice, axis=1)[:, 0]
         cosine = np.take_along_axis(cosine, choice, axis=1)[:, 0]
@@ -56,7 +56,7 @@ def _feet(slave: Planes, master: Planes) -> np.ndarray:
 
 
 def _size_classes(radius: np.ndarray) -> list[np.ndarray]:
-    """Group facets so that no radius is more than twice another, whatever the grading of the mesh."""
+    """Group facets so that no radius is more than twice another, for any grading of the mesh."""
     octave = np.floor(np.log2(radius / radius.min())).astype(np.int64)
     return [np.flatnonzero(octave == which) for which in np.unique(octave)]
 

@@ -42,7 +42,7 @@ class Cells:
 def cells_of(
     planes: Planes, pair_slave: np.ndarray, pair_master: np.ndarray, master: FacetedSurface
 ) -> tuple[Cells, np.ndarray, np.ndarray, np.ndarray]:
-    """Clip pairs of facets and place quadrature points; return also what the cells' numbers stand for.
+    """Clip pairs of facets and place quadrature points; also return the meaning of the cells' numbers.
 
     Args:
         planes: Planes of the slave facets.
@@ -59,7 +59,7 @@ def cells_of(
     near = ~apart.any(axis=1)
     window, subject, heights = window[near], subject[near], heights[near]
     pair_slave, pair_master = pair_slave[near], pair_master[near]
-    # Seen from the slave the master's facets turn the other way round.
+    # Seen from the slave the orientation of the master's facets is reversed.
     vertices, count = clip(subject[:, ::-1], window)
     middle = heights.mean(axis=1)
     count = np.where(hidden(vertices, count, middle, pair_slave, planes.area), 0, count)

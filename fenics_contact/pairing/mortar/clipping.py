@@ -10,7 +10,7 @@ import numpy as np
 
 
 def clip(subject: np.ndarray, window: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Cut polygons to convex windows (Sutherland–Hodgman), all pairs at once; intervals to intervals.
+    """Clip polygons to convex windows (Sutherland–Hodgman), all pairs at once; intervals to intervals.
 
     Args:
         subject: Polygons, shape (n, k, 2), or intervals, shape (n, 2, 1).
@@ -19,7 +19,7 @@ def clip(subject: np.ndarray, window: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
     Returns:
         Vertices in the order of the subject, shape (n, k', 2) or (n, 2, 1), unused ones equal to the first,
-        and their numbers, shape (n,), zero where nothing is left.
+        and their numbers, shape (n,), zero for empty intersections.
     """
     if window.shape[2] == 1:
         low = np.maximum(subject.min(axis=1), window.min(axis=1))
@@ -36,11 +36,11 @@ def clip(subject: np.ndarray, window: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def _half(
     vertices: np.ndarray, count: np.ndarray, start: np.ndarray, end: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Keep what lies on the left of the lines from ``start`` to ``end``."""
+    """Keep the part to the left of the lines from ``start`` to ``end``."""
     along = (end - start)[:, None]
     away = vertices - start[:, None]
     left = along[:, :, 0] * away[:, :, 1] - along[:, :, 1] * away[:, :, 0]
-    # Unused places repeat the first vertex, so the one after the last is the first.
+    # Unused entries repeat the first vertex, so the one after the last is the first.
     following, left_then = np.roll(vertices, -1, axis=1), np.roll(left, -1, axis=1)
     used = np.arange(vertices.shape[1]) < count[:, None]
     inside = left >= 0
@@ -60,7 +60,7 @@ def _half(
 
 
 def simplices(vertices: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Cut convex polygons into the triangles between their first vertex and the sides opposite to it.
+    """Cut convex polygons into triangles between their first vertex and the opposite sides.
 
     Args:
         vertices: Polygons, shape (n, k, 2), or intervals, shape (n, 2, 1), as `clip` returns them.

@@ -18,18 +18,18 @@ from fenics_contact.pairing.mortar.planes import check_convex, planes_of
 from fenics_contact.pairing.mortar.relief import relief_of_cells
 from fenics_contact.surfaces import FacetedSurface
 
-#: Share of a node's area that has to face the master, or the node carries no multiplier.
+#: Fraction of a node's area that must face the master for the node to carry a multiplier.
 LEAST_SHARE = 1e-8
-#: Pairs of facets treated at once: the arrays of a chunk stay below some 50 MB, and mostly in the cache.
+#: Pairs of facets per chunk: its arrays stay below about 50 MB, and mostly in the cache.
 CHUNK = 4096
 
 
 @dataclass(frozen=True)
 class MortarCoupling:
-    """Which slave nodes carry a multiplier, and the weighted mean of the master that each of them meets.
+    """The slave nodes that carry a multiplier, and the weighted mean of the master for each.
 
     The dual functions ψ_i satisfy ∫ ψ_i N_j = δ_ij D_i with the shape functions N_j of the slave, so that the
-    constraint of one multiplier contains one slave node alone: n_i · (u_i − Σ_j (M_ij / D_i) u_j).
+    constraint of one multiplier contains only one slave node: n_i · (u_i − Σ_j (M_ij / D_i) u_j).
 
     Attributes:
         node: Positions in ``slave.nodes``, ascending, shape (n,).
@@ -37,9 +37,9 @@ class MortarCoupling:
             in plane problems [length].
         weight: M_ij / D_i with M_ij = ∫ ψ_i N_j, N_j of the master, shape (n, len(master.nodes)); rows add up
             to one.
-        normal: Unit normal from master to slave, the averaged slave normal turned round, shape (n, dim).
-        gap: n_i · (x_i − Σ_j weight_ij x_j), less the weighted mean of what the true surfaces stand over
-            their facets, positive when open, shape (n,), [length].
+        normal: Unit normal from master to slave, the averaged slave normal reversed, shape (n, dim).
+        gap: n_i · (x_i − Σ_j weight_ij x_j), less the weighted mean height of the true surfaces over their
+            facets, positive when open, shape (n,), [length].
     """
 
     node: np.ndarray
@@ -64,7 +64,7 @@ def mortar_coupling(
 
     Args:
         slave: Surface that carries the multipliers.
-        master: Surface that it meets.
+        master: The opposite surface.
         comm: Communicator of the ranks that share the work, all with the same surfaces; this one by default.
 
     Raises:
@@ -87,7 +87,7 @@ def mortar_coupling(
                 f"master in {master.dim}: build both from plane or both from solid bodies"
             )
         part = _integrals(slave, master, mine)
-    # All ranks add up in the same order, so that their sums agree to the last bit.
+    # All ranks sum in the same order, so that their sums are bitwise equal.
     parts = [found for found in comm.allgather(part) if found is not None]
     return _coupling(slave, master, *(sum(column) for column in zip(*parts, strict=True)))
 
@@ -99,10 +99,10 @@ def _coupling(
     integrals: sparse.csr_matrix,
     relief: np.ndarray,
 ) -> MortarCoupling:
-    """Keep the nodes that face the master, and divide."""
+    """Keep the nodes that face the master, and divide by their areas."""
     node = np.flatnonzero(area > LEAST_SHARE * slave.areas)
     chosen = integrals[node]
-    # The sums of the rows are the areas, and with their own rounding errors they divide better.
+    # The row sums are the areas, and dividing by them cancels their rounding errors.
     weight = (sparse.diags(1 / np.asarray(chosen.sum(axis=1)).ravel()) @ chosen).tocsr()
     weight.sort_indices()
     normal = -slave.normals[node]
@@ -117,8 +117,8 @@ def _integrals(
     """Integrate over the chosen facets.
 
     Returns:
-        D, shape (slave nodes,), M, shape (slave nodes, master nodes), and ∫ ψ_i of what the true surfaces
-        stand over their facets, slave less master, shape (slave nodes, dim).
+        D, shape (slave nodes,), M, shape (slave nodes, master nodes), and ∫ ψ_i times the height of the true
+        surfaces over their facets, slave less master, shape (slave nodes, dim).
     """
     area, shape = np.zeros(len(slave.nodes)), (len(slave.nodes), len(master.nodes))
     total, relief = sparse.csr_matrix(shape), np.zeros_like(slave.points)
@@ -146,7 +146,7 @@ def _integrals(
 
 
 def _chunks(pair_slave: np.ndarray, pair_master: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Cut the list of pairs where the slave facet changes, after about `CHUNK` of them."""
+    """Split the list of pairs where the slave facet changes, after about `CHUNK` of them."""
     starts = np.flatnonzero(np.diff(pair_slave, prepend=-1))
     cuts = starts[np.flatnonzero(np.diff(starts // CHUNK, prepend=-1))]
     for begin, end in pairwise([*cuts, len(pair_slave)]):

@@ -1,4 +1,4 @@
-"""Dual shape functions of partly covered slave facets, and the mortar integrals that they give.
+"""Dual shape functions of partly covered slave facets, and the mortar integrals with them.
 
 On the covered part of a slave facet the dual functions are ψ = D M⁻¹ N with M = ∫ N Nᵀ and D = diag ∫ N,
 so that ∫ ψ_i N_j = δ_ij ∫ N_j and Σ ψ_i = 1. Integrals of ψ_i with master functions are then D_ii times the
@@ -6,9 +6,9 @@ value at corner i of the master function's L² projection onto the slave functio
 in the basis {1, u, v, u v} of the same space, centred on the covered part and scaled to its extent, which
 stays well conditioned where the part is small.
 
-Directions in which the part is a sliver (see `SLIVER`) are left out: the projection is constant along them
-instead of extrapolated. Biorthogonality is lost there; Σ ψ_i = 1 and ∫ ψ_i = ∫ N_i, hence the transfer of
-forces, are not.
+Directions in which the part is a sliver (see `SLIVER`) are omitted: the projection is constant along them
+instead of extrapolated. Biorthogonality is lost there, but not Σ ψ_i = 1 and ∫ ψ_i = ∫ N_i, hence the
+transfer of forces.
 
 References:
     Wohlmuth, B.: A mortar finite element method using dual spaces for the Lagrange multiplier. SIAM Journal
@@ -45,7 +45,7 @@ def dual_integrals(cells: Cells, field: np.ndarray) -> tuple[np.ndarray, np.ndar
     """Integrate the dual functions with the slave's and the master's shape functions and with a field.
 
     Args:
-        cells: Where to integrate.
+        cells: The integration cells.
         field: Values v at the quadrature points, shape (n, q).
 
     Returns:
@@ -91,7 +91,7 @@ def _modes(cells: Cells, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     over_facet, corners = _SumsBy(cells.facet), cells.slave.shape[2]
 
     def centred(modes: np.ndarray, at_corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        # Twice: where the covered part is small, the first subtraction leaves a mean of its rounding errors.
+        # Twice: if the covered part is small, the first subtraction leaves a mean of its rounding errors.
         for _ in range(2):
             mean = over_facet(np.einsum("nq,nqa->na", cells.weight, modes)) / area[:, None]
             modes, at_corners = modes - mean[cells.facet][:, None], at_corners - mean[:, None]

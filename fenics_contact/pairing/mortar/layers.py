@@ -1,4 +1,4 @@
-"""Layers of the master one behind the other, closer than facets are large: only the nearest one counts."""
+"""Layers of the master behind one another, closer than the size of facets: only the nearest one counts."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from scipy.spatial import cKDTree
 from fenics_contact.pairing.mortar.clipping import clip
 from fenics_contact.pairing.mortar.planes import measure
 
-#: Part of its area by which a slave facet has to be covered twice before layers are looked for.
+#: Fraction of a slave facet's area that must be covered twice for layers to be searched.
 TWICE = 1e-6
 
 
 def hidden(
     vertices: np.ndarray, count: np.ndarray, height: np.ndarray, facet: np.ndarray, area: np.ndarray
 ) -> np.ndarray:
-    """Tell which pieces of the master lie behind nearer ones, seen from the same slave facet.
+    """Return which pieces of the master lie behind nearer ones, seen from the same slave facet.
 
-    A piece that is hidden in part counts as hidden.
+    A partly hidden piece counts as hidden.
 
     Args:
         vertices: Pieces in the planes of the slave facets, as `clip` returns them, shape (n, k, dim − 1).
@@ -48,7 +48,7 @@ def _neighbours(vertices: np.ndarray, height: np.ndarray, facet: np.ndarray) -> 
     """Pair pieces of the same slave facet that may overlap, the further one first."""
     centre = vertices.mean(axis=1)
     reach = 2 * np.linalg.norm(vertices - centre[:, None], axis=2).max()
-    # Facets side by side in one more coordinate, too far apart to meet.
+    # Facets are separated in an additional coordinate, too far apart to overlap.
     places = np.column_stack([centre, 2 * reach * facet])
     pairs = cKDTree(places).query_pairs(reach, output_type="ndarray")
     further = np.abs(height[pairs[:, 0]]) > np.abs(height[pairs[:, 1]])
@@ -56,7 +56,7 @@ def _neighbours(vertices: np.ndarray, height: np.ndarray, facet: np.ndarray) -> 
 
 
 def _area(vertices: np.ndarray, count: np.ndarray) -> np.ndarray:
-    """Return the areas (lengths) of pieces, zero where nothing is left, shape (n,)."""
+    """Return the areas (lengths) of pieces, zero for empty ones, shape (n,)."""
     if vertices.shape[1] < 2:
         return np.zeros(len(vertices))
     return np.where(count > 0, np.abs(measure(vertices)), 0.0)

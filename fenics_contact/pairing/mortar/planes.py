@@ -1,4 +1,4 @@
-"""Auxiliary planes: each facet's centre and mean normal, in which facets that face it are laid flat."""
+"""Auxiliary planes: each facet's centre and mean normal, onto which facing facets are projected."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CONVEX = -1e-10
 
 @dataclass(frozen=True)
 class Planes:
-    """One plane (in plane problems: line) a facet, with orthonormal axes.
+    """One plane (in plane problems: line) per facet, with orthonormal axes.
 
     Attributes:
         origin: Mean of the facet's corners, shape (n, dim), [length].
@@ -76,7 +76,7 @@ def laid_flat(points: np.ndarray, planes: Planes, index: np.ndarray) -> tuple[np
 
 
 def check_convex(planes: Planes, chosen: np.ndarray) -> None:
-    """Make sure that the flat facets are convex, as windows for clipping have to be.
+    """Check that the flat facets are convex, as required of clipping windows.
 
     Raises:
         InvalidInputError: If a quadrilateral is folded or has a re-entrant corner.

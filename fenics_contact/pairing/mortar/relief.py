@@ -1,4 +1,4 @@
-"""How much closer true surfaces are than their facets, at the quadrature points of a mortar coupling."""
+"""Heights of true surfaces over their facets, at the quadrature points of a mortar coupling."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def relief_of_cells(
         slave: The slave surface.
         master: The master surface.
         pairs: Slave facet and master facet of each pair, shape (n_pairs,) each.
-        along: Direction in which heights count for each pair, out of the slave facet, shape (n_pairs, dim).
+        along: Direction of the heights for each pair, out of the slave facet, shape (n_pairs, dim).
     """
     at_slave, at_master = (facet[cells.pair] for facet in pairs)
     direction = along[cells.pair]
@@ -33,7 +33,7 @@ def relief_of_cells(
 def _heights_along(
     surface: FacetedSurface, facet: np.ndarray, local: np.ndarray, values: np.ndarray, direction: np.ndarray
 ) -> np.ndarray:
-    """Return heights along a direction that leans from the normal by less than a facet turns."""
+    """Return heights along a direction whose angle to the normal is less than a facet's turn."""
     if surface.relief is None:
         return np.zeros(local.shape[:2])
     points = local.shape[1]
