@@ -10,12 +10,12 @@ from collections.abc import Sequence
 MISSING = 5
 
 for _name in ("stdout", "stderr"):
-    if getattr(sys, _name) is None:  # closed by who started the program; UFL asks for it when imported
+    if getattr(sys, _name) is None:  # closed by the caller; UFL needs it when imported
         setattr(sys, _name, open(os.devnull, "w", encoding="utf-8"))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command that the arguments name on all ranks; return the exit status."""
+    """Run the command given by the arguments on all ranks; return the exit status."""
     from fenics_contact._libraries import MPI
     from fenics_contact._requirements import require_extra
     from fenics_contact.errors import MissingRequirementError

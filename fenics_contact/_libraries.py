@@ -1,8 +1,8 @@
-"""MPI and PETSc, loaded when something of them is first used: importing the package starts nothing.
+"""MPI and PETSc, loaded on first use: importing the package starts nothing.
 
-What MPI_Init leaves in the environment makes every `mpirun` that is started from the process fail, so a
-program that only imports the package has to stay free of it. Starting PETSc is collective, and by default
-over all ranks there are: `start` does it over those that work.
+The environment after MPI_Init makes every `mpirun` started from the process fail, so a program that only
+imports the package must not start MPI. Starting PETSc is collective, by default over all ranks: `start` does
+it over the ranks that compute.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ __all__ = ["MPI", "Late", "PETSc", "check_not_forked", "start"]
 
 
 class Late(ModuleType):
-    """A stand-in for a module that is loaded when one of its names is asked for."""
+    """A proxy of a module that is loaded on first access."""
 
     def __init__(self, name: str, load: Callable[[], Any]) -> None:
-        """Keep how the module is loaded."""
+        """Store the function that loads the module."""
         super().__init__(name)
         self._load = load
         self._module: Any = None
 
     def __getattr__(self, name: str) -> Any:
-        """Return the name of the module itself, which is loaded by the first call.
+        """Return an attribute of the module, which is loaded by the first call.
 
         Raises:
-            MissingRequirementError: The library cannot be loaded or does not do.
+            MissingRequirementError: The library cannot be loaded or is unsuitable.
             ForkedProcessError: The process was forked from one that had computed.
         """
         check_not_forked()
@@ -49,13 +49,13 @@ else:
 
 
 def start(comm: MPI.Comm) -> None:
-    """Start PETSc on the ranks of a communicator where nobody has. Collective on ``comm``.
+    """Start PETSc on the ranks of a communicator unless it runs already. Collective on ``comm``.
 
-    PETSc's own world are these ranks then, and others need not know. A program that uses ``PETSc.COMM_WORLD``
-    itself imports petsc4py on all ranks before.
+    PETSc's world then consists of these ranks. A program that uses ``PETSc.COMM_WORLD`` itself must import
+    petsc4py on all ranks before.
 
     Raises:
-        MissingRequirementError: PETSc cannot be loaded or does not do.
+        MissingRequirementError: PETSc cannot be loaded or is unsuitable.
         ForkedProcessError: The process was forked from one that had computed.
     """
     check_not_forked()
@@ -63,14 +63,14 @@ def start(comm: MPI.Comm) -> None:
     if not comm.allreduce(ready, MPI.LAND):
         world = comm.Split(MPI.UNDEFINED if ready else 0, comm.rank)
         if not ready:
-            _requirements.load_petsc(world)  # which keeps it: it is never freed
+            _requirements.load_petsc(world)  # which holds it: it is never freed
 
 
 _forked = False
 
 
 def check_not_forked() -> None:
-    """Refuse to compute where libraries would wait for threads that are in another process.
+    """Raise where libraries would wait for threads that exist in another process.
 
     Raises:
         ForkedProcessError: The process was forked from one that had computed.
@@ -84,7 +84,7 @@ def check_not_forked() -> None:
 
 
 def _note_fork() -> None:
-    """Remember in a child that its parent has computed, so that factorisations may have started threads."""
+    """Record in a child that its parent has computed, so that factorisations may have started threads."""
     global _forked
     _forked = _forked or vars(PETSc)["_module"] is not None
 

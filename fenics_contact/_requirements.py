@@ -1,8 +1,8 @@
-"""What the package stands on, checked by name before anything of it is used.
+"""Requirements of the package, checked before they are used.
 
-dolfinx, petsc4py, mpi4py and gmsh come from the system and not from pip, so no installer has compared
-their versions with what the package needs. What is there, and in which version, is checked when the package
-is imported; what a library can do, when it is loaded.
+dolfinx, petsc4py, mpi4py and gmsh come from the system and not from pip, so no installer has compared their
+versions with the requirements. Presence and versions are checked when the package is imported, features of a
+library when it is loaded.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Requirement:
-    """A library, the oldest version that will do, and where to get it.
+    """A library, its oldest supported version, and how to install it.
 
     Attributes:
         module: Name by which it is imported.
-        oldest: Oldest version that the package runs with.
+        oldest: Oldest supported version.
         debian: How to install it on Debian.
         conda: How to install it from conda-forge.
         distribution: Name of its metadata where that is not ``module``.
-        tested: First two numbers of the versions that the tests run with; others get a warning. Empty: any.
+        tested: First two numbers of the tested versions; others cause a warning. Empty: any.
     """
 
     module: str
@@ -45,14 +45,14 @@ class Requirement:
     tested: tuple[str, ...] = ()
 
     def version(self) -> str | None:
-        """Return the installed version without importing the library; None where it leaves no metadata."""
+        """Return the installed version without importing the library; None if it has no metadata."""
         try:
             return metadata.version(self.distribution or self.module)
         except metadata.PackageNotFoundError:
             return None
 
     def error(self, found: str) -> MissingRequirementError:
-        """Return the error that says what is needed, what was found and how to install it."""
+        """Return the error that states what is needed, what was found and how to install it."""
         return MissingRequirementError(
             f"fenics_contact needs {self.module} {self.oldest} or newer, found {found}. "
             f"Debian: {self.debian}; conda-forge: {self.conda}",
@@ -89,7 +89,7 @@ _PYMETIS = Requirement("pymetis", "2025.2", "pip install pymetis", "conda instal
 
 
 def check() -> None:
-    """Check that everything is there that every part of the package needs; loads and starts nothing of it.
+    """Check all libraries that every part of the package needs, without loading or starting them.
 
     Raises:
         MissingRequirementError: A library is missing or too old.
@@ -99,7 +99,7 @@ def check() -> None:
 
 
 def load_mpi() -> Any:
-    """Return ``mpi4py.MPI``; starts MPI unless ``mpi4py.rc`` says otherwise.
+    """Return ``mpi4py.MPI``; starts MPI unless ``mpi4py.rc`` prevents it.
 
     Raises:
         MissingRequirementError: mpi4py cannot be loaded.
@@ -108,13 +108,13 @@ def load_mpi() -> Any:
 
 
 def petsc_is_started() -> bool:
-    """Tell whether PETSc can be used; starts nothing."""
+    """Return whether PETSc can be used; starts nothing."""
     petsc = sys.modules.get("petsc4py.PETSc")
     return petsc is not None and bool(petsc.Sys.isInitialized())
 
 
 def load_petsc(world: MPI.Comm | None = None) -> Any:
-    """Return ``petsc4py.PETSc``; starts PETSc where nobody has.
+    """Return ``petsc4py.PETSc``; starts PETSc unless it runs already.
 
     Args:
         world: Communicator on which it is started, which is collective; all ranks of MPI by default.
@@ -150,7 +150,7 @@ def require_extra(use: str, extra: str, *modules: str) -> None:
 
 
 def check_gmsh() -> None:
-    """Check gmsh, which only the construction of geometries needs.
+    """Check gmsh, which only geometries need.
 
     Raises:
         MissingRequirementError: gmsh is missing, too old or cannot be loaded.
@@ -172,12 +172,12 @@ def load_pymetis() -> Any:
 
 
 def pymetis_error(ending: str) -> MissingRequirementError:
-    """Return the error of a pymetis that is there and does not run."""
+    """Return the error of an installed pymetis that does not run."""
     return _PYMETIS.error(f"{_PYMETIS.version() or 'one'} that {ending}")
 
 
 def _check_installed(requirement: Requirement) -> None:
-    """Raise where a library is not there or too old, without importing it."""
+    """Raise if a library is missing or too old, without importing it."""
     if importlib.util.find_spec(requirement.module) is None:
         raise requirement.error("none")
     version = requirement.version()
@@ -186,7 +186,7 @@ def _check_installed(requirement: Requirement) -> None:
 
 
 def _check_version(requirement: Requirement, version: str) -> None:
-    """Raise where a version is too old, warn where it was never tested."""
+    """Raise if a version is too old, warn if it was never tested."""
     if _numbers(version) < _numbers(requirement.oldest):
         raise requirement.error(version)
     if requirement.tested and ".".join(map(str, _numbers(version)[:2])) not in requirement.tested:
@@ -205,7 +205,7 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 
 def _load(requirement: Requirement, module: str) -> Any:
-    """Import a module of a library that is there, and name the library where that fails.
+    """Import a module of an installed library, and name the library if that fails.
 
     One that was built against another NumPy or MPI, for instance, is found but cannot be loaded.
     """

@@ -1,11 +1,11 @@
-"""The one place that knows which dolfinx runs; everything else takes FEniCSx through it.
+"""The only module that depends on the dolfinx version; everything else uses FEniCSx through it.
 
 Forms are written once on a *template*, a `ufl.Mesh` without coordinates, compiled once, and then bound to any
-number of meshes: subdomain meshes of one body differ in their numbers, never in their code.
+number of meshes: subdomain meshes of one body differ in their data, not in their code.
 
-Node numbers of meshes handed in are called *input nodes*, their cells *input cells*; cells come in the node
-order of VTK. Triangles and quadrilaterals lie in the plane: their points have two coordinates, their fields
-two components.
+Node numbers of given meshes are called *input nodes*, their cells *input cells*; cells are in the node order
+of VTK. Triangles and quadrilaterals lie in the plane: their points have two coordinates, their fields two
+components.
 """
 
 from fenics_contact._dolfinx.assembly import (

@@ -1,4 +1,4 @@
-"""Numbers of bound forms."""
+"""Assembly of bound forms."""
 
 from __future__ import annotations
 

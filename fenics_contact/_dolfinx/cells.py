@@ -1,11 +1,11 @@
-"""The kinds of cells: dimension, shape, degree, order of nodes, facets."""
+"""Cell types: dimension, shape, degree, order of nodes, facets."""
 
 from __future__ import annotations
 
 _DIMENSION = {"triangle": 2, "quadrilateral": 2, "tetrahedron": 3, "hexahedron": 3}
 #: Quadratic cells and the linear ones of the same shape.
 _SHAPE = {"triangle6": "triangle", "quadrilateral9": "quadrilateral", "hexahedron27": "hexahedron"}
-#: The cells that a body may consist of.
+#: The cell types of bodies.
 CELL_TYPES = (*_DIMENSION, *_SHAPE)
 
 #: Node order of VTK -> that of dolfinx (tensor-product order of the vertices); the permutations of linear

@@ -39,14 +39,14 @@ class CompiledForm:
     ) -> Any:
         """Return the form on one mesh.
 
-        Integrals without a tag cover the whole mesh, those with a tag what is given for it, nothing else.
+        Integrals without a tag cover the whole mesh, those with a tag only the entities given for it.
 
         Args:
             mesh: The mesh.
             spaces: dolfinx function spaces of the form's arguments, in their order.
             coefficients: Template coefficient -> dolfinx Function on ``mesh``.
             constants: Template constant -> dolfinx Constant.
-            facets: Tag of a surface integral -> (cells, local facets), as `match_facets` returns them.
+            facets: Tag of a surface integral -> (cells, local facets) from `match_facets`.
             cells: Tag of a volume integral -> cells of ``mesh``; no cell has two tags.
         """
         if old():
@@ -59,7 +59,7 @@ class CompiledForm:
             for kind, parts in ((kinds.exterior_facet, surfaces), (kinds.cell, volumes))
             if parts
         }
-        # A symbol that dropped out of the form while UFL simplified it must not be handed over.
+        # A symbol that UFL has simplified away must not be passed.
         functions = {symbol: coefficients[symbol] for symbol in self.form.coefficients()}
         numbers = {symbol: constants[symbol] for symbol in self.form.constants()}
         return dolfinx.fem.create_form(self._compiled, list(spaces), mesh, domains, functions, numbers)

@@ -1,4 +1,4 @@
-"""Importing dolfinx without its side effects, when something of it is first used; nothing else imports it."""
+"""Lazy import of dolfinx without its side effects; nothing else imports it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fenics_contact._requirements import DOLFINX, load_petsc
 
 @contextmanager
 def side_effects_undone() -> Iterator[None]:
-    """Undo what importing and compiling with old releases leaves behind in the process.
+    """Undo the side effects of importing and compiling with old releases.
 
     dolfinx 0.5 switches `sys.setdlopenflags` to RTLD_GLOBAL for good, after which VTK's own
     libraries clash with the system's; ffcx 0.5 configures the root logger and captures warnings.
@@ -36,7 +36,7 @@ def side_effects_undone() -> Iterator[None]:
 
 
 def _load() -> Any:
-    """Import dolfinx with the parts that are used of it."""
+    """Import dolfinx with the submodules that are used."""
     load_petsc()  # names what is wrong with it; dolfinx would fail in its own words
     with side_effects_undone():
         import dolfinx
@@ -54,7 +54,7 @@ jit: Any = Late("dolfinx.jit", lambda: dolfinx.jit)
 
 
 def release() -> str:
-    """Return the whole version of dolfinx."""
+    """Return the full version of dolfinx."""
     return str(dolfinx.__version__)
 
 
@@ -65,5 +65,5 @@ def version() -> tuple[int, ...]:
 
 
 def old() -> bool:
-    """Tell whether dolfinx has the interface of 0.5 and 0.6; later releases have the newer one."""
+    """Return whether dolfinx has the interface of 0.5 and 0.6; later releases have the newer one."""
     return version() < (0, 7)

@@ -22,7 +22,7 @@ def _partitioner(destinations: Any) -> Any:
 
 
 def local_mesh(points: np.ndarray, cells: np.ndarray, cell_type: str) -> Any:
-    """Build a mesh that lives on this rank alone.
+    """Build a mesh on this rank only.
 
     Args:
         points: Coordinates, shape (n, dim), [length].
@@ -33,7 +33,7 @@ def local_mesh(points: np.ndarray, cells: np.ndarray, cell_type: str) -> Any:
 
 
 def rank_mesh(comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, rank: np.ndarray, cell_type: str) -> Any:
-    """Build a distributed mesh whose cells live on given ranks; a rank may have none. Collective on ``comm``.
+    """Build a distributed mesh with cells on given ranks; a rank may have none. Collective on ``comm``.
 
     Args:
         comm: Communicator of the mesh.
@@ -54,7 +54,7 @@ def rank_mesh(comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, rank: np.nd
 def _with_ghosts(cells: np.ndarray, rank: np.ndarray, mine: np.ndarray, comm: MPI.Comm) -> Any:
     """Send each cell to its owner and to all ranks around it.
 
-    dolfinx 0.5 does not find out that two ranks share a vertex unless a ghost cell tells it.
+    dolfinx 0.5 detects that two ranks share a vertex only through a ghost cell.
     """
     vertices = cells.shape[1]
     touching = sp.csr_matrix((np.ones(cells.size), (cells.ravel(), np.repeat(rank, vertices))))

@@ -1,4 +1,4 @@
-"""Spaces on a mesh, and which of its cells, nodes, dofs and facets are which of the given ones."""
+"""Spaces on a mesh, and maps from its cells, nodes, dofs and facets to the input."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def coefficient(mesh: Any, name: str) -> Any:
 
 
 def scalar_space(mesh: Any, degree: int) -> Any:
-    """Return the space of scalar fields on ``mesh``: one value a cell (degree 0) or a node (1)."""
+    """Return the space of scalar fields on ``mesh``: one value per cell (degree 0) or node (1)."""
     cell_type = cell_type_of_mesh(mesh)
     return _space(mesh, scalar_element(cell_type) if degree == 1 else cellwise_element(cell_type))
 
@@ -84,7 +84,7 @@ def global_dofs(space: Any, dofs: np.ndarray) -> np.ndarray:
 
 def update_coordinates(mesh: Any, points: np.ndarray) -> None:
     """Move the nodes of ``mesh`` to ``points``, shape (n_nodes, dim), indexed by input node."""
-    # dolfinx keeps three coordinates a node whatever the dimension.
+    # dolfinx stores three coordinates per node in any dimension.
     mesh.geometry.x[:, : points.shape[1]] = points[_input_nodes(mesh)]
 
 
@@ -96,13 +96,13 @@ def match_facets(mesh: Any, surface: np.ndarray) -> tuple[np.ndarray, np.ndarray
         surface: Corners of facets as input nodes, shape (n_facets, n_corners), any order.
 
     Returns:
-        Cells and local facet numbers of those that lie on this mesh, one entry each.
+        Cells and local facet numbers of those on this mesh, one entry each.
     """
     cell_type = cell_type_of_mesh(mesh)
     local = np.array(facet_vertices(cell_type))
     faces = np.sort(cell_nodes(mesh)[:, local].reshape(-1, local.shape[1]), axis=1)
     wanted = np.sort(surface, axis=1)
-    # One integer key a facet: rows of both tables are numbered together.
+    # One integer key per facet: rows of both tables are numbered together.
     _, key = np.unique(np.vstack([wanted, faces]), axis=0, return_inverse=True)
     key = key.ravel()
     found = np.flatnonzero(np.isin(key[len(wanted) :], key[: len(wanted)]))

@@ -9,7 +9,7 @@ from fenics_contact._dolfinx.loading import dolfinx, old
 
 
 def has_vtx() -> bool:
-    """Tell whether this dolfinx was built with ADIOS2."""
+    """Return whether this dolfinx was built with ADIOS2."""
     return hasattr(dolfinx.io, "VTXWriter")
 
 

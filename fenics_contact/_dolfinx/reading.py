@@ -1,4 +1,4 @@
-"""Meshes that dolfinx reads from files or has in memory, as plain arrays; imported only for that."""
+"""Meshes of dolfinx, from files or in memory, as plain arrays; imported only for that."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class MeshArrays:
     Attributes:
         cell_type: dolfinx's name of the cells.
         dim: Topological dimension of the cells.
-        points: Coordinates, (n_nodes, geometric dimension), in the order they were handed to dolfinx.
-        cells: Node numbers, (n_cells, nodes of a cell), in the order they were handed to dolfinx; vertices in
-            VTK order where the cells are linear.
-        linear: Whether a cell has no nodes but its vertices.
+        points: Coordinates, (n_nodes, geometric dimension), in the order of dolfinx's input.
+        cells: Node numbers, (n_cells, nodes of a cell), in the order of dolfinx's input; vertices in VTK
+            order where the cells are linear.
+        linear: Whether cells have no nodes except their vertices.
         node: Number of every node of dolfinx's geometry among ``points``.
         cell: Number of every cell of dolfinx's topology among ``cells``.
     """
@@ -56,15 +56,16 @@ class TagArrays:
 
 
 def read_mesh(path: Path, name: str, inline: bool) -> Any:
-    """Read a grid of an XDMF file onto this rank alone.
+    """Read a grid of an XDMF file on this rank only.
 
     Args:
         path: The file.
         name: Name of the grid.
-        inline: Whether the numbers are in the file itself and not in an HDF5 file beside it.
+        inline: Whether the data are in the file itself and not in an HDF5 file beside it.
 
     Raises:
-        InvalidInputError: If a node belongs to no cell, at which dolfinx 0.5 ends the whole process.
+        InvalidInputError: If a node belongs to no cell, in which case dolfinx 0.5 would end the whole
+            process.
     """
     with _opened(path, inline) as file:
         n_nodes = len(file.read_geometry_data(name, "/Xdmf/Domain"))
@@ -87,11 +88,10 @@ def read_tags(path: Path, mesh: Any, name: str, inline: bool, own_points: bool) 
         mesh: The mesh.
         name: As in `read_mesh`.
         inline: As in `read_mesh`.
-        own_points: Whether the grid has points of its own, which must be those of the mesh then.
+        own_points: Whether the grid has its own points, which must then be those of the mesh.
 
     Raises:
-        InvalidInputError: If the points are others, or some of the tagged cells or facets are not in the
-            mesh.
+        InvalidInputError: If the points differ, or some of the tagged cells or facets are not in the mesh.
     """
     tdim = mesh.topology.dim
     mesh.topology.create_connectivity(tdim - 1, tdim)
@@ -109,7 +109,7 @@ def read_tags(path: Path, mesh: Any, name: str, inline: bool, own_points: bool) 
 
 
 def _check_points(mesh: Any, points: np.ndarray, path: Path) -> None:
-    """Refuse tags on other nodes: they would be taken for those with the same numbers."""
+    """Reject tags on other nodes, which would be mistaken for those with the same numbers."""
     own = np.empty((len(mesh.geometry.x), mesh.geometry.dim))
     own[mesh.geometry.input_global_indices] = mesh.geometry.x[:, : mesh.geometry.dim]
     if own.shape != points.shape or not np.allclose(own, points, rtol=0.0, atol=1e-8 * np.abs(own).max()):
@@ -127,7 +127,7 @@ def _opened(path: Path, inline: bool) -> Any:
 
 
 def mesh_arrays(mesh: Any) -> MeshArrays:
-    """Take the arrays out of a mesh on one rank."""
+    """Extract the arrays of a mesh on one rank."""
     topology, geometry = mesh.topology, mesh.geometry
     n_cells = topology.index_map(topology.dim).size_local
     name = topology.cell_name()
@@ -145,7 +145,7 @@ def mesh_arrays(mesh: Any) -> MeshArrays:
 
 
 def tag_arrays(mesh: Any, arrays: MeshArrays, tags: Any) -> TagArrays:
-    """Take the arrays out of tags on the cells or facets of a mesh on one rank."""
+    """Extract the arrays of tags on the cells or facets of a mesh on one rank."""
     if tags.dim == arrays.dim:
         return TagArrays(arrays.cell[tags.indices], np.asarray(tags.values))
     topology = mesh.topology

@@ -24,7 +24,7 @@ def _element(cell_type: str, shape: tuple[int, ...]) -> Any:
 
 
 def vector_element(cell_type: str) -> Any:
-    """Return the element of coordinates and displacements, of the cells' degree, a component a direction."""
+    """Return the element of coordinates and displacements, of the cells' degree, one value per direction."""
     return _element(cell_type, (dimension(cell_type),))
 
 
@@ -57,7 +57,8 @@ def displacement_space(cell_type: str) -> Any:
 def field_symbols(cell_type: str, count: int) -> list[Any]:
     """Return UFL coefficients on the template's `displacement_space`, to be bound to Functions later.
 
-    They are counted from 0 in every form: ffcx 0.5 writes counts into C identifiers, which fails from ten on.
+    They are numbered from 0 in every form: ffcx 0.5 writes counts into C identifiers, which fails from ten
+    on.
     """
     return [ufl.Coefficient(displacement_space(cell_type), count=number) for number in range(count)]
 

@@ -1,4 +1,4 @@
-"""Checkpoints: long runs write down all that they need to go on, in files that are whole or not there."""
+"""Checkpoints: long runs store all that they need to continue, in atomically written files."""
 
 from fenics_contact.checkpoint.archive import read_archive, write_archive
 from fenics_contact.checkpoint.checkpoint import Checkpoint, without_checkpoint

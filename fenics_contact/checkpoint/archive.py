@@ -1,9 +1,9 @@
-"""Arrays by name in a file of NumPy's .npz format, with what it holds and of which problem it is.
+"""Arrays by name in a file of NumPy's .npz format, with their kind and the fingerprint of the problem.
 
-The format is a zip archive with one .npy file an array, which `numpy.load` reads with ``allow_pickle=False``,
-as libraries for other languages do. NumPy is there wherever this package is. The arrays are those of the
-whole problem, whatever number of ranks it ran on. HDF5 would need h5py, built for the MPI and the HDF5 of
-dolfinx, which Debian's FEniCSx does without, and save nothing: a file that must be whole is written anew.
+The format is a zip archive with one .npy file per array, which `numpy.load` reads with
+``allow_pickle=False``, as do libraries for other languages. The arrays are those of the whole problem,
+independent of the number of ranks. HDF5 would need h5py, built for the MPI and the HDF5 of dolfinx, which
+Debian's FEniCSx lacks, without any saving: a file that must be complete is rewritten anyway.
 
 | array | what it is |
 |---|---|
@@ -16,12 +16,12 @@ dolfinx, which Debian's FEniCSx does without, and save nothing: a file that must
 A load history has ``steps``, the number of steps done, and for each, numbered from 000000, ``NUMBER.step``
 (JSON text that describes it), ``NUMBER.multiplier`` (λ of all rows, [force]), ``NUMBER.origin`` (from where
 slip is measured, [length]), ``NUMBER.slid`` (the same of points without friction) and ``NUMBER.motion``
-(coefficients of the rigid motions); a state that was found without multipliers has the description alone.
+(coefficients of the rigid motions); a state without multipliers has only the description.
 
 A minimisation has ``centre.*`` (best point ``x``, ``value``, ``subgradient``), ``bundle.*``, ``trust.*`` and
-``first_t``, ``careful`` (where the method stands), ``history.*`` (a list for each attribute of a `Record` of
-the optimiser) and ``fun.*``, what the function remembers: of a shape problem the states of the first, best
-and last design, and the one to start from.
+``first_t``, ``careful`` (state of the method), ``history.*`` (a list for each attribute of a `Record` of the
+optimiser) and ``fun.*``, the memory of the function: of a shape problem the states of the first, best and
+last design, and the one to start from.
 """
 
 from __future__ import annotations
@@ -48,12 +48,12 @@ Arrays = dict[str, NDArray[Any]]
 
 
 def write_archive(path: Path, kind: str, fingerprint: Mapping[str, str], arrays: Mapping[str, Any]) -> None:
-    """Write arrays with their kind and the problem's fingerprint, whole or not at all.
+    """Write arrays with their kind and the problem's fingerprint, atomically.
 
     Args:
         path: File to replace.
-        kind: What the arrays are.
-        fingerprint: Says what the problem is, see `described`.
+        kind: Kind of the arrays.
+        fingerprint: Identifies the problem, see `described`.
         arrays: Numbers and text by name; names must not start with an underscore.
 
     Raises:
@@ -75,8 +75,8 @@ def read_archive(path: Path, kind: str, fingerprint: Mapping[str, str]) -> Array
     """Read the arrays of a problem.
 
     Raises:
-        InvalidInputError: If the file is missing, cannot be read, is no whole checkpoint, or is one of
-            another version, kind or problem; says what differs.
+        InvalidInputError: If the file is missing, cannot be read, is not a complete checkpoint, or is of
+            another version, kind or problem; states what differs.
     """
     arrays = _loaded(path)
     if str(arrays.pop("_format", "")) != FORMAT:
@@ -104,7 +104,7 @@ def read_archive(path: Path, kind: str, fingerprint: Mapping[str, str]) -> Array
 
 
 def _digest(members: Arrays) -> str:
-    """Return a hash of names and contents: the checksums of the format leave out the names."""
+    """Return a hash of names and contents: the checksums of the format exclude the names."""
     digest = hashlib.sha256()
     for name in sorted(members):
         digest.update(f"{name} {members[name].dtype.str} {members[name].shape} ".encode())
@@ -122,7 +122,7 @@ def _loaded(path: Path) -> Arrays:
         ) from error
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            spoilt = archive.testzip()  # before anybody believes a length that stands in it
+            spoilt = archive.testzip()  # before any stored length is trusted
         if spoilt is None:
             with np.load(io.BytesIO(content), allow_pickle=False) as members:
                 found = {name: members[name] for name in members.files}
@@ -130,7 +130,7 @@ def _loaded(path: Path) -> Arrays:
             if "_format" not in found or digest == _digest(found):
                 return found
         reason = "its checksums do not agree"
-    except Exception as error:  # bytes of any other origin can make the libraries say anything
+    except Exception as error:  # arbitrary bytes can make the libraries raise anything
         reason = str(error) or type(error).__name__
     raise InvalidInputError(
         f"a whole checkpoint is needed, {str(path)!r} with {len(content)} bytes is none ({reason}): bring "

@@ -1,4 +1,4 @@
-"""Where a run keeps its checkpoint, and what it does with one that is there already."""
+"""The checkpoint of a run, and the treatment of an existing one."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ if TYPE_CHECKING:  # the optimiser does without mpi4py
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A file from which an interrupted run goes on.
+    """A file from which an interrupted run continues.
 
-    It is replaced at once: killed at any moment, a run leaves the last whole one. The same command run again
-    goes on from there, on any number of ranks.
+    It is replaced atomically: killed at any moment, a run leaves the last complete one. The same command run
+    again continues from there, on any number of ranks.
 
     Attributes:
         path: The file, in NumPy's .npz format; its folder is created.
-        every: Evaluations or load steps between two writes; the end of the run is written in any case. Each
-            write is of all steps so far: for hundreds of them on fine meshes do it less often.
-        resume: None goes on from the file where there is one, True wants one, False starts anew and replaces
+        every: Evaluations or load steps between two writes; the end of the run is always written. Each write
+            contains all steps so far: for hundreds of them on fine meshes write less often.
+        resume: None continues from the file if it exists, True requires it, False starts anew and replaces
             it.
-        comm: Communicator on which the run is replicated: rank 0 reads and writes. Only a function that does
-            not know its communicator needs it.
+        comm: Communicator on which the run is replicated: rank 0 reads and writes. Needed only for functions
+            that do not know their communicator.
 
     Example:
         >>> kept = Checkpoint("output/run.npz", every=5)
@@ -42,14 +42,14 @@ class Checkpoint:
     comm: MPI.Comm | None = None
 
     def __post_init__(self) -> None:
-        """Refuse intervals that are none."""
+        """Reject invalid intervals."""
         if self.every < 1:
             raise InvalidInputError(
                 f"every must be at least 1, got {self.every}: how many evaluations lie between two writes"
             )
 
     def read(self, kind: str, fingerprint: Mapping[str, str], comm: MPI.Comm | None) -> Arrays | None:
-        """Return what is stored, None where the run starts anew. Collective on ``comm``.
+        """Return the stored arrays, None if the run starts anew. Collective on ``comm``.
 
         Raises:
             InvalidInputError: On all ranks, see `read_archive`.
@@ -65,16 +65,16 @@ class Checkpoint:
         names = comm.bcast(None if found is None else list(found))
         if names is None:
             return None
-        # One by one: a message of MPI holds 2 GB, a long history more.
+        # One by one: an MPI message is limited to 2 GB, which a long history exceeds.
         return {name: comm.bcast(None if found is None else found[name]) for name in names}
 
     def write(
         self, kind: str, fingerprint: Mapping[str, str], arrays: Mapping[str, Any], comm: MPI.Comm | None
     ) -> None:
-        """Replace what is stored. Collective on ``comm``.
+        """Replace the stored arrays. Collective on ``comm``.
 
         Raises:
-            CheckpointError: On all ranks; the file is then what it was.
+            CheckpointError: On all ranks; the file is then unchanged.
         """
         if comm is None:
             write_archive(Path(self.path), kind, fingerprint, arrays)
@@ -84,11 +84,11 @@ class Checkpoint:
                 write_archive(Path(self.path), kind, fingerprint, arrays)
 
     def resume_hint(self, done: int, kept: str) -> str:
-        """Say what an interrupted run leaves in the file, and how the next one goes on.
+        """Describe what an interrupted run leaves in the file, and how to continue it.
 
         Args:
-            done: How many pieces of work the file holds.
-            kept: They in words: "3 of 5 load steps".
+            done: Number of pieces of work in the file.
+            kept: Their description: "3 of 5 load steps".
         """
         if done == 0:
             return f"nothing was done yet that {self.path} could keep: run the same command again"
@@ -99,7 +99,7 @@ class Checkpoint:
 
 
 def without_checkpoint(done: str) -> str:
-    """Say that an interrupted run leaves nothing, and how it could."""
+    """Describe that an interrupted run leaves nothing, and how it could."""
     return (
         f'nothing is kept of {done}: give checkpoint=Checkpoint("run.npz"), and the same command, run again, '
         "goes on from where it was stopped"

@@ -1,4 +1,4 @@
-"""Runs that are told to stop: at the next moment at which everything can be kept."""
+"""Stopping of runs by signals, at the next point at which everything can be stored."""
 
 from __future__ import annotations
 
@@ -15,48 +15,48 @@ from fenics_contact.errors import InvalidInputError, tell
 if TYPE_CHECKING:  # the optimiser does without mpi4py
     from mpi4py import MPI
 
-#: Ctrl-C, the end of a job, and the warning before it that queues can be asked for.
+#: Ctrl-C, the end of a job, and the earlier warning that queues can send.
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
 
 _LOG = logging.getLogger(__name__)
 
 
 class Interrupted(SystemExit):
-    """A signal told the run to stop, and it has stopped where it can go on from.
+    """The run stopped on a signal, at a point from which it can continue.
 
-    Not caught, it ends the program with exit status 128 + the signal's number, as shells count, and without
-    a traceback; what is kept was logged.
+    Uncaught, it ends the program with exit status 128 + the signal's number, as in shells, and without a
+    traceback; what is stored was logged.
 
     Attributes:
         signal: The signal.
     """
 
     def __init__(self, message: str, number: int) -> None:
-        """Keep the message beside the exit status."""
+        """Store the message with the exit status."""
         super().__init__(128 + number)
         self.signal = signal.Signals(number)
         self._message = message
 
     def __str__(self) -> str:
-        """Return what is kept and how to go on."""
+        """Return what is stored and how to continue."""
         return self._message
 
 
 class Interruption:
-    """Hears signals and remembers the first one until the run can stop.
+    """Handles signals and records the first one until the run can stop.
 
     Attributes:
-        comm: Communicator of the run; rank 0 says what happens.
-        requested: Number of the signal that was heard, 0 if none was.
+        comm: Communicator of the run; rank 0 logs.
+        requested: Number of the received signal, 0 if none.
     """
 
     def __init__(self, comm: MPI.Comm | None) -> None:
-        """Begin with no signal heard."""
+        """Begin without a signal."""
         self.comm, self.requested = comm, 0
         self._kept = ""
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        """Hear a signal: the second one ends the run at once."""
+        """Handle a signal: the second one ends the run at once."""
         name = signal.Signals(number).name
         if not self.requested:
             self.requested = number
@@ -64,7 +64,7 @@ class Interruption:
             return
         self._say("%s again: the run stops at once%s", name)
         if self.comm is not None and self.comm.size > 1:
-            self.comm.Abort(128 + number)  # the other ranks would wait for this one for ever
+            self.comm.Abort(128 + number)  # the other ranks would wait for this one forever
         raise Interrupted(f"stopped at once by {name}", number)
 
     def safe_point(
@@ -73,15 +73,15 @@ class Interruption:
         save: Callable[[], None] | None = None,
         comm: MPI.Comm | None = None,
     ) -> None:
-        """Stop here if a rank was told to. Collective on the communicator.
+        """Stop here if a rank received a signal. Collective on the communicator.
 
         Args:
-            kept: Says what a run that ends here leaves, and how to go on.
-            save: Writes down what is not yet; collective.
+            kept: Describes what a run that ends here leaves, and how to continue it.
+            save: Stores what is not stored yet; collective.
             comm: Communicator whose ranks agree; that of the run by default.
 
         Raises:
-            Interrupted: On all ranks, if one of them has heard a signal.
+            Interrupted: On all ranks, if one of them has received a signal.
         """
         self._kept = kept()
         comm = comm or self.comm
@@ -98,31 +98,28 @@ class Interruption:
 
     def _say(self, words: str, name: str) -> None:
         if self.comm is None or self.comm.rank == 0:
-            # Those who start ranks may kill them a second later: what is kept is said now.
+            # Launchers may kill the ranks a second later: report what is stored now.
             tell(_LOG.warning, words, name, f"; so far {self._kept}" if self._kept else "")
 
 
 @contextmanager
 def interruptible(comm: MPI.Comm | None = None, signals: Sequence[int] = SIGNALS) -> Iterator[Interruption]:
-    """Let a signal stop the load history or the optimisation in the block where it can go on from.
+    """Let a signal stop the load history or the optimisation in the block where it can continue.
 
-    The first signal lets the step or evaluation under way come to its end and be written; then all ranks
-    raise `Interrupted`, which ends the program quietly. A second signal stops at once; the checkpoint is then
-    the last whole one. Handlers are put back after the block. Collective on ``comm``.
+    After the first signal the step or evaluation under way is completed and written; then all ranks raise
+    `Interrupted`, which ends the program quietly. A second signal stops at once; the checkpoint is then the
+    last complete one. Handlers are restored after the block. Collective on ``comm``.
 
-    Queues send SIGTERM some seconds before they kill a job, and an earlier signal if they are asked for it
-    (Slurm: ``--signal=USR1@300``). mpirun kills its ranks one second after Ctrl-C or SIGTERM; it passes
-    SIGUSR1 on and waits.
+    Queues send SIGTERM some seconds before they kill a job, and an earlier signal on request (Slurm:
+    ``--signal=USR1@300``). mpirun kills its ranks one second after Ctrl-C or SIGTERM; it forwards SIGUSR1 and
+    waits.
 
     Args:
         comm: Communicator of the run; None for a program that is not started by mpirun.
-        signals: Signals to hear.
-
-    Yields:
-        What hears them: a loop of one's own calls its `Interruption.safe_point`.
+        signals: Signals to handle. Yields: Their handler: your own loop calls its `Interruption.safe_point`.
 
     Raises:
-        InvalidInputError: If this is not the main thread, which alone hears signals.
+        InvalidInputError: If this is not the main thread, the only one that receives signals.
 
     Example:
         >>> with interruptible(comm):  # doctest: +SKIP
@@ -139,14 +136,14 @@ def interruptible(comm: MPI.Comm | None = None, signals: Sequence[int] = SIGNALS
         yield hearing
     finally:
         for number, handler in before.items():
-            # None is a handler that was not installed from Python and cannot be put back.
+            # None is a handler that was not installed from Python and cannot be restored.
             signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
 
 def safe_point(kept: Callable[[], str], save: Callable[[], None], comm: MPI.Comm | None) -> None:
-    """Stop here if the run is `interruptible` and was told to; see `Interruption.safe_point`. Collective."""
+    """Stop here if an `interruptible` run received a signal; see `Interruption.safe_point`. Collective."""
     for number in signal.valid_signals():
-        # The table of handlers is where a process keeps this: there is nothing to hide elsewhere.
+        # The process's table of handlers holds this state, so no other global is needed.
         handler = signal.getsignal(number)
         if isinstance(handler, Interruption):
             handler.safe_point(kept, save, comm)
@@ -155,7 +152,7 @@ def safe_point(kept: Callable[[], str], save: Callable[[], None], comm: MPI.Comm
 
 @contextmanager
 def telling_what_is_kept(kept: Callable[[], str], comm: MPI.Comm | None) -> Iterator[None]:
-    """Say what an interrupted block leaves: as a note on the exception, and in the log of rank 0."""
+    """Report what an interrupted block leaves: as a note on the exception, and in the log of rank 0."""
     try:
         yield
     except Interrupted:

@@ -1,8 +1,8 @@
-"""Files appear whole: a reader finds the old or the new one, whatever happens to the writer.
+"""Atomic files: a reader sees the old or the new one, whatever happens to the writer.
 
 They are written under another name in the same folder and then renamed. The other name is that of a hidden
-folder, ``.NAME.XXXXXXXX.partial``, whose writer holds a lock on it. The system takes the lock away from a
-writer that dies, however it dies; the next one that comes to the folder removes what such writers have left.
+folder, ``.NAME.XXXXXXXX.partial``, whose writer holds a lock on it. The system releases the lock of a writer
+that dies for any reason; the next one in the folder removes the remains of such writers.
 """
 
 from __future__ import annotations
@@ -21,24 +21,23 @@ from pathlib import Path
 from fenics_contact.errors import FenicsContactError
 
 _HIDDEN = re.compile(r"\..+\.[0-9a-f]{8}\.partial")
-#: Where the file system knows no locks, age tells: no writer takes that long for a file, [s].
+#: On file systems without locks, age at which a folder counts as abandoned: no write takes that long, [s].
 _ABANDONED = 24 * 3600.0
 
 
 class CheckpointError(FenicsContactError, OSError):
-    """A checkpoint could not be written; the one before, if there was one, is as it was."""
+    """A checkpoint could not be written; an earlier one is unchanged."""
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a checkpoint as `put_whole` does.
+    """Write a checkpoint by `put_whole`.
 
     Args:
         path: The file; its folder is created.
-        content: All of it.
+        content: Its content.
 
     Raises:
-        CheckpointError: If the disk is full or the folder cannot be written to; the target is then what it
-            was.
+        CheckpointError: If the disk is full or the folder cannot be written to; the target is then unchanged.
     """
     try:
         put_whole(path, content)
@@ -52,15 +51,15 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 def put_whole(path: Path, content: bytes) -> None:
-    """Put a file in place of another, on the disk before it gets its name.
+    """Replace a file by another, which is on the disk before it is renamed.
 
     Args:
         path: The file; its folder is created.
-        content: All of it.
+        content: Its content.
 
     Raises:
         OSError: If the disk is full, the folder cannot be written to, or another writer has replaced the file
-            meanwhile; the target is then what it was, or what that one has written.
+            meanwhile; the target is then unchanged, or that of the other writer.
     """
     with hidden_folder(path.parent, path.name) as hidden:
         partial, before = hidden / path.name, _version(path)
@@ -73,7 +72,7 @@ def put_whole(path: Path, content: bytes) -> None:
 
 
 def _version(path: Path) -> tuple[int, int] | None:
-    """Return what tells a file from one that has taken its place, None where there is none."""
+    """Return the identity of a file, by which a replacement is detected, None if there is none."""
     with suppress(FileNotFoundError):
         found = path.stat()
         return found.st_ino, found.st_mtime_ns
@@ -82,11 +81,11 @@ def _version(path: Path) -> tuple[int, int] | None:
 
 @contextmanager
 def hidden_folder(folder: Path, stem: str) -> Iterator[Path]:
-    """Make a hidden folder to write in, and remove it in the end; remove those of dead writers before.
+    """Create a hidden folder to write in, and remove it at the end; first remove those of dead writers.
 
     Args:
-        folder: Where to make it; created.
-        stem: What its name begins with.
+        folder: Its parent folder; created.
+        stem: Beginning of its name.
     """
     folder.mkdir(parents=True, exist_ok=True)
     remove_abandoned(folder)
@@ -100,7 +99,7 @@ def hidden_folder(folder: Path, stem: str) -> Iterator[Path]:
 
 
 def remove_abandoned(folder: Path) -> None:
-    """Remove the hidden folders of writers that are dead."""
+    """Remove the hidden folders of dead writers."""
     for left in folder.glob(".*.partial"):
         if not _HIDDEN.fullmatch(left.name) or not left.is_dir():
             continue
@@ -115,8 +114,8 @@ def remove_abandoned(folder: Path) -> None:
 def replace_all(written: Sequence[Path], folder: Path) -> None:
     """Move complete files or folders into a folder, one after the other; each survives a loss of power.
 
-    The last of several names the others. The old one goes first, so that none ever names files of which some
-    are older than others.
+    The last of several refers to the others. The old one is removed first, so that it never refers to files
+    of different age.
     """
     for path in written:
         for part in (*path.rglob("*"), path) if path.is_dir() else (path,):
@@ -127,20 +126,20 @@ def replace_all(written: Sequence[Path], folder: Path) -> None:
         (folder / written[-1].name).unlink(missing_ok=True)
     for path in written:
         target = folder / path.name
-        if path.is_dir() and target.is_dir():  # unlike a file, it cannot be replaced at once
+        if path.is_dir() and target.is_dir():  # unlike a file, it cannot be replaced atomically
             shutil.rmtree(target)
         os.replace(path, target)
     synchronise(folder)
 
 
 def _made(folder: Path, stem: str) -> tuple[Path, int | None]:
-    """Make a hidden folder and lock it, where the file system can."""
+    """Create a hidden folder and lock it, if the file system supports locks."""
     while True:
         hidden = folder / f".{stem}.{secrets.token_hex(4)}.partial"
         hidden.mkdir()
         with suppress(FileNotFoundError):
             taken, lock = _locked(hidden)
-            # Between its making and its lock another writer may have taken it for an abandoned one.
+            # Before it was locked another writer may have taken it for abandoned.
             if (taken or lock is None) and hidden.exists():
                 return hidden, lock
             if lock is not None:
@@ -148,7 +147,7 @@ def _made(folder: Path, stem: str) -> tuple[Path, int | None]:
 
 
 def _locked(path: Path) -> tuple[bool, int | None]:
-    """Try to lock a folder: whether it worked, and the open folder, None where there are no locks."""
+    """Try to lock a folder; return the success and the open folder, None where there are no locks."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

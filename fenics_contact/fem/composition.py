@@ -1,4 +1,4 @@
-"""Which material is where on a mesh, and integrals over all of them."""
+"""The materials on the cells of a mesh, and integrals over all of them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Composition:
 
     Attributes:
         materials: The materials.
-        cells: Tag (from 1, in the order of the materials) -> cells of the mesh; None where there is but one.
+        cells: Tag (from 1, in the order of the materials) -> cells of the mesh; None if there is only one.
     """
 
     materials: tuple[Material, ...]
@@ -36,12 +36,12 @@ class Composition:
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """Numbers for the constants that `integrate` makes."""
+        """Values of the constants of `integrate`."""
         return tuple(value for material in self.materials for value in material.parameters)
 
 
 def composition(body: Body, cells: np.ndarray) -> Composition:
-    """Return what some cells of a body are made of.
+    """Return the materials of some cells of a body.
 
     Args:
         body: The body.
@@ -71,7 +71,7 @@ def integrate(
     Args:
         materials: As in `Composition`.
         cell_type: Of the template.
-        integrand: Gets each material with its constants.
+        integrand: Takes each material with its constants.
         measure: dx on the template.
     """
     all_constants: list[Any] = []

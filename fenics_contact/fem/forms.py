@@ -40,7 +40,7 @@ __all__ = [
 
 
 class FormLibrary:
-    """The compiled forms of a scene, by what they express and for which cell type."""
+    """The compiled forms of a scene, by content and cell type."""
 
     def __init__(self, comm: MPI.Comm) -> None:
         """Start empty; `prepare` fills it."""
@@ -54,11 +54,11 @@ class FormLibrary:
 
     @property
     def templates(self) -> Templates:
-        """The compiled forms; what floors above write joins them, when it is asked for."""
+        """The compiled forms, to which upper floors add their own on demand."""
         return self._templates
 
     def prepare(self, scene: Scene) -> None:
-        """Compile what the scene calls for and is not there yet. Collective on the library's communicator.
+        """Compile the missing forms of a scene. Collective on the library's communicator.
 
         Raises:
             InvalidInputError: If a material contradicts itself (see `check_model`), or the value of a load
@@ -99,7 +99,7 @@ class FormLibrary:
             cell_type: Of the mesh.
             space: Displacements on the mesh.
             points: Coordinates by input node of the mesh, shape (n, dim), [length].
-            facets: (cells, local facets) that a surface load acts on.
+            facets: (cells, local facets) on which a surface load acts.
         """
         template = self._templates[load_key(load, parts.materials, cell_type)]
         cells = parts.cells if isinstance(load, ThermalStrain) else None
@@ -107,13 +107,13 @@ class FormLibrary:
         return template.bind([space], load_parameters(load, parts), functions, facets, cells=cells)
 
     def varies(self, material: Material, cell_type: str) -> bool:
-        """Return whether the stiffness of a material mentions the place that it is at."""
+        """Return whether the stiffness of a material depends on position."""
         return self._templates["stiffness", (material,), cell_type].mentions(ufl.geometry.SpatialCoordinate)
 
     def typical_modulus(self, material: Material, cell_type: str) -> float:
         """Return the mean diagonal entry of the stiffness of a cell of edge length one.
 
-        [force / length²] times [length^(dim − 2)]; a measure of how stiff materials are beside one another.
+        [force / length²] times [length^(dim − 2)]; a measure of the relative stiffness of materials.
         """
         return self._typical_modulus[material, cell_type]
 

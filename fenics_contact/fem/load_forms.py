@@ -1,4 +1,4 @@
-"""Virtual work of loads in UFL, and the numbers and fields to bind it with."""
+"""Virtual work of loads in UFL, and the values and fields to bind to it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fenics_contact.fem.composition import Composition, integrate
 from fenics_contact.fem.templates import scalar_constants, surface_measure, volume_measure
 from fenics_contact.scene import BodyForce, Load, Material, Pressure, ThermalStrain, Ufl, evaluate, strain
 
-#: Coefficients of loads are counted from here, behind those of displacement fields.
+#: First number of the coefficients of loads, after those of displacement fields.
 FIRST_COUNT = 4
 KIND = {BodyForce: "body force", ThermalStrain: "thermal strain", Pressure: "pressure"}
 
@@ -25,22 +25,22 @@ def is_scalar(load: Load) -> bool:
 
 
 def load_name(load: Load, cell_type: str) -> tuple[Any, ...]:
-    """Return what the form of a load is called: kind, how its value is given, cell type."""
+    """Return the name of the form of a load: kind, type of its value, cell type."""
     given = "UFL" if isinstance(load.value, Ufl) else "of position" if callable(load.value) else "numbers"
     return (KIND.get(type(load), "surface load"), given, cell_type)
 
 
 def load_key(load: Load, materials: tuple[Material, ...], cell_type: str) -> tuple[Any, ...]:
-    """Return all that the form of a load depends on."""
+    """Return the key of everything on which the form of a load depends."""
     own = load.value if isinstance(load.value, Ufl) else None
     return (*load_name(load, cell_type), own, materials if isinstance(load, ThermalStrain) else ())
 
 
 class Symbol:
-    """The value of a load as UFL, with the constants and coefficients that stand for it."""
+    """The value of a load as UFL, with its constants and coefficients."""
 
     def __init__(self, load: Load, cell_type: str, number: int = 0) -> None:
-        """Write the value of ``load``; ``number`` tells apart the loads of one form."""
+        """Write the value of ``load``; ``number`` distinguishes the loads of one form."""
         dim = _dolfinx.dimension(cell_type)
         self.constants: tuple[Any, ...] = ()
         self.coefficients: tuple[Any, ...] = ()
@@ -71,7 +71,7 @@ def from_ufl(load: Load, value: Ufl, cell_type: str) -> Any:
 
 
 def numbers_of(load: Load) -> tuple[float, ...]:
-    """Return the numbers for a symbol's constants."""
+    """Return the values of a symbol's constants."""
     if callable(load.value) or isinstance(load.value, Ufl):
         return ()
     return tuple(load.value) if isinstance(load.value, Sequence) else (float(load.value),)
@@ -105,8 +105,8 @@ def load_work(
     """Return the virtual work of a load along ``v``, a UFL form, and the constants of the materials in it.
 
     Args:
-        load: A load whose resultant, if it is one, was spread already.
-        materials: Of the cells it acts on.
+        load: A load; a resultant must have been spread.
+        materials: Materials of the cells on which it acts.
         cell_type: Of the template.
         value: Value of the load (UFL), see `Symbol`.
         v: Test function or another field.
@@ -126,5 +126,5 @@ def load_work(
 
 
 def load_parameters(load: Load, parts: Composition) -> tuple[float, ...]:
-    """Return the numbers for the constants of a load's form: its own, then those of the materials."""
+    """Return the values of the constants of a load's form: its own, then those of the materials."""
     return numbers_of(load) + (parts.parameters if isinstance(load, ThermalStrain) else ())

@@ -1,4 +1,4 @@
-"""Does a material do what it claims? Checked on one small cell, before anything is built on it."""
+"""Consistency checks of a material on one small cell, before it is used."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def unit_cell_stiffness(cell_type: str, bind: Bind) -> np.ndarray:
 def check_model(material: Material, cell_type: str, bind: Bind) -> None:
     """Check stiffness and kernel of a material on one skew cell.
 
-    A kernel with a mode too few makes the generalised inverse blow up, one with a mode too many takes real
-    stiffness away; both would pass for a solution.
+    A kernel with a missing mode makes the generalised inverse blow up, one with an extra mode removes real
+    stiffness; both could be taken for a solution.
 
     Args:
         material: The material.
@@ -39,7 +39,7 @@ def check_model(material: Material, cell_type: str, bind: Bind) -> None:
 
     Raises:
         InvalidInputError: If the stiffness is not finite, not symmetric or has a negative energy, the kernel
-            has the wrong shape, dependent modes or modes that are none, or a mode without energy is missing.
+            has the wrong shape, dependent modes or modes with energy, or a mode without energy is missing.
     """
     name = type(material).__name__
     K, points = stiffness_of_cell(_skewed(CELL_TYPES[cell_type].nodes), cell_type, bind)
@@ -74,19 +74,19 @@ def check_model(material: Material, cell_type: str, bind: Bind) -> None:
 def check_kernel(stiffness: Any, kernel: np.ndarray, what: str) -> None:
     """Check that a stiffness matrix annihilates its kernel.
 
-    All modes are tried at once, each with a weight of its own.
+    All modes are tested at once, each with a weight of its own.
 
     Args:
         stiffness: K, dense or sparse, shape (n, n).
         kernel: R, shape (n, n_modes).
-        what: Whose they are, for the message.
+        what: Name of their owner, for the message.
 
     Raises:
-        InvalidInputError: If ‖K R‖ is not small beside ‖K‖ ‖R‖.
+        InvalidInputError: If ‖K R‖ is not small compared with ‖K‖ ‖R‖.
     """
     weights = 1 / (1 + np.sqrt(np.arange(2, 2 + kernel.shape[1])))
     energy = np.abs(stiffness @ (kernel @ weights)).max(initial=0.0)
-    # No entry of a matrix without negative energies is larger than the largest on its diagonal.
+    # In a positive semidefinite matrix no entry exceeds the largest on the diagonal.
     scale = stiffness.diagonal().max() * np.abs(kernel).max(initial=0.0)
     if not energy <= KERNEL_TOLERANCE * scale:
         raise InvalidInputError(
@@ -100,7 +100,7 @@ def kernel_of(material: Material, points: np.ndarray) -> np.ndarray:
     """Return the modes without energy of a material at points, shape (n, dim, n_modes).
 
     Raises:
-        InvalidInputError: If the material returns something else.
+        InvalidInputError: If the material returns other values.
         UserCodeError: If it raises.
     """
     name = type(material).__name__

@@ -1,4 +1,4 @@
-"""Typical nodal stiffness of cells, by which stiff and soft neighbours are weighted."""
+"""Typical nodal stiffness of cells, for weighting stiff and soft neighbours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The temperature change of a body in UFL, and the stress that is left when it has strained the body."""
+"""The temperature change of a body in UFL, and the stress including thermal strain."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ class Temperature:
     """The sum of the temperature changes of one body.
 
     Attributes:
-        loads: They; none means that no temperature enters any form.
+        loads: The temperature changes; without any, no form depends on temperature.
     """
 
     loads: tuple[ThermalStrain, ...] = ()
 
     @property
     def key(self) -> tuple[Any, ...]:
-        """All of it that a form depends on."""
+        """The key of everything on which a form depends."""
         return bool(self._numbers), bool(self._of_position), tuple(load.value for load in self._ufl)
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Numbers for the constants: the sum of the uniform changes."""
+        """Values of the constants: the sum of the uniform changes."""
         return (sum(self._numbers),) if self._numbers else ()
 
     def write(self, cell_type: str) -> tuple[Any, tuple[Any, ...], tuple[Any, ...]]:
@@ -92,7 +92,7 @@ def stress_left(material: Any, u: Any, constants: Sequence[Any], temperature: An
 
 
 def stress_in_space(material: Material, u: Any, constants: Sequence[Any], temperature: Any) -> Any:
-    """Return the stress (3 x 3, UFL), in the plane with what the material carries normal to it."""
+    """Return the stress (3 x 3, UFL), in the plane including the component normal to it."""
     stress = stress_left(material, u, constants, temperature)
     if stress.ufl_shape == (3, 3):
         return stress

@@ -1,4 +1,4 @@
-"""Compiled forms with their constants and coefficients, and the measures they are integrated with."""
+"""Compiled forms with their constants and coefficients, and the integration measures."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from fenics_contact._libraries import MPI
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.fingerprint import require_alike
 
-#: Gauss rule of the volume by shape: two points a direction on tensor-product cells, one on simplices suit
+#: Gauss rule of the volume by shape: two points per direction on tensor-product cells, one on simplices suit
 #: linear elasticity; quadratic cells get twice the degree.
 QUADRATURE_DEGREE = {"hexahedron": 2, "tetrahedron": 1, "quadrilateral": 2, "triangle": 1}
-#: Tag that every loaded surface gets inside a load form.
+#: Tag of every loaded surface inside a load form.
 LOADED = 1
 
 #: A form, its constants and its coefficients.
@@ -38,7 +38,7 @@ class Template:
         self._constants, self._coefficients = tuple(constants), tuple(coefficients)
 
     def mentions(self, kind: type) -> bool:
-        """Return whether the form was written with a symbol of UFL of some kind."""
+        """Return whether the form contains a UFL symbol of a given type."""
         return bool(extract_type(self._written, kind))
 
     def bind(
@@ -50,11 +50,11 @@ class Template:
         mesh: Any = None,
         cells: Mapping[int, np.ndarray] | None = None,
     ) -> Any:
-        """Return the form on one mesh, with numbers for its constants and Functions for its coefficients.
+        """Return the form on one mesh, with values for its constants and Functions for its coefficients.
 
         Args:
             spaces: Spaces of its arguments.
-            values: Numbers for its constants.
+            values: Values of its constants.
             functions: Functions for its coefficients.
             facets: (cells, local facets) of its surface integral.
             mesh: The mesh, where there are no arguments.
@@ -71,10 +71,10 @@ class Template:
 
 
 class Templates:
-    """Compiled forms by key; what different keys write alike is compiled once.
+    """Compiled forms by key; identical forms of different keys are compiled once.
 
-    A key names all that a form was written from. Keys of two materials of one class differ, their forms
-    mostly do not: only numbers do, which enter later.
+    A key contains everything on which a form depends. Keys of two materials of one class differ, but mostly
+    not their forms: only values of constants do, which are bound later.
     """
 
     def __init__(self, comm: MPI.Comm) -> None:
@@ -86,11 +86,11 @@ class Templates:
 
     @property
     def names(self) -> tuple[tuple[Any, ...], ...]:
-        """Names of the forms that were compiled, in that order."""
+        """Names of the compiled forms, in order."""
         return tuple(self._names)
 
     def __getitem__(self, key: Hashable) -> Template:
-        """Return what was prepared under ``key``."""
+        """Return the template prepared under ``key``."""
         return self._by_key[key]
 
     def __contains__(self, key: Hashable) -> bool:
@@ -100,9 +100,9 @@ class Templates:
         """Return the template under ``key``. Collective when it is new, on all ranks or on none.
 
         Args:
-            key: All that the form depends on.
-            name: What it is called among `names`.
-            write: Gives form, constants and coefficients.
+            key: Everything on which the form depends.
+            name: Its name among `names`.
+            write: Returns form, constants and coefficients.
 
         Raises:
             InvalidInputError: If ranks write different forms, or a number in it is not finite.
@@ -122,7 +122,7 @@ class Templates:
 
 
 def _check_numbers(form: Any, what: str) -> None:
-    """Refuse numbers in a form that no compiler takes."""
+    """Reject non-finite numbers in a form."""
     bad = [number for number in extract_type(form, FloatValue) if not np.isfinite(float(number))]
     if bad:
         raise InvalidInputError(
@@ -136,7 +136,7 @@ def _called(part: Any) -> str:
 
 
 def _text(form: Any, constants: Sequence[Any], coefficients: Sequence[Any]) -> Hashable:
-    """Return what two forms have in common if one can be bound in the place of the other."""
+    """Return the key that two forms share if one can replace the other."""
     used = form.constants(), form.coefficients()
     places = tuple(
         tuple(symbol in mine for symbol in symbols)
@@ -153,7 +153,7 @@ def scalar_constants(cell_type: str, count: int) -> tuple[Any, ...]:
 def volume_measure(cell_type: str, degree: int | None = None) -> Any:
     """Return dx on the template with the package's quadrature degree, or the given one.
 
-    The given one is for linear cells; quadratic ones get twice that.
+    The given one is for linear cells; it is doubled on quadratic ones.
     """
     linear = QUADRATURE_DEGREE[_dolfinx.shape(cell_type)] if degree is None else degree
     metadata = {"quadrature_degree": linear * _dolfinx.degree(cell_type)}

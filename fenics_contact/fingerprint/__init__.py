@@ -1,4 +1,4 @@
-"""What a problem is, in words: by them another run finds its checkpoint, and ranks see that they agree."""
+"""Descriptions of problems, by which a run identifies its checkpoint and ranks check that they agree."""
 
 from fenics_contact.fingerprint.alike import require_alike
 from fenics_contact.fingerprint.description import described, differences

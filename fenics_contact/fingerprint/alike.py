@@ -1,4 +1,4 @@
-"""Ranks that are given different things are told so, instead of solving a mixture or waiting for ever."""
+"""Check that all ranks have the same input, instead of solving a mixture or waiting forever."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ if TYPE_CHECKING:  # the optimiser does without mpi4py
     from mpi4py import MPI
 
 
-def require_alike(comm: MPI.Comm, told: Mapping[str, str]) -> None:
-    """Refuse input that differs from rank to rank. Collective on ``comm``.
+def require_alike(comm: MPI.Comm, descriptions: Mapping[str, str]) -> None:
+    """Reject input that differs from rank to rank. Collective on ``comm``.
 
     Args:
-        comm: Communicator of the ranks that must have been given the same.
-        told: What this rank was given, as `described` tells it.
+        comm: Communicator of the ranks that must have the same input.
+        descriptions: This rank's input, from `described`.
 
     Raises:
-        InvalidInputError: On all ranks; names what differs between two of them.
+        InvalidInputError: On all ranks; names the differences between two of them.
     """
     if comm.size == 1:
         return
-    digest = hashlib.sha256(repr(list(told.items())).encode()).digest()
+    digest = hashlib.sha256(repr(list(descriptions.items())).encode()).digest()
     digests = comm.allgather(digest)
     other = next((rank for rank, found in enumerate(digests) if found != digests[0]), 0)
     if other == 0:
         return
-    first = comm.bcast(dict(told))
-    named = comm.bcast(differences(first, told) or [_order(first, told)], root=other)
+    first = comm.bcast(dict(descriptions))
+    named = comm.bcast(differences(first, descriptions) or [_order(first, descriptions)], root=other)
     error = InvalidInputError(
         f"all ranks must be given the same, but on rank 0 and rank {other} differ {'; '.join(named)}: build "
         "it from the same numbers on every rank, or on rank 0 alone and send it with comm.bcast"
@@ -40,7 +40,7 @@ def require_alike(comm: MPI.Comm, told: Mapping[str, str]) -> None:
 
 
 def _order(there: Mapping[str, str], here: Mapping[str, str]) -> str:
-    """Name where two descriptions stand in different orders."""
+    """Describe where two descriptions differ in order."""
     pairs = zip(there, here, strict=True)
     one, other = next(((one, other) for one, other in pairs if one != other), ("", ""))
     return f"the order of entries ({one}, {other})"

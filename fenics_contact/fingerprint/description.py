@@ -1,4 +1,4 @@
-"""What a problem is, in words that another run of the same script finds again."""
+"""Descriptions of problems that another run of the same script reproduces."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from typing import Any
 
 import numpy as np
 
-#: How many differences a message lists.
+#: Largest number of differences in a message.
 MOST_NAMED = 4
 
 
 def described(value: Any, name: str, *, carried: bool = True) -> dict[str, str]:
     """Describe a value by its parts: one entry for each number, text or array.
 
-    Arrays are described by shape, type and a hash of their bits, dataclasses, mappings and sequences by what
-    they hold, functions by their names and the values that they carry along, classes by their names; of any
-    other object only the class is told.
+    Arrays are described by shape, type and a hash of their bits, dataclasses, mappings and sequences by their
+    contents, functions by their names and the values in their closures and defaults, classes by their names;
+    any other object only by its class.
 
     Args:
-        value: What is to be recognised.
-        name: How it is called.
-        carried: Tell what functions carry along, too.
+        value: The value.
+        name: Its name.
+        carried: Whether to describe closures and defaults of functions.
 
     Example:
         >>> described({"length": 2.0}, "beam")
@@ -39,10 +39,10 @@ def described(value: Any, name: str, *, carried: bool = True) -> dict[str, str]:
 
 
 def differences(there: Mapping[str, str], here: Mapping[str, str]) -> list[str]:
-    """Name what differs between two descriptions, the first few in words.
+    """Name the differences between two descriptions, the first few in full.
 
     Args:
-        there: The one that was stored.
+        there: The stored one.
         here: The present one.
     """
     unlike = [name for name in {**there, **here} if there.get(name) != here.get(name)]
@@ -54,7 +54,7 @@ def differences(there: Mapping[str, str], here: Mapping[str, str]) -> list[str]:
 
 
 def _describe(value: Any, name: str, found: dict[str, str], around: tuple[int, ...], carried: bool) -> None:
-    """Add the parts of a value, which lies inside the objects of these identities."""
+    """Add the parts of a value, which is nested in the objects of these identities."""
     known = _leaf(value)
     if known is not None:
         found[name] = known
@@ -79,7 +79,7 @@ def _leaf(value: Any) -> str | None:
 
 
 def _branches(value: Any, name: str) -> tuple[str, list[tuple[str, Any]]]:
-    """Return what an object is and its parts by name."""
+    """Return the type of an object and its parts by name."""
     if isinstance(value, Mapping):
         return f"{len(value)} entries", [(f"{name}[{key!r}]", part) for key, part in value.items()]
     if isinstance(value, Sequence):
@@ -99,7 +99,7 @@ def _branches(value: Any, name: str) -> tuple[str, list[tuple[str, Any]]]:
 
 
 def _filled(cell: Any) -> bool:
-    """Tell whether a variable of an enclosing function has a value yet."""
+    """Return whether a variable of an enclosing function has a value yet."""
     try:
         cell.cell_contents
     except ValueError:

@@ -1,4 +1,4 @@
-"""Sparse linear algebra that the upper floors share."""
+"""Sparse linear algebra shared by the upper floors."""
 
 from fenics_contact.linalg.cost_model import expected_bytes, expected_seconds, prefers_explicit
 from fenics_contact.linalg.disposal import dispose_with, sweep

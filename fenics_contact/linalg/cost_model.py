@@ -1,7 +1,7 @@
-"""Sparse factors or dense matrices for a subdomain? What either costs, from measured rates.
+"""Cost model for sparse factors and dense matrices of a subdomain, from measured rates.
 
-The choice depends on sizes alone, never on a clock, so that a run can be repeated. `python -m
-benchmarks.prices` measures anew and compares with the predictions.
+The choice depends only on sizes, not on timings, so that a run is reproducible. `python -m benchmarks.prices`
+repeats the measurements and compares them with the predictions.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ class Rates:
 
     Attributes:
         factor: Seconds to factor a sparse matrix of n dofs of a solid, divided by n^1.37.
-        substitution: Seconds to substitute forth and back, divided by n^1.3.
+        substitution: Seconds for forward and backward substitution, divided by n^1.3.
         condensation: Time to form a Schur complement relative to that of factoring the whole matrix.
-        dense: Floating point operations a second of a dense factorisation and inversion.
-        stream: Bytes a second that the product with a packed triangle reads.
+        dense: Floating point operations per second of a dense factorisation and inversion.
+        stream: Bytes per second that the product with a packed triangle reads.
     """
 
     factor: float = 0.75e-6
@@ -52,7 +52,7 @@ class LocalCost:
     product: float
 
     def total(self, products: int) -> float:
-        """Return the seconds of the set-up and of so many products."""
+        """Return the seconds of the set-up and of a number of products."""
         return self.setup + products * self.product
 
 
@@ -73,12 +73,12 @@ def explicit_cost(size: int, interface: int, rates: Rates = MEASURED) -> LocalCo
 
 
 def prefers_explicit(size: int, interface: int, *, products: int = PRODUCTS, rates: Rates = MEASURED) -> bool:
-    """Tell whether dense interface matrices are expected to be faster than sparse factors.
+    """Return whether dense interface matrices are expected to be faster than sparse factors.
 
     Args:
         size: Dofs of the subdomain.
         interface: Dofs that B touches.
-        products: Expected products with the dual operator, as many with the preconditioner.
+        products: Expected number of products with the dual operator, and with the preconditioner.
         rates: Rates of the machine.
 
     Example:
@@ -90,12 +90,12 @@ def prefers_explicit(size: int, interface: int, *, products: int = PRODUCTS, rat
 
 
 def expected_seconds(size: int, interface: int) -> float:
-    """Return what a subdomain costs when it is kept in the cheaper way; arguments as `prefers_explicit`."""
+    """Return the cost of a subdomain stored in the cheaper way; arguments as for `prefers_explicit`."""
     return min(_totals(size, interface, PRODUCTS, MEASURED))
 
 
 def expected_bytes(size: int, interface: int) -> float:
-    """Return the memory of a factored subdomain that is kept in the cheaper way; arguments as above."""
+    """Return the memory of a factored subdomain stored in the cheaper way; arguments as above."""
     if prefers_explicit(size, interface):
         return TRIANGLE_BYTES * interface**2 + FACTOR_BYTES * (size - interface) ** 1.5
     return FACTOR_BYTES * (size**1.5 + (size - interface) ** 1.5)

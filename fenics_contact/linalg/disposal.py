@@ -1,7 +1,7 @@
 """Destroy PETSc objects together with the Python object that uses them.
 
-petsc4py frees nothing by itself when a Python reference goes away: PETSc has to be told, and for objects
-shared by several ranks by all of them in the same order.
+petsc4py frees nothing when a Python reference goes away: PETSc objects must be destroyed explicitly, those
+shared by several ranks on all of them in the same order.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-#: Size of the communicator and place in the order of registration there: the same on all its ranks.
+#: Size of the communicator and index in the order of registration there: the same on all its ranks.
 Key = tuple[int, int]
 
 #: Objects of several ranks whose owner is gone on this rank.
@@ -30,7 +30,7 @@ def dispose_with(owner: Any, *objects: Any, comm: MPI.Comm | None = None, keep: 
         comm: Communicator they live on: that of the scene or of its first ranks, or None for this rank alone.
             Objects of one rank are destroyed at once, others by `sweep`; they must be registered by all ranks
             in the same order.
-        keep: What has to live as long as the objects, such as the mesh whose communicator they use.
+        keep: An object that must live as long as they do, such as the mesh whose communicator they use.
     """
     finalizer: Any
     if comm is None or comm.size == 1:

@@ -11,10 +11,10 @@ from fenics_contact.linalg.disposal import dispose_with
 
 Vector = npt.NDArray[np.float64]
 
-#: Rows for which one more rank takes part in the factorisation.
+#: Number of rows per rank that takes part in the factorisation.
 ROWS_PER_RANK = 20_000
-#: Added to the diagonal of the scaled matrix, so that a singular one can be factored too; one step of
-#: refinement removes its trace from the solutions.
+#: Added to the diagonal of the scaled matrix, so that a singular one can be factored, too; one step of
+#: refinement removes its effect from the solutions.
 SHIFT = 1e-13
 
 _subsets: dict[tuple[int, int], MPI.Comm] = {}
@@ -31,7 +31,7 @@ class SharedFactor:
     def __init__(
         self, comm: MPI.Comm, share: sp.csr_matrix, scale: Vector, *, holders: int | None = None
     ) -> None:
-        """Bring the shares together and factor. Collective on ``comm``.
+        """Sum the shares and factor. Collective on ``comm``.
 
         Args:
             comm: Communicator of the ranks that use the factors.
@@ -94,7 +94,7 @@ class SharedFactor:
 
     def _factor(self, rows: sp.csr_matrix) -> None:
         start, height = self._bounds[self._comm.rank], rows.shape[0]
-        # Every diagonal entry must be there for the shift, also zeros, which sums of sparse matrices drop.
+        # Every diagonal entry must exist for the shift, also zeros, which sums of sparse matrices drop.
         entries, own = rows.tocoo(), np.arange(height)
         value = np.concatenate([entries.data, np.zeros(height)])
         place = np.concatenate([entries.row, own]), np.concatenate([entries.col, start + own])

@@ -1,4 +1,4 @@
-"""Threads of BLAS beside ranks of MPI: where every rank's BLAS takes all cores, all of them wait."""
+"""Oversubscription by BLAS threads of MPI ranks."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from fenics_contact.errors import tell
 
 _LOG = logging.getLogger(__name__)
 
-#: What tells OpenBLAS, MKL and OpenMP how many threads to start.
+#: Environment variables for the number of threads of OpenBLAS, MKL and OpenMP.
 SETTINGS = ("OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 
 
 @lru_cache
 def warn_of_threads(ranks: int) -> None:
-    """Warn, once, if several ranks run and nobody has said how many threads each may start.
+    """Warn, once, if several ranks run and the number of their threads is unset.
 
-    The number itself is the user's: a library that changes it would change it for all that runs beside it.
+    The number itself is the user's choice: a library that changed it would affect the whole process.
 
     Args:
         ranks: Number of ranks.

@@ -16,29 +16,29 @@ from fenics_contact.partition.cutting import check_parts, merge_pieces
 from fenics_contact.partition.weights import cell_weights, face_areas
 
 LAYER = 1e-12
-"""Cells whose centres differ by less than this part of the body's extent lie in one layer."""
+"""Cells whose centres differ by less than this fraction of the body's extent lie in one layer."""
 
 UNEVEN = 2.0
-"""Subdomains that are e^s times too large or too small pass for a cut that is e^(2 s) times as small."""
+"""Subdomains e^s times too large or too small are accepted for a cut that is e^(2 s) times smaller."""
 
 APART = 0.5
-"""A cut at the end of the middle third passes for a cut in the middle that is larger by a twelfth."""
+"""A cut at the end of the middle third is equivalent to a cut in the middle that is larger by a twelfth."""
 
 ALIKE = 1e-6
-"""Cuts that differ by less are alike: rounding does not choose between them."""
+"""Cuts that differ by less are equivalent: rounding does not choose between them."""
 
 
 def bisection_partition(mesh: BodyMesh, parts: int) -> np.ndarray:
-    """Cut any mesh in two, and the halves again, each time where the cut has the least area.
+    """Cut any mesh in two, and the halves again, each time by the cut of least area.
 
-    Cuts run across the directions of the grid where there is one, else across the axes of coordinates and
-    the principal axes of the piece; they do not split layers of cells. Cells count by the root of their
-    volume, so that subdomains stay compact where cells are graded. Pieces that a cut leaves hanging by an
-    edge or a node are given to a neighbour, see `merge_pieces`.
+    Cuts are normal to the directions of the grid if there is one, else to the coordinate axes and the
+    principal axes of the piece; they do not split layers of cells. Cells are weighted by the root of their
+    volume, so that subdomains stay compact where cells are graded. Pieces that a cut leaves connected only by
+    an edge or a node are given to a neighbour, see `merge_pieces`.
 
     Args:
         mesh: Any mesh.
-        parts: Number of subdomains. The more often it can be halved, the more alike they are.
+        parts: Number of subdomains. The more often it can be halved, the more similar they are.
 
     Returns:
         (n_cells,) subdomain numbers, every subdomain connected through faces; the same on every rank.
@@ -61,13 +61,13 @@ def bisection_partition(mesh: BodyMesh, parts: int) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Cut:
-    """A cut of a piece across one direction.
+    """A cut of a piece normal to one direction.
 
     Attributes:
         order: Its cells along the direction, (n,).
-        cells: How many of them lie before the cut.
-        parts: How many subdomains they will become.
-        cost: Area, more where the cut is uneven.
+        cells: Number of cells before the cut.
+        parts: Number of subdomains that they become.
+        cost: Area, increased if the cut is uneven.
     """
 
     order: np.ndarray
@@ -83,8 +83,8 @@ class _Piece:
     Attributes:
         cells: Its cells, (n,).
         places: Layers or coordinates of their centres, (n, 3 | 2).
-        turned: Whether it may be cut across its principal axes.
-        weights: What each cell counts, (n,), that of one subdomain being 1.
+        turned: Whether it may be cut normal to its principal axes.
+        weights: Weight of each cell, (n,), with 1 for a subdomain.
         pairs: Pairs of cells that share a face, in its own numbering, (n_pairs, 2).
         areas: Areas of these faces, (n_pairs,).
         first: Number of its first subdomain.
@@ -101,7 +101,7 @@ class _Piece:
     parts: int
 
     def halves(self) -> tuple[_Piece, _Piece]:
-        """Cut it in two where that costs least."""
+        """Cut it in two by the cheapest cut."""
         best = self._best(between_layers=True) or self._best(between_layers=False)
         assert best is not None  # a piece has as many cells as subdomains
         before = np.zeros(len(self.cells), dtype=bool)
@@ -112,7 +112,7 @@ class _Piece:
         )
 
     def _best(self, between_layers: bool) -> _Cut | None:
-        """Return the cheapest cut, of two alike the first."""
+        """Return the cheapest cut, the first of equivalent ones."""
         best: _Cut | None = None
         for place in self._directions():
             cut = self._across(place, between_layers)
@@ -121,7 +121,7 @@ class _Piece:
         return best
 
     def _directions(self) -> list[np.ndarray]:
-        """List where the cells lie along the directions, each (n,)."""
+        """List the positions of the cells along the directions, each (n,)."""
         along = list(self.places.T)
         if self.turned:
             arms = self.places - self.weights @ self.places / self.weights.sum()
@@ -130,7 +130,7 @@ class _Piece:
         return along
 
     def _across(self, place: np.ndarray, between_layers: bool) -> _Cut | None:
-        """Return the cheapest cut across a direction, None if there is none between layers."""
+        """Return the cheapest cut normal to a direction, None if there is none between layers."""
         order = np.argsort(place, kind="stable")
         n, total = len(order), self.weights.sum()
         cells, before = np.arange(1, n), np.cumsum(self.weights[order])[:-1]
@@ -174,7 +174,7 @@ class _Piece:
 def _whole(mesh: BodyMesh, parts: int) -> _Piece:
     """Return the whole mesh as a piece."""
     if mesh.grid is None:
-        # Counted in units that rounding does not reach: layers of cells are not split by the last bits.
+        # In units above rounding, so that layers of cells are not split by the last bits.
         unit = LAYER * float(np.ptp(mesh.points, axis=0).max()) + coordinate_rounding(mesh.points)
         centres = mesh.points[mesh.cells].mean(axis=1)
         places = np.round((centres - mesh.points.min(axis=0)) / unit)

@@ -1,8 +1,8 @@
 """Cutting a mesh into subdomains.
 
-A partition is an int64 array with the subdomain 0..S-1 of every cell. A subdomain must hang together through
-faces: pieces joined by an edge or a node only can move against each other at no energy, beyond the rigid
-body modes that the solver knows of.
+A partition is an int64 array with the subdomain 0..S-1 of every cell. A subdomain must be connected through
+faces: pieces joined only by an edge or a node have zero-energy relative motions beyond the rigid body modes
+that the solver knows.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from fenics_contact.mesh import BodyMesh, neighbours
 def box_partition(mesh: BodyMesh, boxes: tuple[int, ...]) -> np.ndarray:
     """Cut a structured mesh into boxes of cells.
 
-    Where a count does not divide, the boxes differ by at most one layer of cells. Subdomains are numbered
-    with the last direction running fastest, so that consecutive numbers are mostly neighbours.
+    If a count is not divisible, the boxes differ by at most one layer of cells. Subdomains are numbered with
+    the last direction running fastest, so that consecutive numbers are mostly neighbours.
 
     Args:
         mesh: Mesh with a ``grid``.
@@ -57,10 +57,10 @@ def box_partition(mesh: BodyMesh, boxes: tuple[int, ...]) -> np.ndarray:
 
 
 def check_parts(mesh: BodyMesh, parts: int) -> None:
-    """Refuse a number of subdomains that a mesh cannot be cut into.
+    """Reject a number of subdomains into which a mesh cannot be cut.
 
     Raises:
-        InvalidInputError: If it is none from 1 to the number of cells.
+        InvalidInputError: If it is not between 1 and the number of cells.
     """
     check_count(parts, "parts")
     if parts > mesh.n_cells:
@@ -82,8 +82,8 @@ def _face_pieces(mesh: BodyMesh, partition: np.ndarray, pairs: np.ndarray) -> tu
 def merge_pieces(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> np.ndarray:
     """Make every subdomain connected through faces.
 
-    The largest piece of each subdomain stays; every other piece goes to the subdomain whose largest piece it
-    shares most faces with, those that touch none in a later round.
+    The largest piece of each subdomain stays; every other piece goes to the subdomain with whose largest
+    piece it shares most faces, those that touch none in a later round.
 
     Args:
         mesh: A mesh that is itself connected through faces.
@@ -130,14 +130,14 @@ def _named(body: str) -> str:
 
 
 def check_one_piece(mesh: BodyMesh, body: str = "") -> None:
-    """Refuse a mesh that does not hang together through faces.
+    """Reject a mesh that is not connected through faces.
 
     Args:
         mesh: The mesh.
         body: Name of the body, for the message.
 
     Raises:
-        InvalidInputError: Saying in how many parts it is.
+        InvalidInputError: States the number of its parts.
     """
     piece, owner = _face_pieces(
         mesh, np.zeros(mesh.n_cells, dtype=np.int64), neighbours(mesh.cells, mesh.dim)
@@ -151,7 +151,7 @@ def check_one_piece(mesh: BodyMesh, body: str = "") -> None:
 
 
 def check_face_connected(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> None:
-    """Refuse a partition with a subdomain that is empty or does not hang together through faces.
+    """Reject a partition with a subdomain that is empty or not connected through faces.
 
     Args:
         mesh: The mesh.
@@ -159,7 +159,7 @@ def check_face_connected(mesh: BodyMesh, partition: np.ndarray, body: str = "") 
         body: Name of the body, for the message.
 
     Raises:
-        InvalidInputError: Naming the subdomain.
+        InvalidInputError: Names the subdomain.
     """
     partition = _checked_partition(mesh, partition)
     _, owner = _face_pieces(mesh, partition, neighbours(mesh.cells, mesh.dim))
@@ -193,7 +193,7 @@ def _checked_partition(mesh: BodyMesh, partition: np.ndarray) -> np.ndarray:
 
 
 def combine(partitions: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Number the subdomains of several bodies through.
+    """Number the subdomains of several bodies consecutively.
 
     Args:
         partitions: One partition for each body, each counting from zero.

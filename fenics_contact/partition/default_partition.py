@@ -1,4 +1,4 @@
-"""How many subdomains a body gets, and which, when nobody says."""
+"""Default number of subdomains of a body, and the default partition."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from fenics_contact.partition.bisection import bisection_partition
 from fenics_contact.partition.cutting import check_one_piece
 
 TARGET_NODES = {3: 700, 2: 1000}
-"""Nodes of a subdomain by dimension: about 2000 displacements in both.
+"""Nodes of a subdomain by dimension: about 2000 displacement unknowns in both.
 
-In 3D these are 9 nodes along an edge, as in the published chain of links. As many displacements make 32 nodes
-along an edge in 2D: the matrices are as large, their factors sparser and the interface smaller, and the
-condition number grows with the logarithm, squared, of the cells along an edge only."""
+In 3D these are 9 nodes along an edge, as in the published chain of links. In 2D they are 32 nodes
+along an edge: the matrices are of the same size, their factors sparser and the interface smaller, and the
+condition number grows only with the squared logarithm of the cells along an edge."""
 
 NEAR = (0.8, 1.25)
-"""By which factors the number of subdomains may miss the target so that it can be halved more often."""
+"""Factors by which the number of subdomains may miss the target so that it can be halved more often."""
 
 _NODES_PER_CELL = {
     "hexahedron": 1.0,
@@ -29,7 +29,7 @@ _NODES_PER_CELL = {
     "quadrilateral9": 4.0,
     "triangle6": 2.0,
 }
-"""In the interior of a large mesh; for tetrahedra as mesh generators make them (6 in a split hexahedron)."""
+"""Nodes per cell in a large mesh; for tetrahedra those of mesh generators (6 in a split hexahedron)."""
 
 
 def target_parts(mesh: BodyMesh, nodes: float | None = None) -> int:
@@ -61,11 +61,11 @@ def target_parts(mesh: BodyMesh, nodes: float | None = None) -> int:
 def default_partition(
     mesh: BodyMesh, ranks: int = 1, *, nodes: float | None = None, body: str = ""
 ) -> np.ndarray:
-    """Cut a body into as many subdomains as suit its size, and at least one for every rank.
+    """Cut a body into a number of subdomains suited to its size, and at least one for every rank.
 
-    A number near the one aimed at that can be halved often is taken: halves are alike, so that their matrices
-    have one pattern. `bisection_partition` cuts. Only a body with fewer cells than ranks gets fewer
-    subdomains than there are ranks.
+    A number near the target that can be halved often is chosen: halves are similar, so that their matrices
+    share a pattern. The cuts are those of `bisection_partition`. Only a body with fewer cells than ranks has
+    fewer subdomains than there are ranks.
 
     Args:
         mesh: Any mesh that is connected through faces.
@@ -86,6 +86,6 @@ def default_partition(
 
 
 def _often_halved(target: int, least: int, most: int) -> int:
-    """Return the number near the target that can be halved most often, of two the nearer one."""
+    """Return the number near the target that can be halved most often, the nearer one of two."""
     first, last = (min(max(least, round(factor * target)), most) for factor in NEAR)
     return min(range(first, last + 1), key=lambda number: (-(number & -number), abs(number - target)))

@@ -1,8 +1,9 @@
-"""Partition of any mesh by METIS: little area between subdomains of like size.
+"""Partition of any mesh by METIS: small interfaces between subdomains of similar size.
 
-The graph is the dual one: a vertex for every cell, an edge for every face that two cells share, which costs
-its area; see `partition.weights`. METIS may return a part in pieces, and, when parts are small, a part
-without cells; both are mended. It balances parts to the cell, which leaves jags; these are smoothed.
+The graph is the dual one: a vertex for every cell, an edge for every face that two cells share, weighted by
+its area; see `partition.weights`. METIS may return a disconnected part and, when parts are small, a part
+without cells; both are repaired. It balances parts to the cell, which leaves jagged boundaries; these are
+smoothed.
 
 References:
     G. Karypis, V. Kumar: A fast and high quality multilevel scheme for partitioning irregular graphs. SIAM J.
@@ -22,11 +23,11 @@ from fenics_contact.partition.smoothing import smoothed
 from fenics_contact.partition.weights import cell_weights, face_areas
 
 STEPS = 1000
-"""Into how many the largest weight is divided: METIS counts in integers."""
+"""Integer value of the largest weight, as METIS uses integers."""
 
 
 def graph_partition(mesh: BodyMesh, parts: int, body: str = "") -> np.ndarray:
-    """Cut any mesh so that little area lies between its subdomains.
+    """Cut any mesh with small interfaces between its subdomains.
 
     The same mesh gives the same subdomains on every call and every rank.
 
@@ -67,7 +68,7 @@ def _integers(weights: np.ndarray) -> np.ndarray:
 
 
 def _without_empty_parts(graph: csr_matrix, partition: np.ndarray, parts: int) -> np.ndarray:
-    """Give every part without cells half of the largest one."""
+    """Give half of the largest part to every part without cells."""
     partition = partition.copy()
     sizes = np.bincount(partition, minlength=parts)
     for empty in np.flatnonzero(sizes == 0):
@@ -75,7 +76,7 @@ def _without_empty_parts(graph: csr_matrix, partition: np.ndarray, parts: int) -
         cells = np.flatnonzero(partition == largest)
         inside = graph[cells][:, cells]
         reached = breadth_first_order(inside, 0, directed=False, return_predecessors=False)
-        # What is not reached from the first cell is another piece and moves over first.
+        # Cells not reached from the first one are another piece and move first.
         order = np.concatenate([np.setdiff1d(np.arange(cells.size), reached), reached[::-1]])
         moved = cells[order[: cells.size // 2]]
         partition[moved] = empty

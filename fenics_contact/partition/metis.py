@@ -1,13 +1,12 @@
-"""METIS of pymetis, and of no other library that the process holds.
+"""METIS of pymetis, and not of another library in the process.
 
 pymetis carries METIS inside its extension and exports its functions. The dynamic linker prefers functions of
-the same name in libraries that were opened for all (RTLD_GLOBAL), and so does dolfinx 0.5 open the METIS of
-the system, whose indices have 32 bits where those of pymetis have 64: a pymetis that is loaded after it
-computes partly with the one and partly with the other, and crashes or never ends. Here it is loaded so that
-it prefers its own functions.
+the same name in libraries opened with RTLD_GLOBAL, as dolfinx 0.5 opens the METIS of the system, whose
+indices have 32 bits while those of pymetis have 64: a pymetis loaded after it mixes both and crashes or never
+ends. Here it is loaded so that it prefers its own functions.
 
-A library is loaded once. What a program has loaded itself stays as it is, and where another METIS may have
-taken its calls, the graph is cut in a process of its own.
+A library is loaded only once. If the program itself has loaded pymetis and another METIS may have taken its
+calls, the graph is partitioned in a separate process.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ def part_graph(graph: csr_matrix, vertices: np.ndarray, parts: int) -> np.ndarra
 
     Args:
         graph: Cost of cutting two vertices apart, integers of at least 1, (n, n), symmetric.
-        vertices: What each vertex counts, integers of at least 1, (n,).
+        vertices: Weight of each vertex, integers of at least 1, (n,).
         parts: Number of parts, at least 2.
 
     Returns:
@@ -51,15 +50,15 @@ def part_graph(graph: csr_matrix, vertices: np.ndarray, parts: int) -> np.ndarra
     return metis_call.part_graph(graph.indptr, graph.indices, graph.data, vertices, parts)
 
 
-@cache  # of the first call, before which nothing of the package has loaded pymetis
+@cache  # determined at the first call, before the package has loaded pymetis
 def _may_have_lost_its_calls() -> bool:
-    """Tell whether the program has loaded pymetis itself and there is a METIS for all that it may call."""
+    """Return whether the program has loaded pymetis itself and there is a global METIS that it may call."""
     return "pymetis._internal" in sys.modules and hasattr(ctypes.CDLL(None), "METIS_PartGraphKway")
 
 
 @contextmanager
 def _own_functions_first() -> Iterator[None]:
-    """Let what is loaded in this block prefer its own functions to those of libraries opened for all."""
+    """Let libraries loaded in this block prefer their own functions to global ones."""
     flags = sys.getdlopenflags()
     sys.setdlopenflags(os.RTLD_NOW | os.RTLD_LOCAL | getattr(os, "RTLD_DEEPBIND", 0))
     try:
@@ -69,7 +68,7 @@ def _own_functions_first() -> Iterator[None]:
 
 
 def _part_graph_elsewhere(graph: csr_matrix, vertices: np.ndarray, parts: int) -> np.ndarray:
-    """Return METIS's part of every vertex, found by a new Python that loads nothing but pymetis."""
+    """Return METIS's part of every vertex, from a new Python process that loads only pymetis."""
     given, path = io.BytesIO(), os.pathsep.join(filter(None, sys.path))
     np.savez(
         given, indptr=graph.indptr, indices=graph.indices, edges=graph.data, vertices=vertices, parts=parts

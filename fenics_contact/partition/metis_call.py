@@ -1,7 +1,7 @@
-"""The one call of METIS; also a program of its own, which knows nothing of the package.
+"""The call of METIS; also a separate program, independent of the package.
 
-Program: the graph and the number of parts come in through stdin as the arrays of an ``.npz`` file, named as
-the arguments of `part_graph`; the parts of the vertices go out through stdout as an ``.npy`` file.
+Program: reads the graph and the number of parts from stdin as the arrays of an ``.npz`` file, named as the
+    arguments of `part_graph`; writes the parts of the vertices to stdout as an ``.npy`` file.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ _SEED = 1
 def part_graph(
     indptr: np.ndarray, indices: np.ndarray, edges: np.ndarray, vertices: np.ndarray, parts: int
 ) -> np.ndarray:
-    """Return METIS's part of every vertex: the same for the same graph, always.
+    """Return METIS's part of every vertex, deterministically.
 
     Args:
-        indptr: (n + 1,) where the neighbours of each vertex begin in ``indices``.
+        indptr: (n + 1,) start of the neighbours of each vertex in ``indices``.
         indices: (2 n_edges,) neighbours, both directions of every edge.
-        edges: (2 n_edges,) what it costs to cut them, integers of at least 1.
-        vertices: (n,) what they count in a part, integers of at least 1.
+        edges: (2 n_edges,) cost of cutting them, integers of at least 1.
+        vertices: (n,) their weights, integers of at least 1.
         parts: Number of parts, at least 2.
 
     Returns:
@@ -49,7 +49,7 @@ def main() -> None:
             given[name] for name in ("indptr", "indices", "edges", "vertices")
         )
         answer = part_graph(indptr, indices, edges, vertices, int(given["parts"]))
-    written = io.BytesIO()  # NumPy asks a file for its position, a pipe has none
+    written = io.BytesIO()  # NumPy needs the position in a file, which a pipe lacks
     np.save(written, answer)
     sys.stdout.buffer.write(written.getvalue())
 

@@ -1,21 +1,21 @@
-"""Smooth boundaries between subdomains: cells that stick out go to the neighbour that holds more of them."""
+"""Smoothing of boundaries between subdomains: protruding cells move to the neighbour."""
 
 from __future__ import annotations
 
 import numpy as np
 
 ROUNDS = 20
-"""Most passes; each makes the boundaries smaller, and a few do."""
+"""Largest number of passes; each reduces the boundaries, and a few suffice."""
 
 GAIN = 1e-9
-"""A cell moves if the boundaries shrink by more than this part of the largest face."""
+"""A cell moves if the boundaries shrink by more than this fraction of the largest face."""
 
 
 def smoothed(partition: np.ndarray, pairs: np.ndarray, areas: np.ndarray) -> np.ndarray:
     """Move cells that share more area with another subdomain than with their own.
 
-    In each pass only cells move that gain more than all their neighbours, so that no two moves meet. A cell
-    that shares no face with its own subdomain stays: no subdomain loses its last one.
+    In each pass only cells move that gain more than all their neighbours, so that no two moves interfere. A
+    cell that shares no face with its own subdomain stays: no subdomain loses its last one.
 
     Args:
         partition: (n_cells,) subdomain numbers.
@@ -42,12 +42,12 @@ def smoothed(partition: np.ndarray, pairs: np.ndarray, areas: np.ndarray) -> np.
 
 
 def _gains(partition: np.ndarray, towards: np.ndarray, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return what each cell gains at most by a move, zero where it stays, and the subdomain it would go to.
+    """Return the largest gain of each cell by a move, zero if it stays, and the target subdomain.
 
     Args:
         partition: (n_cells,) subdomain numbers.
-        towards: Cell and subdomain beyond every face, seen from both sides, as one number, (2 n,).
-        area: Of the faces, (2 n,).
+        towards: Cell and subdomain beyond every face, from both sides, as one number, (2 n,).
+        area: Areas of the faces, (2 n,).
     """
     parts = int(partition.max()) + 1
     found, where = np.unique(towards, return_inverse=True)

@@ -1,7 +1,7 @@
-"""What a cut costs and what a cell counts: the weights by which meshes are cut into compact subdomains.
+"""Weights of faces and cells for cutting meshes into compact subdomains.
 
-Subdomains that are slim in space, however many cells they are thick, have soft motions that cost iterations;
-so have subdomains whose boundaries are jagged. Both have more area than compact ones of the same size.
+Slender subdomains, however many cells thick, have soft modes that cost iterations, and so have subdomains
+with jagged boundaries. Both have more area than compact ones of the same size.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ def face_areas(mesh: BodyMesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def cell_weights(mesh: BodyMesh) -> np.ndarray:
-    """Return what every cell counts, (n_cells,), together 1: the root of its volume.
+    """Return the weight of every cell, (n_cells,), with sum 1: the root of its volume.
 
-    Between as many cells, which cost as much, and as much volume, which is as compact where cells are graded.
+    A compromise between equal numbers of cells, hence equal cost, and equal volume, hence compactness.
     """
     root = np.sqrt(cell_volumes(mesh.points, mesh.cells))
     return np.asarray(root / root.sum())

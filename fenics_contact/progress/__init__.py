@@ -1,8 +1,8 @@
-"""How far long work is: told by every part of the package, shown where somebody asks for it.
+"""Progress of long work: reported by every part of the package, shown on request.
 
 The package reports through the logger ``fenics_contact.progress``, at level DEBUG. Each record carries an
-`Event` in its attribute ``progress``: which work, how many of how many, residual and target. Nobody listens
-by default, and then a report costs less than a microsecond. `show_progress` listens and draws.
+`Event` in its attribute ``progress``: work, number and total, residual and target. Without a listener, the
+default, a report costs less than a microsecond. `show_progress` listens and draws.
 
 Example:
     >>> with show_progress(comm):  # doctest: +SKIP

@@ -1,4 +1,4 @@
-"""What is reported: one thing that happened to a piece of work, in numbers."""
+"""Progress reports: one event of a piece of work, in numbers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fenics_contact.progress.words import joined
 
 
 class Kind(Enum):
-    """What happened to a piece of work."""
+    """Kinds of events of a piece of work."""
 
     BEGIN = "begins"
     STEP = "step"
@@ -20,23 +20,23 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Event:
-    """One report. Numbers that are not known are None.
+    """One report. Unknown numbers are None.
 
     Attributes:
-        task: Tells pieces of work apart that are under way at the same time.
+        task: Identifies a piece of work among those under way.
         what: The work: "factor", "load steps".
-        kind: What happened.
-        unit: What is counted: "products".
-        number: How many are done.
-        total: How many there are.
-        most: How many there may be, where it is not known how many there are.
-        measure: What must become small: the residual.
-        target: How small.
-        measured: What the measure is.
+        kind: Kind of the event.
+        unit: Unit of the count: "products".
+        number: Number done.
+        total: Total number.
+        most: Largest number, if the total is unknown.
+        measure: Quantity that must become small: the residual.
+        target: Its target.
+        measured: Its name.
         value: Best value so far, of an optimisation.
-        left: How long the work itself expects to take still, [s].
-        words: What else there is to say, for readers.
-        timed: Whether the time since the last step tells how long others take.
+        left: Remaining time as estimated by the work itself, [s].
+        words: Further text for readers.
+        timed: Whether the time since the last step is representative of others.
     """
 
     task: int
@@ -62,7 +62,7 @@ class Event:
 
     @property
     def details(self) -> str:
-        """The numbers in words."""
+        """The numbers as text."""
         count = value = measure = ""
         if self.number is not None:
             unit = self.unit.removesuffix("s") if self.number == 1 else self.unit

@@ -1,4 +1,4 @@
-"""Where progress can be drawn: whether a stream ends at a terminal, also through mpirun, or in a notebook."""
+"""Detection of terminals, also behind mpirun, and notebooks."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TextIO
 
-#: Programs that start ranks and pass on what they write.
+#: Programs that start ranks and forward their output.
 LAUNCHERS = {
     "mpirun", "mpiexec", "mpiexec.hydra", "hydra_pmi_proxy", "orterun", "orted", "prterun", "prted", "srun",
 }  # fmt: skip
 
 
 def at_terminal(stream: TextIO | None) -> bool:
-    """Tell whether a stream ends at a terminal that can draw.
+    """Return whether a stream ends at a terminal that supports drawing.
 
-    What a rank writes goes to mpirun through a pipe, or through a pseudo-terminal even where mpirun's own
-    output is a file. So under mpirun it counts where that one writes to.
+    The output of a rank goes to mpirun through a pipe, or through a pseudo-terminal even if mpirun's own
+    output is a file. So under mpirun its output is what counts.
     """
     if stream is None or os.environ.get("TERM") == "dumb":
         return False
-    with suppress(OSError, ValueError, AttributeError):  # no file of the system knows itself what it is
+    with suppress(OSError, ValueError, AttributeError):  # streams without a file descriptor decide themselves
         launcher, descriptor = _launcher(), stream.fileno()
         if launcher is not None and descriptor <= 2:
             with suppress(OSError):
@@ -34,13 +34,13 @@ def at_terminal(stream: TextIO | None) -> bool:
 
 
 def in_notebook() -> bool:
-    """Tell whether this process is the kernel of a notebook."""
+    """Return whether this process is the kernel of a notebook."""
     shell = sys.modules.get("IPython")
     return getattr(shell and shell.get_ipython(), "kernel", None) is not None
 
 
 def _launcher() -> int | None:
-    """Return the process that started the ranks on this machine, None where this is none of them."""
+    """Return the process that started the ranks on this machine, None if this is not one of them."""
     found, candidate = None, os.getppid()
     with suppress(OSError):
         while True:

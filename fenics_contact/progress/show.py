@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from fenics_contact.progress.terminal import Bars
 
-#: Outermost work leaves a line if it took so long, [s], and such a part of all the time so far.
+#: Outermost work leaves a line if it took this long, [s], and this fraction of the time so far.
 WORTH, SHARE = 1.0, 0.05
 
 
@@ -28,17 +28,17 @@ WORTH, SHARE = 1.0, 0.05
 def show_progress(
     comm: MPI.Comm | None = None, stream: TextIO | None = None, interval: float = 10.0
 ) -> Iterator[None]:
-    """Show how far the work in the block is.
+    """Show the progress of the work in the block.
 
     On a terminal there are bars, below what the program prints. In a notebook there is one output of the
-    cell. Elsewhere, or without rich, a line is logged at level INFO now and then, by the logger
-    ``fenics_contact.progress``: nobody sees it unless logging is configured. Only rank 0 shows anything, and
+    cell. Elsewhere, or without rich, a line is logged at level INFO at intervals, by the logger
+    ``fenics_contact.progress``: it is invisible unless logging is configured. Only rank 0 shows anything, and
     no rank waits for another. Within another `show_progress` the inner one does nothing.
 
     Args:
         comm: Communicator of the work; None for a program that is not started by mpirun.
-        stream: Where to draw if it is a terminal; stderr by default.
-        interval: Least time between two lines in the log, [s].
+        stream: Stream for drawing if it is a terminal; stderr by default.
+        interval: Smallest time between two lines in the log, [s].
 
     Example:
         >>> with show_progress(MPI.COMM_WORLD):  # doctest: +SKIP
@@ -70,12 +70,12 @@ def show_progress(
 
 
 def _writer(works: Works, stream: TextIO | None, interval: float) -> Bars | Log | Notebook:
-    """Return the way of showing that suits where the program runs."""
+    """Return the display that suits the environment of the program."""
     if in_notebook() and stream is None:
         return Notebook()
     stream = stream or sys.stderr
     if not at_terminal(stream) or importlib.util.find_spec("rich") is None:
         return Log(interval)
-    from fenics_contact.progress.terminal import Bars  # costs a tenth of a second, for terminals alone
+    from fenics_contact.progress.terminal import Bars  # takes a tenth of a second, only for terminals
 
     return Bars(works, stream)

@@ -1,4 +1,4 @@
-"""A piece of work that tells how far it is."""
+"""A piece of work that reports its progress."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from typing import Any
 from fenics_contact.errors import tell
 from fenics_contact.progress.event import Event, Kind
 
-#: Through this logger everything is reported.
+#: Logger of all reports.
 LOGGER_NAME = "fenics_contact.progress"
-#: What else hears every event: `show_progress` while it draws.
+#: Other listeners of events: `show_progress` while it draws.
 LISTENERS: list[Callable[[Event], None]] = []
 
 _LOGGER = logging.getLogger(LOGGER_NAME)
 
 
 class Task:
-    """A piece of work that tells how far it is, if anybody listens.
+    """A piece of work that reports its progress if there are listeners.
 
     Attributes:
-        outcome: What is told when it ends.
+        outcome: Reported when it ends.
 
     Example:
         >>> with Task("load steps", total=2) as task:
@@ -41,21 +41,21 @@ class Task:
         target: float | None = None,
         measured: str = "residual",
     ) -> None:
-        """Describe the work; nothing is told before it begins.
+        """Describe the work; nothing is reported before it begins.
 
         Args:
             what: Name of the work.
-            unit: What is counted, in the plural.
-            total: How many there are, None if nobody knows.
-            most: How many there may be.
-            target: What the measure of the steps must fall to.
-            measured: What that measure is.
+            unit: Unit of the count, in the plural.
+            total: Total number, None if unknown.
+            most: Largest number.
+            target: Target of the steps' measure.
+            measured: Name of that measure.
         """
         self.outcome = ""
         self._event = Event(id(self), what, Kind.BEGIN, unit, None, total, most, None, target, measured)
 
     def begin(self, number: int | None = None) -> None:
-        """Say that the work begins, and how many steps an earlier run has done."""
+        """Report that the work begins, and the number of steps of an earlier run."""
         self._tell(Kind.BEGIN, number=number)
 
     def step(
@@ -69,21 +69,21 @@ class Task:
         words: str = "",
         timed: bool = True,
     ) -> None:
-        """Say how far the work is: the attributes of an `Event`; a target is told where it has changed."""
+        """Report progress by the attributes of an `Event`; a target only if it has changed."""
         if LISTENERS or _LOGGER.isEnabledFor(logging.DEBUG):
             known = {} if target is None else {"target": target}
             found = {"measure": measure, "value": value, "left": left, "words": words, "timed": timed}
             self._tell(Kind.STEP, number=number, **found, **known)
 
     def end(self, error: BaseException | None = None) -> None:
-        """Say that the work is over, and what it ended with instead of its result: a failure, or Ctrl-C."""
+        """Report that the work is over, and what it ended with instead of a result: a failure, or Ctrl-C."""
         kind = Kind.END
         if error is not None:
             kind = Kind.FAILED if isinstance(error, Exception) else Kind.STOPPED
         self._tell(kind, words=self.outcome)
 
     def __enter__(self) -> Task:
-        """Begin; work of which steps are known or a limit shows that none is done."""
+        """Begin; work with a known number or limit of steps reports that none is done."""
         self.begin(None if self._event.total is None and self._event.most is None else 0)
         return self
 

@@ -25,12 +25,12 @@ BAR = 12
 
 
 class Bars:
-    """Draws bars below everything else that the program writes, at their own rate."""
+    """Draws bars below all other output of the program, at their own rate."""
 
     pause = math.inf
 
     def __init__(self, works: Works, stream: TextIO) -> None:
-        """Draw from now on; what the program prints and logs appears above the bars."""
+        """Start drawing; output and logs of the program appear above the bars."""
         self._works = works
         self._console = Console(file=stream, force_terminal=True, markup=False, highlight=False, emoji=False)
         streams = {id(stream): name for name in ("stdout", "stderr") if (stream := getattr(sys, name))}
@@ -38,7 +38,7 @@ class Bars:
             console=self._console,
             get_renderable=self._drawn,
             transient=True,
-            redirect_stdout=at_terminal(sys.stdout),  # what goes to a file must go on to do so
+            redirect_stdout=at_terminal(sys.stdout),  # output to a file must not be redirected
         )
         self._live.start()
         self._console.show_cursor(True)  # a run that is killed could not bring it back
@@ -50,7 +50,7 @@ class Bars:
                 handler.setStream(getattr(sys, streams[id(handler.stream)]))
 
     def show(self, lines: list[str]) -> None:
-        """Nothing: the bars are drawn at their own rate."""
+        """Do nothing: the bars are drawn at their own rate."""
 
     def leave(self, line: str) -> None:
         """Leave a line above the bars."""
@@ -58,7 +58,7 @@ class Bars:
             self._console.out(visible(line), highlight=False)
 
     def stop(self) -> None:
-        """Remove the bars and give the streams back."""
+        """Remove the bars and restore the streams."""
         for handler, stream in self._logging:
             handler.setStream(stream)
         self._live.stop()

@@ -1,19 +1,19 @@
-"""Numbers and texts as readers want them."""
+"""Formatting of numbers and texts for readers."""
 
 from __future__ import annotations
 
 import re
 
-#: What a terminal obeys instead of showing it: control characters but for the new line and the tab, breaks of
-#: lines and paragraphs, changes of the direction of writing, halves of characters.
+#: Characters that a terminal interprets: control characters except newline and tab, line and paragraph
+#: separators, changes of writing direction, surrogates.
 _OBEYED = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
 def duration(seconds: float | None) -> str:
-    """Write a duration for readers: 0.4 s, 8 s, 3 min, 1.5 h.
+    """Format a duration: 0.4 s, 8 s, 3 min, 1.5 h.
 
     Args:
-        seconds: The duration, None where nobody knows.
+        seconds: The duration, None if unknown.
     """
     if seconds is None:
         return "?"
@@ -25,15 +25,15 @@ def duration(seconds: float | None) -> str:
 
 
 def joined(*parts: str) -> str:
-    """Join the parts that say something by commas."""
+    """Join the non-empty parts by commas."""
     return ", ".join(part for part in parts if part)
 
 
 def is_visible(text: str) -> bool:
-    """Tell whether a text holds nothing that a terminal obeys instead of showing it."""
+    """Return whether a text contains no characters that a terminal interprets."""
     return not _OBEYED.search(text)
 
 
 def visible(text: str) -> str:
-    """Return a text with everything that a terminal would obey written as Python's escapes."""
+    """Return a text with all characters that a terminal interprets as Python's escapes."""
     return _OBEYED.sub(lambda found: found.group().encode("unicode_escape").decode("ascii"), text)

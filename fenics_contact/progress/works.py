@@ -1,4 +1,4 @@
-"""What is under way at the moment, put together from the events."""
+"""The work under way, assembled from the events."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 from fenics_contact.progress.event import Event, Kind
 from fenics_contact.progress.words import duration, joined
 
-#: Part of the digits, or of what may be done, that must be done before the time of the rest is told.
+#: Fraction of the digits, or of the limit, that must be done before the remaining time is reported.
 ENOUGH = 0.2
-#: Steps on which an estimate looks back.
+#: Number of past steps used for an estimate.
 WINDOW = 12
 
 
@@ -20,11 +20,11 @@ class Work:
     """A piece of work under way.
 
     Attributes:
-        event: Its last event, with what earlier ones told.
-        begun: When it began, [s].
-        stepped: When its last event was, [s].
+        event: Its last event, completed from earlier ones.
+        begun: Time of its start, [s].
+        stepped: Time of its last event, [s].
         first: Its first measure.
-        reached: When which part of it was done, as far as the time that it takes is known.
+        reached: Times and fractions done, of timed steps.
     """
 
     event: Event
@@ -34,7 +34,7 @@ class Work:
     reached: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=WINDOW))
 
     def take(self, event: Event, moment: float) -> None:
-        """Take an event of this work."""
+        """Process an event of this work."""
         if event.kind is Kind.STEP:
             told = ("number", "measure", "target", "value")
             kept = {name: getattr(self.event, name) for name in told if getattr(event, name) is None}
@@ -53,12 +53,12 @@ class Work:
 
     @property
     def shows_numbers(self) -> bool:
-        """Whether more is known than that it is under way."""
+        """Whether there are numbers to report."""
         return self.event.number is not None or self.event.total is not None
 
     @property
     def fraction(self) -> float | None:
-        """How much is done, from 0 to 1: of the pieces, or of the digits; None if nobody knows."""
+        """Fraction done, from 0 to 1, of the pieces or of the digits; None if unknown."""
         event, first = self.event, self.first
         if event.total:
             return min((event.number or 0) / event.total, 1.0)
@@ -67,7 +67,7 @@ class Work:
         return None
 
     def left(self, moment: float) -> str:
-        """Return how long it will still take at the pace of its last steps: "about 3 min left", or ""."""
+        """Return the remaining time at the pace of its last steps: "about 3 min left", or ""."""
         event, seconds, since = self.event, self.event.left, self.stepped
         if seconds is None and len(self.reached) > 1:
             (start, before), (since, done) = self.reached[0], self.reached[-1]
@@ -83,23 +83,23 @@ class Work:
         return joined(f"{name}: {details}" if details else name, self.left(moment))
 
     def summary(self) -> str:
-        """Return one line about it when it is over."""
+        """Return one line about it at its end."""
         event = self.event
         if event.measure is not None and event.target is not None and event.measure > event.target:
-            event = replace(event, measure=None)  # of the last step: it is over for another reason
+            event = replace(event, measure=None)  # of the last step, but it ended for another reason
         ending = "" if event.kind is Kind.END else event.kind.value
         return f"{event.what}: {joined(ending, event.details, duration(self.stepped - self.begun))}"
 
 
 class Works:
-    """The pieces of work that are under way, outer ones first."""
+    """The pieces of work under way, outer ones first."""
 
     def __init__(self) -> None:
         """Begin with none."""
         self._under_way: dict[int, Work] = {}
 
     def take(self, event: Event, moment: float) -> Work | None:
-        """Take what happened at a moment, [s]; return work that is over where no other is under way."""
+        """Process an event at a time, [s]; return work that is over if no other is under way."""
         if event.kind is Kind.BEGIN:
             self._under_way.pop(event.task, None)
         elif event.kind is not Kind.STEP and event.task not in self._under_way:
@@ -114,11 +114,11 @@ class Works:
             return work
         outer = list(self._under_way.values())[-1]
         if outer.event.what == work.event.what and not outer.shows_numbers:
-            # A phase and the solver within it have one name: the phase ends with the solver's numbers.
+            # A phase and the solver within it share a name: the phase ends with the solver's numbers.
             outer.event = replace(work.event, task=outer.event.task, kind=Kind.STEP)
         return None
 
     def shown(self) -> list[Work]:
-        """Return what to tell: all work with numbers, and the innermost one."""
+        """Return the work to report: all with numbers, and the innermost one."""
         works = list(self._under_way.values())
         return [work for work in works if work.shows_numbers or work is works[-1]]

@@ -1,4 +1,4 @@
-"""Progress where nothing is drawn in place: lines in a log, or an output of a notebook that is replaced."""
+"""Progress without bars: lines in a log, or an output of a notebook that is replaced."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from fenics_contact.progress.task import LOGGER_NAME
 
 
 class Log:
-    """Logs a line at level INFO now and then, and one about work that is over."""
+    """Logs a line at level INFO at intervals, and one about finished work."""
 
     def __init__(self, pause: float) -> None:
-        """Begin; ``pause`` is the least time between two lines, [s]."""
+        """Begin; ``pause`` is the smallest time between two lines, [s]."""
         self.pause = pause
 
     def show(self, lines: list[str]) -> None:
-        """Log how far the work is."""
+        """Log the progress of the work."""
         if lines:
             self.leave("; ".join(lines))
 
     def leave(self, line: str) -> None:
-        """Log what came out."""
+        """Log the outcome."""
         tell(logging.getLogger(LOGGER_NAME).info, "%s", line)
 
     def stop(self) -> None:
-        """Nothing remains to be done."""
+        """Do nothing."""
 
 
 class Notebook:
-    """Replaces an output of the cell; needs no widgets, so that a stored notebook shows the end of it."""
+    """Replaces an output of the cell; needs no widgets, so that a saved notebook shows the final output."""
 
     pause = 0.3
 
@@ -42,7 +42,7 @@ class Notebook:
 
     def show(self, lines: list[str]) -> None:
         """Replace the output."""
-        from IPython.display import display  # a notebook has it
+        from IPython.display import display  # available in notebooks
 
         text = "\n".join([*self._over, *lines])
         content = {"text/plain": text, "text/html": f"<pre>{html.escape(text)}</pre>"}
@@ -56,6 +56,6 @@ class Notebook:
         self._over.append(line)
 
     def stop(self) -> None:
-        """Leave the lines about what is over."""
+        """Keep only the lines about finished work."""
         if self._output is not None:
             self.show([])

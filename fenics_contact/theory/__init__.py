@@ -1,7 +1,7 @@
-"""Contacts whose answer is known by formula: yardsticks for states, and first guesses for designs.
+"""Analytical contact solutions: references for states, and initial estimates for designs.
 
-All bodies are linearly elastic, contacts without friction and small beside the bodies (but for `pin_in_hole`,
-which may be as large as the pin). Any consistent system of units will do.
+All bodies are linearly elastic, contacts without friction and small compared with the bodies (except for
+`pin_in_hole`, which may be as large as the pin). Any consistent system of units can be used.
 """
 
 from __future__ import annotations

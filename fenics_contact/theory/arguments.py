@@ -1,4 +1,4 @@
-"""Numbers that formulas take."""
+"""Checks of the arguments of formulas."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fenics_contact.errors import InvalidInputError
 
 
 def require_numbers(**given: Any) -> None:
-    """Refuse arguments, given by their names, that are no finite numbers."""
+    """Reject arguments, given by their names, that are not finite numbers."""
     for name, value in given.items():
         real = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
         if not (real and -np.inf < value < np.inf):
@@ -18,7 +18,7 @@ def require_numbers(**given: Any) -> None:
 
 
 def require_positive(**given: Any) -> None:
-    """Refuse arguments, given by their names, that are no positive finite numbers."""
+    """Reject arguments, given by their names, that are not positive finite numbers."""
     require_numbers(**given)
     for name, value in given.items():
         if value <= 0.0:

@@ -17,18 +17,18 @@ from scipy.special import ellipe, ellipkm1, elliprd
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.theory.arguments import require_numbers, require_positive
 
-#: How many times one relative curvature may be the other: beyond, a contact is one along a line.
+#: Largest ratio of the relative curvatures: beyond, a contact is a line contact.
 SLENDEREST = 1e12
 
 
 @dataclass(frozen=True)
 class PointContact:
-    """An ellipse of contact.
+    """An elliptical contact.
 
     Attributes:
         semi_axes: Semi-axes along the directions of both relative curvatures, [length].
-        peak_pressure: Pressure p0 in the middle, [force / length²].
-        approach: How far points of the two bodies far from the contact come closer, [length].
+        peak_pressure: Pressure p0 at the centre, [force / length²].
+        approach: Mutual approach of remote points of the two bodies, [length].
     """
 
     semi_axes: tuple[float, float]
@@ -41,7 +41,7 @@ class PointContact:
         return float(np.pi * self.semi_axes[0] * self.semi_axes[1])
 
     def pressure(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the pressure p0 √(1 − x²/a² − y²/b²) at places of any shape, 0 beyond the ellipse."""
+        """Return the pressure p0 √(1 − x²/a² − y²/b²) at coordinates of any shape, 0 outside the ellipse."""
         a, b = self.semi_axes
         inside = 1.0 - (np.asarray(x) / a) ** 2 - (np.asarray(y) / b) ** 2
         return np.asarray(self.peak_pressure * np.sqrt(np.maximum(inside, 0.0)))
@@ -49,18 +49,18 @@ class PointContact:
 
 @dataclass(frozen=True)
 class LineContact:
-    """A strip of contact.
+    """A line contact.
 
     Attributes:
         half_width: Half its width, [length].
-        peak_pressure: Pressure p0 in the middle, [force / length²].
+        peak_pressure: Pressure p0 at the centre, [force / length²].
     """
 
     half_width: float
     peak_pressure: float
 
     def pressure(self, x: np.ndarray) -> np.ndarray:
-        """Return the pressure p0 √(1 − x²/a²) at distances from the middle, 0 beyond the strip."""
+        """Return the pressure p0 √(1 − x²/a²) at distances from the centre, 0 outside the strip."""
         inside = 1.0 - (np.asarray(x) / self.half_width) ** 2
         return np.asarray(self.peak_pressure * np.sqrt(np.maximum(inside, 0.0)))
 
@@ -71,7 +71,7 @@ def contact_modulus(young_1: float, poisson_1: float, young_2: float, poisson_2:
     Args:
         young_1: Young's modulus of a body, [force / length²].
         poisson_1: Its Poisson's ratio.
-        young_2: Young's modulus of the other; infinite where it is rigid.
+        young_2: Young's modulus of the other; infinite if rigid.
         poisson_2: Its Poisson's ratio.
 
     Raises:
@@ -97,10 +97,10 @@ def relative_curvatures(
     Args:
         first: Principal curvatures of a surface, positive where it is convex, [1 / length].
         second: Those of the other.
-        angle: Between the first principal direction of the one and that of the other, in radians.
+        angle: Angle between the first principal directions of both, in radians.
 
     Example:
-        Crossed cylinders of radius 2 touch like a ball of radius 2 and a plane.
+        Crossed cylinders of radius 2 are equivalent to a ball of radius 2 and a plane.
 
         >>> import numpy as np
         >>> x, y = relative_curvatures((0.5, 0.0), (0.5, 0.0), np.pi / 2)
@@ -168,13 +168,13 @@ def hertz_point(force: float, curvatures: Sequence[float], modulus: float) -> Po
 
 
 def _axes_ratio(ratio: float) -> float:
-    """Find b/a ≤ 1 for κ_b/κ_a ≥ 1."""
+    """Return b/a ≤ 1 for κ_b/κ_a ≥ 1."""
 
     def excess(logarithm: float) -> float:
         square = np.exp(2.0 * logarithm)
         return float(np.log(elliprd(0.0, 1.0, square) / elliprd(0.0, square, 1.0) / ratio))
 
-    # The ratio of curvatures grows faster than a/b, and is 1 with it, but for rounding.
+    # The ratio of curvatures grows faster than a/b, and both are 1 together, up to rounding.
     lowest = -np.log(ratio) - 1.0
     return 1.0 if excess(0.0) >= 0.0 else float(np.exp(brentq(excess, lowest, 0.0, xtol=1e-15)))
 
@@ -185,7 +185,7 @@ def hertz_line(force: float, curvature: float, modulus: float) -> LineContact:
     a² = 4 F / (π E* κ), p0 = 2 F / (π a).
 
     Args:
-        force: F on a unit of length, [force / length].
+        force: F per unit length, [force / length].
         curvature: Relative curvature κ across the line, the sum of those of both surfaces, [1 / length].
         modulus: E*, see `contact_modulus`; bodies are in plane strain.
 

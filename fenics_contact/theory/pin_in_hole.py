@@ -1,6 +1,7 @@
-"""A pin in a hole of nearly its size, whose contact reaches around a good part of it.
+"""A pin in a hole of nearly its size, with contact over a large arc.
 
-Hertz's theory takes surfaces for flat beside the contact, which those of a pin in a tight hole are not.
+Hertz's theory assumes that surfaces are nearly flat on the scale of the contact, unlike those of a pin in a
+tight hole.
 
 References:
     Persson, On the stress distribution of cylindrical elastic bodies in contact, Chalmers (1964).
@@ -21,11 +22,11 @@ from fenics_contact.theory.arguments import require_numbers, require_positive
 
 @dataclass(frozen=True)
 class PinContact:
-    """An arc of contact.
+    """A contact over an arc.
 
     Attributes:
-        half_angle: Half the angle that the contact reaches around the pin, in radians.
-        mean_pressure: Force on a unit of length over the radius, [force / length²].
+        half_angle: Half the contact angle, in radians.
+        mean_pressure: Force per unit length over the radius, [force / length²].
     """
 
     half_angle: float
@@ -33,11 +34,11 @@ class PinContact:
 
     @property
     def peak_pressure(self) -> float:
-        """Pressure in the middle, [force / length²]."""
+        """Pressure at the centre, [force / length²]."""
         return float(self.pressure(np.zeros(1))[0])
 
     def pressure(self, angle: np.ndarray) -> np.ndarray:
-        """Return the pressure at angles from the middle, (n,) in radians, 0 beyond the contact.
+        """Return the pressure at angles from the centre, (n,) in radians, 0 outside the contact.
 
         With b = tan(ε/2), y = tan(θ/2) and s = √(b² − y²), r = √(b² + 1) it is
 
@@ -52,20 +53,20 @@ class PinContact:
 
 
 def pin_in_hole(force: float, radius: float, clearance: float, modulus: float) -> PinContact:
-    """Return the contact of a pin that is pressed into the side of a hole, both of one material.
+    """Return the contact of a pin pressed against the side of a hole, both of one material.
 
-    Pin and plate are in plane strain, the plate is wide beside the hole, the force acts in the middle of the
-    pin, and there is no friction. The half angle ε follows with b = tan(ε/2) from
+    Pin and plate are in plane strain, the plate is wide compared with the hole, the force acts at the centre
+    of the pin, and there is no friction. The half angle ε follows with b = tan(ε/2) from
 
         2 E* ΔR / F = (2 − ln(b² + 1) − 2 b⁴) / (π b² (b² + 1)).
 
-    A loose or little loaded pin touches as `hertz_line` has it with κ = ΔR / R²; one without clearance
-    touches up to 84.8 degrees from the middle whatever its load.
+    A loose or lightly loaded pin approaches `hertz_line` with κ = ΔR / R²; one without clearance has contact
+    up to 84.8 degrees from the centre for any load.
 
     Args:
-        force: F on a unit of length, [force / length].
+        force: F per unit length, [force / length].
         radius: R of the pin, [length].
-        clearance: ΔR, radius of the hole less that of the pin, at least 0 and small beside the radius.
+        clearance: ΔR, radius of the hole less that of the pin, at least 0 and small compared with the radius.
         modulus: E*, see `contact_modulus`, of two bodies of one material.
 
     Raises:
@@ -85,7 +86,7 @@ def pin_in_hole(force: float, radius: float, clearance: float, modulus: float) -
         right = (2.0 - np.log1p(square) - 2.0 * square**2) / (np.pi * square * (square + 1.0))
         return float(right - wanted)
 
-    # The right side falls; it is more than 1 / (π b²) for b² < 1/4, and negative for b = 1.
+    # The right side decreases; it exceeds 1 / (π b²) for b² < 1/4, and is negative for b = 1.
     lowest = -0.5 * float(np.log(np.pi * wanted + 4.0))
     b = np.exp(brentq(excess, lowest, 0.0, xtol=1e-15))
     return PinContact(float(2.0 * np.arctan(b)), float(force / radius))
