@@ -47,7 +47,8 @@ def drawn_together(places: np.ndarray, spot: float, strength: float) -> np.ndarr
     Args:
         places: Ascending points, (n,), from the start of the interval, or symmetric about its middle, to its
             end.
-        spot: Point of concentration. strength: κ; 0 returns the points unchanged.
+        spot: Point of concentration.
+        strength: κ; 0 returns the points unchanged.
 
     Returns:
         Points, (n,), with the same ends.

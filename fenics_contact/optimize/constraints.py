@@ -208,7 +208,7 @@ def _residual(matrix: Array, limit: Array, x: Array) -> tuple[Array, Array]:
 
 
 def ranges(allowed: FeasibleSet) -> list[tuple[Array, Array, Array]]:
-    """Return the rows as low ≤ matrix x ≤ high, inequalities and equalities separately, without empty ones."""
+    """Return the rows as low ≤ matrix x ≤ high, inequalities and equalities apart, without empty ones."""
     sides = [
         (allowed.matrix, np.full(len(allowed.limit), -np.inf), allowed.limit),
         (allowed.equality_matrix, allowed.equality_value, allowed.equality_value),

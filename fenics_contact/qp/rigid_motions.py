@@ -187,8 +187,8 @@ class _Springs:
         """Return the derivative of the imbalance, shape (k, k). Collective.
 
         Args:
-            balance: The balance at the motion. growth: dΨ/dλ_N where the bound follows the trial normal
-                force, None where it is frozen.
+            balance: The balance at the motion.
+            growth: dΨ/dλ_N where the bound follows the trial normal force, None where it is frozen.
         """
         normal, pairs = self.problem.layout.normal, self.problem.layout.tangential
         closed = normal[balance.trial[normal] > 0.0]

@@ -78,7 +78,7 @@ def test_vtu_files_hold_further_fields_of_the_cells(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("field", "message"),
     [
-        ({}, r"the cell field 'error' must have 192 rows for body 'block', one per cell, got none: give every"),
+        ({}, r"the cell field 'error' must have 192 rows for body 'block', one per cell, got none: give"),
         ({"block": np.zeros(3)}, r"must have 192 rows for body 'block', one per cell, got shape \(3,\)"),
     ],
 )
