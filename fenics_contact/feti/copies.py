@@ -84,6 +84,7 @@ def tear(
     for index, name in enumerate(names):
         cells = scene.bodies[name].mesh.cells
         subdomain = partitions[name].astype(np.int64) + subdomain_offset[index]
+        # One integer key per node and subdomain: unique keys are the copies, already in their order.
         every = (cells + node_offset[index]) * total + subdomain[:, None]
         found, where = np.unique(every.ravel(), return_inverse=True)
         weights = np.repeat(stiffness[name], cells.shape[1])

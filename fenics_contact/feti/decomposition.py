@@ -82,6 +82,7 @@ def decompose(scene: Scene, partitions: Mapping[str, np.ndarray], comm: MPI.Comm
             warn_of_threads(comm.size)
     forms = FormLibrary(comm)
     forms.prepare(scene)
+    # Ranks agree on errors after each local stage, before the next collective one.
     with together(comm):
         tearing = tear(scene, partitions, comm.size, cell_stiffness(scene, forms))
         if tearing.n_subdomains < comm.size:

@@ -105,6 +105,7 @@ class DualSystem:
     def _set_up(self, timer: PhaseTimer) -> None:
         """Build coarse space and preconditioner. Collective."""
         torn, comm = self.torn, self.torn.numbering.comm
+        # B has no other nonzero columns: products with F then need no vectors of the torn size.
         self._B_interface = torn.B[:, self.inverse.interface].tocsr()
         self._Bt_interface = self._B_interface.T.tocsr()
         with timer.phase("coarse space"):

@@ -42,6 +42,7 @@ def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:
         place = np.arange(offset[start], offset[start + 1])
         found = [parts[number] for number in range(start, end)]
         whole = [part for part in found if part is not None and part.shape[1] == len(place)]
+        # All parts or none: the modes of a body replace those of a part only if every part reproduces them.
         if len(found) == 1 or len(whole) < len(found):
             continue
         kept[place] = 0.0

@@ -293,6 +293,7 @@ def _advanced(
     method: BundleTrust, problem: PosedProblem, state: MethodState, step: Step, needed: Demand
 ) -> MethodState:
     """Try the step and return the state after its null, serious or rejected trial."""
+    # The subproblem meets constraints only to its tolerance: the projected step is tried and recorded.
     x = problem.allowed.project(state.centre.x + problem.scale * step.move)
     step = replace(step, move=(x - state.centre.x) / problem.scale)
     try:
@@ -305,6 +306,7 @@ def _advanced(
         )
     gradient = found.subgradient * problem.scale
     change, slope = found.value - state.centre.value, float(gradient @ step.move)
+    # Reduced before the cut is added: the weights belong to the old planes, and the new one must stay.
     bundle = state.bundle.reduced(step.weights, method.max_bundle - 1)
     bundle = bundle.with_cut(gradient, slope - change, step.length, found.error, found.doubtful)
     trial = Trial(step, change, slope, float(bundle.measures[-1]))

@@ -67,6 +67,7 @@ def contact_by_shape(state: State, adjoint: Adjoint, by_bound: np.ndarray) -> np
     by_bound_full[torn.frictional] = by_bound
     for index, pair in enumerate(torn.scene.contacts):
         mine = np.flatnonzero(points.pair == index)
+        # Tresca's nodal bound is a traction times a nodal area, which moves with the nodes.
         if isinstance(pair.friction, Tresca):
             surface = surface_of(torn.scene, pair.slave, "faceted")
             nodes = tearing.global_nodes(pair.slave.body, surface.nodes)

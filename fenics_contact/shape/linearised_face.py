@@ -103,8 +103,9 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
     trial = solution.multiplier - step * solution.residual
     coefficient = system.torn.friction_coefficient[system.owned_discs()]
     length = np.linalg.norm(trial[layout.tangential], axis=1)
-    told, closest = _told_apart(system.problem, solution, step)
-    counted = _on_switch(layout, trial, bound, coefficient, told)
+    # Two slacks: every point that may be weak is counted, but only one that leans to no side is reassigned.
+    uncertainty, closest = _uncertainty(system.problem, solution, step)
+    counted = _on_switch(layout, trial, bound, coefficient, uncertainty)
     weak = _on_switch(layout, trial, bound, coefficient, closest)
 
     known = classify(layout, bound, solution.multiplier, solution.residual, step)
@@ -158,7 +159,7 @@ def _on_switch(
     return _OnSwitch(contact, vanishing, disc)
 
 
-def _told_apart(
+def _uncertainty(
     problem: DualProblem, solution: DualSolution, step: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the distance from a switch beyond which a point's side is certain, owned, [force]. Collective.
@@ -174,8 +175,8 @@ def _told_apart(
     forces, jumps = residuals.natural * residuals.force_scale, residuals.gluing * residuals.gluing_scale
     moved = np.where(problem.between_supports, 0.0, step * problem.rhs)  # no multiplier changes the others
     rounding = ROUNDING * max(problem.norm(solution.multiplier), problem.norm(moved))
-    told = np.asarray(UNCERTAINTY * (forces + step * jumps) + rounding)
-    return told, np.minimum(told, LEANING * residuals.force_scale + rounding)
+    uncertainty = np.asarray(UNCERTAINTY * (forces + step * jumps) + rounding)
+    return uncertainty, np.minimum(uncertainty, LEANING * residuals.force_scale + rounding)
 
 
 def _points_on_edges(state: State) -> int:

@@ -248,6 +248,7 @@ def _fitted(surface: FacetedSurface, wedges: _Wedges, order: int) -> tuple[np.nd
     away, centre = _with_mirror_images(away, centre, mirrored)
     size = np.zeros(count)
     np.maximum.at(size, centre, np.linalg.norm(away, axis=1))
+    # Relative to the patch's size: powers of the coordinates are then of order one, however fine the mesh.
     axes = tangent_bases(mean)
     place = np.einsum("nad,nd->na", axes[centre], away) / size[centre][:, None]
     height = np.einsum("nd,nd->n", mean[centre], away) / size[centre]

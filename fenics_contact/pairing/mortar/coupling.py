@@ -128,6 +128,7 @@ def _integrals(
     check_convex(planes, chosen)
     pairs = candidate_pairs(planes, planes_of(master, np.arange(len(master.facets))))
     rows, columns, values = [], [], []
+    # Entries of M are collected and summed once: adding sparse matrices chunk by chunk would copy them all.
     for pair_slave, pair_master in _chunks(*pairs):
         cells, facets, at_slave, at_master = cells_of(planes, pair_slave, pair_master, master)
         closer = relief_of_cells(cells, slave, master, (chosen[at_slave], at_master), planes.normal[at_slave])
