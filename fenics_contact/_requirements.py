@@ -212,19 +212,19 @@ def _load(requirement: Requirement, module: str) -> Any:
     try:
         return importlib.import_module(module)
     except (ImportError, OSError) as reason:
-        found = requirement.version() or "one"
+        version = requirement.version() or "one"
         raise requirement.error(
-            f"{found} that cannot be loaded ({reason}): a library under it is missing or of another version"
+            f"{version} that cannot be loaded ({reason}): a library under it is missing or of another version"
         ) from reason
 
 
 def _check_petsc(requirement: Requirement, petsc: Any) -> None:
     """Raise where PETSc computes with complex numbers or cannot factor a sparse matrix."""
-    found = requirement.version() or "one"
+    version = requirement.version() or "one"
     if petsc.ScalarType(0).dtype.kind != "f":
-        raise requirement.error(f"{found} with complex numbers, where real ones are needed")
+        raise requirement.error(f"{version} with complex numbers, where real ones are needed")
     if not (factors(petsc, "cholmod") or factors(petsc, "mumps")):
-        raise requirement.error(f"{found} with neither CHOLMOD nor MUMPS, where one is needed")
+        raise requirement.error(f"{version} with neither CHOLMOD nor MUMPS, where one is needed")
 
 
 def factors(petsc: Any, package: str) -> bool:

@@ -45,10 +45,10 @@ def traces(names: Iterable[str]) -> list[str]:
 
 def clean_environment(given: Mapping[str, str] | None = None) -> dict[str, str]:
     """Return an environment, by default that of this process, without the traces of MPI."""
-    kept = dict(os.environ if given is None else given)
-    for name in traces(kept):
-        del kept[name]
-    return kept
+    environment = dict(os.environ if given is None else given)
+    for name in traces(environment):
+        del environment[name]
+    return environment
 
 
 def launcher(ranks: int) -> list[str]:
@@ -60,14 +60,14 @@ def launcher(ranks: int) -> list[str]:
     if ranks == 1:
         return []
     beside = [Path(prefix) / "bin" / "mpirun" for prefix in (sys.prefix, sys.base_prefix)]
-    found = [str(path) for path in beside if os.access(path, os.X_OK)] or [shutil.which("mpirun") or ""]
-    if not found[0]:
+    candidates = [str(path) for path in beside if os.access(path, os.X_OK)] or [shutil.which("mpirun") or ""]
+    if not candidates[0]:
         raise MissingRequirementError(
             f"{ranks} ranks need mpirun, found none beside {sys.executable} or on PATH: install the MPI of "
             "its mpi4py, or take one rank",
             name="mpirun",
         )
-    return [found[0], "-n", str(ranks)]
+    return [candidates[0], "-n", str(ranks)]
 
 
 @dataclass(frozen=True)

@@ -105,5 +105,5 @@ def match_facets(mesh: Any, surface: np.ndarray) -> tuple[np.ndarray, np.ndarray
     # One integer key per facet: rows of both tables are numbered together.
     _, key = np.unique(np.vstack([wanted, faces]), axis=0, return_inverse=True)
     key = key.ravel()
-    found = np.flatnonzero(np.isin(key[len(wanted) :], key[: len(wanted)]))
-    return found // len(local), found % len(local)
+    matches = np.flatnonzero(np.isin(key[len(wanted) :], key[: len(wanted)]))
+    return matches // len(local), matches % len(local)

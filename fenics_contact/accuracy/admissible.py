@@ -125,15 +125,15 @@ def admissible(
     stick = (slip_bound > 0.0) & ~slip
     statuses = Statuses(problem, trial[layout.normal] > 0.0, stick, slip, start)
     feasible = FeasibleSet(layout, slip_bound)
-    found, left = _balanced(statuses, feasible, start)
+    balanced, left = _balanced(statuses, feasible, start)
     if left > ROUNDING:
-        found, left = _balanced_by_nearest(problem, feasible, start)
+        balanced, left = _balanced_by_nearest(problem, feasible, start)
     if left > UNBALANCED and global_max(problem.comm, float(follows.any())):
         endless = FeasibleSet(layout, np.where(follows, ENDLESS, slip_bound))
-        found, left = _balanced(statuses, endless, start)
-        raised = np.maximum(slip_bound, np.linalg.norm(found[layout.tangential], axis=1))
+        balanced, left = _balanced(statuses, endless, start)
+        raised = np.maximum(slip_bound, np.linalg.norm(balanced[layout.tangential], axis=1))
         slip_bound = np.where(follows, raised, slip_bound)
-    return Admissible(found, statuses, slip_bound, left)
+    return Admissible(balanced, statuses, slip_bound, left)
 
 
 def _balanced_by_nearest(problem: DualProblem, feasible: FeasibleSet, start: Vector) -> tuple[Vector, float]:
@@ -142,8 +142,8 @@ def _balanced_by_nearest(problem: DualProblem, feasible: FeasibleSet, start: Vec
     Slower than `_balanced` and without its preferences, but it finds a multiplier whenever there is one:
     alternating projections stagnate before they reach a narrow set.
     """
-    found = nearest(problem, feasible, start, ROUNDING * _forces(problem, start))
-    return found, _unbalanced(problem, found)
+    closest = nearest(problem, feasible, start, ROUNDING * _forces(problem, start))
+    return closest, _unbalanced(problem, closest)
 
 
 def _balanced(statuses: Statuses, feasible: FeasibleSet, start: Vector) -> tuple[Vector, float]:
@@ -154,18 +154,18 @@ def _balanced(statuses: Statuses, feasible: FeasibleSet, start: Vector) -> tuple
     gluing forces alone would carry the difference through the bodies, which bends thin ones. Forces across
     open gaps come last, as each costs its gap in energy.
     """
-    problem, found = statuses.problem, feasible.project(start)
-    left = _unbalanced(problem, found)
+    problem, point = statuses.problem, feasible.project(start)
+    left = _unbalanced(problem, point)
     for rows, coarse in statuses.spaces():
         for _ in range(ROUNDS):
             if left <= ROUNDING:
-                return found, left
-            lacking = rows @ coarse.transpose(coarse.solve(problem.coarse.residual(found)))
-            found = feasible.project(found - evening(problem) * lacking)
-            before, left = left, _unbalanced(problem, found)
+                return point, left
+            lacking = rows @ coarse.transpose(coarse.solve(problem.coarse.residual(point)))
+            point = feasible.project(point - evening(problem) * lacking)
+            before, left = left, _unbalanced(problem, point)
             if left > PROGRESS * before:
                 break
-    return found, left
+    return point, left
 
 
 def basis(

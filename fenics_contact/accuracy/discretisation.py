@@ -87,9 +87,9 @@ def discretisation_error(torn: TornSystem, displacement: np.ndarray) -> Discreti
             mesh = subdomain.mesh
             if mesh.number in sites.of_cells:
                 of_cells = sites.of_cells[mesh.number]
-                found = energies[mesh.body].by_cell(subdomain, displacements[of_cells], gradients[of_cells])
+                energy = energies[mesh.body].by_cell(subdomain, displacements[of_cells], gradients[of_cells])
                 cells[mesh.body].append(mesh.cells)
-                squares[mesh.body].append(found)
+                squares[mesh.body].append(energy)
     own = {name: (np.concatenate(cells[name]), np.concatenate(squares[name])) for name in scene.bodies}
     sums = comm.allreduce(np.array([values.sum() for _, values in own.values()]))
     by_body = {name: float(np.sqrt(value)) for name, value in zip(own, sums, strict=True)}

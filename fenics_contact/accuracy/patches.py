@@ -75,8 +75,8 @@ class Patches:
         size, dim = self.polynomials.count, self.dim
         packed = np.zeros((self.sites.count if len(rows) else 0, size * (size + dim)))
         for part in self._chunks(rows):
-            found = self._of_this_rank(part, displacement)
-            packed[part] = np.concatenate([found.matrix, found.right], axis=2).reshape(len(part), -1)
+            moments = self._of_this_rank(part, displacement)
+            packed[part] = np.concatenate([moments.matrix, moments.right], axis=2).reshape(len(part), -1)
         summed = self.sites.sharing.add_up(packed)[rows].reshape(-1, size, size + dim)
         return Moments(rows, summed[:, :, :size], summed[:, :, size:])
 

@@ -49,38 +49,38 @@ def recovered_gradients(sites: Sites, displacement: np.ndarray) -> np.ndarray:
     """
     patches = find_patches(sites)
     dim, penalty, highest = patches.dim, _penalty(patches), patches.polynomials.highest
-    found = np.zeros((sites.count, patches.polynomials.count, dim))
+    coefficients = np.zeros((sites.count, patches.polynomials.count, dim))
     waiting, doubts = [], []
     for moments in patches.moments(displacement):
         inverse = np.linalg.inv(moments.matrix + SLIGHT * penalty)
         first = inverse @ moments.right
         # Once more with the remainder, which removes the effect of the weight.
-        found[moments.rows] = first + inverse @ (moments.right - moments.matrix @ first)
+        coefficients[moments.rows] = first + inverse @ (moments.right - moments.matrix @ first)
         spread = np.einsum("nii->n", inverse[:, highest, highest])
         open_ = spread > OPEN[patches.polynomials.degree, dim]
         waiting.append(moments.part(open_))
         doubts.append(spread[open_])
-    _ask_neighbours(patches, _joined(waiting), np.concatenate(doubts), found)
-    return np.asarray(np.einsum("njk,nji->nki", found[:, :dim], patches.turn))
+    _ask_neighbours(patches, _joined(waiting), np.concatenate(doubts), coefficients)
+    return np.asarray(np.einsum("njk,nji->nki", coefficients[:, :dim], patches.turn))
 
 
-def _ask_neighbours(patches: Patches, open_: Moments, doubt: np.ndarray, found: np.ndarray) -> None:
+def _ask_neighbours(patches: Patches, open_: Moments, doubt: np.ndarray, coefficients: np.ndarray) -> None:
     """Refit undetermined sites with the highest derivatives of neighbours, layer by layer. Collective.
 
     Args:
         patches: The patches.
         open_: Normal equations of the n undetermined sites.
         doubt: Measure of how poorly each is determined, shape (n,).
-        found: Coefficients of all sites, which are overwritten, shape (n_sites, m, dim), [length].
+        coefficients: Coefficients of all sites, which are overwritten, shape (n_sites, m, dim), [length].
     """
     comm = patches.sites.sharing.comm
     known = np.ones(patches.sites.count, dtype=bool)
     known[open_.rows] = False
     while comm.allreduce(len(open_.rows)):
-        heard, derivatives = _mean_of_neighbours(patches, open_.rows, known, found)
+        heard, derivatives = _mean_of_neighbours(patches, open_.rows, known, coefficients)
         if comm.allreduce(np.count_nonzero(heard)):
             ready = open_.part(heard)
-            found[ready.rows] = _fitted(patches, ready, derivatives[heard])
+            coefficients[ready.rows] = _fitted(patches, ready, derivatives[heard])
         else:
             heard = doubt <= ALIKE * comm.allreduce(float(doubt.min(initial=np.inf)), op=MPI.MIN)
         known[open_.rows[heard]] = True
@@ -105,7 +105,7 @@ def _fitted(patches: Patches, moments: Moments, derivatives: np.ndarray) -> np.n
 
 
 def _mean_of_neighbours(
-    patches: Patches, rows: np.ndarray, known: np.ndarray, found: np.ndarray
+    patches: Patches, rows: np.ndarray, known: np.ndarray, coefficients: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return whether sites have known neighbours, and the mean of these neighbours' highest derivatives.
 
@@ -115,7 +115,7 @@ def _mean_of_neighbours(
         patches: The patches.
         rows: The sites, shape (n,).
         known: Which sites are known, shape (n_sites,).
-        found: Coefficients of all sites.
+        coefficients: Coefficients of all sites.
 
     Returns:
         Shapes (n,) and (n, dim, ..., dim, dim): ∂u_k/∂x_i...∂x_j as entry (i, ..., j, k).
@@ -125,7 +125,7 @@ def _mean_of_neighbours(
     needed = np.unique(links.indices)
     needed = needed[known[needed]]
     polynomials = patches.polynomials
-    of_sites = polynomials.tensors(found[needed][:, polynomials.highest])
+    of_sites = polynomials.tensors(coefficients[needed][:, polynomials.highest])
     turned = polynomials.turned(of_sites, patches.turn[needed])
     size = dim ** (polynomials.degree + 1)
     values = np.column_stack([np.ones(len(needed)), turned.reshape(len(needed), size)])

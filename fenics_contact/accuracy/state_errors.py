@@ -79,9 +79,9 @@ class StateErrors:
             "discretisation": (self.discretisation, "estimate"),
             "geometry": (self.geometry, "estimate"),
         }
-        told = "\n".join(f"{name:15s} {_told(value, kind)}" for name, (value, kind) in lines.items())
+        text = "\n".join(f"{name:15s} {_in_percent(value, kind)}" for name, (value, kind) in lines.items())
         in_peak = f", {100 * self.peak_by_geometry:.2g} % in peak pressure"
-        return told + in_peak * (self.geometry > 0.0)
+        return text + in_peak * (self.geometry > 0.0)
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def state_errors(solver: SolverErrors, estimate: DiscretisationError, norm: floa
     return StateErrors(algebraic, friction, discretisation, norm, names, solver.own_bounds, estimate)
 
 
-def _told(value: float, kind: str) -> str:
+def _in_percent(value: float, kind: str) -> str:
     return f"{100 * value:.2g} % ({kind})" if np.isfinite(value) else "unknown"
 
 

@@ -76,5 +76,5 @@ def energy_on_subdomain(
         fields.append(_dolfinx.fem.Function(space))
         fields[-1].x.array.reshape(-1, dim)[blocks] = values
     of_cells = _dolfinx.scalar_space(mesh, 0)
-    found = _dolfinx.assemble_vector(form.bind([of_cells], material.parameters, fields))
-    return np.asarray(found[_dolfinx.cell_dofs(of_cells).ravel()])
+    energies = _dolfinx.assemble_vector(form.bind([of_cells], material.parameters, fields))
+    return np.asarray(energies[_dolfinx.cell_dofs(of_cells).ravel()])

@@ -6,8 +6,8 @@ from fenics_contact.checkpoint.interruption import (
     Interrupted,
     Interruption,
     interruptible,
+    reporting_what_is_stored,
     safe_point,
-    telling_what_is_kept,
 )
 from fenics_contact.checkpoint.whole_file import (
     CheckpointError,
@@ -29,8 +29,8 @@ __all__ = [
     "read_archive",
     "remove_abandoned",
     "replace_all",
+    "reporting_what_is_stored",
     "safe_point",
-    "telling_what_is_kept",
     "without_checkpoint",
     "write_archive",
     "write_whole",

@@ -84,15 +84,15 @@ def read_archive(path: Path, kind: str, fingerprint: Mapping[str, str]) -> Array
             f"a checkpoint is needed, but {str(path)!r} is another file: give the path of a checkpoint, or a "
             "new name to start anew"
         )
-    version, found = int(arrays.pop("_version")), str(arrays.pop("_kind"))
+    version, stored_kind = int(arrays.pop("_version")), str(arrays.pop("_kind"))
     if version != VERSION:
         raise InvalidInputError(
             f"a checkpoint of version {VERSION} is needed, {str(path)!r} is of version {version}: go on with "
             "the version of fenics_contact that wrote it, or give a new name to start anew"
         )
-    if found != kind:
+    if stored_kind != kind:
         raise InvalidInputError(
-            f"a checkpoint of a {kind} is needed, {str(path)!r} is one of a {found}: give another path"
+            f"a checkpoint of a {kind} is needed, {str(path)!r} is one of a {stored_kind}: give another path"
         )
     unlike = differences(json.loads(str(arrays.pop("_fingerprint"))), fingerprint)
     if unlike:
@@ -125,10 +125,10 @@ def _loaded(path: Path) -> Arrays:
             spoilt = archive.testzip()  # before any stored length is trusted
         if spoilt is None:
             with np.load(io.BytesIO(content), allow_pickle=False) as members:
-                found = {name: members[name] for name in members.files}
-            digest = str(found.pop("_digest", ""))
-            if "_format" not in found or digest == _digest(found):
-                return found
+                arrays = {name: members[name] for name in members.files}
+            digest = str(arrays.pop("_digest", ""))
+            if "_format" not in arrays or digest == _digest(arrays):
+                return arrays
         reason = "its checksums do not agree"
     except Exception as error:  # arbitrary bytes can make the libraries raise anything
         reason = str(error) or type(error).__name__

@@ -54,19 +54,19 @@ class Checkpoint:
         Raises:
             InvalidInputError: On all ranks, see `read_archive`.
         """
-        path, found = Path(self.path), None
+        path, arrays = Path(self.path), None
         if self.resume is False:
             return None
         if comm is None:
             return read_archive(path, kind, fingerprint) if self.resume or path.exists() else None
         with together(comm):
             if comm.rank == 0 and (self.resume or path.exists()):
-                found = read_archive(path, kind, fingerprint)
-        names = comm.bcast(None if found is None else list(found))
+                arrays = read_archive(path, kind, fingerprint)
+        names = comm.bcast(None if arrays is None else list(arrays))
         if names is None:
             return None
         # One by one: an MPI message is limited to 2 GB, which a long history exceeds.
-        return {name: comm.bcast(None if found is None else found[name]) for name in names}
+        return {name: comm.bcast(None if arrays is None else arrays[name]) for name in names}
 
     def write(
         self, kind: str, fingerprint: Mapping[str, str], arrays: Mapping[str, Any], comm: MPI.Comm | None

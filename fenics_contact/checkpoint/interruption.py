@@ -151,7 +151,7 @@ def safe_point(kept: Callable[[], str], save: Callable[[], None], comm: MPI.Comm
 
 
 @contextmanager
-def telling_what_is_kept(kept: Callable[[], str], comm: MPI.Comm | None) -> Iterator[None]:
+def reporting_what_is_stored(kept: Callable[[], str], comm: MPI.Comm | None) -> Iterator[None]:
     """Report what an interrupted block leaves: as a note on the exception, and in the log of rank 0."""
     try:
         yield

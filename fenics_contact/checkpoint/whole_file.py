@@ -74,8 +74,8 @@ def put_whole(path: Path, content: bytes) -> None:
 def _version(path: Path) -> tuple[int, int] | None:
     """Return the identity of a file, by which a replacement is detected, None if there is none."""
     with suppress(FileNotFoundError):
-        found = path.stat()
-        return found.st_ino, found.st_mtime_ns
+        status = path.stat()
+        return status.st_ino, status.st_mtime_ns
     return None
 
 

@@ -80,9 +80,9 @@ def _check(instance: Any, cls: type, own: tuple[str, ...]) -> None:
         wrong = _misfit(getattr(instance, field.name), hints[field.name], name)
         if wrong is not None:
             place, hint, value = wrong
-            told = meaning(type(instance), field.name)
+            explanation = meaning(type(instance), field.name)
             given = f"{place} must be {_named(hint)}, got {reprlib.repr(value)}"
-            raise InvalidInputError(f"{given}: {told}" if told else given)
+            raise InvalidInputError(f"{given}: {explanation}" if explanation else given)
 
 
 @cache
@@ -172,8 +172,8 @@ def meaning(owner: Any, name: str) -> str:
     """
     for known in getattr(owner, "__mro__", (owner,)):
         text = inspect.cleandoc(known.__doc__ or "")
-        if found := re.search(rf"^    {name}: (.*(?:\n {{8}}.*)*)", text, re.MULTILINE):
-            words = re.split(r"\.(?: |$)", " ".join(found[1].split()))[0].replace("``", "")
+        if match := re.search(rf"^    {name}: (.*(?:\n {{8}}.*)*)", text, re.MULTILINE):
+            words = re.split(r"\.(?: |$)", " ".join(match[1].split()))[0].replace("``", "")
             ordinary = words[1:2].islower() and "'s" not in words.split()[0]  # neither ΔT nor Poisson's
             return f"{words[0].lower() if ordinary else words[0]}{words[1:]}"
     return ""

@@ -48,19 +48,19 @@ class _Lists(TyperCommand):
 
 def spread(arguments: Sequence[str]) -> list[str]:
     """Return arguments with ``--sizes 2 3`` as ``--sizes 2 --sizes 3``."""
-    found: list[str] = []
+    repeated: list[str] = []
     option, pending = "", False
     for argument in arguments:
         if argument.startswith("-") and argument != "-":
-            found += [option, options.NOTHING] if pending else []
+            repeated += [option, options.NOTHING] if pending else []
             option, pending = (argument, True) if argument in LISTS else ("", False)
-            found += [] if option else [argument]
+            repeated += [] if option else [argument]
         elif option:
-            found += [option, argument]
+            repeated += [option, argument]
             pending = False
         else:
-            found.append(argument)
-    return [*found, option, options.NOTHING] if pending else found
+            repeated.append(argument)
+    return [*repeated, option, options.NOTHING] if pending else repeated
 
 
 def add_to(app: typer.Typer) -> None:

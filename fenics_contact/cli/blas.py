@@ -52,11 +52,11 @@ def loaded_blas() -> list[Blas]:
     except OSError:
         return []
     files = {line.split(maxsplit=5)[-1] for line in maps.splitlines() if line.count(" /")}
-    found: dict[str, str] = {}
+    libraries: dict[str, str] = {}
     for file in sorted(files):
         if _LIBRARY.search(file):
-            found.setdefault(os.path.realpath(file), file)
-    return [Blas(file, _measured(file), bool(_REFERENCE.search(file))) for file in found]
+            libraries.setdefault(os.path.realpath(file), file)
+    return [Blas(file, _measured(file), bool(_REFERENCE.search(file))) for file in libraries]
 
 
 def numpy_speed() -> float:

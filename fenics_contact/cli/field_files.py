@@ -52,16 +52,16 @@ def _blocks(path: Path) -> dict[str, Any]:
 
 def fields_in(path: Path) -> dict[str, str]:
     """Return name -> range of every field of a file, for vectors of their magnitude."""
-    found: dict[str, list[tuple[float, float]]] = {}
+    by_name: dict[str, list[tuple[float, float]]] = {}
     for block in _blocks(path).values():
         for data in (block.point_data, block.cell_data):
             for name in data:
                 values = np.asarray(data[name], dtype=float)
                 size = np.linalg.norm(values, axis=1) if values.ndim == 2 else values
-                found.setdefault(name, []).append((float(np.nanmin(size)), float(np.nanmax(size))))
+                by_name.setdefault(name, []).append((float(np.nanmin(size)), float(np.nanmax(size))))
     return {
         name: f"{min(low for low, _ in ranges):.5g} to {max(high for _, high in ranges):.5g}"
-        for name, ranges in found.items()
+        for name, ranges in by_name.items()
     }
 
 
@@ -144,7 +144,9 @@ _BAR = {
 
 def _range(blocks: dict[str, Any], field: str) -> tuple[float, float]:
     """Return the range of the colours: all but the largest few values, which would leave one shade."""
-    found = [np.asarray(block[field], dtype=float) for block in blocks.values() if field in block.array_names]
-    sizes = [np.linalg.norm(values, axis=1) if values.ndim == 2 else values for values in found]
+    arrays = [
+        np.asarray(block[field], dtype=float) for block in blocks.values() if field in block.array_names
+    ]
+    sizes = [np.linalg.norm(values, axis=1) if values.ndim == 2 else values for values in arrays]
     values = np.concatenate([size.ravel() for size in sizes])
     return float(np.nanmin(values)), float(np.nanquantile(values, QUANTILE))

@@ -18,23 +18,23 @@ def resumable(desk: Desk, checkpoint: Checkpoint | None) -> Iterator[None]:
 
     Collective.
     """
-    with interruptible(desk.comm), _telling(desk, checkpoint):
+    with interruptible(desk.comm), _reporting(desk, checkpoint):
         yield
 
 
 @contextmanager
-def _telling(desk: Desk, checkpoint: Checkpoint | None) -> Iterator[None]:
+def _reporting(desk: Desk, checkpoint: Checkpoint | None) -> Iterator[None]:
     if checkpoint is None:
         yield
         return
     path = Path(checkpoint.path)
-    found = path.exists() and checkpoint.resume is not False
-    if found:
+    resumed = path.exists() and checkpoint.resume is not False
+    if resumed:
         desk.say(f"going on from {path} (--fresh starts anew)")
     try:
         yield
     except InvalidInputError as error:
-        if found:
+        if resumed:
             raise InvalidInputError(f"{error} (with --fresh the run starts anew)") from error
         raise
     except (ConvergenceError, InfeasibleError):

@@ -100,7 +100,7 @@ def _through_steps(desk: Desk, file: SceneFile, resume: bool | None) -> dict[str
         Some of the states by name, the last one among them.
     """
     checkpoint = checkpoint_of(file, resume)
-    rows, kept = [], {}
+    rows, drawn = [], {}
     chosen = set(np.unique(np.linspace(0, len(file.steps) - 1, MAPS).round().astype(int)))
     with resumable(desk, checkpoint):
         sequence = file.sequence(checkpoint)
@@ -111,13 +111,13 @@ def _through_steps(desk: Desk, file: SceneFile, resume: bool | None) -> dict[str
                 series.add(state, number, step.name)
             rows.append(step_row(number, step.name, state))
             if number in chosen:
-                kept[f"{number}: {step.name}"] = state
+                drawn[f"{number}: {step.name}"] = state
         sequence.finish()
     desk.show(step_table(rows, file))
     desk.show(facts(state_facts(state, file.document.units), f"{file.title}: after the last step"))
     write_result(state, file.folder, more={**_origin(file), "steps": _steps(rows)})
     _done(desk, checkpoint)
-    return kept
+    return drawn
 
 
 def _done(desk: Desk, checkpoint: Checkpoint | None) -> None:

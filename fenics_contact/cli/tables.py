@@ -44,16 +44,16 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
 
 def pairs(state: State, units: UnitNames) -> list[str]:
     """Return a summary of each contact pair."""
-    contact, found = state.contact, []
+    contact, rows = state.contact, []
     for number, pair in enumerate(state.scene.contacts):
         mine = contact.on_pair(number)
         force = np.linalg.norm(contact.force[mine].sum(axis=0))
         pressure = contact.pressure[mine].max(initial=0.0)
-        found.append(
+        rows.append(
             f"{_place(pair)}: {len(mine)} points, {_kinds(pair, contact.status[mine])}; "
             f"force {force:.6g} {units.force}, pressure up to {pressure:.5g} {units.stress}"
         )
-    return found
+    return rows
 
 
 def _kinds(pair: ContactPair, status: np.ndarray) -> str:

@@ -89,8 +89,8 @@ def _view(desk: Desk, result: Path, save: Path | None, look: tuple[str, float], 
 
 
 def _fields_of(folder: Path) -> Path | None:
-    found = [*sorted(folder.glob("*.pvd")), *sorted(folder.glob("*.vtm"))]
-    return found[0] if found else None
+    files = [*sorted(folder.glob("*.pvd")), *sorted(folder.glob("*.vtm"))]
+    return files[0] if files else None
 
 
 def show_record(desk: Desk, record: dict[str, Any]) -> None:

@@ -42,8 +42,8 @@ class Energies:
 
     def __str__(self) -> str:
         """List the energies, one per line."""
-        told = ("strain", "load", "friction", "total_potential", "primal", "dual")
-        return "\n".join(f"{name.replace('_', ' '):16s}{getattr(self, name):14.6e}" for name in told)
+        names = ("strain", "load", "friction", "total_potential", "primal", "dual")
+        return "\n".join(f"{name.replace('_', ' '):16s}{getattr(self, name):14.6e}" for name in names)
 
 
 def compute_energies(

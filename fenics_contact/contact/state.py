@@ -116,13 +116,13 @@ class State:
         from fenics_contact.contact.geometry_error import geometry_error
 
         with Task("errors"):
-            found = self.known_errors
-            if found is None:
+            errors = self.known_errors
+            if errors is None:
                 solver = solver_errors(self.system, self.solution)
                 estimate = discretisation_error(self.torn, self.conforming_displacement)
-                found = state_errors(solver, estimate, self.energies.norm)
+                errors = state_errors(solver, estimate, self.energies.norm)
             geometry = geometry_error(self.system, self.solution)
-        return found.with_geometry(geometry.energy, geometry.peak_pressure)
+        return errors.with_geometry(geometry.energy, geometry.peak_pressure)
 
     @cached_property
     def unheld(self) -> tuple[UnheldMotion, ...]:

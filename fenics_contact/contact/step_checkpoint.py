@@ -39,10 +39,10 @@ class StepCheckpoint:
             return
         for name in ("scene", "partitions", "solver", "tolerance"):
             self._fingerprint.update(described(getattr(problem, name), name))
-        found = checkpoint.read(KIND, self._fingerprint, problem.comm)
-        if found is not None:
-            self._stored = self._written = int(found.pop("steps"))
-            self._arrays = found
+        arrays = checkpoint.read(KIND, self._fingerprint, problem.comm)
+        if arrays is not None:
+            self._stored = self._written = int(arrays.pop("steps"))
+            self._arrays = arrays
 
     @property
     def recalling(self) -> bool:
@@ -108,7 +108,7 @@ class StepCheckpoint:
             with suppress(CheckpointError):
                 self.write()
 
-    def kept(self, done: int, count: int | None) -> str:
+    def summary(self, done: int, count: int | None) -> str:
         """Describe what a run that ends now leaves, and how to continue it.
 
         Args:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fenics_contact.checkpoint import Checkpoint, safe_point, telling_what_is_kept
+from fenics_contact.checkpoint import Checkpoint, reporting_what_is_stored, safe_point
 from fenics_contact.contact.problem import ContactProblem
 from fenics_contact.contact.state import State
 from fenics_contact.contact.step_checkpoint import StepCheckpoint
@@ -56,8 +56,10 @@ class LoadSequence:
                 ranks have one.
         """
         self.problem, self.scene, self._comm = problem, problem.scene, problem.comm
-        kept = None if checkpoint is None else (checkpoint.every, checkpoint.resume)
-        require_alike(self._comm, described({"count": count, "checkpoint (every, resume)": kept}, "steps"))
+        settings = None if checkpoint is None else (checkpoint.every, checkpoint.resume)
+        require_alike(
+            self._comm, described({"count": count, "checkpoint (every, resume)": settings}, "steps")
+        )
         self._done = StepCheckpoint(checkpoint, problem)
         self._task, self._count, self._number = Task("load steps", unit="done", total=count), count, 0
 
@@ -81,7 +83,7 @@ class LoadSequence:
         self._task.step(self._number, words=step.name)
         try:
             self._may_stop()
-            with telling_what_is_kept(self._left, self._comm):
+            with reporting_what_is_stored(self._left, self._comm):
                 state = self._advanced(step)
             self._number += 1
             self._may_stop()
@@ -95,12 +97,12 @@ class LoadSequence:
 
     def _may_stop(self) -> None:
         """Stop between two steps if a signal requested it. Collective."""
-        safe_point(lambda: self._done.kept(self._number, self._count), self._done.write, self._comm)
+        safe_point(lambda: self._done.summary(self._number, self._count), self._done.write, self._comm)
 
     def _left(self) -> str:
         """Write what can be written in the middle of a step, and describe what is stored."""
         self._done.write_rest()
-        return self._done.kept(self._number, self._count)
+        return self._done.summary(self._number, self._count)
 
     def _advanced(self, step: LoadStep) -> State:
         with together(self._comm):

@@ -39,7 +39,7 @@ def unheld_motions(system: DualSystem) -> tuple[UnheldMotion, ...]:
     count = system.unheld.shape[1]
     if count == 0:
         return ()
-    torn, found = system.torn, []
+    torn, coefficients = system.torn, []
     starts = np.cumsum([0] + [part.mesh.size for part in torn.subdomains])
     for name, body in torn.scene.bodies.items():
         modes = rigid_body_modes(body.mesh.points)
@@ -51,8 +51,8 @@ def unheld_motions(system: DualSystem) -> tuple[UnheldMotion, ...]:
                 moved = system.unheld[start : start + part.mesh.size].toarray()
                 sums += own.T @ np.hstack([own, moved])
         sums = torn.numbering.comm.allreduce(sums)
-        found.append(np.linalg.solve(sums[:, :size], sums[:, size:]))
-    motions = np.stack(found)  # (n_bodies, n_modes, count)
+        coefficients.append(np.linalg.solve(sums[:, :size], sums[:, size:]))
+    motions = np.stack(coefficients)  # (n_bodies, n_modes, count)
     motions /= np.abs(motions).max(axis=(0, 1))
     motions[np.abs(motions) <= ROUNDING] = 0.0
     return tuple(

@@ -26,14 +26,14 @@ def carried_over(old: DualSystem, solution: DualSolution, new: DualSystem) -> np
         -1, before.dim - 1
     )
     match = _matches(before.points, after.points)
-    found = match >= 0
+    matched = match >= 0
     values = np.zeros(after.points.count)
-    values[found] = normal[match[found]]
+    values[matched] = normal[match[matched]]
     _put(new, start, after.normal_rows, values)
     if len(after.frictional):
         friction = np.zeros((before.points.count, before.dim))
         friction[before.frictional] = np.einsum("na,nad->nd", tau, before.points.tangents[before.frictional])
-        in_space = np.where(found[:, None], friction[match], 0.0)[after.frictional]
+        in_space = np.where(matched[:, None], friction[match], 0.0)[after.frictional]
         turned = np.einsum("nad,nd->na", after.points.tangents[after.frictional], in_space)
         _put(new, start, after.tangential_rows.ravel(), turned.ravel())
     return start

@@ -60,14 +60,14 @@ def from_ufl(load: Load, value: Ufl, cell_type: str) -> Any:
     dim = _dolfinx.dimension(cell_type)
     shape = () if is_scalar(load) else (dim,)
     with calling(f"the function given as Ufl of {type(load).__name__} on body {load.body!r}"):
-        found = value.function(ufl.SpatialCoordinate(_dolfinx.template(cell_type)))
-        found = ufl.as_vector(list(found)) if isinstance(found, list | tuple) else ufl.as_ufl(found)
-    if found.ufl_shape != shape:
+        result = value.function(ufl.SpatialCoordinate(_dolfinx.template(cell_type)))
+        result = ufl.as_vector(list(result)) if isinstance(result, list | tuple) else ufl.as_ufl(result)
+    if result.ufl_shape != shape:
         raise InvalidInputError(
             f"the UFL value of {type(load).__name__} on body {load.body!r} must have shape {shape}, got "
-            f"{found.ufl_shape}: return {'a scalar' if is_scalar(load) else f'a vector of {dim} components'}"
+            f"{result.ufl_shape}: return {'a scalar' if is_scalar(load) else f'a vector of {dim} components'}"
         )
-    return found
+    return result
 
 
 def numbers_of(load: Load) -> tuple[float, ...]:

@@ -63,11 +63,11 @@ def check_model(material: Material, cell_type: str, bind: Bind) -> None:
         )
     R = _checked_kernel(material, points)
     check_kernel(K, R, f"material {name}")
-    claimed, found = R.shape[1], int((energies < ROUNDING * energies[-1]).sum())
-    if found > claimed:
+    claimed, counted = R.shape[1], int((energies < ROUNDING * energies[-1]).sum())
+    if counted > claimed:
         raise InvalidInputError(
             f"the kernel of a material must hold every motion without energy, that of {name} has {claimed} "
-            f"modes and a {cell_type} has {found} of them: add the missing ones to kernel(points)"
+            f"modes and a {cell_type} has {counted} of them: add the missing ones to kernel(points)"
         )
 
 

@@ -18,10 +18,10 @@ def cell_stiffness(scene: Scene, forms: FormLibrary) -> dict[str, np.ndarray]:
         scene: The scene.
         forms: Its prepared forms.
     """
-    found = {}
+    stiffness = {}
     for name, body in scene.bodies.items():
         size = (body.mesh.volume / body.mesh.n_cells) ** (1.0 / scene.dim)
         cell_type = body.mesh.cell_type
         moduli = np.array([forms.typical_modulus(material, cell_type) for material in body.materials])
-        found[name] = moduli[body.material_of_cells] * size ** (scene.dim - 2)
-    return found
+        stiffness[name] = moduli[body.material_of_cells] * size ** (scene.dim - 2)
+    return stiffness

@@ -14,7 +14,7 @@ from fenics_contact.feti.factor import symmetric_matrix
 from fenics_contact.linalg import dispose_with
 
 #: Number of cached symbolic factorisations. Each also holds the values of its last matrix: a few MB.
-KEPT = 8
+CACHED = 8
 #: MUMPS control parameter and its value for nested dissection by METIS.
 ORDERING, METIS = 7, 5
 
@@ -81,7 +81,7 @@ class Condensations:
 
     def __init__(self) -> None:
         """Start empty."""
-        self._kept: OrderedDict[tuple[bytes, bytes, bytes], Condensation] = OrderedDict()
+        self._recent: OrderedDict[tuple[bytes, bytes, bytes], Condensation] = OrderedDict()
         self.analysed = 0
 
     def schur_complement(self, stiffness: sp.csr_matrix, interface: np.ndarray) -> np.ndarray:
@@ -89,13 +89,13 @@ class Condensations:
         if len(interface) == stiffness.shape[0]:
             return stiffness[interface][:, interface].toarray(order="F")
         key = (stiffness.indptr.tobytes(), stiffness.indices.tobytes(), interface.tobytes())
-        if key not in self._kept:
-            self._kept[key] = Condensation(stiffness, interface)
+        if key not in self._recent:
+            self._recent[key] = Condensation(stiffness, interface)
             self.analysed += 1
-        self._kept.move_to_end(key)
-        if len(self._kept) > KEPT:
-            self._kept.popitem(last=False)
-        return self._kept[key](stiffness)
+        self._recent.move_to_end(key)
+        if len(self._recent) > CACHED:
+            self._recent.popitem(last=False)
+        return self._recent[key](stiffness)
 
 
 @lru_cache(maxsize=1)

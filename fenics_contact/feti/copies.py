@@ -86,9 +86,9 @@ def tear(
         subdomain = partitions[name].astype(np.int64) + subdomain_offset[index]
         # One integer key per node and subdomain: unique keys are the copies, already in their order.
         every = (cells + node_offset[index]) * total + subdomain[:, None]
-        found, where = np.unique(every.ravel(), return_inverse=True)
+        unique, where = np.unique(every.ravel(), return_inverse=True)
         weights = np.repeat(stiffness[name], cells.shape[1])
-        keys.append(found)
+        keys.append(unique)
         sums.append(np.bincount(where.ravel(), weights) / np.bincount(where.ravel()))
     key, stiff = np.concatenate(keys), np.concatenate(sums)
     multiplicity = np.bincount(key // total, minlength=int(node_offset[-1]))

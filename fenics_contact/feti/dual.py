@@ -167,20 +167,20 @@ class DualSystem:
 
         u contains no unresisted motion: its least-squares fit over the nodes is removed.
         """
-        found = self.inverse(self.torn.load - self.force(multiplier)) + self.kernel @ alpha
-        return self._at_rest(found)
+        displacement = self.inverse(self.torn.load - self.force(multiplier)) + self.kernel @ alpha
+        return self._at_rest(displacement)
 
-    def _at_rest(self, found: np.ndarray) -> np.ndarray:
+    def _at_rest(self, displacement: np.ndarray) -> np.ndarray:
         """Remove the unresisted motions from a torn displacement. Collective."""
         if self.unheld.shape[1] == 0:
-            return found
+            return displacement
         tearing, here = self.torn.decomposition.tearing, self.torn.decomposition.copy_block
-        weight = np.empty(len(found) // tearing.dim)
+        weight = np.empty(len(displacement) // tearing.dim)
         weight[here[here >= 0]] = 1.0 / tearing.multiplicity[tearing.copy_node[here >= 0]]
         weighted = self.unheld.T @ sp.diags(np.repeat(weight, tearing.dim))
-        sums = np.column_stack([(weighted @ self.unheld).toarray(), weighted @ found])
+        sums = np.column_stack([(weighted @ self.unheld).toarray(), weighted @ displacement])
         sums = self.torn.numbering.comm.allreduce(sums)
-        return found - self.unheld @ np.linalg.solve(sums[:, :-1], sums[:, -1])
+        return displacement - self.unheld @ np.linalg.solve(sums[:, :-1], sums[:, -1])
 
     def sewn(self, residual: np.ndarray) -> np.ndarray:
         """Return the interface displacement that makes copies agree and satisfies supports. Collective.
@@ -247,9 +247,9 @@ class DualSystem:
         if k == 0:
             return coarse
         self._require_unloaded()
-        kept = np.sort(order[k:])
-        self.kernel = self.kernel[:, kept]
-        return CoarseSpace(coarse.comm, coarse.matrix[kept], coarse.load[kept])
+        remaining = np.sort(order[k:])
+        self.kernel = self.kernel[:, remaining]
+        return CoarseSpace(coarse.comm, coarse.matrix[remaining], coarse.load[remaining])
 
     def _require_unloaded(self) -> None:
         """Reject loads on motions in the kernel of B. Collective."""

@@ -51,12 +51,12 @@ class Factor:
         given = PETSc.Mat().createDense(
             (self.size, columns), array=np.asfortranarray(right), comm=PETSc.COMM_SELF
         )
-        found = PETSc.Mat().createDense((self.size, columns), comm=PETSc.COMM_SELF)
-        found.setUp()
-        self._factor.matSolve(given, found)
-        solution = np.array(found.getDenseArray())
+        solutions = PETSc.Mat().createDense((self.size, columns), comm=PETSc.COMM_SELF)
+        solutions.setUp()
+        self._factor.matSolve(given, solutions)
+        solution = np.array(solutions.getDenseArray())
         given.destroy()
-        found.destroy()
+        solutions.destroy()
         return solution
 
 

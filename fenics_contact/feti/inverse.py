@@ -143,10 +143,10 @@ class TornInverse:
         method: Callable[[LocalOperator], Callable[[np.ndarray, np.ndarray], None]],
         given: np.ndarray,
     ) -> np.ndarray:
-        found = np.empty_like(given)
+        result = np.empty_like(given)
         for operator, part in zip(self.operators, self._parts, strict=True):
-            method(operator)(given[part], found[part])
-        return found
+            method(operator)(given[part], result[part])
+        return result
 
     def _operator_of(
         self, index: int, subdomain: Subdomain, interface: np.ndarray, kind: LocalKind

@@ -35,17 +35,17 @@ def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:
         bodies = {name: torn.scene.bodies[name] for name in {part.mesh.body for part in torn.subdomains}}
         modes = {name: common_kernel(body.materials, body.mesh.points) for name, body in bodies.items()}
         mine = {part.mesh.number: _coefficients(part, modes[part.mesh.body]) for part in torn.subdomains}
-    parts = {number: found for share in comm.allgather(mine) for number, found in share.items()}
+    parts = {number: coefficients for share in comm.allgather(mine) for number, coefficients in share.items()}
     total, first = int(offset[-1]), torn.decomposition.tearing.subdomain_offset
-    kept, rows, columns, values = np.ones(total), [], [], []
+    unchanged, rows, columns, values = np.ones(total), [], [], []
     for start, end in pairwise(first):
         place = np.arange(offset[start], offset[start + 1])
-        found = [parts[number] for number in range(start, end)]
-        whole = [part for part in found if part is not None and part.shape[1] == len(place)]
+        coefficients = [parts[number] for number in range(start, end)]
+        whole = [part for part in coefficients if part is not None and part.shape[1] == len(place)]
         # All parts or none: the modes of a body replace those of a part only if every part reproduces them.
-        if len(found) == 1 or len(whole) < len(found):
+        if len(coefficients) == 1 or len(whole) < len(coefficients):
             continue
-        kept[place] = 0.0
+        unchanged[place] = 0.0
         block = np.vstack(whole)
         row, column = np.indices(block.shape)
         rows.append(offset[start] + row.ravel())
@@ -54,7 +54,7 @@ def whole_motions(torn: TornSystem, offset: np.ndarray) -> sp.csr_matrix:
     nowhere = np.zeros(0, dtype=np.int64)
     entries = (np.concatenate([nowhere, *rows]), np.concatenate([nowhere, *columns]))
     motions = sp.csr_matrix((np.concatenate([np.zeros(0), *values]), entries), shape=(total, total))
-    return (motions + sp.diags(kept)).tocsr()
+    return (motions + sp.diags(unchanged)).tocsr()
 
 
 def _coefficients(subdomain: Subdomain, modes: np.ndarray) -> np.ndarray | None:
@@ -63,6 +63,6 @@ def _coefficients(subdomain: Subdomain, modes: np.ndarray) -> np.ndarray | None:
     None if they are not in its span.
     """
     wanted = modes[subdomain.mesh.nodes].reshape(subdomain.mesh.size, modes.shape[-1])
-    found = np.linalg.lstsq(subdomain.kernel, wanted, rcond=None)[0]
-    error = np.abs(subdomain.kernel @ found - wanted).max(initial=0.0)
-    return found if error <= SPANNED * np.abs(wanted).max(initial=0.0) else None
+    coefficients = np.linalg.lstsq(subdomain.kernel, wanted, rcond=None)[0]
+    error = np.abs(subdomain.kernel @ coefficients - wanted).max(initial=0.0)
+    return coefficients if error <= SPANNED * np.abs(wanted).max(initial=0.0) else None

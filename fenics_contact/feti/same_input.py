@@ -35,31 +35,31 @@ def check_same_input(comm: MPI.Comm, scene: Scene, **settings: Any) -> None:
     if comm.size == 1:
         return
     with together(comm):
-        told = {**described(scene, "scene", carried=False), **_values(scene)}
+        descriptions = {**described(scene, "scene", carried=False), **_values(scene)}
         for name, value in settings.items():
-            told.update(described(value, name, carried=False))
-    require_alike(comm, told)
+            descriptions.update(described(value, name, carried=False))
+    require_alike(comm, descriptions)
 
 
 def _values(scene: Scene) -> dict[str, str]:
     """Describe what the user's functions and materials return."""
-    found: dict[str, str] = {}
+    descriptions: dict[str, str] = {}
     for name, body in scene.bodies.items():
         for material in body.materials:
             kind = type(material).__name__
             with calling(f"the parameters of material {kind}"):
                 numbers = np.asarray(material.parameters, dtype=np.float64)
-            found.update(described(numbers.tolist(), f"parameters of {kind} in body {name!r}"))
+            descriptions.update(described(numbers.tolist(), f"parameters of {kind} in body {name!r}"))
     for number, support in enumerate(scene.supports):
         if any(callable(component) for component in support.value):
             values = support.values(_nodes(scene, support))
-            found.update(described(values, f"scene.supports[{number}] at some nodes"))
+            descriptions.update(described(values, f"scene.supports[{number}] at some nodes"))
     for number, load in enumerate(scene.loads):
         if callable(load.value) and not isinstance(load.value, Ufl):
             points, shape = _nodes(scene, load), () if is_scalar(load) else (scene.dim,)
             values = evaluate(f"{type(load).__name__} on body {load.body!r}", load.value, points, shape)
-            found.update(described(values, f"scene.loads[{number}] at some nodes"))
-    return found
+            descriptions.update(described(values, f"scene.loads[{number}] at some nodes"))
+    return descriptions
 
 
 def _nodes(scene: Scene, part: Any) -> np.ndarray:

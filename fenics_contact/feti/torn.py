@@ -136,7 +136,7 @@ class TornSystem:
         decomposition, points = self.decomposition, self.points
         tearing, comm = decomposition.tearing, decomposition.comm
         finer = find_contact_points(self.scene, decomposition.fixed, comm, finer=True)
-        mine, theirs = (found.pair * tearing.n_nodes + found.slave for found in (points, finer))
+        mine, theirs = (searched.pair * tearing.n_nodes + searched.slave for searched in (points, finer))
         _, here, there = np.intersect1d(mine, theirs, return_indices=True)
         gap = points.gap.copy()
         gap[here] = finer.gap[there]
@@ -246,7 +246,7 @@ def _joined(
     tied = tied_relations(ties, scene.ties, fixed)
     relations = (tied, normal_relations(points), tangential_relations(points, frictional, prescribed))
     if decomposition.comm.rank == 0:
-        _tell_of_held(relations[2], fixed)
+        _log_held(relations[2], fixed)
     rows = stack([gluing, *(relation.rows(tearing, fixed) for relation in relations)])
     numbering, B = _own_part(rows, decomposition, None if previous is None else previous.numbering)
     return TornSystem(
@@ -256,7 +256,7 @@ def _joined(
     )  # fmt: skip
 
 
-def _tell_of_held(rows: Relations, fixed: np.ndarray) -> None:
+def _log_held(rows: Relations, fixed: np.ndarray) -> None:
     held = int(rows.held(fixed).sum())
     if held:
         words = "%d of %d friction rows are left to the supports, which hold slip there"

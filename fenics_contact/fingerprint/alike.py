@@ -27,7 +27,7 @@ def require_alike(comm: MPI.Comm, descriptions: Mapping[str, str]) -> None:
         return
     digest = hashlib.sha256(repr(list(descriptions.items())).encode()).digest()
     digests = comm.allgather(digest)
-    other = next((rank for rank, found in enumerate(digests) if found != digests[0]), 0)
+    other = next((rank for rank, each in enumerate(digests) if each != digests[0]), 0)
     if other == 0:
         return
     first = comm.bcast(dict(descriptions))

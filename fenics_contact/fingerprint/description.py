@@ -33,9 +33,9 @@ def described(value: Any, name: str, *, carried: bool = True) -> dict[str, str]:
         >>> described({"length": 2.0}, "beam")
         {'beam': '1 entries', "beam['length']": '2.0'}
     """
-    found: dict[str, str] = {}
-    _describe(value, name, found, (), carried)
-    return found
+    parts: dict[str, str] = {}
+    _describe(value, name, parts, (), carried)
+    return parts
 
 
 def differences(there: Mapping[str, str], here: Mapping[str, str]) -> list[str]:
@@ -53,16 +53,18 @@ def differences(there: Mapping[str, str], here: Mapping[str, str]) -> list[str]:
     return [*named, f"{more} more"] if more > 0 else named
 
 
-def _describe(value: Any, name: str, found: dict[str, str], around: tuple[int, ...], carried: bool) -> None:
+def _describe(
+    value: Any, name: str, descriptions: dict[str, str], around: tuple[int, ...], carried: bool
+) -> None:
     """Add the parts of a value, which is nested in the objects of these identities."""
     known = _leaf(value)
     if known is not None:
-        found[name] = known
+        descriptions[name] = known
         return
-    found[name], parts = _branches(value, name)
+    descriptions[name], parts = _branches(value, name)
     if id(value) not in around and (carried or not isinstance(value, FunctionType)):
         for part, inner in parts:
-            _describe(inner, part, found, (*around, id(value)), carried)
+            _describe(inner, part, descriptions, (*around, id(value)), carried)
 
 
 def _leaf(value: Any) -> str | None:

@@ -36,16 +36,16 @@ def require_room(*counts: int) -> None:
 
 def memory() -> int:
     """Return the memory that this process may use, in bytes: limited by machine, container or process."""
-    found = [os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")]
+    limits = [os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")]
     own, _ = resource.getrlimit(resource.RLIMIT_AS)
     if own != resource.RLIM_INFINITY:
-        found.append(own)
+        limits.append(own)
     for place in _LIMITS:
         try:
-            found.append(int(Path(place).read_text()))
+            limits.append(int(Path(place).read_text()))
         except (OSError, ValueError):  # there is none, or it says "max"
             continue
-    return min(found)
+    return min(limits)
 
 
 def _size(needed: int) -> str:

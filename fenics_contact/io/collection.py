@@ -52,7 +52,7 @@ def read_collection(path: Path) -> list[Member]:
     Raises:
         InvalidInputError: If it cannot be read or was not written by a `ResultSeries`.
     """
-    name, found = path.stem, []
+    name, members = path.stem, []
     try:
         for entry in ET.parse(path).getroot().iter("DataSet"):
             file = entry.attrib["file"]
@@ -64,10 +64,10 @@ def read_collection(path: Path) -> list[Member]:
             if file != f"{name}/{stem_of(name, member.number)}.vtm" or not math.isfinite(member.value):
                 raise ValueError(f"it names {file!r} at {member.value}")
             if (path.parent / file).is_file():
-                found.append(member)
+                members.append(member)
     except (OSError, ET.ParseError, KeyError, ValueError) as error:
         raise InvalidInputError(
             f"a series needs a PVD file that a ResultSeries wrote, or none, {str(path)!r} is another one "
             f"({error}): give the series another name, or move the file away"
         ) from error
-    return sorted(found)
+    return sorted(members)

@@ -59,9 +59,9 @@ def _material(material: Material) -> dict[str, Any]:
 
 
 def _pair(pair: ContactPair | Tie) -> dict[str, Any]:
-    found = {part.name: readable(getattr(pair, part.name)) for part in fields(pair)}
+    entries = {part.name: readable(getattr(pair, part.name)) for part in fields(pair)}
     for side in ("slave", "master"):
         surface = getattr(pair, side)
         if isinstance(surface, Surface):
-            found[side] = {"body": surface.body, "surface": surface.name}
-    return found
+            entries[side] = {"body": surface.body, "surface": surface.name}
+    return entries

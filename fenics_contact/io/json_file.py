@@ -94,7 +94,7 @@ def plain(data: Any, place: str = "data", *, lenient: bool = False) -> Any:
     if isinstance(data, Sequence) and not isinstance(data, bytes | bytearray):
         return [inside(value, f"[{index}]") for index, value in enumerate(data)]
     if lenient:
-        return _told(data)
+        return _named(data)
     raise InvalidInputError(
         f"{place} must be a mapping, sequence, string, number, truth value, None or array, got a "
         f"{type(data).__name__}: convert it first"
@@ -107,8 +107,8 @@ def _key(key: Any, place: str, lenient: bool) -> str:
     return str(key)
 
 
-def _told(data: Any) -> dict[str, str]:
+def _named(data: Any) -> dict[str, str]:
     """Describe a function by its name, any other object by its type."""
     if isinstance(data, partial):
-        return _told(data.func)
+        return _named(data.func)
     return {"function": data.__qualname__} if hasattr(data, "__qualname__") else {"type": type(data).__name__}

@@ -18,11 +18,11 @@ def versions() -> dict[str, str]:
 
     A library that is not installed or does not report its version is marked as such.
     """
-    found = {"fenics_contact": _installed("fenics_contact"), "python": platform.python_version()}
-    found["dolfinx"] = _dolfinx.release()
-    found["petsc"] = ".".join(map(str, PETSc.Sys.getVersion()))
-    found["mpi"] = MPI.Get_library_version().partition(",")[0].strip("\x00 \n")
-    return found | {name: _installed(name) for name in _MODULES}
+    entries = {"fenics_contact": _installed("fenics_contact"), "python": platform.python_version()}
+    entries["dolfinx"] = _dolfinx.release()
+    entries["petsc"] = ".".join(map(str, PETSc.Sys.getVersion()))
+    entries["mpi"] = MPI.Get_library_version().partition(",")[0].strip("\x00 \n")
+    return entries | {name: _installed(name) for name in _MODULES}
 
 
 def _installed(name: str) -> str:

@@ -44,9 +44,9 @@ def read_result(path: str | Path) -> dict[str, Any]:
             "bring back a copy or write it again"
         ) from error
     if not isinstance(data, dict) or data.get("format") != FORMAT:
-        found = data.get("format") if isinstance(data, dict) else None
+        kind = data.get("format") if isinstance(data, dict) else None
         raise InvalidInputError(
-            f'a result must say "format": {FORMAT!r}, {str(file)!r} says {found!r}: give a file that '
+            f'a result must say "format": {FORMAT!r}, {str(file)!r} says {kind!r}: give a file that '
             "write_result or write_optimisation_result wrote"
         )
     version = data.get("format_version")

@@ -228,14 +228,14 @@ def _knows_errors(state: State) -> bool:
 
 def _errors(state: State) -> dict[str, Any]:
     """Return the errors of a state. Collective if they are not known."""
-    found = state.errors
+    errors = state.errors
     return {
-        "algebraic": readable(found.algebraic),
-        "friction": readable(found.friction),
-        "discretisation": readable(found.discretisation),
-        "geometry": readable(found.geometry),
-        "peak_pressure_by_geometry": readable(found.peak_by_geometry),
-        "by_body": readable(found.by_body),
+        "algebraic": readable(errors.algebraic),
+        "friction": readable(errors.friction),
+        "discretisation": readable(errors.discretisation),
+        "geometry": readable(errors.geometry),
+        "peak_pressure_by_geometry": readable(errors.peak_by_geometry),
+        "by_body": readable(errors.by_body),
     }
 
 

@@ -75,16 +75,16 @@ def write_vtu(
 def _checked(
     state: State, body: str, fields: Mapping[str, Mapping[str, np.ndarray]]
 ) -> dict[str, np.ndarray]:
-    count, found = state.scene.bodies[body].mesh.n_cells, {}
+    count, arrays = state.scene.bodies[body].mesh.n_cells, {}
     for name, values in fields.items():
-        found[name] = np.asarray(values[body]) if body in values else np.zeros(0)
-        if found[name].shape[:1] != (count,):
-            given = f"shape {found[name].shape}" if body in values else "none"
+        arrays[name] = np.asarray(values[body]) if body in values else np.zeros(0)
+        if arrays[name].shape[:1] != (count,):
+            given = f"shape {arrays[name].shape}" if body in values else "none"
             raise InvalidInputError(
                 f"the cell field {name!r} must have {count} rows for body {body!r}, one per cell, got "
                 f"{given}: give every body an array in the order of the cells of its mesh"
             )
-    return found
+    return arrays
 
 
 def _gathered(state: State, body: str, more: Mapping[str, np.ndarray]) -> meshio.Mesh:

@@ -150,14 +150,14 @@ def orient(cells: np.ndarray, facets: np.ndarray, dim: int = 3) -> np.ndarray:
         InvalidInputError: If a facet is not on the boundary.
     """
     boundary, _ = boundary_faces(cells, dim)
-    found = match_faces(corners_of(facets, dim), corners_of(boundary, dim))
-    if np.any(found < 0):
-        lost = np.flatnonzero(found < 0)
+    matches = match_faces(corners_of(facets, dim), corners_of(boundary, dim))
+    if np.any(matches < 0):
+        lost = np.flatnonzero(matches < 0)
         raise InvalidInputError(
             f"facets must be boundary faces of the cells, {lost.size} of {facets.shape[0]} are not, first "
             f"facet {lost[0]} with nodes {facets[lost[0]].tolist()}: take them from `boundary_faces(cells)`"
         )
-    return boundary[found]
+    return boundary[matches]
 
 
 def start_at_smallest(facets: np.ndarray) -> np.ndarray:

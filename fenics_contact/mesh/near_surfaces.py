@@ -52,8 +52,8 @@ def near_surfaces(
         if not sides[one].may_meet(sides[other], distance):
             continue
         first, second = sides[one].over(sides[other], distance), sides[other].over(sides[one], distance)
-        found = {one: first[0] | second[1], other: first[1] | second[0]}
-        if not (found[one].any() and found[other].any()):
+        near = {one: first[0] | second[1], other: first[1] | second[0]}
+        if not (near[one].any() and near[other].any()):
             continue
         pairs.append((one, other))
         for a, b in ((one, other), (other, one)):
@@ -61,7 +61,7 @@ def near_surfaces(
                 raise InvalidInputError(
                     f"body {a!r} must have no surface 'near {b}' yet, it has one: rename it, or use it"
                 )
-            surfaces[a][f"near {b}"] = sides[a].facets[found[a]]
+            surfaces[a][f"near {b}"] = sides[a].facets[near[a]]
     return {name: replace(mesh, surfaces=surfaces[name]) for name, mesh in meshes.items()}, pairs
 
 

@@ -73,10 +73,10 @@ def _with_more_nodes(
     for count in sorted({len(around) for around in parents}):
         columns = [index for index, around in enumerate(parents) if len(around) == count]
         groups = np.sort(cells[:, [parents[index] for index in columns]], axis=2)
-        found, number = np.unique(groups.reshape(-1, count), axis=0, return_inverse=True)
+        unique, number = np.unique(groups.reshape(-1, count), axis=0, return_inverse=True)
         where = len(cells[0]) + np.array(columns)
         result[:, where] = number.reshape(len(cells), -1) + len(points)
-        points = np.concatenate([points, points[found].mean(axis=1)])
+        points = np.concatenate([points, points[unique].mean(axis=1)])
     return points, result
 
 
@@ -91,11 +91,11 @@ def _follow(points: np.ndarray, cells: np.ndarray, kind: CellType, placed: np.nd
     if kind is HEXAHEDRON27:
         for face in kind.faces:
             centre = cells[:, face[8]]
-            found = 0.5 * points[cells[:, face[4:8]]].sum(axis=1) - 0.25 * points[cells[:, face[:4]]].sum(
+            centres = 0.5 * points[cells[:, face[4:8]]].sum(axis=1) - 0.25 * points[cells[:, face[:4]]].sum(
                 axis=1
             )
             free = ~placed[centre]
-            points[centre[free]] = found[free]
+            points[centre[free]] = centres[free]
         points[cells[:, 26]] = 0.25 * (points[cells[:, 8:20]].sum(axis=1) - points[cells[:, :8]].sum(axis=1))
         return
     points[cells[:, 8]] = 0.5 * points[cells[:, 4:8]].sum(axis=1) - 0.25 * points[cells[:, :4]].sum(axis=1)

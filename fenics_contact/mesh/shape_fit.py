@@ -52,7 +52,7 @@ def check_shapes(
         InvalidInputError: If there is no such surface, the shape is of another dimension, or nodes lie off it
             by more than a tenth of an edge.
     """
-    found = {}
+    distances = {}
     for name, shape in shapes.items():
         if name not in surfaces:
             raise InvalidInputError(
@@ -73,5 +73,5 @@ def check_shapes(
                 f"lie off {type(shape).__name__} by more than a tenth of an edge, up to {away.max():.3g} "
                 "edges: check its place and size and the unit of length, or give the shape of another surface"
             )
-        found[name] = away
-    return found
+        distances[name] = away
+    return distances

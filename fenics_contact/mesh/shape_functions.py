@@ -60,8 +60,8 @@ def quadrature(cell: CellType) -> tuple[np.ndarray, np.ndarray]:
 def _tabulated(cell: CellType, positions: np.ndarray, derivatives: int) -> np.ndarray:
     """Return the shape functions and their derivatives in each direction, (1 + ..., m, nodes of a cell)."""
     element, number = _element(cell)
-    found = element.tabulate(derivatives, np.ascontiguousarray(positions, dtype=np.float64))
-    return np.asarray(found[..., number, 0])
+    values = element.tabulate(derivatives, np.ascontiguousarray(positions, dtype=np.float64))
+    return np.asarray(values[..., number, 0])
 
 
 @cache

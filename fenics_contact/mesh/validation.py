@@ -130,25 +130,27 @@ def checked_surfaces(
                 f"got {array.shape}: leave out a surface that is empty"
             )
         _check_range(array, n_nodes, f"surface '{name}'")
-        found = _facets_found(name, array, boundary, dim)
+        numbers = _face_numbers(name, array, boundary, dim)
         # Midpoints follow from the corners; from here on they are in the order of `boundary_faces`.
-        checked[name] = array if boundary.shape[1] == corners_of(boundary, dim).shape[1] else boundary[found]
+        checked[name] = (
+            array if boundary.shape[1] == corners_of(boundary, dim).shape[1] else boundary[numbers]
+        )
         checked[name].setflags(write=False)
     return checked
 
 
-def _facets_found(name: str, facets: np.ndarray, boundary: np.ndarray, dim: int) -> np.ndarray:
+def _face_numbers(name: str, facets: np.ndarray, boundary: np.ndarray, dim: int) -> np.ndarray:
     """Return the numbers of the boundary faces that the facets are, (n_facets,)."""
-    found = match_faces(corners_of(facets, dim), corners_of(boundary, dim))
-    lost = np.flatnonzero(found < 0)
+    numbers = match_faces(corners_of(facets, dim), corners_of(boundary, dim))
+    lost = np.flatnonzero(numbers < 0)
     if lost.size:
         raise InvalidInputError(
             f"surface '{name}' must consist of boundary faces of the cells, {lost.size} of {facets.shape[0]} "
             f"are not, first facet {lost[0]} with nodes {facets[lost[0]].tolist()}: take them from "
             f"`boundary_faces(cells, dim={dim})`"
         )
-    _check_once(name, facets, found)
-    there = boundary[found]
+    _check_once(name, facets, numbers)
+    there = boundary[numbers]
     wrong = np.flatnonzero((np.sort(facets, axis=1) != np.sort(there, axis=1)).any(axis=1))
     if wrong.size:
         raise InvalidInputError(
@@ -166,12 +168,12 @@ def _facets_found(name: str, facets: np.ndarray, boundary: np.ndarray, dim: int)
             f"{np.count_nonzero(~same)} of {facets.shape[0]} facets do not, first facet {first} with nodes "
             f"{facets[first].tolist()}: order them with `orient(cells, facets, dim={dim})`"
         )
-    return found
+    return numbers
 
 
-def _check_once(name: str, facets: np.ndarray, found: np.ndarray) -> None:
+def _check_once(name: str, facets: np.ndarray, numbers: np.ndarray) -> None:
     """Reject a facet that is listed twice, also in another order: its area would count twice."""
-    _, first, counts = np.unique(found, return_index=True, return_counts=True)
+    _, first, counts = np.unique(numbers, return_index=True, return_counts=True)
     twice = np.flatnonzero(counts > 1)
     if twice.size:
         raise InvalidInputError(

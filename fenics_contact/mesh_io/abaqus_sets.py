@@ -43,7 +43,7 @@ def with_element_sets(mesh: meshio.Mesh, path: Path) -> meshio.Mesh:
     heads = [line for line in lines if _ELEMENT.match(line)]
     if len(heads) != len(mesh.cells):
         return mesh
-    names = [found.group(1).strip() if (found := _ELSET.search(head)) else None for head in heads]
+    names = [match.group(1).strip() if (match := _ELSET.search(head)) else None for head in heads]
     for name in filter(None, dict.fromkeys(names)):
         mesh.cell_sets[name] = [
             np.arange(len(block)) if name == mine else np.zeros(0, dtype=np.int64)

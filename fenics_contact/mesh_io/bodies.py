@@ -61,13 +61,13 @@ def bodies_of(mesh: TaggedMesh, bodies: Any = None, surfaces: Any = None) -> dic
 
 def _cells_of(mesh: TaggedMesh, name: str, parts: BodyParts) -> tuple[str, np.ndarray, np.ndarray]:
     """Return the cell type of a body, its ascending cells, and the group of each."""
-    found = [
+    chosen = [
         (kind, cells, n) for n, label in enumerate(parts.labels) for kind, cells in mesh.groups[label].items()
     ]
-    found = [(kind, cells, n) for kind, cells, n in found if cells.size]
-    kinds = sorted({kind for kind, _, _ in found})
+    chosen = [(kind, cells, n) for kind, cells, n in chosen if cells.size]
+    kinds = sorted({kind for kind, _, _ in chosen})
     if len(kinds) > 1:
-        counts = [sum(cells.size for kind, cells, _ in found if kind == one) for one in kinds]
+        counts = [sum(cells.size for kind, cells, _ in chosen if kind == one) for one in kinds]
         there = " and ".join(f"{count} of type {kind}" for count, kind in zip(counts, kinds, strict=True))
         raise InvalidInputError(
             f"a body must have cells of one type, body '{name}' of {mesh.source} has {there}: mesh it with "
@@ -77,8 +77,8 @@ def _cells_of(mesh: TaggedMesh, name: str, parts: BodyParts) -> tuple[str, np.nd
         raise InvalidInputError(
             f"a body must have cells, body '{name}' of {mesh.source} has none: mesh it, or leave it out"
         )
-    cells = np.concatenate([cells for _, cells, _ in found])
-    region = np.concatenate([np.full(cells.size, n) for _, cells, n in found])
+    cells = np.concatenate([cells for _, cells, _ in chosen])
+    region = np.concatenate([np.full(cells.size, n) for _, cells, n in chosen])
     order = np.argsort(cells, kind="stable")
     cells, region = cells[order], region[order]
     double = np.flatnonzero(np.diff(cells) == 0)

@@ -80,7 +80,7 @@ def _read(
         if size <= 0:
             raise InvalidInputError(f"size must be above zero, got {size}: give the largest edge of a cell")
     with gmsh_model("fenics_contact CAD") as gmsh:
-        kept = gmsh.option.getNumber(_SIZE)
+        previous = gmsh.option.getNumber(_SIZE)
         try:
             gmsh.merge(str(path))
             dim = max((dim for dim, _ in gmsh.model.getEntities()), default=0)
@@ -95,7 +95,7 @@ def _read(
                 "gmsh, or give another size"
             ) from reason
         finally:
-            gmsh.option.setNumber(_SIZE, kept)
+            gmsh.option.setNumber(_SIZE, previous)
         return from_gmsh_model(bodies, surfaces)
 
 

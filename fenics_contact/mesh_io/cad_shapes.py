@@ -129,9 +129,9 @@ def _on_entity(
     """Return which facets are elements of an entity, by equal middles, (n,)."""
     on = np.zeros(len(middles), dtype=bool)
     types, _, elements = gmsh.model.mesh.getElements(*entity)
-    for kind, found in zip(types, elements, strict=True):
+    for kind, numbers in zip(types, elements, strict=True):
         _, _, _, each, _, first, *_ = gmsh.model.mesh.getElementProperties(kind)
-        theirs = nodes[found.astype(np.int64).reshape(-1, each)[:, :first]].mean(axis=1)
+        theirs = nodes[numbers.astype(np.int64).reshape(-1, each)[:, :first]].mean(axis=1)
         on |= cKDTree(theirs[:, : middles.shape[1]]).query(middles)[0] < SAME * edge
     return on
 

@@ -76,7 +76,7 @@ def tagged_mesh_of(gmsh: ModuleType, source: str) -> TaggedMesh:
 
 def _elements(gmsh: ModuleType, dim: int, source: str) -> dict[int, dict[str, np.ndarray]]:
     """Node tags of all cells of a dimension by entity and cell type; entities without cells left out."""
-    found: dict[int, dict[str, np.ndarray]] = {}
+    elements: dict[int, dict[str, np.ndarray]] = {}
     for _, entity in gmsh.model.getEntities(dim):
         types, _, nodes = gmsh.model.mesh.getElements(dim, entity)
         for number, tags in zip(types, nodes, strict=True):
@@ -89,9 +89,9 @@ def _elements(gmsh: ModuleType, dim: int, source: str) -> dict[int, dict[str, np
                     f"cells must be tetrahedra or hexahedra (in two dimensions triangles or quadrilaterals), "
                     f"{source} has cells of type '{name}': mesh it without prisms and pyramids"
                 )
-            blocks = found.setdefault(int(entity), {})
+            blocks = elements.setdefault(int(entity), {})
             blocks[_TYPES[number]] = tags.astype(np.int64).reshape(-1, nodes_each)
-    return found
+    return elements
 
 
 def _in_vtk_order(points: np.ndarray, kind: str, cells: np.ndarray) -> np.ndarray:

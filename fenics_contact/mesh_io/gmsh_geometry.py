@@ -89,10 +89,10 @@ def _values(gmsh: ModuleType, entity: tuple[int, int], parameters: np.ndarray) -
 
 def _periodic(grid: np.ndarray) -> tuple[bool, ...]:
     """Return in which directions a grid is smoothly periodic: bent there no more than elsewhere."""
-    found = []
+    periodic = []
     for axis in range(grid.ndim - 1):
         steps = np.diff(np.moveaxis(grid, axis, 0), axis=0)
         closed = np.abs(steps.sum(axis=0)).max() <= 1e-6 * np.abs(steps).max()
         bend = np.linalg.norm(np.diff(steps, axis=0), axis=-1).max()
-        found.append(bool(closed and np.linalg.norm(steps[0] - steps[-1], axis=-1).max() <= 2 * bend))
-    return tuple(found)
+        periodic.append(bool(closed and np.linalg.norm(steps[0] - steps[-1], axis=-1).max() <= 2 * bend))
+    return tuple(periodic)

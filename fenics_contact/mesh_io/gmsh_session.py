@@ -46,7 +46,7 @@ def gmsh_model(name: str) -> Iterator[ModuleType]:
         foreign = _is_initialised(gmsh)
         if not foreign:
             _initialise(gmsh)
-        kept = {option: gmsh.option.getNumber(option) for option in _OPTIONS}
+        options = {option: gmsh.option.getNumber(option) for option in _OPTIONS}
         current = gmsh.model.getCurrent()
         while name in gmsh.model.list():
             name += "'"
@@ -59,7 +59,7 @@ def gmsh_model(name: str) -> Iterator[ModuleType]:
             gmsh.model.setCurrent(name)
             gmsh.model.remove()
             gmsh.model.setCurrent(current)
-            for option, value in kept.items():
+            for option, value in options.items():
                 gmsh.option.setNumber(option, value)
             if not foreign:
                 gmsh.finalize()
@@ -114,12 +114,12 @@ def _is_initialised(gmsh: ModuleType) -> bool:
 
 @contextmanager
 def _standard_error_closed() -> Iterator[None]:
-    kept = os.dup(2)
+    duplicate = os.dup(2)
     sink = os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(sink, 2)
         yield
     finally:
-        os.dup2(kept, 2)
+        os.dup2(duplicate, 2)
         os.close(sink)
-        os.close(kept)
+        os.close(duplicate)

@@ -76,10 +76,10 @@ def _sets(mesh: meshio.Mesh, blocks: Sequence[Block], source: str) -> dict[Label
     for name, given in mesh.cell_sets.items():
         if name in _NO_LABELS:
             continue
-        found = [np.zeros(0, int) if part is None else np.asarray(part, dtype=np.int64) for part in given]
-        fits = len(found) == len(blocks) and all(
+        members = [np.zeros(0, int) if part is None else np.asarray(part, dtype=np.int64) for part in given]
+        fits = len(members) == len(blocks) and all(
             part.ndim == 1 and (not part.size or (part.min() >= 0 and part.max() < block.size))
-            for part, block in zip(found, blocks, strict=True)
+            for part, block in zip(members, blocks, strict=True)
         )
         if not fits:
             raise InvalidInputError(
@@ -87,7 +87,7 @@ def _sets(mesh: meshio.Mesh, blocks: Sequence[Block], source: str) -> dict[Label
                 "cells, it does not: meshio misunderstands a set of sets; list the cells themselves, or name "
                 'the bodies otherwise (labels="pieces", or the name of cell data)'
             )
-        sets[name] = found
+        sets[name] = members
     return sets
 
 
@@ -102,11 +102,11 @@ def _node_sets(mesh: meshio.Mesh) -> dict[Label, Iterable[int]]:
 
 def _families(names: Mapping[int, Sequence[str]]) -> dict[str, list[int]]:
     """Name to the families of a MED file with that name."""
-    found: dict[str, list[int]] = {}
+    families: dict[str, list[int]] = {}
     for tag, several in names.items():
         for name in several:
-            found.setdefault(name, []).append(tag)
-    return found
+            families.setdefault(name, []).append(tag)
+    return families
 
 
 def _tag_array(
@@ -151,7 +151,7 @@ def _holds_integers(data: Sequence[np.ndarray], blocks: Sequence[Block]) -> bool
 def _by_tag(mesh: meshio.Mesh, name: str) -> dict[Label, Members]:
     """Convert cell data to sets; numbers are replaced by their names in gmsh and MED files."""
     data = [np.asarray(part).ravel().astype(np.int64) for part in mesh.cell_data[name]]
-    found: dict[Label, Members] = {}
+    members: dict[Label, Members] = {}
     if name == "cell_tags" and (families := _families(getattr(mesh, "cell_tags", {}))):
         return {label: [np.flatnonzero(np.isin(p, tags)) for p in data] for label, tags in families.items()}
     named: dict[tuple[int, int], str] = {}
@@ -164,9 +164,9 @@ def _by_tag(mesh: meshio.Mesh, name: str) -> dict[Label, Members]:
                 np.flatnonzero(part == tag) if block.dim == dim else np.zeros(0, int)
                 for part, block in zip(data, mesh.cells, strict=True)
             ]
-            before = found.get(label, there)
-            found[label] = [np.union1d(a, b) for a, b in zip(before, there, strict=True)]
-    return found
+            before = members.get(label, there)
+            members[label] = [np.union1d(a, b) for a, b in zip(before, there, strict=True)]
+    return members
 
 
 def _cells_among(members: Members, blocks: Sequence[Block]) -> bool:

@@ -128,13 +128,13 @@ def chosen_grid(
     Raises:
         InvalidInputError: If there is no such grid, or there are several and none is named.
     """
-    found = [grid for grid in grids if suits(grid) and name in (None, grid.name)]
-    if len(found) == 1:
-        return found[0]
+    suitable = [grid for grid in grids if suits(grid) and name in (None, grid.name)]
+    if len(suitable) == 1:
+        return suitable[0]
     there = ", ".join(f"'{grid.name}' ({grid.topology})" for grid in grids) or "no grids at all"
     if name is not None:
         raise InvalidInputError(f"file '{path}' has no grid for {argument}='{name}': it has {there}")
-    if found:
+    if suitable:
         raise InvalidInputError(
             f"file '{path}' has several grids that could be {argument}: it has {there}; name one of them"
         )

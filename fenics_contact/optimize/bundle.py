@@ -135,9 +135,9 @@ class Bundle:
         order = 1 + np.lexsort((self.measures[1:], -weights[1:]))
         if np.count_nonzero(carrying[1:]) < room:
             return self.chosen(np.concatenate([[0], np.sort(order[: room - 1])]))
-        kept = self.chosen(np.concatenate([[0], np.sort(order[: room - 2])]))
+        remaining = self.chosen(np.concatenate([[0], np.sort(order[: room - 2])]))
         share = weights / weights.sum()
-        return kept.with_cut(
+        return remaining.with_cut(
             share @ self.gradients,
             float(share @ self.errors),
             float(share @ self.distances),

@@ -205,8 +205,8 @@ def _iterated(
 
 def _evaluated(problem: PosedProblem, state: MethodState, x: Array, accuracy: Accuracy) -> Evaluation:
     """Call the function, and once more near x where needed."""
-    found = evaluate(problem.fun, x, state.evaluations + 1, accuracy)
-    return surely(problem, found, state.evaluations + 1) if state.careful else found
+    evaluation = evaluate(problem.fun, x, state.evaluations + 1, accuracy)
+    return surely(problem, evaluation, state.evaluations + 1) if state.careful else evaluation
 
 
 def _guarded_step(problem: PosedProblem, state: MethodState) -> tuple[Step, Trust]:
@@ -252,11 +252,13 @@ def _wanted(
 def _refined(problem: PosedProblem, state: MethodState, step: Step, accuracy: Accuracy) -> MethodState:
     """Re-evaluate the centre, more accurately."""
     centre = state.centre
-    found = again(centre, _evaluated(problem, state, centre.x, accuracy))
-    change = found.value - centre.value
-    bundle = state.bundle.refined(found.subgradient * problem.scale, change, found.error, found.doubtful)
+    evaluation = again(centre, _evaluated(problem, state, centre.x, accuracy))
+    change = evaluation.value - centre.value
+    bundle = state.bundle.refined(
+        evaluation.subgradient * problem.scale, change, evaluation.error, evaluation.doubtful
+    )
     return replace(
-        state, centre=found, bundle=bundle, history=_recorded(state, step, StepKind.REFINED, found)
+        state, centre=evaluation, bundle=bundle, history=_recorded(state, step, StepKind.REFINED, evaluation)
     )
 
 
@@ -297,36 +299,36 @@ def _advanced(
     x = problem.allowed.project(state.centre.x + problem.scale * step.move)
     step = replace(step, move=(x - state.centre.x) / problem.scale)
     try:
-        found = _evaluated(problem, state, x, needed.asked)
+        evaluation = _evaluated(problem, state, x, needed.asked)
     except InvalidDesignError as error:
         tell(_LOG.info, "trial design %d is invalid: %s", state.evaluations + 1, error)
         trust = state.trust.after_rejection(step.length)
         return replace(
             state, trust=trust, history=_recorded(state, step, StepKind.REJECTED, None, str(error))
         )
-    gradient = found.subgradient * problem.scale
-    change, slope = found.value - state.centre.value, float(gradient @ step.move)
+    gradient = evaluation.subgradient * problem.scale
+    change, slope = evaluation.value - state.centre.value, float(gradient @ step.move)
     # Reduced before the cut is added: the weights belong to the old planes, and the new one must stay.
     bundle = state.bundle.reduced(step.weights, method.max_bundle - 1)
-    bundle = bundle.with_cut(gradient, slope - change, step.length, found.error, found.doubtful)
+    bundle = bundle.with_cut(gradient, slope - change, step.length, evaluation.error, evaluation.doubtful)
     trial = Trial(step, change, slope, float(bundle.measures[-1]))
     if change > -method.descent * step.decrease:
-        history = _recorded(state, step, StepKind.NULL, found)
+        history = _recorded(state, step, StepKind.NULL, evaluation)
         return replace(state, bundle=bundle, trust=state.trust.after_null(trial), history=history)
     locality = method.locality * float(np.linalg.norm(gradient)) / problem.length
     return replace(
         state,
-        centre=found,
+        centre=evaluation,
         bundle=bundle.moved(step.move, change, locality),
         trust=state.trust.after_serious(trial),
-        history=_recorded(state, step, StepKind.SERIOUS, found),
+        history=_recorded(state, step, StepKind.SERIOUS, evaluation),
     )
 
 
 def _recorded(
-    state: MethodState, step: Step, kind: StepKind, found: Evaluation | None, note: str = ""
+    state: MethodState, step: Step, kind: StepKind, evaluation: Evaluation | None, note: str = ""
 ) -> tuple[Record, ...]:
-    value = np.nan if found is None else found.value
+    value = np.nan if evaluation is None else evaluation.value
     record = Record(
         iteration=state.iterations + (kind is StepKind.SERIOUS),
         kind=kind,
@@ -339,7 +341,7 @@ def _recorded(
         aggregate_error=step.aggregate_error,
         bundle_size=state.bundle.size,
         evaluations=state.evaluations + 1,
-        error=0.0 if found is None else found.error,
+        error=0.0 if evaluation is None else evaluation.error,
         note=note,
     )
     return (*state.history, record)

@@ -17,7 +17,7 @@ _NEAR = 1e-2  # distance to a neighbour, in lengths of the problem
 _ATTEMPTS = 8  # directions that are tried until one yields half the distance
 
 
-def surely(problem: PosedProblem, found: Evaluation, number: int) -> Evaluation:
+def surely(problem: PosedProblem, given: Evaluation, number: int) -> Evaluation:
     """Return an evaluation whose subgradient is valid, as far as the function knows.
 
     At almost every point a locally Lipschitz function has a gradient, and limits of such gradients at points
@@ -26,14 +26,14 @@ def surely(problem: PosedProblem, found: Evaluation, number: int) -> Evaluation:
 
     Args:
         problem: The problem.
-        found: Value and subgradient, doubtful or not.
+        given: Value and subgradient, doubtful or not.
         number: Count of the evaluation, for messages.
 
     References:
         J. V. Burke, A. S. Lewis, M. L. Overton, A robust gradient sampling algorithm for nonsmooth, nonconvex
         optimization, SIAM J. Optim. 15 (2005) 751-779.
     """
-    return beside(problem.fun, found, neighbour(problem, found.x), number) if found.doubtful else found
+    return beside(problem.fun, given, neighbour(problem, given.x), number) if given.doubtful else given
 
 
 def without_doubt(problem: PosedProblem, state: MethodState) -> MethodState:
@@ -44,8 +44,8 @@ def without_doubt(problem: PosedProblem, state: MethodState) -> MethodState:
     centre = surely(problem, state.centre, state.evaluations + 1)
     bundle = state.bundle.refined(centre.subgradient * problem.scale, 0.0, centre.error)
     trust = replace(state.trust, t=state.first_t) if state.trust.exhausted else state.trust
-    kept = bundle.chosen(np.flatnonzero(~bundle.doubtful))
-    return replace(state, centre=centre, bundle=kept, trust=trust, careful=True)
+    remaining = bundle.chosen(np.flatnonzero(~bundle.doubtful))
+    return replace(state, centre=centre, bundle=remaining, trust=trust, careful=True)
 
 
 def neighbour(problem: PosedProblem, x: Array) -> Array:

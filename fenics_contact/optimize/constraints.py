@@ -138,19 +138,19 @@ class FeasibleSet:
         Returns:
             One phrase for each violation; empty where x is feasible.
         """
-        found = []
+        messages = []
         margin = _FEASIBILITY * (1.0 + np.abs(x))
         for k in np.flatnonzero(x < self.lower - margin):
-            found.append(f"x[{k}] = {x[k]:.6g} is below its lower bound {self.lower[k]:.6g}")
+            messages.append(f"x[{k}] = {x[k]:.6g} is below its lower bound {self.lower[k]:.6g}")
         for k in np.flatnonzero(x > self.upper + margin):
-            found.append(f"x[{k}] = {x[k]:.6g} is above its upper bound {self.upper[k]:.6g}")
+            messages.append(f"x[{k}] = {x[k]:.6g} is above its upper bound {self.upper[k]:.6g}")
         excess, margin = _residual(self.matrix, self.limit, x)
         for k in np.flatnonzero(excess > margin):
-            found.append(f"row {k} of A x ≤ b is exceeded by {excess[k]:.3g}")
+            messages.append(f"row {k} of A x ≤ b is exceeded by {excess[k]:.3g}")
         excess, margin = _residual(self.equality_matrix, self.equality_value, x)
         for k in np.flatnonzero(np.abs(excess) > margin):
-            found.append(f"row {k} of E x = e is missed by {excess[k]:.3g}")
-        return found
+            messages.append(f"row {k} of E x = e is missed by {excess[k]:.3g}")
+        return messages
 
     def clip(self, x: Array) -> Array:
         """Return x moved into the box (rounding only, for a point that is feasible to tolerance)."""

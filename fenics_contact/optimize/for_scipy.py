@@ -147,28 +147,28 @@ class ForScipy:
                 f"a problem with linear constraints needs a method that keeps them, got {method!r}: use "
                 "SLSQP, trust-constr or COBYLA"
             )
-        found: dict[str, Any] = {"x0": self._problem.start / self._problem.scale, "method": method}
+        arguments: dict[str, Any] = {"x0": self._problem.start / self._problem.scale, "method": method}
         if name in _WITHOUT_DERIVATIVE:
-            found["fun"] = self.value_alone
+            arguments["fun"] = self.value_alone
         else:
-            found.update(fun=self, jac=True)
+            arguments.update(fun=self, jac=True)
         box, rows = self._box(keep_feasible=name == "trust-constr"), self._rows(name in _WITHOUT_BOUNDS)
         if box is not None and name not in _WITHOUT_BOUNDS:
-            found["bounds"] = box
+            arguments["bounds"] = box
         if rows:
-            found["constraints"] = rows
-        return found
+            arguments["constraints"] = rows
+        return arguments
 
     def __call__(self, z: ArrayLike) -> tuple[float, Array]:
         """Return scaled value and subgradient at a point in SciPy's variables."""
         x = self.design(z)
         try:
-            found = evaluate(self._problem.fun, x, self.evaluations + 1)
+            evaluation = evaluate(self._problem.fun, x, self.evaluations + 1)
         except InvalidDesignError as error:
             return self._refused(x, error)
-        self._keep(x, found.value)
-        slope = np.asarray(self._problem.scale * found.subgradient / self._unit, dtype=np.float64)
-        return found.value / self._unit, slope
+        self._keep(x, evaluation.value)
+        slope = np.asarray(self._problem.scale * evaluation.subgradient / self._unit, dtype=np.float64)
+        return evaluation.value / self._unit, slope
 
     def value_alone(self, z: ArrayLike) -> float:
         """Return the scaled value at a point in SciPy's variables."""

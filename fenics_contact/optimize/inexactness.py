@@ -69,9 +69,9 @@ def demand(worth: float, reach: float, norm: float, shares: tuple[float, float])
     return Demand(shares[0] * worth, min(shares[1] * worth / slope if slope > 0.0 else np.inf, 1.0))
 
 
-def again(centre: Evaluation, found: Evaluation) -> Evaluation:
+def again(centre: Evaluation, evaluation: Evaluation) -> Evaluation:
     """Return the re-evaluated centre with the change of its subgradient since the first evaluation."""
-    size = float(np.linalg.norm(found.subgradient))
-    change = float(np.linalg.norm(found.subgradient - centre.subgradient))
+    size = float(np.linalg.norm(evaluation.subgradient))
+    change = float(np.linalg.norm(evaluation.subgradient - centre.subgradient))
     turned = change / size if size > 0.0 else (0.0 if change == 0.0 else np.inf)
-    return replace(found, turned=float(turned))
+    return replace(evaluation, turned=float(turned))

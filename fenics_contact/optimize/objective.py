@@ -126,20 +126,20 @@ def evaluate(fun: Fun, x: Array, number: int, accuracy: Accuracy | None = None) 
         InvalidDesignError: If the function raises it.
     """
     if accuracy is None or not (isinstance(fun, Inexact) and fun.inexact):
-        found = _checked(fun(x.copy()), x, f"at evaluation {number}")
+        evaluation = _checked(fun(x.copy()), x, f"at evaluation {number}")
     else:
         value, subgradient, error = fun.within(x.copy(), accuracy.value, accuracy.subgradient)
-        found = replace(
+        evaluation = replace(
             _checked((value, subgradient), x, f"at evaluation {number}"),
             error=float(error),
             asked_value=accuracy.value,
             asked_subgradient=accuracy.subgradient,
             turned=float(np.inf),
         )
-    return replace(found, doubtful=isinstance(fun, Kinked) and bool(fun.doubtful(x.copy())))
+    return replace(evaluation, doubtful=isinstance(fun, Kinked) and bool(fun.doubtful(x.copy())))
 
 
-def beside(fun: Fun, found: Evaluation, end: Array, number: int) -> Evaluation:
+def beside(fun: Fun, evaluation: Evaluation, end: Array, number: int) -> Evaluation:
     """Return a doubtful evaluation with a nearby gradient as its subgradient; any other unchanged.
 
     Where the function does not exist near the point, its result at the point is used.
@@ -147,15 +147,15 @@ def beside(fun: Fun, found: Evaluation, end: Array, number: int) -> Evaluation:
     Raises:
         InvalidInputError: If the result is not n finite numbers.
     """
-    if not (found.doubtful and isinstance(fun, Kinked)):
-        return found
+    if not (evaluation.doubtful and isinstance(fun, Kinked)):
+        return evaluation
     try:
-        gradient = fun.beside(found.x.copy(), end.copy())
+        gradient = fun.beside(evaluation.x.copy(), end.copy())
     except InvalidDesignError as error:
         tell(_LOG.warning, "the subgradient of evaluation %d may be none: %s", number, error)
-        return replace(found, doubtful=False)
-    checked = _checked((found.value, gradient), found.x, f"beside evaluation {number}")
-    return replace(found, subgradient=checked.subgradient, doubtful=False)
+        return replace(evaluation, doubtful=False)
+    checked = _checked((evaluation.value, gradient), evaluation.x, f"beside evaluation {number}")
+    return replace(evaluation, subgradient=checked.subgradient, doubtful=False)
 
 
 def _checked(answer: Any, x: Array, where: str) -> Evaluation:

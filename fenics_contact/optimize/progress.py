@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenics_contact.checkpoint import (
     Checkpoint,
+    reporting_what_is_stored,
     safe_point,
-    telling_what_is_kept,
     without_checkpoint,
 )
 from fenics_contact.errors import collective
@@ -135,7 +135,7 @@ class Progress:
     @contextmanager
     def reporting(self) -> Iterator[Task]:
         """Report the minimisation as under way, and what it leaves if it is interrupted."""
-        with self._task as task, telling_what_is_kept(self._kept, self.comm):
+        with self._task as task, reporting_what_is_stored(self._summary, self.comm):
             yield task
 
     def evaluated(self, state: MethodState) -> None:
@@ -153,7 +153,7 @@ class Progress:
             with nullcontext() if self.comm is None else _asking(self.comm):
                 self._callback(state.history[-1], state.centre.x.copy())
         self.keep(state)
-        safe_point(self._kept, lambda: self.keep(state, last=True), self.comm)
+        safe_point(self._summary, lambda: self.keep(state, last=True), self.comm)
 
     def _tell(self, state: MethodState, *, timed: bool = True) -> None:
         self._state, record = state, state.history[-1]
@@ -182,7 +182,7 @@ class Progress:
         self._checkpoint.write(KIND, self._fingerprint, arrays, self.comm)
         self._written = state.evaluations
 
-    def _kept(self) -> str:
+    def _summary(self) -> str:
         """Describe what a run that ends now leaves, and how to continue it."""
         if self._checkpoint is None:
             return without_checkpoint(_evaluations(0 if self._state is None else self._state.evaluations))
@@ -202,11 +202,11 @@ def _fingerprint(method: Method, problem: PosedProblem) -> dict[str, str]:
     options = {
         field.name: getattr(method, field.name) for field in fields(method) if field.name not in LIMITS
     }
-    found = {"variables": str(problem.start.size)}
-    found.update(described(options, "method"))
+    descriptions = {"variables": str(problem.start.size)}
+    descriptions.update(described(options, "method"))
     for field in fields(problem.allowed):
         values = np.asarray(getattr(problem.allowed, field.name))
-        found.update(described(values, f"constraints.{field.name}"))
-    found.update(described(problem.scale, "scale"))
-    found.update(described(problem.start, "x0"))
-    return found
+        descriptions.update(described(values, f"constraints.{field.name}"))
+    descriptions.update(described(problem.scale, "scale"))
+    descriptions.update(described(problem.start, "x0"))
+    return descriptions

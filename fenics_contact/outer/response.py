@@ -87,7 +87,7 @@ class Response(ABC):
             values = self._values(parameters, named)
         self.evaluations += 1
         try:
-            found, subgradients, products = self._answer(values)
+            results, subgradients, products = self._answer(values)
         except NO_ANSWER as error:
             if self._failures == "raise":
                 raise
@@ -95,8 +95,8 @@ class Response(ABC):
             return Answer(values, nothing, failure=str(error) or type(error).__name__)
         self.products += products
         # Outer tools on different ranks must see bitwise equal values.
-        found, subgradients = self.comm.bcast((found, subgradients))
-        return Answer(values, found, subgradients, products=products)
+        results, subgradients = self.comm.bcast((results, subgradients))
+        return Answer(values, results, subgradients, products=products)
 
     def table(self, samples: ArrayLike) -> np.ndarray:
         """Evaluate at many sets of parameters, in their order. Collective.
@@ -258,8 +258,8 @@ class DesignResponse(Response):
         before = self.problem.products
         point = self.problem.evaluate(np.array(list(values.values())))
         more = evaluated(self._of_state, point.state, self.comm)
-        found = {"objective": point.value, **more}
-        return found, {"objective": point.gradient}, self.problem.products - before
+        results = {"objective": point.value, **more}
+        return results, {"objective": point.gradient}, self.problem.products - before
 
 
 def evaluated(quantities: Mapping[str, Quantity], state: State, comm: MPI.Comm) -> dict[str, float]:
@@ -270,11 +270,11 @@ def evaluated(quantities: Mapping[str, Quantity], state: State, comm: MPI.Comm) 
         Exception: The error that a quantity raises on all ranks.
         UserCodeError: If it raises on some of them only.
     """
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for name, quantity in quantities.items():
         with collective(comm, f"quantity {name!r} of a response", closed=True, users=True):
-            found[name] = _number(name, quantity(state))
-    return found
+            values[name] = _number(name, quantity(state))
+    return values
 
 
 def _number(name: str, value: Any) -> float:

@@ -21,7 +21,7 @@ from fenics_contact.pairing.contact_points import (
     tangent_frames,
 )
 from fenics_contact.pairing.node_numbers import NodeNumbers
-from fenics_contact.pairing.surface_doubts import tell_of_surface
+from fenics_contact.pairing.surface_doubts import warn_of_surface
 from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie, master_share, surface_of
 from fenics_contact.surface_shapes import asked
 from fenics_contact.surfaces import FacetedSurface, Geometry, Projection, join, project, shape_functions
@@ -52,9 +52,7 @@ def find_contact_points(
     return _points_of_pairs(scene, scene.contacts, fixed, comm or MPI.COMM_SELF, finer)
 
 
-def find_tied_points(
-    scene: Scene, fixed: np.ndarray, comm: MPI.Comm | None = None
-) -> ContactPoints:
+def find_tied_points(scene: Scene, fixed: np.ndarray, comm: MPI.Comm | None = None) -> ContactPoints:
     """Find the points of tied surfaces, as `find_contact_points`; ``pair`` numbers the ties. Collective."""
     return _points_of_pairs(scene, scene.ties, fixed, comm or MPI.COMM_SELF)
 
@@ -108,7 +106,7 @@ def _points_of_pairs(
         slave = _Side.of(scene, pair.slave, geometry, numbers, finer)
         movable = ~fixed[slave.nodes].all(axis=1)
         if not finer:
-            tell_of_surface(scene, pair.slave, geometry, slave.surface, comm)
+            warn_of_surface(scene, pair.slave, geometry, slave.surface, comm)
         if not isinstance(pair.master, Surface):
             with together(comm):
                 points = _on_obstacle(slave, movable, pair.master)
@@ -117,7 +115,7 @@ def _points_of_pairs(
         else:
             master = _Side.of(scene, pair.master, geometry, numbers, finer)
             if not finer:
-                tell_of_surface(scene, pair.master, geometry, master.surface, comm)
+                warn_of_surface(scene, pair.master, geometry, master.surface, comm)
             if pair.discretisation == "mortar":
                 points = _by_mortar(slave, movable, master, comm, master_share(scene, pair))
             else:
@@ -149,9 +147,9 @@ def _symmetric(points: ContactPoints, slave: _Side, master: _Side) -> np.ndarray
     met = points.master.tocoo()
     node, other = points.slave[met.row], met.col
     same = np.abs(place[node] - place[other]) <= coordinate_rounding(place)
-    found = np.zeros(points.normal.shape, dtype=bool)
-    np.logical_or.at(found, met.row, cut[node] & cut[other] & same)
-    return found
+    symmetric = np.zeros(points.normal.shape, dtype=bool)
+    np.logical_or.at(symmetric, met.row, cut[node] & cut[other] & same)
+    return symmetric
 
 
 def _by_projection(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm) -> ContactPoints:
@@ -193,16 +191,16 @@ def _by_mortar(
     """
     from fenics_contact.pairing.mortar import mortar_coupling  # only imported if a pair needs it
 
-    found = mortar_coupling(slave.surface, master.surface, comm)
-    kept = np.flatnonzero(movable[found.node])
+    coupling = mortar_coupling(slave.surface, master.surface, comm)
+    chosen = np.flatnonzero(movable[coupling.node])
     count = len(master.nodes)
     spread = sp.csr_matrix((np.ones(count), (np.arange(count), master.nodes)), shape=(count, master.n_nodes))
-    weight = (found.weight[kept] @ spread).tocsr()
-    gap = found.gap[kept]
+    weight = (coupling.weight[chosen] @ spread).tocsr()
+    gap = coupling.gap[chosen]
     if slave.surface.relief is not None or master.surface.relief is not None:
-        gap = _closable(slave, found.node[kept], master, found.weight[kept], gap, comm, share)
-    points = _points(slave, found.node[kept], found.normal[kept], gap, weight)
-    return replace(points, area=found.area[kept])
+        gap = _closable(slave, coupling.node[chosen], master, coupling.weight[chosen], gap, comm, share)
+    points = _points(slave, coupling.node[chosen], coupling.normal[chosen], gap, weight)
+    return replace(points, area=coupling.area[chosen])
 
 
 def _closable(
@@ -228,8 +226,8 @@ def _closable(
     own[here.point], opposite[nodes[there.point]] = here.gap, there.gap
     lost = abs(weight) @ np.isnan(opposite).astype(np.float64) > 0
     across = np.where(lost, own, weight @ np.nan_to_num(opposite))
-    found = (1.0 - share) * own + share * across
-    return np.where(np.isnan(found), mean, found)
+    closable = (1.0 - share) * own + share * across
+    return np.where(np.isnan(closable), mean, closable)
 
 
 def _on_obstacle(slave: _Side, movable: np.ndarray, obstacle: RigidObstacle) -> ContactPoints:
@@ -259,9 +257,9 @@ def _shared_projection(
 ) -> Projection:
     """Project the movable nodes, distributed round-robin over the ranks. Collective."""
     mine = np.arange(comm.rank, len(movable), comm.size)
-    found: Projection | None = None
+    projection: Projection | None = None
     with together(comm):
         chosen = movable[mine]
         hit = project(slave.points[chosen], slave.normals[chosen], master)
-        found = replace(hit, point=mine[hit.point], lost=mine[hit.lost])
-    return join([part for part in comm.allgather(found) if part is not None])
+        projection = replace(hit, point=mine[hit.point], lost=mine[hit.lost])
+    return join([part for part in comm.allgather(projection) if part is not None])

@@ -17,8 +17,8 @@ ON_SHAPE = 1e-6
 _LOG = logging.getLogger(__name__)
 
 
-def tell_of_surface(
-    scene: Scene, surface: Surface, geometry: Geometry, found: FacetedSurface, comm: MPI.Comm
+def warn_of_surface(
+    scene: Scene, surface: Surface, geometry: Geometry, faceted: FacetedSurface, comm: MPI.Comm
 ) -> None:
     """Warn of nodes off their shape, and of reconstructed facets that stay flat.
 
@@ -26,7 +26,7 @@ def tell_of_surface(
         scene: The scene.
         surface: Slave or master of a pair.
         geometry: Its representation in the pair.
-        found: The resulting surface.
+        faceted: The resulting surface.
         comm: Communicator; rank 0 logs.
     """
     mesh = scene.bodies[surface.body].mesh.origin
@@ -41,11 +41,11 @@ def tell_of_surface(
             "from the nodes where they are; move them onto the shape, or correct it",
             off, len(away), name, type(mesh.shapes[surface.name]).__name__, away.max(),
         )  # fmt: skip
-    flattened = 0 if found.relief is None else found.relief.flattened
+    flattened = 0 if faceted.relief is None else faceted.relief.flattened
     if flattened:
         tell(
             _LOG.warning,
             "%d of %d facets of %s stay flat, as the surface that their nodes suggest has cusps there or "
             "folds: refine the mesh there, give the surface its shape, or take geometry='faceted'",
-            flattened, len(found.facets), name,
+            flattened, len(faceted.facets), name,
         )  # fmt: skip

@@ -101,15 +101,15 @@ def merge_pieces(mesh: BodyMesh, partition: np.ndarray, body: str = "") -> np.nd
     while True:
         piece, owner = _face_pieces(mesh, partition, pairs)
         by_size = np.lexsort((np.arange(owner.size), -np.bincount(piece)))
-        kept = np.zeros(owner.size, dtype=bool)
-        kept[by_size[np.unique(owner[by_size], return_index=True)[1]]] = True
-        if kept.all():
+        done = np.zeros(owner.size, dtype=bool)
+        done[by_size[np.unique(owner[by_size], return_index=True)[1]]] = True
+        if done.all():
             return partition
         links = np.concatenate([piece[pairs], piece[pairs][:, ::-1]])
-        links = links[~kept[links[:, 0]] & kept[links[:, 1]]]
+        links = links[~done[links[:, 0]] & done[links[:, 1]]]
         if links.shape[0] == 0:
             raise InvalidInputError(
-                f"{_named(body)} must be connected through faces to be cut, {np.count_nonzero(~kept)} pieces "
+                f"{_named(body)} must be connected through faces to be cut, {np.count_nonzero(~done)} pieces "
                 f"of it have no neighbour: {_APART}"
             )
         shared, counts = np.unique(links, axis=0, return_counts=True)

@@ -50,9 +50,9 @@ def _gains(partition: np.ndarray, towards: np.ndarray, area: np.ndarray) -> tupl
         area: Areas of the faces, (2 n,).
     """
     parts = int(partition.max()) + 1
-    found, where = np.unique(towards, return_inverse=True)
+    unique, where = np.unique(towards, return_inverse=True)
     shared = np.bincount(where.ravel(), area)
-    cells, subdomains = found // parts, found % parts
+    cells, subdomains = unique // parts, unique % parts
     own = np.zeros(len(partition))
     inside = subdomains == partition[cells]
     own[cells[inside]] = shared[inside]

@@ -41,12 +41,12 @@ def in_notebook() -> bool:
 
 def _launcher() -> int | None:
     """Return the process that started the ranks on this machine, None if this is not one of them."""
-    found, candidate = None, os.getppid()
+    launcher, candidate = None, os.getppid()
     with suppress(OSError):
         while True:
             status = Path(f"/proc/{candidate}/stat").read_text()
             name, _, rest = status.partition("(")[2].rpartition(")")
             if name not in LAUNCHERS:
                 break
-            found, candidate = candidate, int(rest.split()[1])
-    return found
+            launcher, candidate = candidate, int(rest.split()[1])
+    return launcher

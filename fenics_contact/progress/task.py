@@ -72,8 +72,8 @@ class Task:
         """Report progress by the attributes of an `Event`; a target only if it has changed."""
         if LISTENERS or _LOGGER.isEnabledFor(logging.DEBUG):
             known = {} if target is None else {"target": target}
-            found = {"measure": measure, "value": value, "left": left, "words": words, "timed": timed}
-            self._tell(Kind.STEP, number=number, **found, **known)
+            given = {"measure": measure, "value": value, "left": left, "words": words, "timed": timed}
+            self._tell(Kind.STEP, number=number, **given, **known)
 
     def end(self, error: BaseException | None = None) -> None:
         """Report that the work is over, and what it ended with instead of a result: a failure, or Ctrl-C."""
@@ -93,9 +93,9 @@ class Task:
         """End, as a failure where an exception passes."""
         self.end(error)
 
-    def _tell(self, kind: Kind, **found: Any) -> None:
+    def _tell(self, kind: Kind, **attributes: Any) -> None:
         if LISTENERS or _LOGGER.isEnabledFor(logging.DEBUG):
-            event = replace(self._event, kind=kind, **found)
+            event = replace(self._event, kind=kind, **attributes)
             for listen in LISTENERS:
                 listen(event)
             tell(_LOGGER.debug, "%s", event, extra={"progress": event})

@@ -36,4 +36,4 @@ def is_visible(text: str) -> bool:
 
 def visible(text: str) -> str:
     """Return a text with all characters that a terminal interprets as Python's escapes."""
-    return _OBEYED.sub(lambda found: found.group().encode("unicode_escape").decode("ascii"), text)
+    return _OBEYED.sub(lambda match: match.group().encode("unicode_escape").decode("ascii"), text)

@@ -36,9 +36,9 @@ class Work:
     def take(self, event: Event, moment: float) -> None:
         """Process an event of this work."""
         if event.kind is Kind.STEP:
-            told = ("number", "measure", "target", "value")
-            kept = {name: getattr(self.event, name) for name in told if getattr(event, name) is None}
-            self.event = replace(event, **kept)
+            names = ("number", "measure", "target", "value")
+            earlier = {name: getattr(self.event, name) for name in names if getattr(event, name) is None}
+            self.event = replace(event, **earlier)
             self.first = event.measure if self.first is None else self.first
         else:
             self.event = replace(self.event, kind=event.kind, words=event.words)

@@ -42,10 +42,10 @@ def force_along(scene: SceneParts, normal: np.ndarray) -> float | None:
     """
     total = {name: np.zeros(scene.dim) for name in scene.body_names}
     for load in scene.loads:
-        found = _resultant(scene, load)
-        if found is None:
+        resultant = _resultant(scene, load)
+        if resultant is None:
             return None
-        total[load.body] += found
+        total[load.body] += resultant
     return max(abs(float(force @ normal)) for force in total.values())
 
 
@@ -92,13 +92,13 @@ def master_share(scene: SceneParts, pair: ContactPair | Tie) -> float:
 
 def _constants(body: Body) -> tuple[float, float] | None:
     """Return Young's modulus and Poisson's ratio, the latter 0 where a thin slice strains freely."""
-    found = []
+    constants = []
     for material in body.materials:
         if not (hasattr(material, "young_modulus") and hasattr(material, "poisson_ratio")):
             return None
         ratio = 0.0 if isinstance(material, PlaneStress) else float(material.poisson_ratio)
-        found.append((float(material.young_modulus), ratio))
-    return min(found)
+        constants.append((float(material.young_modulus), ratio))
+    return min(constants)
 
 
 def hertz_approach(

@@ -38,11 +38,11 @@ class Body:
         """The different materials, in the order of the regions."""
         if not isinstance(self.material, Mapping):
             return (self.material,)
-        found: list[Material] = []
+        different: list[Material] = []
         for region in self.mesh.regions:
-            if self.material[region] not in found:
-                found.append(self.material[region])
-        return tuple(found)
+            if self.material[region] not in different:
+                different.append(self.material[region])
+        return tuple(different)
 
     @property
     def material_of_cells(self) -> np.ndarray:

@@ -43,10 +43,10 @@ class Effect:
 
 def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
     """List the effects in a scene, in the order of `EffectName`."""
-    return tuple(_found(scene))
+    return tuple(_effects_in(scene))
 
 
-def _found(scene: SceneParts) -> Iterator[Effect]:
+def _effects_in(scene: SceneParts) -> Iterator[Effect]:
     names = EffectName
     yield Effect(names.ELASTICITY, _count(len(scene.bodies), "elastic body", "elastic bodies"))
     if scene.supports:

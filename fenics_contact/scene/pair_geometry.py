@@ -94,13 +94,13 @@ def pair_geometry(scene: SceneParts, pair: ContactPair) -> PairGeometry:
     return PairGeometry(name, _name(scene, pair, pair.master, master), height, approach)
 
 
-def _name(scene: SceneParts, pair: ContactPair, surface: Surface, found: FacetedSurface) -> str:
+def _name(scene: SceneParts, pair: ContactPair, surface: Surface, faceted: FacetedSurface) -> str:
     if pair.geometry == "faceted":
         return "facets"
     shape = scene.bodies[surface.body].mesh.origin.shapes.get(surface.name)
     if pair.geometry == "best" and shape is not None:
         return _shape_name(shape)
-    return "flat" if found.relief is None else "reconstructed"
+    return "flat" if faceted.relief is None else "reconstructed"
 
 
 def _shape_name(shape: SurfaceShape) -> str:

@@ -51,13 +51,13 @@ def checked_vector(name: str, value: Any) -> Any:
     """
     if isinstance(value, Ufl) or callable(value):
         return value
-    found = _floats(value)
-    if found is None or found.shape not in ((2,), (3,)):
+    array = _floats(value)
+    if array is None or array.shape not in ((2,), (3,)):
         raise InvalidInputError(
             f"{name} must be three finite numbers (two for a plane body), got {value!r}: give one for x, y "
             "and z, or a function of the points"
         )
-    return tuple(float(component) for component in found)
+    return tuple(float(component) for component in array)
 
 
 def checked_scalar(name: str, value: Any) -> Any:
@@ -68,20 +68,20 @@ def checked_scalar(name: str, value: Any) -> Any:
     """
     if isinstance(value, Ufl) or callable(value):
         return value
-    found = _floats(value)
-    if found is None or found.shape != ():
+    array = _floats(value)
+    if array is None or array.shape != ():
         raise InvalidInputError(
             f"{name} must be a finite number, got {value!r}: give a number or a function of the points"
         )
-    return float(found)
+    return float(array)
 
 
 def _floats(value: Any) -> np.ndarray | None:
     try:
-        found = np.asarray(value, dtype=np.float64)
+        array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         return None
-    return found if np.isfinite(found).all() else None
+    return array if np.isfinite(array).all() else None
 
 
 def evaluate(name: str, function: OfPosition, points: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
@@ -98,12 +98,12 @@ def evaluate(name: str, function: OfPosition, points: np.ndarray, shape: tuple[i
         UserCodeError: If it raises.
     """
     with calling(f"the function given as {name}"):
-        found = _floats(function(points.copy()))
+        values = _floats(function(points.copy()))
     wanted = (len(points), *shape)
-    if found is None or found.shape != wanted:
-        given = "something other than finite numbers" if found is None else f"shape {found.shape}"
+    if values is None or values.shape != wanted:
+        given = "something other than finite numbers" if values is None else f"shape {values.shape}"
         raise InvalidInputError(
             f"the function given as {name} must return finite numbers of shape {wanted} for points of shape "
             f"{points.shape}, got {given}: it receives all points at once, one row each"
         )
-    return found
+    return values

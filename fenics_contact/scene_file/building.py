@@ -141,10 +141,10 @@ def located(source: Source, path: Path, mistakes: list[Mistake] | None = None) -
             raise
         mistakes.extend(error.mistakes)
     except InvalidInputError as error:
-        found = source.mistake(path, f"{written(path)}: {error}")
+        mistake = source.mistake(path, f"{written(path)}: {error}")
         if mistakes is None:
-            raise SceneFileError(source.name, [found]) from error
-        mistakes.append(found)
+            raise SceneFileError(source.name, [mistake]) from error
+        mistakes.append(mistake)
 
 
 def _refuse(empty: Scene, part: dict[str, Any]) -> None:

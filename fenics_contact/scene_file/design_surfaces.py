@@ -24,14 +24,14 @@ def design_surface(shape: Shaped, surface: str, body: str) -> DesignSurface:
     if shape.crown is not None and surface == "contact":
         return shape.crown
     facets = shape.mesh.surfaces.get(surface)
-    found = None if facets is None or shape.mesh.dim != 3 else _flat(shape.mesh, facets)
-    if found is None:
+    lattice = None if facets is None or shape.mesh.dim != 3 else _flat(shape.mesh, facets)
+    if lattice is None:
         raise InvalidInputError(
             f"a design needs the surface 'contact' of a chain link or a flat side of a block, got "
             f"{surface!r} of {body!r}, which has {sorted(shape.mesh.surfaces)}: for other surfaces write a "
             "DesignSurface in Python"
         )
-    return found
+    return lattice
 
 
 def _flat(mesh: BodyMesh, facets: np.ndarray) -> DesignSurface | None:

@@ -97,8 +97,8 @@ class Expression:
     @property
     def names(self) -> frozenset[str]:
         """Coordinates that the formula depends on."""
-        found = {node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name)}
-        return frozenset(found & set(COORDINATES))
+        used = {node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name)}
+        return frozenset(used & set(COORDINATES))
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """Evaluate at points.
@@ -121,17 +121,17 @@ class Expression:
                 "bodies lie in the plane: use x and y"
             )
         with np.errstate(all="ignore"):
-            found = np.asarray(_value(self._tree, {**CONSTANTS, **values}), dtype=np.float64)
-        found = np.broadcast_to(found, (len(points),)).copy()
-        infinite = np.flatnonzero(~np.isfinite(found))
+            result = np.asarray(_value(self._tree, {**CONSTANTS, **values}), dtype=np.float64)
+        result = np.broadcast_to(result, (len(points),)).copy()
+        infinite = np.flatnonzero(~np.isfinite(result))
         if infinite.size:
             place = ", ".join(f"{x:.6g}" for x in points[infinite[0]])
             raise InvalidInputError(
                 f"the formula {shortened(self.text)!r} must have a finite value at every node, got "
-                f"{found[infinite[0]]} at ({place}): choose another one there with where(condition, a, b), "
+                f"{result[infinite[0]]} at ({place}): choose another one there with where(condition, a, b), "
                 "each of whose values may be infinite where the other is taken"
             )
-        return found
+        return result
 
 
 @dataclass(frozen=True)
@@ -193,10 +193,10 @@ def _check(node: ast.expr, text: str, depth: int) -> None:
 
 def _from_left(node: ast.expr) -> list[ast.expr]:
     """Return the operations of a - b + c - ..., each of which is the left operand of the one before."""
-    found = [node]
-    while isinstance(found[-1], ast.BinOp):
-        found.append(found[-1].left)
-    return found
+    operations = [node]
+    while isinstance(operations[-1], ast.BinOp):
+        operations.append(operations[-1].left)
+    return operations
 
 
 def _known(node: ast.expr) -> bool:

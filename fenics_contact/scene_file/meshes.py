@@ -178,8 +178,8 @@ class ChainMesh(_Links):
 
     def links_of(self, comm: MPI.Comm) -> Mapping[str, Link]:
         """Return all links. Collective."""
-        found = gallery.chain([self.made()] * self.links, gap=self.gap, comm=comm)
-        return {str(number): link for number, link in enumerate(found.links, 1)}
+        chain = gallery.chain([self.made()] * self.links, gap=self.gap, comm=comm)
+        return {str(number): link for number, link in enumerate(chain.links, 1)}
 
 
 Mesh: TypeAlias = Annotated[

@@ -10,7 +10,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene_file.places import Path
 
 #: Largest number of mistakes in a message.
-MOST_TOLD = 50
+MOST_LISTED = 50
 
 
 @dataclass(frozen=True)
@@ -48,16 +48,18 @@ class SceneFileError(InvalidInputError):
             name: Name of the file; or the whole message if there are no mistakes.
             mistakes: The mistakes.
         """
-        found = () if isinstance(mistakes, str) else tuple(sorted(mistakes, key=lambda mistake: mistake.line))
-        self.mistakes: tuple[Mistake, ...] = found
-        if not found:
+        ordered = (
+            () if isinstance(mistakes, str) else tuple(sorted(mistakes, key=lambda mistake: mistake.line))
+        )
+        self.mistakes: tuple[Mistake, ...] = ordered
+        if not ordered:
             super().__init__(name)
-        elif len(found) == 1:
-            super().__init__(f"{name}, {found[0]}" if found[0].place else f"{name}: {found[0]}")
+        elif len(ordered) == 1:
+            super().__init__(f"{name}, {ordered[0]}" if ordered[0].place else f"{name}: {ordered[0]}")
         else:
-            lines = "".join(f"\n  {mistake}" for mistake in found[:MOST_TOLD])
-            more = f"\n  and {len(found) - MOST_TOLD} more" if len(found) > MOST_TOLD else ""
-            super().__init__(f"{name} has {len(found)} mistakes:{lines}{more}")
+            lines = "".join(f"\n  {mistake}" for mistake in ordered[:MOST_LISTED])
+            more = f"\n  and {len(ordered) - MOST_LISTED} more" if len(ordered) > MOST_LISTED else ""
+            super().__init__(f"{name} has {len(ordered)} mistakes:{lines}{more}")
 
 
 def suggestion(given: str, allowed: Iterable[str]) -> str:

@@ -64,20 +64,20 @@ class Part(BaseModel):
         try:
             return handler(data)
         except ValidationError as error:
-            told = [cls._explain(each) for each in error.errors()]
-            raise ValidationError.from_exception_data(cls.__name__, told) from None
+            explained = [cls._explain(each) for each in error.errors()]
+            raise ValidationError.from_exception_data(cls.__name__, explained) from None
 
     @classmethod
     def _explain(cls, error: Any) -> InitErrorDetails:
         context = error.get("ctx", {})
-        if error["type"] != "told":
+        if error["type"] != "explained":
             known = {field.alias or name: field.description for name, field in cls.model_fields.items()}
             hint = known.get(error["loc"][0]) if error["loc"] else None
             context = {
                 **context, "kind": error["type"], "text": error["msg"], "keys": list(known), "hint": hint
             }  # fmt: skip
-        told = PydanticCustomError("told", "{kind}", context)
-        return {"type": told, "loc": error["loc"], "input": error["input"]}
+        explained = PydanticCustomError("explained", "{kind}", context)
+        return {"type": explained, "loc": error["loc"], "input": error["input"]}
 
 
 def keys_of(

@@ -115,8 +115,8 @@ def _no_toml(text: str, error: Exception) -> Mistake:
         reason, line = str(better).partition(" at line ")[0], better.line
     except Exception:  # otherwise the first parser's message is used
         reason, _, place = reason.partition(" (at ")
-        found = re.match(r"line (\d+)", place)
-        line = int(found.group(1)) if found else 0
+        match = re.match(r"line (\d+)", place)
+        line = int(match.group(1)) if match else 0
     lines = text.split("\n")
     line = min(line, len(lines))
     content = f", got {shortened(lines[line - 1].strip())!r}" if line else ""
@@ -132,17 +132,17 @@ def _parsed(override: str) -> tuple[Path, Any]:
     if not path:
         raise ValueError("what stands before = is no key")
     with suppress(ValueError, RecursionError):
-        found = tomllib.loads(f"x = {value}")
-        if list(found) == ["x"]:
-            return tuple(path), found["x"]
+        parsed = tomllib.loads(f"x = {value}")
+        if list(parsed) == ["x"]:
+            return tuple(path), parsed["x"]
     return tuple(path), value.strip()
 
 
 def _resolved(data: Any, path: Path) -> Path:
     """Return a path with numbers for list entries."""
-    found: list[str | int] = []
+    resolved: list[str | int] = []
     for part in path:
         numbered = isinstance(data, Sequence) and not isinstance(data, str) and str(part).isdecimal()
-        found.append(int(part) if numbered else part)
-        data = value_at(data, (found[-1],))
-    return tuple(found)
+        resolved.append(int(part) if numbered else part)
+        data = value_at(data, (resolved[-1],))
+    return tuple(resolved)

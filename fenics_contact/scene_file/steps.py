@@ -58,7 +58,7 @@ def load_steps(
     dim = next(iter(bodies.values())).mesh.dim
     held: dict[str, Any] = {part.name: part.value or (0.0,) * dim for part in supports if part.name}
     acting: dict[str, Any] = {part.name: part.size for part in loads if part.name}
-    found: list[LoadStep] = []
+    built: list[LoadStep] = []
     for position, step in enumerate(steps):
         with at("steps", position):
             for number in range(1, step.count + 1):
@@ -66,18 +66,18 @@ def load_steps(
                 supported = {**held, **_on_the_way(held, step.supports, share)}
                 loaded = {**acting, **_on_the_way(acting, step.loads, share)}
                 name = step.name if step.count == 1 else f"{step.name} {number}/{step.count}"
-                found.append(
+                built.append(
                     LoadStep(
                         name,
                         loads=tuple(part.build(dim, loaded.get(part.name or "")) for part in loads),
                         supports=tuple(part.build(dim, supported.get(part.name or "")) for part in supports),
                     )
                 )
-            for part in (*(found[-1].loads or ()), *(found[-1].supports or ())):
+            for part in (*(built[-1].loads or ()), *(built[-1].supports or ())):
                 check_formulas(part, bodies)
         held.update(step.supports)
         acting.update(step.loads)
-    return tuple(found)
+    return tuple(built)
 
 
 def _require_few(steps: Sequence[StepPart]) -> None:

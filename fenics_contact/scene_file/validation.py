@@ -47,7 +47,7 @@ def validated(source: Source) -> Document:
     try:
         return Document.model_validate(source.data)
     except ValidationError as error:
-        mistakes = [_mistake(source, each) for each in _told_once(error.errors())]
+        mistakes = [_mistake(source, each) for each in _without_misspelt(error.errors())]
         raise SceneFileError(source.name, mistakes) from None
 
 
@@ -62,7 +62,7 @@ def invisible_texts(source: Source) -> list[Mistake]:
     ]
 
 
-def _told_once(errors: Sequence[Any]) -> list[Any]:
+def _without_misspelt(errors: Sequence[Any]) -> list[Any]:
     """Omit missing keys that are only misspelt."""
     misspelt = [tuple(error["loc"]) for error in errors if error["ctx"]["kind"] == "extra_forbidden"]
 

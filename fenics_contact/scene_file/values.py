@@ -53,8 +53,8 @@ def said(needed: str) -> WrapValidator:
         try:
             return handler(value)
         except ValidationError as error:
-            told = (each["ctx"] for each in error.errors() if each["type"] == "sentence")
-            sentence = next(told, None)
+            contexts = (each["ctx"] for each in error.errors() if each["type"] == "sentence")
+            sentence = next(contexts, None)
             raise PydanticCustomError("sentence", "{sentence}", sentence) if sentence else needs(needed)
 
     return WrapValidator(check)

@@ -205,5 +205,5 @@ def _growth(face: Face, starting: np.ndarray, coefficient: np.ndarray) -> sp.csr
 
 
 def _directions(known: np.ndarray, trial: np.ndarray, length: np.ndarray, weak: np.ndarray) -> np.ndarray:
-    found = trial / np.where(length > 0, length, 1.0)[:, None]
-    return np.where(weak[:, None], found, known)
+    directions = trial / np.where(length > 0, length, 1.0)[:, None]
+    return np.where(weak[:, None], directions, known)

@@ -91,23 +91,23 @@ class DesignMemory:
 
     def point(self, name: str) -> DesignPoint | None:
         """Return a design by its name; one of an earlier run is rebuilt first. Collective then."""
-        found = self._points.get(name)
-        if found is None or isinstance(found, DesignPoint):
-            return found
-        built = self._built(found)
-        self._points = {key: built if kept is found else kept for key, kept in self._points.items()}
+        stored = self._points.get(name)
+        if stored is None or isinstance(stored, DesignPoint):
+            return stored
+        built = self._built(stored)
+        self._points = {key: built if point is stored else point for key, point in self._points.items()}
         return built
 
     def stored(self) -> Stored:
         """Return everything as arrays. Collective."""
         arrays: Stored = {}
         names: dict[int, str] = {}
-        for name, kept in self._points.items():
-            if id(kept) in names:
-                arrays[f"{name}.{_SAME}"] = np.array(names[id(kept)])
+        for name, point in self._points.items():
+            if id(point) in names:
+                arrays[f"{name}.{_SAME}"] = np.array(names[id(point)])
                 continue
-            names[id(kept)] = name
-            parts = _stored_point(kept) if isinstance(kept, DesignPoint) else kept
+            names[id(point)] = name
+            parts = _stored_point(point) if isinstance(point, DesignPoint) else point
             arrays.update({f"{name}.{part}": values for part, values in parts.items()})
         if self.state is not None:
             arrays[f"{_START}.alpha"] = self._alpha

@@ -50,16 +50,16 @@ class Errors:
 
     def of(self, run: Run, quantity: str) -> float | None:
         """Return the relative error of a run, None if unknown."""
-        found = (run.quantities or {}).get(quantity)
-        if run.failed or found is None:
+        quantities = (run.quantities or {}).get(quantity)
+        if run.failed or quantities is None:
             return None
         reference = self.references[quantity]
         if reference.true:
-            error = found.get("error")
+            error = quantities.get("error")
             return None if error is None else abs(float(error))
         if reference.value is None or (reference.kind == "finest mesh" and self._is_finest(run)):
             return None
-        value, known = np.atleast_1d(found["value"]), np.atleast_1d(reference.value)
+        value, known = np.atleast_1d(quantities["value"]), np.atleast_1d(reference.value)
         scale = float(np.linalg.norm(known))
         if value.shape != known.shape or scale == 0.0:
             return None
@@ -114,9 +114,9 @@ class Errors:
         if isinstance(finest, list):
             return Reference("finest mesh", finest, note="several numbers are not extrapolated")
         spacing = [self.results.scene.spacing[run.parameters.size] for run, _ in known]
-        found = extrapolate(spacing, [float(value) for _, value in known])
-        kind = "finest mesh" if found.refused else "extrapolated"
-        return Reference(kind, found.value, found.rate, found.refused)
+        extrapolation = extrapolate(spacing, [float(value) for _, value in known])
+        kind = "finest mesh" if extrapolation.refused else "extrapolated"
+        return Reference(kind, extrapolation.value, extrapolation.rate, extrapolation.refused)
 
     def _is_finest(self, run: Run) -> bool:
         """Return whether a run has the discretisation of the reference on the finest mesh."""

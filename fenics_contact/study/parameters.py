@@ -121,12 +121,12 @@ class Sweep:
     def runs(self) -> tuple[Parameters, ...]:
         """Return all runs, each once, cheap ones first."""
         base = self.base
-        found = [base]
-        found += [replace(base, size=n, tolerance=t) for n, t in product(self.sizes, self.tolerances)]
-        found += [replace(base, size=n, cell=c) for n, c in product(self.sizes, self.cells)]
-        found += [
+        settings = [base]
+        settings += [replace(base, size=n, tolerance=t) for n, t in product(self.sizes, self.tolerances)]
+        settings += [replace(base, size=n, cell=c) for n, c in product(self.sizes, self.cells)]
+        settings += [
             replace(base, size=n, discretisation=d) for n, d in product(self.sizes, self.discretisations)
         ]
-        found += [replace(base, solver="fixed point", tolerance=t) for t in self.fixed_points]
-        found += [replace(base, subdomains=count) for count in self.subdomains]
-        return tuple(sorted(dict.fromkeys(found), key=Parameters.rank))
+        settings += [replace(base, solver="fixed point", tolerance=t) for t in self.fixed_points]
+        settings += [replace(base, subdomains=count) for count in self.subdomains]
+        return tuple(sorted(dict.fromkeys(settings), key=Parameters.rank))

@@ -87,13 +87,13 @@ def write_overview(folder: str | Path) -> Path:
 
 def overview_page(folder: Path) -> str:
     """Return the page of all studies in a folder; raises as `write_overview` does."""
-    found = sorted(folder.glob("*/study.json"))
-    if not found:
+    files = sorted(folder.glob("*/study.json"))
+    if not files:
         raise InvalidInputError(
             f"a page of studies needs some, {folder} holds none: run a study into it first"
         )
     parts = [GUIDE]
-    for file in found:
+    for file in files:
         errors, name = Errors(read_study(file)), file.parent.name
         pictures = "\n".join(f"![{picture}]({name}/{picture}.png)" for picture in PICTURES)
         more = f"[All {len(errors.results.runs)} runs]({name}/table.md).\n"
@@ -146,10 +146,10 @@ def rates_table(errors: Errors) -> str:
         reference = errors.references[quantity.name]
         kind = reference.kind + (f": {reference.note}" if reference.note else "")
         value = f"{reference.value:.6g} {quantity.unit}" if isinstance(reference.value, float) else ""
-        found, theory = errors.rate(strict, quantity.name), quantity.rate
-        body.append((quantity.name, kind, value, _number(found), _number(theory)))
-    found, theory = errors.estimate_rate(strict), errors.results.scene.energy_rate
-    body.append(("error of the displacement", "its own estimate", "", _number(found), _number(theory)))
+        rate, theory = errors.rate(strict, quantity.name), quantity.rate
+        body.append((quantity.name, kind, value, _number(rate), _number(theory)))
+    rate, theory = errors.estimate_rate(strict), errors.results.scene.energy_rate
+    body.append(("error of the displacement", "its own estimate", "", _number(rate), _number(theory)))
     return f'{table(head, body)}\n\nOf the runs that differ from "{strict}" in size alone.\n'
 
 

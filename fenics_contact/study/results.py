@@ -52,8 +52,8 @@ class Run:
 
     def value(self, quantity: str) -> Any:
         """Return the value of a quantity, None if the run does not have it."""
-        found = (self.quantities or {}).get(quantity)
-        return None if found is None else found["value"]
+        entry = (self.quantities or {}).get(quantity)
+        return None if entry is None else entry["value"]
 
     def seconds_of(self, quantity: QuantityFacts) -> float:
         """Return the time to compute a quantity: that of the state and the phases after it, [s]."""

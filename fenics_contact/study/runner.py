@@ -87,11 +87,13 @@ def measure(job: Job, *, first: bool = True) -> Record:
 
 def _environment(threads: int | None) -> dict[str, str]:
     """Return the environment of a run: this package, with ranks instead of threads on the cores."""
-    kept = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", **os.environ}
+    environment = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", **os.environ}
     if threads is not None:
-        kept["OPENBLAS_NUM_THREADS"] = str(threads)
+        environment["OPENBLAS_NUM_THREADS"] = str(threads)
     package = str(Path(__file__).resolve().parents[2])
-    return kept | {"PYTHONPATH": os.pathsep.join(filter(None, [package, kept.get("PYTHONPATH", "")]))}
+    return environment | {
+        "PYTHONPATH": os.pathsep.join(filter(None, [package, environment.get("PYTHONPATH", "")]))
+    }
 
 
 def _read(file: Path) -> Any:
@@ -147,8 +149,8 @@ class Store:
 
     def records(self, job: Job) -> list[Record]:
         """Return all measurements of a job, the first one first; empty if that is missing."""
-        found = [self.read(job, repeat) for repeat in range(job.repeats)]
-        return [record for record in found if record is not None] if found[0] is not None else []
+        records = [self.read(job, repeat) for repeat in range(job.repeats)]
+        return [record for record in records if record is not None] if records[0] is not None else []
 
     def complete(self, job: Job) -> bool:
         """Return whether a job has all its measurements, without a failure."""

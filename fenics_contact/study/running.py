@@ -96,8 +96,8 @@ class StudyPlan:
 
     def collected(self) -> Results:
         """Return the measurements so far."""
-        found = {parameters: self.store.records(job) for parameters, job in self.jobs.items()}
-        runs = tuple(_joined(parameters, records) for parameters, records in found.items() if records)
+        measured = {parameters: self.store.records(job) for parameters, job in self.jobs.items()}
+        runs = tuple(_joined(parameters, records) for parameters, records in measured.items() if records)
         what = {**versions(), "code": self.store.mark}
         return Results(self.study.facts, self.ranks, runs, self.base, what)
 

@@ -138,15 +138,15 @@ def compared(errors: Errors) -> list[tuple[str, Run, Run]]:
     Among runs with the same value that of the finest mesh and the strictest tolerance is used.
     """
     base, known = errors.results.base, {run.parameters: run for run in errors.results.good}
-    found: dict[tuple[str, object], tuple[str, Run, Run]] = {}
+    twins: dict[tuple[str, object], tuple[str, Run, Run]] = {}
     for setting in ("tolerance", "solver", "subdomains", "cell", "discretisation"):
         for run in sorted(errors.results.good, key=lambda run: run.parameters.rank()):
             usual: dict[str, Any] = {setting: getattr(base, setting)}
             value = getattr(run.parameters, setting)
             twin = known.get(replace(run.parameters, **usual))
             if twin is not None and value != usual[setting]:
-                found[setting, value] = setting, run, twin
-    return list(found.values())
+                twins[setting, value] = setting, run, twin
+    return list(twins.values())
 
 
 def _value(run: Run, setting: str) -> str:

@@ -45,11 +45,11 @@ def true_errors(states: tuple[State, ...]) -> TrueErrors | None:
         return None
     for tolerance in EXACT:
         try:
-            found = _compared(states, FaceNewton(tolerance=tolerance))
+            errors = _compared(states, FaceNewton(tolerance=tolerance))
         except ConvergenceError:
             continue
-        if np.isfinite(found.uncertainty):
-            return found
+        if np.isfinite(errors.uncertainty):
+            return errors
     return None
 
 
@@ -78,6 +78,6 @@ def _distance(state: State, other: DualSolution, displacement: np.ndarray) -> fl
     force = system.force(state.dual_solution.multiplier - other.multiplier)
     sewn = system.sewn(state.dual_solution.residual)
     energy, _ = system.inverse.energy(sewn)
-    found, by_sewing = float(moved @ force), energy - 2.0 * float(system.inverse.extend(sewn) @ force)
-    squares = state.torn.numbering.comm.allreduce(np.array([found, found + by_sewing]))
+    by_force, by_sewing = float(moved @ force), energy - 2.0 * float(system.inverse.extend(sewn) @ force)
+    squares = state.torn.numbering.comm.allreduce(np.array([by_force, by_force + by_sewing]))
     return float(np.sqrt(max(0.0, *squares)))

@@ -113,9 +113,9 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
     near = _best(near.part(near.beside == 0.0), rounding)
     waiting = np.setdiff1d(np.arange(len(points)), near.point)
     reached = _solve(points, normals, master, *_within_reach(tree, radius, points, waiting), rounding)
-    found = join([near, _best(reached, rounding)])
-    gap = found.gap - heights(master, found.facet, found.local).value
-    return replace(found, gap=gap, lost=np.setdiff1d(found.lost, found.point))
+    projection = join([near, _best(reached, rounding)])
+    gap = projection.gap - heights(master, projection.facet, projection.local).value
+    return replace(projection, gap=gap, lost=np.setdiff1d(projection.lost, projection.point))
 
 
 def _nearest(tree: cKDTree, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -208,22 +208,22 @@ def _newton_step(
     return np.where(regular[:, None], -np.linalg.solve(matrix, residual[:, :, None])[:, :, 0], 0.0)
 
 
-def _best(found: Projection, rounding: float) -> Projection:
+def _best(projections: Projection, rounding: float) -> Projection:
     """Keep the projection least beside its facet for each point; then by smallest |gap|, then facet.
 
     Args:
-        found: Projections, several of a point.
+        projections: Projections, several per point.
         rounding: Rounding of coordinates, within which gaps at an edge of two facets agree.
     """
-    distance = np.abs(found.gap)
-    order = np.lexsort((distance, found.beside, found.point))
-    _, first, group = np.unique(found.point[order], return_index=True, return_inverse=True)
+    distance = np.abs(projections.gap)
+    order = np.lexsort((distance, projections.beside, projections.point))
+    _, first, group = np.unique(projections.point[order], return_index=True, return_inverse=True)
     nearest = order[first][group.ravel()]  # of the same point, for each in order
     alike = distance[order] - distance[nearest] <= rounding + coordinate_rounding(distance)
-    order = order[alike & (found.beside[order] == found.beside[nearest])]
-    order = order[np.lexsort((found.facet[order], found.point[order]))]
-    _, first = np.unique(found.point[order], return_index=True)
-    return found.part(order[first])
+    order = order[alike & (projections.beside[order] == projections.beside[nearest])]
+    order = order[np.lexsort((projections.facet[order], projections.point[order]))]
+    _, first = np.unique(projections.point[order], return_index=True)
+    return projections.part(order[first])
 
 
 def join(parts: Sequence[Projection]) -> Projection:

@@ -144,7 +144,7 @@ def _wedges(surface: FacetedSurface) -> _Wedges:
 def _joints_with_images(surface: FacetedSurface) -> list[_Joints]:
     """Return the joints of a surface with its mirror images across each axis."""
     count, corners = surface.facets.shape
-    corner, found = np.arange(count * corners).reshape(count, corners), []
+    corner, joints = np.arange(count * corners).reshape(count, corners), []
     summed = corner_products(surface.points, surface.facets).sum(axis=1)
     unit = summed / np.linalg.norm(summed, axis=1)[:, None]
     for axis in range(surface.dim):
@@ -156,8 +156,8 @@ def _joints_with_images(surface: FacetedSurface) -> list[_Joints]:
         if corners > 2:
             ends = np.column_stack([ends, corner[facet, (place + 1) % corners]])
         angle = 2 * np.arcsin(np.minimum(np.abs(unit[facet, axis]), 1.0))
-        found.append(_Joints(np.stack([facet, facet], 1), np.stack([ends, ends], 1), angle))
-    return found
+        joints.append(_Joints(np.stack([facet, facet], 1), np.stack([ends, ends], 1), angle))
+    return joints
 
 
 def _is_crease(surface: FacetedSurface, joints: _Joints) -> np.ndarray:
@@ -253,9 +253,9 @@ def _fitted(surface: FacetedSurface, wedges: _Wedges, order: int) -> tuple[np.nd
     place = np.einsum("nad,nd->na", axes[centre], away) / size[centre][:, None]
     height = np.einsum("nd,nd->n", mean[centre], away) / size[centre]
     powers = _powers(dim - 1, order)
-    found = _coefficients(place, height, centre, count, powers)
-    slope, bend = found[:, : dim - 1], np.zeros((count, dim - 1, dim - 1))
-    for power, coefficient in zip(powers, found.T, strict=True):
+    coefficients = _coefficients(place, height, centre, count, powers)
+    slope, bend = coefficients[:, : dim - 1], np.zeros((count, dim - 1, dim - 1))
+    for power, coefficient in zip(powers, coefficients.T, strict=True):
         if sum(power) == 2:
             one, other = np.repeat(np.arange(dim - 1), power)
             bend[:, one, other] += coefficient

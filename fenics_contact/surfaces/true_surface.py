@@ -53,19 +53,19 @@ def true_surface(
             order.
     """
     marks = np.zeros(mesh.points.shape, dtype=bool) if mirrored is None else mirrored
-    found = faceted_surface(mesh.points, mesh.linear.surfaces[name], marks)
-    found = _with_areas(found, mesh, name)
+    surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], marks)
+    surface = _with_areas(surface, mesh, name)
     order = 2
     if finer:
         order, geometry = (2 if geometry == "faceted" else 3), "best"
     if geometry == "faceted":
-        return found
+        return surface
     key = (name, geometry, order, marks.tobytes())
     known = _KNOWN.setdefault(mesh.origin, {})
     if key not in known:
         shape = mesh.origin.shapes.get(name) if geometry == "best" else None
         known[key] = _relief(mesh.origin, name, marks, shape, order)
-    return replace(found, relief=known[key])
+    return replace(surface, relief=known[key])
 
 
 def _with_areas(surface: FacetedSurface, mesh: BodyMesh, name: str) -> FacetedSurface:
@@ -81,8 +81,8 @@ def _relief(
     mesh: BodyMesh, name: str, marks: np.ndarray, shape: SurfaceShape | None, order: int
 ) -> Relief | None:
     surface = faceted_surface(mesh.points, mesh.linear.surfaces[name], marks)
-    found = reconstructed(surface, order) if shape is None else by_shape(surface, shape)
-    return None if _is_flat(found) else found.relief
+    raised = reconstructed(surface, order) if shape is None else by_shape(surface, shape)
+    return None if _is_flat(raised) else raised.relief
 
 
 def _is_flat(surface: FacetedSurface) -> bool:
@@ -109,8 +109,10 @@ def by_shape(surface: FacetedSurface, shape: SurfaceShape) -> FacetedSurface:
     corners = np.zeros((*surface.facets.shape, surface.dim))
     for part, mine in parts:
         nodes = surface.facets[mine]
-        found = asked(part, "normals", surface.points[nodes.ravel()]).reshape(*nodes.shape, surface.dim)
-        corners[mine] = _unit(found)
+        shape_normals = asked(part, "normals", surface.points[nodes.ravel()]).reshape(
+            *nodes.shape, surface.dim
+        )
+        corners[mine] = _unit(shape_normals)
     normals = np.zeros_like(surface.averaged)
     np.add.at(normals, surface.facets, corners)
     normals = _unit(np.where(surface.mirrored, 0.0, normals))

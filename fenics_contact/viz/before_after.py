@@ -123,9 +123,9 @@ def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> N
     )
     frame = Frame(np.minimum(one.low, other.low), np.maximum(one.high, other.high))
     shown = look.clim or (0.0, peak or 1.0)
-    found = profiles(first, best, look.reach)
+    outlines = profiles(first, best, look.reach)
     # Sections have equal heights and together the width of the picture, but a limited height.
-    wide = [profile.frame.proportion for profile in found]
+    wide = [profile.frame.proportion for profile in outlines]
     tall = [0.4 / frame.proportion + 0.08, min(0.8 / sum(wide), 0.45) + 0.13]
     size = look.width, round((sum(tall) + 0.03) * look.width)
     with sheet(paper, size, look.headline) as figure:
@@ -136,9 +136,9 @@ def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> N
             axes.set_title(f"{word}: pressure on {patch.name}")
             label_axes(axes, replace(patch, frame=frame), look.units)
         pressure_bar(panels[1], shown, "max" if peak > shown[1] else "neither", look.units)
-        sections = lower.subplots(1, len(found), width_ratios=wide)
-        for axes, profile in zip(sections, found, strict=True):
-            _draw_profile(axes, profile, min(profile.factor for profile in found), look.units)
+        sections = lower.subplots(1, len(outlines), width_ratios=wide)
+        for axes, profile in zip(sections, outlines, strict=True):
+            _draw_profile(axes, profile, min(profile.factor for profile in outlines), look.units)
         lower.legend(*sections[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
 
 

@@ -92,9 +92,9 @@ def error_range(values: Mapping[str, np.ndarray]) -> tuple[float, float]:
 
 
 def _estimated(state: State) -> dict[str, np.ndarray]:
-    found = discretisation_error(state.torn, state.conforming_displacement)
+    estimate = discretisation_error(state.torn, state.conforming_displacement)
     size = np.sqrt(2 * state.energies.strain)
-    cells = {name: found.by_cell(name) for name in state.scene.bodies}
+    cells = {name: estimate.by_cell(name) for name in state.scene.bodies}
     return {name: part / size if size > 0 else np.zeros_like(part) for name, part in cells.items()}
 
 

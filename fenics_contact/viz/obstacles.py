@@ -24,11 +24,11 @@ _LINE = {"color": GREY, "line_width": 3, "lighting": False}
 
 def obstacles_of(scene: Scene) -> list[RigidObstacle]:
     """Return the different rigid obstacles of a scene."""
-    found: list[RigidObstacle] = []
+    obstacles: list[RigidObstacle] = []
     for pair in scene.contacts:
-        if not isinstance(pair.master, Surface) and pair.master not in found:
-            found.append(pair.master)
-    return found
+        if not isinstance(pair.master, Surface) and pair.master not in obstacles:
+            obstacles.append(pair.master)
+    return obstacles
 
 
 def shade_obstacles(axes: Any, scene: Scene, frame: Frame) -> None:

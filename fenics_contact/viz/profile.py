@@ -86,13 +86,13 @@ def profiles(first: State, best: State, reach: float | None) -> list[Profile]:
         whole = frame_around(IN_PLANE, points, BORDER)
         frame = Frame(np.maximum(spot.centre - half, whole.low), np.minimum(spot.centre + half, whole.high))
         return [_profile("outlines", bodies, IN_PLANE, frame)]
-    found = []
+    outlines = []
     for view in section_views(spot, oblique_view(points)):
         faces = {name: cut(body, view, spot.centre) for name, body in bodies.items()}
         across = axis_label(view.towards).strip("−")
         title = f"section across {across}" if across else "section"
-        found.append(_profile(title, faces, view, section_frame(view, spot, points, reach)))
-    return found
+        outlines.append(_profile(title, faces, view, section_frame(view, spot, points, reach)))
+    return outlines
 
 
 def _profile(title: str, faces: Mapping[str, Any], view: View, frame: Frame) -> Profile:

@@ -31,8 +31,8 @@ def candidate_pairs(slave: Planes, master: Planes) -> tuple[np.ndarray, np.ndarr
         Slave facet, ascending, and master facet of each pair, each shape (n,).
     """
     feet = _feet(slave, master)
-    found = [_near(slave, master, feet, members) for members in _size_classes(master.radius)]
-    pair_slave, pair_master = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    pairs = [_near(slave, master, feet, members) for members in _size_classes(master.radius)]
+    pair_slave, pair_master = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
     order = np.lexsort((pair_master, pair_slave))
     return pair_slave[order], pair_master[order]
 
@@ -67,7 +67,7 @@ def _near(
     """Pair the slave facets with those among ``members`` that lie near their feet and face them."""
     reach = slave.radius + master.radius[members].max()
     lists = cKDTree(master.origin[members]).query_ball_point(feet, reach / FACING)
-    pair_slave = np.repeat(np.arange(len(feet)), [len(found) for found in lists])
+    pair_slave = np.repeat(np.arange(len(feet)), [len(each) for each in lists])
     pair_master = members[np.concatenate(lists).astype(np.int64)]
     away = master.origin[pair_master] - feet[pair_slave]
     normal = slave.normal[pair_slave]

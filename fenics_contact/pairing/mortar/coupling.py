@@ -88,7 +88,7 @@ def mortar_coupling(
             )
         part = _integrals(slave, master, mine)
     # All ranks sum in the same order, so that their sums are bitwise equal.
-    parts = [found for found in comm.allgather(part) if found is not None]
+    parts = [each for each in comm.allgather(part) if each is not None]
     return _coupling(slave, master, *(sum(column) for column in zip(*parts, strict=True)))
 
 

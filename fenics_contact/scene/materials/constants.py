@@ -41,9 +41,9 @@ def numbers(name: str, values: Sequence[float], count: int, meaning: str) -> tup
         InvalidInputError: If they are not; ``meaning`` ends the message.
     """
     try:
-        found = np.asarray(values, dtype=np.float64)
+        array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
-        found = np.full(0, np.nan)
-    if found.shape != (count,) or not np.isfinite(found).all():
+        array = np.full(0, np.nan)
+    if array.shape != (count,) or not np.isfinite(array).all():
         raise InvalidInputError(f"{name} must be {count} finite numbers, got {values!r}: {meaning}")
-    return tuple(float(value) for value in found)
+    return tuple(float(value) for value in array)

@@ -77,8 +77,8 @@ def _draw(
         known = [(scene.spacing[run.parameters.size], e) for run in series.runs if (e := error(run))]
         if known:
             h, wrong = [h for h, _ in known], [e for _, e in known]
-            found = measured_rate(h, wrong)
-            series.draw(axes, h, wrong, series.name + ("" if found is None else f": rate {found:.2f}"))
+            measured = measured_rate(h, wrong)
+            series.draw(axes, h, wrong, series.name + ("" if measured is None else f": rate {measured:.2f}"))
             through = through or known[-1]
     if rate and through is not None:
         ends = [through[0], places[-1]]

@@ -68,10 +68,10 @@ def draw_stacked(
         names: Labels below the bars.
         unit: Unit after the sums.
     """
-    found = dict.fromkeys(phase for bar in bars for phase in bar)
-    others = [phase for phase in found if phase not in ORDER]
+    phases = dict.fromkeys(phase for bar in bars for phase in bar)
+    others = [phase for phase in phases if phase not in ORDER]
     colours, below = COLOURS | dict(zip(others, MORE, strict=False)), [0.0] * len(bars)
-    for phase in [*(phase for phase in ORDER if phase in found), *others]:
+    for phase in [*(phase for phase in ORDER if phase in phases), *others]:
         heights = [bar.get(phase, 0.0) for bar in bars]
         axes.bar(
             range(len(bars)), heights, 0.65, bottom=below, color=colours.get(phase), edgecolor="white",

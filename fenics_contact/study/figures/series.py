@@ -75,13 +75,13 @@ def series_of(errors: Errors) -> list[Series]:
 
 def _others(errors: Errors, setting: str) -> list[Series]:
     """Return the series of every value of a setting other than the base's."""
-    base, found = errors.results.base, []
+    base, others = errors.results.base, []
     values = dict.fromkeys(getattr(run.parameters, setting) for run in _varied(errors, setting))
     for number, value in enumerate(values):
         name = CELL_TYPES[value].plural if value in CELL_TYPES else f"contact by {value}"
         runs = errors.sequence(replace(base, **{setting: value}))
-        found.append(Series(name, runs, *LOOKS[setting][number % len(LOOKS[setting])]))
-    return found
+        others.append(Series(name, runs, *LOOKS[setting][number % len(LOOKS[setting])]))
+    return others
 
 
 def _varied(errors: Errors, setting: str) -> tuple[Run, ...]:

@@ -53,10 +53,10 @@ def _from_file(path: Path) -> StudyScene:
     return _checked(getattr(module, "study", None), str(path))
 
 
-def _checked(found: object, name: str) -> StudyScene:
-    if not isinstance(found, StudyScene):
+def _checked(study: object, name: str) -> StudyScene:
+    if not isinstance(study, StudyScene):
         raise InvalidInputError(
-            f"{name!r} must define `study`, a StudyScene, got {type(found).__name__}: see "
+            f"{name!r} must define `study`, a StudyScene, got {type(study).__name__}: see "
             "fenics_contact/study/scenes/hertz.py for an example"
         )
-    return found
+    return study
