@@ -176,8 +176,8 @@ assert abs(found["node"]["a"] / a - 1) < 0.01
 # ## What to try next
 #
 # - A rubber block: give it another material; $E^*$ knows both.
-# - Twice as many cells: the errors fall, also those that the state itself tells. Where they are large, cells
+# - Twice as many cells: the errors fall, also those that the state reports. Where they are large, cells
 #   are dark in `error.png`.
 # - Quadratic cells on a plane: `quadratic(ball)` from `fenics_contact.mesh` bends them onto the sphere.
 # - A rigid plane instead of the block: `RigidPlane((0, 0, 0), (0, 0, 1))` as master of `Surface("ball",
-#   "contact")`; every node is then kept off the plane, and both discretisations are the same.
+#   "contact")`; contact with the plane is then nodal, and both discretisations are the same.

@@ -4,7 +4,7 @@
 #
 # A rigid ball is pressed into a block of wood. Wood is much stiffer along its fibres than across them, so
 # the contact patch is no circle. The model is not taken from the package: it is written here, as a user
-# would, by its energy a volume. With the unit vector $a$ along the fibres and the strain
+# would, by its energy density. With the unit vector $a$ along the fibres and the strain
 # $\varepsilon = \tfrac12 (\nabla u + \nabla u^T)$,
 #
 # $$ W(\varepsilon) = \tfrac{\lambda}{2} (\mathrm{tr}\,\varepsilon)^2 + \mu_T\, \varepsilon : \varepsilon
