@@ -1,10 +1,11 @@
-"""How processes are started on one rank or several, free of what MPI left in the environment of this one.
+"""Starting processes on one rank or several, without the traces of MPI in this one's environment.
 
 MPI_Init and mpirun describe a process in its environment, which its children inherit: a child that starts MPI
-takes itself for that process, and an mpirun among them ends with status 1 and no word. What a user sets (a
-component, the prefix of the installation) stays.
+takes itself for that process, and an mpirun among them ends with status 1 without a message. Settings of
+users (a component, the prefix of the installation) are kept.
 
-Also a program, for shells: ``python -P launching.py RANKS`` prints how the command begins, a word a line.
+Also a program, for shells: ``python -P launching.py RANKS`` prints the beginning of the command, one word per
+line.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from pathlib import Path
 
 from fenics_contact.errors import MissingRequirementError
 
-#: How the names begin that Open MPI 4 and 5, PMIx, PMI, ORTE, PRRTE and MPICH write and nobody else.
+#: Prefixes of names that only Open MPI 4 and 5, PMIx, PMI, ORTE, PRRTE and MPICH write.
 _TRACES = (
     "OMPI_APP_CTX_", "OMPI_ARGV", "OMPI_COMMAND", "OMPI_COMM_WORLD_", "OMPI_FILE_LOCATION",
     "OMPI_FIRST_RANKS", "OMPI_NUM_APP_CTX", "OMPI_UNIVERSE_SIZE", "OMPI_MCA_ess", "OMPI_MCA_initial_wdir",
@@ -34,12 +35,12 @@ _TRACES = (
 )  # fmt: skip
 #: Settings of users among them.
 _SETTINGS = ("PMIX_MCA_", "PRTE_MCA_")
-#: How all names begin that have to do with starting MPI.
+#: Prefixes of all names related to starting MPI.
 _FAMILIES = ("OMPI_", "OPAL_", "ORTE_", "PMI_", "PMIX_", "PRTE_", "HYDRA_", "I_MPI_", "MPICH_")
 
 
 def traces(names: Iterable[str]) -> list[str]:
-    """Return those of the names of an environment that MPI has written."""
+    """Return the names in an environment that MPI has written."""
     return [name for name in names if name.startswith(_TRACES) and not name.startswith(_SETTINGS)]
 
 
@@ -52,7 +53,7 @@ def clean_environment(given: Mapping[str, str] | None = None) -> dict[str, str]:
 
 
 def launcher(ranks: int) -> list[str]:
-    """Return how a program is started on so many ranks: by the mpirun beside this Python, or on PATH.
+    """Return the launcher for a number of ranks: the mpirun beside this Python, or on PATH.
 
     Raises:
         MissingRequirementError: If there is no mpirun for several ranks.
@@ -75,9 +76,9 @@ class Ending:
     """How a process ended.
 
     Attributes:
-        status: Its exit status, None if it was not over in time.
-        output: What it wrote to stdout.
-        errors: What it wrote to stderr.
+        status: Its exit status, None if it did not end in time.
+        output: Its output on stdout.
+        errors: Its output on stderr.
     """
 
     status: int | None
@@ -95,10 +96,10 @@ def finished(
     """Run a command in a session of its own, free of the traces of MPI, and wait for its end.
 
     Args:
-        command: What to run.
-        limit: Seconds after which it is ended with all that it started.
+        command: The command.
+        limit: Seconds after which it is ended with all its children.
         environment: Its environment, by default that of this process.
-        folder: Where it runs, by default where this process does.
+        folder: Its working folder, by default that of this process.
     """
     process = subprocess.Popen(
         command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -117,7 +118,7 @@ def finished(
 
 
 def _end(process: subprocess.Popen[str]) -> None:
-    """End a process with all that it started; mpirun needs a moment to end its ranks."""
+    """End a process with all its children; mpirun needs a moment to end its ranks."""
     process.terminate()
     with contextlib.suppress(subprocess.TimeoutExpired):
         process.wait(timeout=5.0)
@@ -126,11 +127,11 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 
 def last_words(command: Sequence[str], output: str, most: int = 2000) -> str:
-    """Return the end of what a process that failed has said, or what to look at where it said nothing.
+    """Return the end of a failed process's output, or advice if there is none.
 
     Args:
         command: Its command.
-        output: All that it wrote.
+        output: Its output.
         most: Largest number of characters.
     """
     words = output.strip()[-most:]
@@ -144,7 +145,7 @@ def last_words(command: Sequence[str], output: str, most: int = 2000) -> str:
 
 
 def main() -> None:
-    """Print the beginning of the command that the program's one argument, the number of ranks, asks for."""
+    """Print the beginning of the command for the number of ranks given as the only argument."""
     try:
         start = launcher(int(sys.argv[1]))
     except MissingRequirementError as error:

@@ -10,7 +10,7 @@ from fenics_contact.progress import Task
 
 
 class PhaseTimer:
-    """Adds up wall time under names, and tells which phase is under way (`fenics_contact.progress`).
+    """Adds up wall time under names, and reports the phase under way (`fenics_contact.progress`).
 
     Example:
         >>> timer = PhaseTimer()

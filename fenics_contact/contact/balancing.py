@@ -25,7 +25,7 @@ from fenics_contact.timing import PhaseTimer
 #: An estimate is repeated if the solver's error was more than this share of it: jumps between subdomains that
 #: are not converged yet raise it by about three times the solver's error.
 DOUBTED = 0.1
-#: A solution this good is accepted where the solver cannot reach what the mesh asks for.
+#: A solution this good is accepted where the solver cannot reach the accuracy of the mesh.
 GOOD = 1e-6
 
 #: An earlier solution, a multiplier, or nothing.

@@ -72,7 +72,7 @@ def tear(
     Args:
         scene: The scene.
         partitions: Body name -> subdomain of every cell, numbered from 0 within the body.
-        ranks: Number of ranks; each gets about the same work, of every body consecutive subdomains.
+        ranks: Number of ranks; each has about the same work, of every body consecutive subdomains.
         stiffness: Body name -> typical nodal stiffness of every cell, shape (n_cells,), [force / length].
     """
     numbers = NodeNumbers.of(scene)
@@ -136,7 +136,7 @@ def _spread_over_ranks(cost: np.ndarray, ranks: int) -> np.ndarray:
     """Distribute consecutive items over ranks so that the costs are about equal and no rank is empty."""
     middle = np.cumsum(cost) - 0.5 * cost
     owner = np.minimum((middle * ranks / cost.sum()).astype(int), ranks - 1)
-    # Every rank gets at least one: no rank is skipped, and enough items remain for the last ones.
+    # Every rank has at least one: no rank is skipped, and enough items remain for the last ones.
     index = np.arange(len(cost))
     without_jumps = np.minimum.accumulate(np.minimum(owner, index) - index) + index
     return np.maximum(without_jumps, ranks - (len(cost) - index))

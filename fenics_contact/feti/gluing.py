@@ -91,8 +91,8 @@ class GluingRows:
 def gluing_rows(tearing: Tearing, fixed: np.ndarray) -> GluingRows:
     """Build the equality rows B_E u = c_E, for which B_E D⁻¹ B_Eᵀ is diagonal, D the stiffness of copies.
 
-    A free component of a node with m copies gets m − 1 gluing rows of unit length (see `weighted_helmert`,
-    c = 0). A prescribed one gets m rows, one for each copy, which glue it as well.
+    A free component of a node with m copies has m − 1 gluing rows of unit length (see `weighted_helmert`, c =
+    0). A prescribed one has m rows, one for each copy, which glue it as well.
 
     Args:
         tearing: Copies of the nodes.

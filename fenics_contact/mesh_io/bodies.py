@@ -108,16 +108,16 @@ def _body(
     corners = corners_of(boundary, mesh.dim)
     surfaces = {}
     for surface, parts in facets.items():
-        found: list[np.ndarray] = [np.zeros(0, dtype=np.int64)]
+        members: list[np.ndarray] = [np.zeros(0, dtype=np.int64)]
         mine = [number[block] for block in parts.facets if block.shape[1] == corners.shape[1]]
         mine = [block[(block >= 0).all(axis=1)] for block in mine]
         if mine and (candidates := np.concatenate(mine)).size:
             matches = match_faces(candidates, corners)
             _check_none_inside(mesh, name, surface, candidates[matches < 0], local)
-            found.append(matches[matches >= 0])
+            members.append(matches[matches >= 0])
         for inside in parts.nodes:
-            found.append(np.flatnonzero(np.isin(nodes[corners], inside).all(axis=1)))
-        if (there := np.unique(np.concatenate(found))).size:
+            members.append(np.flatnonzero(np.isin(nodes[corners], inside).all(axis=1)))
+        if (there := np.unique(np.concatenate(members))).size:
             surfaces[surface] = boundary[there]
     named = {} if regions is None else {label: np.flatnonzero(region == n) for n, label in enumerate(regions)}
     try:

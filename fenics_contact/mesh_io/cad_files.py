@@ -39,7 +39,7 @@ def read_cad(
 
     Args:
         path: A file .step, .stp, .iges, .igs, .brep, .geo or .geo_unrolled; .geo is a script: gmsh runs it.
-        size: Largest edge of a cell, [length]; as the file says unless given.
+        size: Largest edge of a cell, [length]; that of the file unless given.
         bodies: As in `read_msh`.
         surfaces: As in `read_msh`.
         comm: If given, rank 0 reads the file and all ranks receive the bodies.

@@ -64,10 +64,10 @@ def cells_of(
         )
     used = [_nodes(block, mesh, source, corners_only) for block in mesh.cells if block.dim == dim]
     points = np.array(mesh.points, dtype=np.float64)
-    found: dict[int, list[np.ndarray]] = {}
+    blocks_of: dict[int, list[np.ndarray]] = {}
     for nodes in used:
-        found.setdefault(nodes.shape[1], []).append(nodes)
-    joined = {columns: np.concatenate(parts) for columns, parts in found.items()}
+        blocks_of.setdefault(nodes.shape[1], []).append(nodes)
+    joined = {columns: np.concatenate(parts) for columns, parts in blocks_of.items()}
     if dim == 2:
         points = flattened(points, np.concatenate([nodes.ravel() for nodes in joined.values()]), source)
     cells: dict[str, np.ndarray] = {}

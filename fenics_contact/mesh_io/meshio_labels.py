@@ -190,13 +190,13 @@ def _facets(members: Mapping[Label, Members], blocks: Sequence[Block]) -> Facets
     """Label to facets; those with the number 0 are unmarked."""
     facets: Facets = {}
     for label, parts in members.items():
-        found = [
+        corners = [
             block.facets[part]
             for part, block in zip(parts, blocks, strict=True)
             if part.size and block.facets is not None
         ]
-        if found and label != 0:
-            facets[label] = found
+        if corners and label != 0:
+            facets[label] = corners
     return facets
 
 

@@ -56,18 +56,18 @@ class Builder:
             with self._at("materials", name):
                 materials[name] = part.build(self._source.folder)
         self._check()
-        chosen, found = {}, {}
+        chosen, made = {}, {}
         for name, body in self._document.bodies.items():
             with self._at("bodies", name):
                 chosen[name] = self._part_of(name, body, shapes[body.mesh])
                 made_of: Any = body.material
                 if isinstance(made_of, str):
-                    found[name] = Body(chosen[name].mesh, materials[made_of])
+                    made[name] = Body(chosen[name].mesh, materials[made_of])
                 else:
                     by_region = {region: materials[part] for region, part in made_of.items()}
-                    found[name] = Body(chosen[name].mesh, by_region)
+                    made[name] = Body(chosen[name].mesh, by_region)
         self._check()
-        return found, chosen
+        return made, chosen
 
     def _part_of(self, name: str, body: Any, shapes: Mapping[str, Shaped]) -> Shaped:
         if body.part is None and len(shapes) == 1:

@@ -231,11 +231,11 @@ def _value(node: ast.expr, names: dict[str, Any]) -> Any:
             return _value(operand, names)
         case ast.BinOp():
             *operations, first = _from_left(node)
-            found = _value(first, names)
+            result = _value(first, names)
             for operation in reversed(operations):
                 assert isinstance(operation, ast.BinOp)
-                found = _BINARY[type(operation.op)](found, _value(operation.right, names))
-            return found
+                result = _BINARY[type(operation.op)](result, _value(operation.right, names))
+            return result
         case ast.Compare(left=left, ops=[comparison], comparators=[right]):
             return _COMPARED[type(comparison)](_value(left, names), _value(right, names))
         case ast.Call(func=ast.Name(id=name), args=arguments):

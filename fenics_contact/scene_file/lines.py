@@ -30,7 +30,7 @@ def lines_of(text: str) -> dict[Path, int]:
     Args:
         text: A valid TOML text; for any other the result is meaningless.
     """
-    return _Scanner(text).found
+    return _Scanner(text).lines
 
 
 def nearest(lines: Mapping[Path, int], path: Path) -> int:
@@ -48,7 +48,7 @@ class _Scanner:
         self._text, self._at = text, 0
         self._ends = [match.start() for match in re.finditer("\n", text)]
         self._lengths: dict[Path, int] = {}  # of lists of tables, [[...]]
-        self.found: dict[Path, int] = {}
+        self.lines: dict[Path, int] = {}
         table: Path = ()
         self._skip(_BLANK)
         while self._at < len(text):
@@ -69,7 +69,7 @@ class _Scanner:
         return match.group()
 
     def _note(self, path: Path) -> None:
-        self.found.setdefault(path, bisect_left(self._ends, self._at) + 1)
+        self.lines.setdefault(path, bisect_left(self._ends, self._at) + 1)
 
     def _head(self) -> Path:
         """Read [a.b] or [[a.b]]; return its path, with the number of the present entry of every list."""

@@ -40,10 +40,10 @@ def load(reference: str, folder: Path) -> Any:
     sys.modules[module_name] = module  # dataclasses of the file are looked up there
     with running(f"the Python file '{path}'"):
         spec.loader.exec_module(module)
-        found = getattr(module, name, _NOTHING)
-    if found is _NOTHING:
+        loaded = getattr(module, name, _NOTHING)
+    if loaded is _NOTHING:
         known = sorted(
             key for key, value in vars(module).items() if getattr(value, "__module__", "") == module_name
         )
         raise InvalidInputError(f"'{path}' must define {name!r}, it defines {known}: use one of them")
-    return found
+    return loaded

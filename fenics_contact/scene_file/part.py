@@ -112,8 +112,8 @@ def keys_of(
 def _field(own: FieldInfo | None, hint: Any, argument: inspect.Parameter, words: str) -> tuple[Any, Any]:
     """Return type and field data of a key, the table's own if there are any."""
     default = ... if argument.default is argument.empty else argument.default
-    found = ((read, beside) for declared, read, beside in IN_FILES if declared == hint)
-    kind, beside = next(found, (hint, ""))
+    matches = ((read, beside) for declared, read, beside in IN_FILES if declared == hint)
+    kind, beside = next(matches, (hint, ""))
     words += beside
     if own is None:
         return kind, Field(default, description=words)

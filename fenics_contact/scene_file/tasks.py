@@ -102,15 +102,15 @@ def _paired(moving: tuple[SurfaceDesign, ...], design: DesignPart) -> Any:
 def _objective(name: str, source: Source) -> Objective:
     if name == TOTAL_POTENTIAL:
         return TotalPotential()
-    found: Any = load(name, source.folder)
+    given: Any = load(name, source.folder)
     with running(f"objective {name!r}"):
-        missing = [part for part in ("value", "partials") if not hasattr(found, part)]
-    if missing or isinstance(found, type):
+        missing = [part for part in ("value", "partials") if not hasattr(given, part)]
+    if missing or isinstance(given, type):
         raise InvalidInputError(
-            f"objective {name!r} must be an object with value and partials, got {found!r}: see "
+            f"objective {name!r} must be an object with value and partials, got {given!r}: see "
             "fenics_contact.shape.Objective, and give an instance, not a class"
         )
-    objective: Objective = found
+    objective: Objective = given
     return objective
 
 

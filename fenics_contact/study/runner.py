@@ -39,7 +39,7 @@ class Job:
             arguments. It returns a mapping that JSON can hold, the same on every rank.
         arguments: Named arguments that JSON can hold.
         first: Additional ones for the first measurement only.
-        ranks: MPI ranks; 0: one process without MPI, whose function gets None for the communicator.
+        ranks: MPI ranks; 0: one process without MPI, whose function receives None for the communicator.
         threads: BLAS threads of each rank; None: one, unless the environment sets another number.
         repeats: Number of measurements.
         short: Duration, [s], from which it is measured only once, as disturbances matter little.

@@ -92,7 +92,7 @@ def placed(
         scale: Factor > 0 on all lengths.
 
     Returns:
-        The moved shape; a placed shape gets the combined motion, the parts of a joined one are moved.
+        The moved shape; a placed shape has the combined motion, the parts of a joined one are moved.
 
     Raises:
         InvalidInputError: If the matrix is not orthogonal, the scale not positive, or the dimensions differ.

@@ -60,17 +60,17 @@ def series_of(errors: Errors) -> list[Series]:
     base, results = errors.results.base, errors.results
     strict = errors.strictest(base)
     name = "" if strict.balanced else f"tolerance {strict.tolerance_words}"
-    found = [
+    grouped = [
         Series("balanced", errors.sequence(replace(base, tolerance=BALANCED)), BLUE, "o"),
         Series(name, () if strict.balanced else errors.sequence(strict), ORANGE, "^"),
         *(series for setting in LOOKS for series in _others(errors, setting)),
         Series("fixed point", _varied(errors, "solver"), "#56b4e9", "v", False),
         Series("other subdomains", _varied(errors, "subdomains"), "#e69f00", "P", False),
     ]
-    known = [run for series in found for run in series.runs]
+    known = [run for series in grouped for run in series.runs]
     rest = tuple(run for run in results.good if run not in known)
-    found.append(Series("other tolerances", rest, GREY, ".", False))
-    return [series for series in found if series.runs]
+    grouped.append(Series("other tolerances", rest, GREY, ".", False))
+    return [series for series in grouped if series.runs]
 
 
 def _others(errors: Errors, setting: str) -> list[Series]:

@@ -166,13 +166,13 @@ study = StudyScene(
     build=build,
     quantities=(
         Quantity(
-            "stick half width", "mm", stick_half_width, lambda found: theory(found.state).stick, rate=1.0
+            "stick half width", "mm", stick_half_width, lambda outcome: theory(outcome.state).stick, rate=1.0
         ),
-        Quantity("peak pressure", "MPa", middle_pressure, lambda found: theory(found.state).peak),
+        Quantity("peak pressure", "MPa", middle_pressure, lambda outcome: theory(outcome.state).peak),
         Quantity("tangential traction", "MPa √mm", weighted_traction, exact_traction, rate=1.0),
         Quantity("total friction force", "N/mm", friction_force, rate=2 * CORNER),
         Quantity(
-            "potential energy", "N", lambda found: found.state.energies.total_potential, rate=2 * CORNER
+            "potential energy", "N", lambda outcome: outcome.state.energies.total_potential, rate=2 * CORNER
         ),
     ),
     sweep=SWEEP,
