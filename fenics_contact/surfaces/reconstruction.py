@@ -23,7 +23,7 @@ ALIKE = 0.9
 ROUNDING = 1e-6
 #: Surfaces with a slope above this at the end of an edge have a cusp there, or fold.
 STEEPEST = 1.0
-#: Directions of the fit whose singular value is below this fraction of the largest are left as in the facets.
+#: Eigenvectors of the fit whose eigenvalue is below this fraction of the largest are left as in the facets.
 UNKNOWN = 1e-6
 
 
