@@ -21,11 +21,11 @@ __all__ = ["MPI", "Late", "PETSc", "check_not_forked", "start"]
 class Late(ModuleType):
     """A proxy of a module that is loaded on first access."""
 
-    def __init__(self, name: str, load: Callable[[], Any]) -> None:
+    def __init__(self, name: str, load: Callable[[], ModuleType]) -> None:
         """Store the function that loads the module."""
         super().__init__(name)
         self._load = load
-        self._module: Any = None
+        self._module: ModuleType | None = None
 
     def __getattr__(self, name: str) -> Any:
         """Return an attribute of the module, which is loaded by the first call.

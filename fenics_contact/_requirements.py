@@ -14,7 +14,8 @@ import re
 import sys
 from dataclasses import dataclass
 from importlib import metadata
-from typing import TYPE_CHECKING, Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 from fenics_contact.errors import MissingRequirementError
 
@@ -98,7 +99,7 @@ def check() -> None:
         _check_installed(requirement)
 
 
-def load_mpi() -> Any:
+def load_mpi() -> ModuleType:
     """Return ``mpi4py.MPI``; starts MPI unless ``mpi4py.rc`` prevents it.
 
     Raises:
@@ -113,7 +114,7 @@ def petsc_is_started() -> bool:
     return petsc is not None and bool(petsc.Sys.isInitialized())
 
 
-def load_petsc(world: MPI.Comm | None = None) -> Any:
+def load_petsc(world: MPI.Comm | None = None) -> ModuleType:
     """Return ``petsc4py.PETSc``; starts PETSc unless it runs already.
 
     Args:
@@ -161,7 +162,7 @@ def check_gmsh() -> None:
         _check_version(_GMSH, module.__version__)
 
 
-def load_pymetis() -> Any:
+def load_pymetis() -> ModuleType:
     """Check and return pymetis, which only the partition of graphs needs.
 
     Raises:
@@ -204,7 +205,7 @@ def _numbers(version: str) -> tuple[int, ...]:
     return tuple(map(int, leading.group().split("."))) if leading else ()
 
 
-def _load(requirement: Requirement, module: str) -> Any:
+def _load(requirement: Requirement, module: str) -> ModuleType:
     """Import a module of an installed library, and name the library if that fails.
 
     One that was built against another NumPy or MPI, for instance, is found but cannot be loaded.
@@ -218,7 +219,7 @@ def _load(requirement: Requirement, module: str) -> Any:
         ) from reason
 
 
-def _check_petsc(requirement: Requirement, petsc: Any) -> None:
+def _check_petsc(requirement: Requirement, petsc: ModuleType) -> None:
     """Raise where PETSc computes with complex numbers or cannot factor a sparse matrix."""
     version = requirement.version() or "one"
     if petsc.ScalarType(0).dtype.kind != "f":
@@ -227,7 +228,7 @@ def _check_petsc(requirement: Requirement, petsc: Any) -> None:
         raise requirement.error(f"{version} with neither CHOLMOD nor MUMPS, where one is needed")
 
 
-def factors(petsc: Any, package: str) -> bool:
+def factors(petsc: ModuleType, package: str) -> bool:
     """Try a package on a matrix of one entry: ``hasExternalPackage`` is wrong on some builds."""
     matrix = petsc.Mat().createAIJ((1, 1), nnz=1, comm=petsc.COMM_SELF)
     matrix.setValue(0, 0, 1.0)

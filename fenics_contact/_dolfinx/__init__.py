@@ -16,7 +16,7 @@ from fenics_contact._dolfinx.assembly import (
 )
 from fenics_contact._dolfinx.cells import CELL_TYPES, degree, dimension, facet_vertices, shape
 from fenics_contact._dolfinx.forms import CompiledForm
-from fenics_contact._dolfinx.loading import fem, jit, release, version
+from fenics_contact._dolfinx.loading import fem, mesh, release, version
 from fenics_contact._dolfinx.meshes import local_mesh, rank_mesh
 from fenics_contact._dolfinx.numbering import (
     cell_dofs,
@@ -68,9 +68,9 @@ __all__ = [
     "global_dofs",
     "has_vtx",
     "input_cells",
-    "jit",
     "local_mesh",
     "match_facets",
+    "mesh",
     "mesh_arrays",
     "nodal_space",
     "node_dofs",

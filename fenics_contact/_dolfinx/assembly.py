@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from fenics_contact._dolfinx.loading import dolfinx
+from fenics_contact._libraries import PETSc
 
 
-def assemble_csr(form: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def assemble_csr(form: dolfinx.fem.Form) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Assemble a bilinear form on one rank; return the matrix as CSR arrays (indptr, indices, data)."""
     matrix = assemble_matrix(form)
     indptr, indices, data = matrix.getValuesCSR()
@@ -17,14 +16,14 @@ def assemble_csr(form: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return indptr, indices, data
 
 
-def assemble_matrix(form: Any) -> Any:
+def assemble_matrix(form: dolfinx.fem.Form) -> PETSc.Mat:
     """Assemble a bilinear form on a distributed mesh into a PETSc matrix. Collective on the mesh."""
     matrix = dolfinx.fem.petsc.assemble_matrix(form)
     matrix.assemble()
     return matrix
 
 
-def assemble_vector(form: Any) -> np.ndarray:
+def assemble_vector(form: dolfinx.fem.Form) -> np.ndarray:
     """Assemble a linear form on one rank; return its values, length block size x n_dofs."""
     vector = dolfinx.fem.petsc.assemble_vector(form)
     values = np.array(vector.array_r)
@@ -32,6 +31,6 @@ def assemble_vector(form: Any) -> np.ndarray:
     return values
 
 
-def assemble_scalar(form: Any) -> float:
+def assemble_scalar(form: dolfinx.fem.Form) -> float:
     """Assemble a functional on this rank's cells (no communication)."""
     return float(dolfinx.fem.assemble_scalar(form))

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
+import ufl
 
-from fenics_contact._dolfinx.loading import cpp, dolfinx, jit, old, side_effects_undone
+from fenics_contact._dolfinx.loading import cpp, dolfinx, old, side_effects_undone
 from fenics_contact._dolfinx.numbering import cell_count, table
 from fenics_contact._libraries import MPI
 from fenics_contact.progress import Task
@@ -20,23 +20,23 @@ Cells = Mapping[int, np.ndarray]
 class CompiledForm:
     """A UFL form on a template, compiled once, bound to many meshes."""
 
-    def __init__(self, comm: MPI.Comm, form: Any) -> None:
+    def __init__(self, comm: MPI.Comm, form: ufl.Form) -> None:
         """Compile ``form``. Collective on ``comm``: one rank compiles, the others read its cache."""
         self.form = form
         with Task("compile forms"), side_effects_undone():
-            build = jit.ffcx_jit if old() else dolfinx.fem.compile_form
+            build = dolfinx.jit.ffcx_jit if old() else dolfinx.fem.compile_form
             self._compiled = build(comm, form, {}, {})
 
     def bind(
         self,
-        mesh: Any,
-        spaces: Sequence[Any],
-        coefficients: Mapping[Any, Any],
-        constants: Mapping[Any, Any],
+        mesh: dolfinx.mesh.Mesh,
+        spaces: Sequence[dolfinx.fem.FunctionSpace],
+        coefficients: Mapping[ufl.Coefficient, dolfinx.fem.Function],
+        constants: Mapping[ufl.Constant, dolfinx.fem.Constant],
         facets: Facets | None = None,
         *,
         cells: Cells | None = None,
-    ) -> Any:
+    ) -> dolfinx.fem.Form:
         """Return the form on one mesh.
 
         Integrals without a tag cover the whole mesh, those with a tag only the entities given for it.
@@ -65,8 +65,14 @@ class CompiledForm:
         return dolfinx.fem.create_form(self._compiled, list(spaces), mesh, domains, functions, numbers)
 
     def _bind_old(
-        self, mesh: Any, spaces: Any, coefficients: Any, constants: Any, facets: Facets, cells: Cells
-    ) -> Any:
+        self,
+        mesh: dolfinx.mesh.Mesh,
+        spaces: Sequence[dolfinx.fem.FunctionSpace],
+        coefficients: Mapping[ufl.Coefficient, dolfinx.fem.Function],
+        constants: Mapping[ufl.Constant, dolfinx.fem.Constant],
+        facets: Facets,
+        cells: Cells,
+    ) -> dolfinx.fem.Form:
         compiled, module, code = self._compiled
         mine = self.form.coefficients()
         order = [compiled.original_coefficient_position[i] for i in range(compiled.num_coefficients)]
@@ -89,7 +95,7 @@ class CompiledForm:
         )
 
 
-def _facet_tags(mesh: Any, facets: Facets) -> Any:
+def _facet_tags(mesh: dolfinx.mesh.Mesh, facets: Facets) -> dolfinx.mesh.MeshTags:
     """Facet tags of dolfinx 0.5 from (cell, local facet) pairs."""
     tdim = mesh.topology.dim
     mesh.topology.create_entities(tdim - 1)
@@ -99,7 +105,7 @@ def _facet_tags(mesh: Any, facets: Facets) -> Any:
     return _tags(mesh, tdim - 1, {tag: numbers[cells, local] for tag, (cells, local) in facets.items()})
 
 
-def _tags(mesh: Any, dim: int, entities: Cells) -> Any:
+def _tags(mesh: dolfinx.mesh.Mesh, dim: int, entities: Cells) -> dolfinx.mesh.MeshTags:
     """Tags of dolfinx 0.5 on entities of one dimension."""
     indices = np.concatenate(list(entities.values())).astype(np.int32)
     tags = np.concatenate([np.full(len(part), tag, np.int32) for tag, part in entities.items()])

@@ -8,10 +8,13 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 from fenics_contact._libraries import Late
 from fenics_contact._requirements import DOLFINX, load_petsc
+
+__all__ = ["cpp", "dolfinx", "fem", "mesh", "old", "release", "side_effects_undone", "version"]
 
 
 @contextmanager
@@ -35,7 +38,7 @@ def side_effects_undone() -> Iterator[None]:
             logging.captureWarnings(False)
 
 
-def _load() -> Any:
+def _load() -> ModuleType:
     """Import dolfinx with the submodules that are used."""
     load_petsc()  # names what is wrong with it; dolfinx would fail in its own words
     with side_effects_undone():
@@ -47,10 +50,17 @@ def _load() -> Any:
     return dolfinx
 
 
-dolfinx: Any = Late("dolfinx", _load)
-fem: Any = Late("dolfinx.fem", lambda: dolfinx.fem)
-cpp: Any = Late("dolfinx.cpp", lambda: dolfinx.cpp)
-jit: Any = Late("dolfinx.jit", lambda: dolfinx.jit)
+# Annotations have the names of 0.9: dolfinx.fem.Form, dolfinx.mesh.MeshTags and the AbstractFiniteElement of
+# ufl.finiteelement are called FormMetaClass, MeshTagsMetaClass and FiniteElementBase in 0.5.
+if TYPE_CHECKING:
+    import dolfinx
+    import dolfinx.fem.petsc
+    from dolfinx import cpp, fem, mesh
+else:
+    dolfinx = Late("dolfinx", _load)
+    fem = Late("dolfinx.fem", lambda: dolfinx.fem)
+    cpp = Late("dolfinx.cpp", lambda: dolfinx.cpp)
+    mesh = Late("dolfinx.mesh", lambda: dolfinx.mesh)
 
 
 def release() -> str:

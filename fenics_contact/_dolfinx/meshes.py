@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,14 +14,14 @@ from fenics_contact._dolfinx.templates import vector_element
 from fenics_contact._libraries import MPI
 
 
-def _partitioner(destinations: Any) -> Any:
+def _partitioner(destinations: cpp.graph.AdjacencyList_int32) -> Callable[..., cpp.graph.AdjacencyList_int32]:
     """Send every cell to the ranks in its row of ``destinations``, the first of which owns it."""
     if old():
         return lambda comm, parts, tdim, cells, ghost_mode: destinations
     return lambda comm, parts, cell_types, cells: destinations
 
 
-def local_mesh(points: np.ndarray, cells: np.ndarray, cell_type: str) -> Any:
+def local_mesh(points: np.ndarray, cells: np.ndarray, cell_type: str) -> dolfinx.mesh.Mesh:
     """Build a mesh on this rank only.
 
     Args:
@@ -32,7 +32,9 @@ def local_mesh(points: np.ndarray, cells: np.ndarray, cell_type: str) -> Any:
     return _create_mesh(MPI.COMM_SELF, points, cells, cell_type, np.zeros((len(cells), 1), dtype=np.int32))
 
 
-def rank_mesh(comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, rank: np.ndarray, cell_type: str) -> Any:
+def rank_mesh(
+    comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, rank: np.ndarray, cell_type: str
+) -> dolfinx.mesh.Mesh:
     """Build a distributed mesh with cells on given ranks; a rank may have none. Collective on ``comm``.
 
     Args:
@@ -44,15 +46,15 @@ def rank_mesh(comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, rank: np.nd
     """
     bounds = np.linspace(0, len(points), comm.size + 1).astype(int)
     mine = np.flatnonzero(rank == comm.rank)
-    destinations: Any = np.full((len(mine), 1), comm.rank, dtype=np.int32)
+    destinations: tuple[np.ndarray, ...] = (np.full((len(mine), 1), comm.rank, dtype=np.int32),)
     if old() and comm.size > 1:
-        destinations = _with_ghosts(cells, rank, mine, comm)
+        destinations = _with_ghosts(cells, rank, mine, comm.rank)
     part = points[bounds[comm.rank] : bounds[comm.rank + 1]]
-    return _create_mesh(comm, part, cells[mine], cell_type, destinations)
+    return _create_mesh(comm, part, cells[mine], cell_type, *destinations)
 
 
-def _with_ghosts(cells: np.ndarray, rank: np.ndarray, mine: np.ndarray, comm: MPI.Comm) -> Any:
-    """Send each cell to its owner and to all ranks around it.
+def _with_ghosts(cells: np.ndarray, rank: np.ndarray, mine: np.ndarray, here: int) -> tuple[np.ndarray, ...]:
+    """Send each cell to its owner and to all ranks around it: their numbers, and where those of a cell begin.
 
     dolfinx 0.5 detects that two ranks share a vertex only through a ghost cell.
     """
@@ -60,19 +62,18 @@ def _with_ghosts(cells: np.ndarray, rank: np.ndarray, mine: np.ndarray, comm: MP
     touching = sp.csr_matrix((np.ones(cells.size), (cells.ravel(), np.repeat(rank, vertices))))
     reached = touching[cells[mine].ravel()].tocoo()
     cell, to = np.unique([reached.row // vertices, reached.col], axis=1)
-    order = np.lexsort((to, to != comm.rank, cell))  # the owner comes first
+    order = np.lexsort((to, to != here, cell))  # the owner comes first
     offsets = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=len(mine)))])
-    return cpp.graph.AdjacencyList_int32(to[order].astype(np.int32), offsets.astype(np.int32))
+    return to[order].astype(np.int32), offsets.astype(np.int32)
 
 
 def _create_mesh(
-    comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, cell_type: str, destinations: Any
-) -> Any:
+    comm: MPI.Comm, points: np.ndarray, cells: np.ndarray, cell_type: str, *destinations: np.ndarray
+) -> dolfinx.mesh.Mesh:
     ordered = np.ascontiguousarray(cells[:, NODE_ORDER[cell_type]], dtype=np.int64)
     points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, dimension(cell_type))
-    if isinstance(destinations, np.ndarray):
-        destinations = cpp.graph.AdjacencyList_int32(destinations)
-    element, partitioner = vector_element(cell_type), _partitioner(destinations)
+    element = vector_element(cell_type)
+    partitioner = _partitioner(cpp.graph.AdjacencyList_int32(*destinations))
     if old():
         adjacency, ghost_mode = cpp.graph.AdjacencyList_int64(ordered), cpp.mesh.GhostMode.shared_facet
         return dolfinx.mesh.create_mesh(comm, adjacency, points, ufl.Mesh(element), ghost_mode, partitioner)

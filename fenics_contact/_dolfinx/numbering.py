@@ -2,69 +2,70 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+import ufl
 
 from fenics_contact._dolfinx.cells import cell_type_named, facet_vertices
-from fenics_contact._dolfinx.loading import dolfinx, old
+from fenics_contact._dolfinx.loading import cpp, dolfinx, old
 from fenics_contact._dolfinx.templates import cellwise_element, scalar_element, vector_element
 
 
-def _space(mesh: Any, element: Any) -> Any:
+def _space(
+    mesh: dolfinx.mesh.Mesh, element: ufl.finiteelement.AbstractFiniteElement
+) -> dolfinx.fem.FunctionSpace:
     return dolfinx.fem.FunctionSpace(mesh, element) if old() else dolfinx.fem.functionspace(mesh, element)
 
 
-def cell_type_of_mesh(mesh: Any) -> str:
+def cell_type_of_mesh(mesh: dolfinx.mesh.Mesh) -> str:
     """Return which of `CELL_TYPES` the cells of a mesh are."""
     return cell_type_named(mesh.topology.cell_name(), int(mesh.geometry.cmap.degree))
 
 
-def coefficient(mesh: Any, name: str) -> Any:
+def coefficient(mesh: dolfinx.mesh.Mesh, name: str) -> dolfinx.fem.Function:
     """Return a vector field on ``mesh`` with the given name (a C identifier)."""
     return dolfinx.fem.Function(_space(mesh, vector_element(cell_type_of_mesh(mesh))), name=name)
 
 
-def scalar_space(mesh: Any, degree: int) -> Any:
+def scalar_space(mesh: dolfinx.mesh.Mesh, degree: int) -> dolfinx.fem.FunctionSpace:
     """Return the space of scalar fields on ``mesh``: one value per cell (degree 0) or node (1)."""
     cell_type = cell_type_of_mesh(mesh)
     return _space(mesh, scalar_element(cell_type) if degree == 1 else cellwise_element(cell_type))
 
 
-def table(adjacency: Any, rows: int) -> np.ndarray:
+def table(adjacency: np.ndarray | cpp.graph.AdjacencyList_int32, rows: int) -> np.ndarray:
     """Return a list of lists of equal length as an array, (rows, length)."""
     flat = np.asarray(getattr(adjacency, "array", adjacency))
     # A rank without cells of a body has no rows; numpy cannot guess their length then.
     return flat.reshape(rows, flat.size // max(rows, 1))
 
 
-def cell_count(mesh: Any) -> int:
+def cell_count(mesh: dolfinx.mesh.Mesh) -> int:
     """Return the number of this rank's cells, ghosts included."""
     index_map = mesh.topology.index_map(mesh.topology.dim)
     return int(index_map.size_local + index_map.num_ghosts)
 
 
-def _input_nodes(mesh: Any) -> np.ndarray:
+def _input_nodes(mesh: dolfinx.mesh.Mesh) -> np.ndarray:
     return np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
 
 
-def cell_nodes(mesh: Any) -> np.ndarray:
+def cell_nodes(mesh: dolfinx.mesh.Mesh) -> np.ndarray:
     """Return the input nodes of this rank's cells, tensor-product order, shape (n_cells, nodes of a cell)."""
     dofmap = table(mesh.geometry.dofmap, cell_count(mesh))
     return _input_nodes(mesh)[dofmap]
 
 
-def cell_dofs(space: Any) -> np.ndarray:
+def cell_dofs(space: dolfinx.fem.FunctionSpace) -> np.ndarray:
     """Return the blocked dofs of this rank's cells, ghosts included, shape (n_cells, n_dofs of a cell)."""
     return table(space.dofmap.list, cell_count(space.mesh))
 
 
-def input_cells(mesh: Any) -> np.ndarray:
+def input_cells(mesh: dolfinx.mesh.Mesh) -> np.ndarray:
     """Return the input cell of each cell of a mesh on one rank, in dolfinx's order, shape (n_cells,)."""
     return np.asarray(mesh.topology.original_cell_index, dtype=np.int64)
 
 
-def node_dofs(space: Any) -> tuple[np.ndarray, np.ndarray]:
+def node_dofs(space: dolfinx.fem.FunctionSpace) -> tuple[np.ndarray, np.ndarray]:
     """Return (input nodes, blocked dofs): dof ``dofs[i]`` of ``space`` sits on input node ``nodes[i]``.
 
     Both arrays have one entry for each node of this rank, ghosts included, in ascending node order.
@@ -77,18 +78,18 @@ def node_dofs(space: Any) -> tuple[np.ndarray, np.ndarray]:
     return nodes, dofs[first]
 
 
-def global_dofs(space: Any, dofs: np.ndarray) -> np.ndarray:
+def global_dofs(space: dolfinx.fem.FunctionSpace, dofs: np.ndarray) -> np.ndarray:
     """Return the global numbers of this rank's blocked dofs, ghosts included."""
     return np.asarray(space.dofmap.index_map.local_to_global(dofs.astype(np.int32)))
 
 
-def update_coordinates(mesh: Any, points: np.ndarray) -> None:
+def update_coordinates(mesh: dolfinx.mesh.Mesh, points: np.ndarray) -> None:
     """Move the nodes of ``mesh`` to ``points``, shape (n_nodes, dim), indexed by input node."""
     # dolfinx stores three coordinates per node in any dimension.
     mesh.geometry.x[:, : points.shape[1]] = points[_input_nodes(mesh)]
 
 
-def match_facets(mesh: Any, surface: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def match_facets(mesh: dolfinx.mesh.Mesh, surface: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Find the facets of ``mesh`` whose nodes form a row of ``surface``.
 
     Args:

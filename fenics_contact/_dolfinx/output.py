@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from pathlib import Path
 
 from fenics_contact._dolfinx.loading import dolfinx, old
 
@@ -13,7 +13,7 @@ def has_vtx() -> bool:
     return hasattr(dolfinx.io, "VTXWriter")
 
 
-def write_xdmf(path: Any, mesh: Any, functions: Sequence[Any]) -> None:
+def write_xdmf(path: Path, mesh: dolfinx.mesh.Mesh, functions: Sequence[dolfinx.fem.Function]) -> None:
     """Write fields on one mesh to an XDMF file (with its HDF5 file). Collective on the mesh."""
     with dolfinx.io.XDMFFile(mesh.comm, str(path), "w") as file:
         file.write_mesh(mesh)
@@ -21,7 +21,7 @@ def write_xdmf(path: Any, mesh: Any, functions: Sequence[Any]) -> None:
             file.write_function(function)
 
 
-def write_vtx(path: Any, function: Any, value: float, *, cellwise: bool) -> None:
+def write_vtx(path: Path, function: dolfinx.fem.Function, value: float, *, cellwise: bool) -> None:
     """Write a field to a folder in the VTX format of ADIOS2, as its one step. Collective on its mesh.
 
     Args:
@@ -38,7 +38,7 @@ def write_vtx(path: Any, function: Any, value: float, *, cellwise: bool) -> None
         file.write(value)
 
 
-def _discontinuous(function: Any) -> Any:
+def _discontinuous(function: dolfinx.fem.Function) -> dolfinx.fem.Function:
     make = dolfinx.fem.FunctionSpace if old() else dolfinx.fem.functionspace
     space = make(function.function_space.mesh, ("Discontinuous Lagrange", 1))
     finer = dolfinx.fem.Function(space, name=function.name)

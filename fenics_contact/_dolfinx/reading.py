@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -55,7 +54,7 @@ class TagArrays:
     values: np.ndarray
 
 
-def read_mesh(path: Path, name: str, inline: bool) -> Any:
+def read_mesh(path: Path, name: str, inline: bool) -> dolfinx.mesh.Mesh:
     """Read a grid of an XDMF file on this rank only.
 
     Args:
@@ -80,7 +79,9 @@ def read_mesh(path: Path, name: str, inline: bool) -> Any:
         return file.read_mesh(name=name)
 
 
-def read_tags(path: Path, mesh: Any, name: str, inline: bool, own_points: bool) -> Any:
+def read_tags(
+    path: Path, mesh: dolfinx.mesh.Mesh, name: str, inline: bool, own_points: bool
+) -> dolfinx.mesh.MeshTags:
     """Read the first attribute of a grid of an XDMF file as tags on ``mesh``.
 
     Args:
@@ -108,7 +109,7 @@ def read_tags(path: Path, mesh: Any, name: str, inline: bool, own_points: bool) 
     return tags
 
 
-def _check_points(mesh: Any, points: np.ndarray, path: Path) -> None:
+def _check_points(mesh: dolfinx.mesh.Mesh, points: np.ndarray, path: Path) -> None:
     """Reject tags on other nodes, which would be mistaken for those with the same numbers."""
     own = np.empty((len(mesh.geometry.x), mesh.geometry.dim))
     own[mesh.geometry.input_global_indices] = mesh.geometry.x[:, : mesh.geometry.dim]
@@ -120,13 +121,13 @@ def _check_points(mesh: Any, points: np.ndarray, path: Path) -> None:
         )
 
 
-def _opened(path: Path, inline: bool) -> Any:
+def _opened(path: Path, inline: bool) -> dolfinx.io.XDMFFile:
     kind = dolfinx.io.XDMFFile
     encoding = kind.Encoding.ASCII if inline else kind.Encoding.HDF5
     return kind(MPI.COMM_SELF, str(path), "r", encoding)
 
 
-def mesh_arrays(mesh: Any) -> MeshArrays:
+def mesh_arrays(mesh: dolfinx.mesh.Mesh) -> MeshArrays:
     """Extract the arrays of a mesh on one rank."""
     topology, geometry = mesh.topology, mesh.geometry
     n_cells = topology.index_map(topology.dim).size_local
@@ -144,7 +145,7 @@ def mesh_arrays(mesh: Any) -> MeshArrays:
     return MeshArrays(name, topology.dim, points, cells, linear, node, cell)
 
 
-def tag_arrays(mesh: Any, arrays: MeshArrays, tags: Any) -> TagArrays:
+def tag_arrays(mesh: dolfinx.mesh.Mesh, arrays: MeshArrays, tags: dolfinx.mesh.MeshTags) -> TagArrays:
     """Extract the arrays of tags on the cells or facets of a mesh on one rank."""
     if tags.dim == arrays.dim:
         return TagArrays(arrays.cell[tags.indices], np.asarray(tags.values))

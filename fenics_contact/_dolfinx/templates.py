@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import ufl
 
@@ -12,7 +11,7 @@ from fenics_contact._dolfinx.cells import shape as shape_of
 from fenics_contact._dolfinx.loading import old
 
 
-def _element(cell_type: str, shape: tuple[int, ...]) -> Any:
+def _element(cell_type: str, shape: tuple[int, ...]) -> ufl.finiteelement.AbstractFiniteElement:
     if not old():
         import basix.ufl
 
@@ -23,17 +22,17 @@ def _element(cell_type: str, shape: tuple[int, ...]) -> Any:
     return family("Lagrange", cell, degree(cell_type), variant="equispaced")
 
 
-def vector_element(cell_type: str) -> Any:
+def vector_element(cell_type: str) -> ufl.finiteelement.AbstractFiniteElement:
     """Return the element of coordinates and displacements, of the cells' degree, one value per direction."""
     return _element(cell_type, (dimension(cell_type),))
 
 
-def scalar_element(cell_type: str) -> Any:
+def scalar_element(cell_type: str) -> ufl.finiteelement.AbstractFiniteElement:
     """Return the element of scalars, of the cells' degree."""
     return _element(cell_type, ())
 
 
-def cellwise_element(cell_type: str) -> Any:
+def cellwise_element(cell_type: str) -> ufl.finiteelement.AbstractFiniteElement:
     """Return the element of scalars that are constant on each cell."""
     if old():
         return ufl.FiniteElement("DG", ufl.Cell(shape_of(cell_type)), 0)
@@ -43,18 +42,18 @@ def cellwise_element(cell_type: str) -> Any:
 
 
 @lru_cache(maxsize=16)
-def template(cell_type: str) -> Any:
+def template(cell_type: str) -> ufl.Mesh:
     """Return the mesh without coordinates on which forms for cells of this type are written."""
     return ufl.Mesh(vector_element(cell_type))
 
 
 @lru_cache(maxsize=16)
-def displacement_space(cell_type: str) -> Any:
+def displacement_space(cell_type: str) -> ufl.FunctionSpace:
     """Return the template's space of vector fields, of the cells' degree."""
     return ufl.FunctionSpace(template(cell_type), vector_element(cell_type))
 
 
-def field_symbols(cell_type: str, count: int) -> list[Any]:
+def field_symbols(cell_type: str, count: int) -> list[ufl.Coefficient]:
     """Return UFL coefficients on the template's `displacement_space`, to be bound to Functions later.
 
     They are numbered from 0 in every form: ffcx 0.5 writes counts into C identifiers, which fails from ten
@@ -64,12 +63,12 @@ def field_symbols(cell_type: str, count: int) -> list[Any]:
 
 
 @lru_cache(maxsize=16)
-def nodal_space(cell_type: str) -> Any:
+def nodal_space(cell_type: str) -> ufl.FunctionSpace:
     """Return the template's space of scalars, of the cells' degree."""
     return ufl.FunctionSpace(template(cell_type), scalar_element(cell_type))
 
 
 @lru_cache(maxsize=16)
-def cellwise_space(cell_type: str) -> Any:
+def cellwise_space(cell_type: str) -> ufl.FunctionSpace:
     """Return the template's space of scalars that are constant on each cell."""
     return ufl.FunctionSpace(template(cell_type), cellwise_element(cell_type))
