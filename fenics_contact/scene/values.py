@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from ufl.core.expr import Expr
 
 from fenics_contact.checks import checked
 from fenics_contact.errors import InvalidInputError, calling
@@ -34,7 +35,7 @@ class Ufl:
         'front'
     """
 
-    function: Callable[[Any], Any]
+    function: Callable[[Expr], Expr | float | Sequence[Expr | float]]
 
 
 #: A vector: numbers, a function of positions, or UFL.

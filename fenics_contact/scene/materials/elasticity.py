@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
 
 import numpy as np
 import ufl
+from ufl.core.expr import Expr
 
 from fenics_contact.scene.kernels import rigid_body_modes
 
 
-def strain(u: Any) -> Any:
+def strain(u: Expr) -> Expr:
     """Return the small strain ε(u) = ½ (∇u + ∇uᵀ)."""
     return ufl.sym(ufl.grad(u))
 
@@ -54,10 +54,10 @@ class Elasticity(ABC):
         """Values of the model's constants, in the order in which `stress` receives them."""
 
     @abstractmethod
-    def stress(self, u: Any, parameters: Any) -> Any:
+    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return the stress tensor (dim x dim, symmetric, UFL), linear in the displacement ``u``."""
 
-    def stiffness(self, u: Any, v: Any, parameters: Any) -> Any:
+    def stiffness(self, u: Expr, v: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return σ(u) : ε(v)."""
         return ufl.inner(self.stress(u, parameters), strain(v))
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any
 
 import numpy as np
 import ufl
 from ufl.algorithms import expand_derivatives, extract_coefficients
+from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
 from fenics_contact.errors import InvalidInputError
@@ -39,10 +39,10 @@ class EnergyModel(Elasticity):
     """
 
     @abstractmethod
-    def energy(self, strain: Any, parameters: Any) -> Any:
+    def energy(self, strain: Expr, parameters: tuple[ufl.Constant, ...] | tuple[float, ...]) -> Expr:
         """Return the energy density (UFL scalar) of a strain tensor (dim x dim, UFL), quadratic in it."""
 
-    def stress(self, u: Any, parameters: Any) -> Any:
+    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return ∂W/∂ε at ε(u).
 
         Raises:
@@ -52,7 +52,7 @@ class EnergyModel(Elasticity):
         i, j, k, l = ufl.indices(4)  # noqa: E741
         return ufl.as_tensor(moduli[i, j, k, l] * strain(u)[k, l], (i, j))
 
-    def _moduli(self, dim: int, parameters: Any) -> Any:
+    def _moduli(self, dim: int, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return ∂²W/∂ε², fourth order, symmetric in its first and in its last two indices."""
         (probe,) = _dolfinx.field_symbols("triangle" if dim == 2 else "tetrahedron", 1)
         epsilon = ufl.variable(strain(probe))

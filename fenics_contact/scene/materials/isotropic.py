@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import ufl
+from ufl.core.expr import Expr
 
 from fenics_contact.checks import checked
 from fenics_contact.scene.materials.constants import check_isotropic, lame
@@ -56,11 +56,11 @@ class IsotropicElasticity(Isotropic):
         """First Lamé parameter and shear modulus, [force / length²], and α where it was given."""
         return (*lame(self.young_modulus, self.poisson_ratio), *self.expansion)
 
-    def stress(self, u: Any, parameters: Any) -> Any:
+    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return σ(u) with ``parameters`` = (λ, G, ...)."""
         return parameters[0] * ufl.div(u) * ufl.Identity(3) + 2 * parameters[1] * strain(u)
 
-    def thermal_stress(self, parameters: Any) -> Any:
+    def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return (3λ + 2G) α I."""
         lame_parameter, shear, expansion = parameters
         return (3 * lame_parameter + 2 * shear) * expansion * ufl.Identity(3)

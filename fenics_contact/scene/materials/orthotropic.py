@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
+import ufl
+from ufl.core.expr import Expr
 
 from fenics_contact.checks import checked
 from fenics_contact.errors import InvalidInputError
@@ -130,11 +131,11 @@ class OrthotropicElasticity(Elasticity):
         C = self.stiffness_matrix
         return upper_triangle(C) + thermal_stresses(C, np.array(self.orientation), self.thermal_expansion)
 
-    def stress(self, u: Any, parameters: Any) -> Any:
+    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return C : ε(u)."""
         return as_tensor(symmetric_product(parameters[:21], strain_vector(strain(u), 3)), 3)
 
-    def thermal_stress(self, parameters: Any) -> Any:
+    def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return C : α, with the expansions as a strain."""
         return as_tensor(list(parameters[21:]), 3)
 
@@ -204,10 +205,10 @@ class OrthotropicPlaneStress(Elasticity):
         C = self.stiffness_matrix
         return upper_triangle(C) + thermal_stresses(C, self._axes, self.thermal_expansion)
 
-    def stress(self, u: Any, parameters: Any) -> Any:
+    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return C : ε(u)."""
         return as_tensor(symmetric_product(parameters[:6], strain_vector(strain(u), 2)), 2)
 
-    def thermal_stress(self, parameters: Any) -> Any:
+    def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return C : α, with the expansions as a strain."""
         return as_tensor(list(parameters[6:]), 2)

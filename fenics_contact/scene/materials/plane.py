@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import ufl
+from ufl.core.expr import Expr
 
 from fenics_contact.scene.materials.constants import lame
 from fenics_contact.scene.materials.elasticity import strain
@@ -32,19 +32,19 @@ class PlaneStrain(Isotropic):
         """First Lamé parameter and shear modulus, [force / length²], and α where it was given."""
         return (*lame(self.young_modulus, self.poisson_ratio), *self.expansion)
 
-    def stress(self, u: Any, parameters: Any) -> Any:
+    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return σ(u) in the plane."""
         return parameters[0] * ufl.div(u) * ufl.Identity(2) + 2 * parameters[1] * strain(u)
 
-    def transverse_stress(self, u: Any, parameters: Any) -> Any:
+    def transverse_stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return λ tr(ε)."""
         return parameters[0] * ufl.div(u)
 
-    def thermal_stress(self, parameters: Any) -> Any:
+    def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return (3λ + 2G) α I."""
         return self.transverse_thermal_stress(parameters) * ufl.Identity(2)
 
-    def transverse_thermal_stress(self, parameters: Any) -> Any:
+    def transverse_thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return (3λ + 2G) α."""
         lame_parameter, shear, expansion = parameters
         return (3 * lame_parameter + 2 * shear) * expansion
@@ -70,12 +70,12 @@ class PlaneStress(Isotropic):
         """E, [force / length²], ν, and α where it was given."""
         return (self.young_modulus, self.poisson_ratio, *self.expansion)
 
-    def stress(self, u: Any, parameters: Any) -> Any:
+    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return σ(u) in the plane."""
         E, nu = parameters[0], parameters[1]
         return E / (1 - nu**2) * ((1 - nu) * strain(u) + nu * ufl.div(u) * ufl.Identity(2))
 
-    def thermal_stress(self, parameters: Any) -> Any:
+    def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return E α / (1 − ν) I."""
         E, nu, expansion = parameters
         return E * expansion / (1 - nu) * ufl.Identity(2)

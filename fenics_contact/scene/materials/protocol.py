@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
+import ufl
+from ufl.core.expr import Expr
 
 
 @runtime_checkable
@@ -24,10 +26,10 @@ class Material(Protocol):
     def parameters(self) -> tuple[float, ...]:
         """Values of the model's constants, in the order in which the forms receive them."""
 
-    def stress(self, u: Any, parameters: Any) -> Any:
+    def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return the stress tensor (dim x dim, UFL) of the displacement ``u``."""
 
-    def stiffness(self, u: Any, v: Any, parameters: Any) -> Any:
+    def stiffness(self, u: Expr, v: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return the integrand of the symmetric bilinear form, virtual work per volume (UFL scalar)."""
 
     def kernel(self, points: np.ndarray) -> np.ndarray:
@@ -42,7 +44,7 @@ class Thermoelastic(Protocol):
     def expands(self) -> bool:
         """Whether this material was given a thermal expansion."""
 
-    def thermal_stress(self, parameters: Any) -> Any:
+    def thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return the stress that free expansion relieves per degree of temperature rise (dim x dim, UFL).
 
         σ = stress(u) − ΔT · thermal_stress; for an isotropic body (3λ + 2G) α I.
@@ -53,10 +55,10 @@ class Thermoelastic(Protocol):
 class Transverse(Protocol):
     """What a plane model provides in addition if it has stress normal to its plane (plane strain)."""
 
-    def transverse_stress(self, u: Any, parameters: Any) -> Any:
+    def transverse_stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return the stress normal to the plane (UFL scalar), without thermal strain."""
 
-    def transverse_thermal_stress(self, parameters: Any) -> Any:
+    def transverse_thermal_stress(self, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return by how much it falls per degree of temperature rise (UFL scalar)."""
 
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import ufl
+from ufl.core.expr import Expr
 
 from fenics_contact.errors import InvalidInputError
 
@@ -13,12 +12,12 @@ from fenics_contact.errors import InvalidInputError
 PAIRS = {3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)), 2: ((0, 0), (1, 1), (0, 1))}
 
 
-def strain_vector(strain: Any, dim: int) -> list[Any]:
+def strain_vector(strain: Expr, dim: int) -> list[Expr]:
     """Return the entries of a strain tensor (UFL) with engineering shears, γ = 2 ε."""
     return [(1 if i == j else 2) * strain[i, j] for i, j in PAIRS[dim]]
 
 
-def as_tensor(vector: list[Any], dim: int) -> Any:
+def as_tensor(vector: list[Expr], dim: int) -> Expr:
     """Return the stress tensor (UFL) with the given Voigt entries."""
     place = {pair: k for k, pair in enumerate(PAIRS[dim])}
     return ufl.as_tensor([[vector[place[min(i, j), max(i, j)]] for j in range(dim)] for i in range(dim)])
@@ -29,7 +28,7 @@ def upper_triangle(matrix: np.ndarray) -> tuple[float, ...]:
     return tuple(float(value) for value in matrix[np.triu_indices(len(matrix))])
 
 
-def symmetric_product(entries: Any, vector: list[Any]) -> list[Any]:
+def symmetric_product(entries: tuple[ufl.Constant, ...], vector: list[Expr]) -> list[Expr]:
     """Return the product of a symmetric matrix, given by its upper triangle, with a vector (UFL)."""
     n = len(vector)
     place = {(i, j): k for k, (i, j) in enumerate(zip(*np.triu_indices(n), strict=True))}
