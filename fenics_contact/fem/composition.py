@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+import ufl
+from ufl.core.expr import Expr
 
 from fenics_contact.errors import calling
-from fenics_contact.fem.templates import scalar_constants
+from fenics_contact.fem.templates import Constants, scalar_constants
 from fenics_contact.scene import Body, Material
 
 #: Builds an integrand (UFL) from a material and its constants.
-OfMaterial = Callable[[Material, Sequence[Any]], Any]
+OfMaterial = Callable[[Material, Constants], Expr]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +65,8 @@ def material_sets(body: Body) -> tuple[tuple[Material, ...], ...]:
 
 
 def integrate(
-    materials: tuple[Material, ...], cell_type: str, integrand: OfMaterial, measure: Any
-) -> tuple[Any, tuple[Any, ...]]:
+    materials: tuple[Material, ...], cell_type: str, integrand: OfMaterial, measure: ufl.Measure
+) -> tuple[ufl.Form, Constants]:
     """Return ∫ integrand over all materials (a form) and its constants.
 
     Args:
@@ -74,7 +75,7 @@ def integrate(
         integrand: Takes each material with its constants.
         measure: dx on the template.
     """
-    all_constants: list[Any] = []
+    all_constants: list[ufl.Constant] = []
     form = None
     for number, material in enumerate(materials):
         constants = scalar_constants(cell_type, len(material.parameters))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import ufl
 
@@ -48,7 +46,7 @@ class FormLibrary:
         self._typical_modulus: dict[tuple[Material, str], float] = {}
 
     @property
-    def compiled(self) -> tuple[tuple[Any, ...], ...]:
+    def compiled(self) -> tuple[tuple[object, ...], ...]:
         """Names of the forms compiled so far."""
         return self._templates.names
 
@@ -77,7 +75,9 @@ class FormLibrary:
             for materials in material_sets(body):
                 self._prepare_load(load, materials, body.mesh.cell_type)
 
-    def stiffness(self, parts: Composition, cell_type: str, space: Any) -> Any:
+    def stiffness(
+        self, parts: Composition, cell_type: str, space: _dolfinx.fem.FunctionSpace
+    ) -> _dolfinx.fem.Form:
         """Return the bilinear form of the materials ``parts`` bound to ``space``."""
         template = self._templates["stiffness", parts.materials, cell_type]
         return template.bind([space, space], parts.parameters, cells=parts.cells)
@@ -87,10 +87,10 @@ class FormLibrary:
         load: Load,
         parts: Composition,
         cell_type: str,
-        space: Any,
+        space: _dolfinx.fem.FunctionSpace,
         points: np.ndarray,
-        facets: Any = None,
-    ) -> Any:
+        facets: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> _dolfinx.fem.Form:
         """Return the linear form of ``load`` bound to ``space``.
 
         Args:
@@ -122,7 +122,7 @@ class FormLibrary:
             return
         parts = Composition((material,))
 
-        def bind(space: Any) -> Any:
+        def bind(space: _dolfinx.fem.FunctionSpace) -> _dolfinx.fem.Form:
             return self.stiffness(parts, cell_type, space)
 
         check_model(material, cell_type, bind)

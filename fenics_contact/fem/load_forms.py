@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from typing import Any
 
 import numpy as np
 import ufl
+from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
 from fenics_contact.errors import InvalidInputError, calling
 from fenics_contact.fem.composition import Composition, integrate
-from fenics_contact.fem.templates import scalar_constants, surface_measure, volume_measure
+from fenics_contact.fem.templates import Constants, scalar_constants, surface_measure, volume_measure
 from fenics_contact.scene import BodyForce, Load, Material, Pressure, ThermalStrain, Ufl, evaluate, strain
 
 #: First number of the coefficients of loads, after those of displacement fields.
@@ -24,13 +25,13 @@ def is_scalar(load: Load) -> bool:
     return isinstance(load, Pressure | ThermalStrain)
 
 
-def load_name(load: Load, cell_type: str) -> tuple[Any, ...]:
+def load_name(load: Load, cell_type: str) -> tuple[str, str, str]:
     """Return the name of the form of a load: kind, type of its value, cell type."""
     given = "UFL" if isinstance(load.value, Ufl) else "of position" if callable(load.value) else "numbers"
     return (KIND.get(type(load), "surface load"), given, cell_type)
 
 
-def load_key(load: Load, materials: tuple[Material, ...], cell_type: str) -> tuple[Any, ...]:
+def load_key(load: Load, materials: tuple[Material, ...], cell_type: str) -> tuple[Hashable, ...]:
     """Return the key of everything on which the form of a load depends."""
     own = load.value if isinstance(load.value, Ufl) else None
     return (*load_name(load, cell_type), own, materials if isinstance(load, ThermalStrain) else ())
@@ -42,8 +43,8 @@ class Symbol:
     def __init__(self, load: Load, cell_type: str, number: int = 0) -> None:
         """Write the value of ``load``; ``number`` distinguishes the loads of one form."""
         dim = _dolfinx.dimension(cell_type)
-        self.constants: tuple[Any, ...] = ()
-        self.coefficients: tuple[Any, ...] = ()
+        self.constants: Constants = ()
+        self.coefficients: tuple[ufl.Coefficient, ...] = ()
         if isinstance(load.value, Ufl):
             self.expression = from_ufl(load, load.value, cell_type)
         elif callable(load.value):
@@ -55,7 +56,7 @@ class Symbol:
             self.expression = self.constants[0] if is_scalar(load) else ufl.as_vector(list(self.constants))
 
 
-def from_ufl(load: Load, value: Ufl, cell_type: str) -> Any:
+def from_ufl(load: Load, value: Ufl, cell_type: str) -> Expr:
     """Return a value given as `Ufl`, written on the template, after a check of its shape."""
     dim = _dolfinx.dimension(cell_type)
     shape = () if is_scalar(load) else (dim,)
@@ -77,7 +78,9 @@ def numbers_of(load: Load) -> tuple[float, ...]:
     return tuple(load.value) if isinstance(load.value, Sequence) else (float(load.value),)
 
 
-def fields_of(load: Load, space: Any, points: np.ndarray) -> tuple[Any, ...]:
+def fields_of(
+    load: Load, space: _dolfinx.fem.FunctionSpace, points: np.ndarray
+) -> tuple[_dolfinx.fem.Function, ...]:
     """Return the Functions for a symbol's coefficients.
 
     Args:
@@ -100,8 +103,8 @@ def fields_of(load: Load, space: Any, points: np.ndarray) -> tuple[Any, ...]:
 
 
 def load_work(
-    load: Load, materials: tuple[Material, ...], cell_type: str, value: Any, v: Any
-) -> tuple[Any, tuple[Any, ...]]:
+    load: Load, materials: tuple[Material, ...], cell_type: str, value: Expr, v: Expr
+) -> tuple[ufl.Form, Constants]:
     """Return the virtual work of a load along ``v``, a UFL form, and the constants of the materials in it.
 
     Args:
@@ -113,7 +116,7 @@ def load_work(
     """
     if isinstance(load, ThermalStrain):
 
-        def thermal(material: Any, constants: Sequence[Any]) -> Any:
+        def thermal(material: Any, constants: Constants) -> Expr:
             return value * ufl.inner(material.thermal_stress(constants), strain(v))
 
         return integrate(materials, cell_type, thermal, volume_measure(cell_type, 2))

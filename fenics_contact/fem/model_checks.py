@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from fenics_contact import _dolfinx
 from fenics_contact.errors import InvalidInputError, calling
@@ -18,7 +18,7 @@ ROUNDING = 1e-11
 KERNEL_TOLERANCE = 1e-8
 
 #: Binds the stiffness of the material to a space.
-Bind = Callable[[Any], Any]
+Bind = Callable[["_dolfinx.fem.FunctionSpace"], "_dolfinx.fem.Form"]
 
 
 def unit_cell_stiffness(cell_type: str, bind: Bind) -> np.ndarray:
@@ -71,7 +71,7 @@ def check_model(material: Material, cell_type: str, bind: Bind) -> None:
         )
 
 
-def check_kernel(stiffness: Any, kernel: np.ndarray, what: str) -> None:
+def check_kernel(stiffness: np.ndarray | sp.csr_matrix, kernel: np.ndarray, what: str) -> None:
     """Check that a stiffness matrix annihilates its kernel.
 
     All modes are tested at once, each with a weight of its own.

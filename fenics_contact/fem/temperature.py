@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import ufl
+from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
 from fenics_contact.fem.load_forms import FIRST_COUNT, from_ufl
-from fenics_contact.fem.templates import scalar_constants
+from fenics_contact.fem.templates import Constants, scalar_constants
 from fenics_contact.scene import Load, Material, ThermalStrain, Transverse, Ufl, evaluate
 
 
@@ -26,7 +27,7 @@ class Temperature:
     loads: tuple[ThermalStrain, ...] = ()
 
     @property
-    def key(self) -> tuple[Any, ...]:
+    def key(self) -> tuple[bool, bool, tuple[Ufl, ...]]:
         """The key of everything on which a form depends."""
         return bool(self._numbers), bool(self._of_position), tuple(load.value for load in self._ufl)
 
@@ -35,16 +36,16 @@ class Temperature:
         """Values of the constants: the sum of the uniform changes."""
         return (sum(self._numbers),) if self._numbers else ()
 
-    def write(self, cell_type: str) -> tuple[Any, tuple[Any, ...], tuple[Any, ...]]:
+    def write(self, cell_type: str) -> tuple[Expr | None, Constants, tuple[ufl.Coefficient, ...]]:
         """Return ΔT (UFL, None without loads), its constants and its coefficients."""
         constants = scalar_constants(cell_type, 1) if self._numbers else ()
-        coefficients: tuple[Any, ...] = ()
+        coefficients: tuple[ufl.Coefficient, ...] = ()
         if self._of_position:
             coefficients = (ufl.Coefficient(_dolfinx.nodal_space(cell_type), count=FIRST_COUNT),)
         terms = [*constants, *coefficients, *(from_ufl(load, load.value, cell_type) for load in self._ufl)]
         return (sum(terms[1:], terms[0]) if terms else None), constants, coefficients
 
-    def fields(self, mesh: Any, points: np.ndarray) -> tuple[Any, ...]:
+    def fields(self, mesh: _dolfinx.mesh.Mesh, points: np.ndarray) -> tuple[_dolfinx.fem.Function, ...]:
         """Return the Functions for the coefficients.
 
         Args:
@@ -78,7 +79,7 @@ def temperature_of(loads: Iterable[Load], body: str) -> Temperature:
     return Temperature(tuple(load for load in loads if isinstance(load, ThermalStrain) and load.body == body))
 
 
-def stress_left(material: Any, u: Any, constants: Sequence[Any], temperature: Any) -> Any:
+def stress_left(material: Any, u: Expr, constants: Constants, temperature: Expr | None) -> Expr:
     """Return the stress (dim x dim, UFL) of a displacement at a temperature change.
 
     Args:
@@ -91,12 +92,12 @@ def stress_left(material: Any, u: Any, constants: Sequence[Any], temperature: An
     return stress if temperature is None else stress - temperature * material.thermal_stress(constants)
 
 
-def stress_in_space(material: Material, u: Any, constants: Sequence[Any], temperature: Any) -> Any:
+def stress_in_space(material: Material, u: Expr, constants: Constants, temperature: Expr | None) -> Expr:
     """Return the stress (3 x 3, UFL), in the plane including the component normal to it."""
     stress = stress_left(material, u, constants, temperature)
     if stress.ufl_shape == (3, 3):
         return stress
-    normal: Any = 0
+    normal: Expr | int = 0
     if isinstance(material, Transverse):
         normal = material.transverse_stress(u, constants)
         if temperature is not None:

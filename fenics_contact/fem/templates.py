@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import ufl
@@ -22,15 +21,21 @@ QUADRATURE_DEGREE = {"hexahedron": 2, "tetrahedron": 1, "quadrilateral": 2, "tri
 #: Tag of every loaded surface inside a load form.
 LOADED = 1
 
+#: UFL constants on a template; numbers are given for them later.
+Constants = tuple[ufl.Constant, ...]
 #: A form, its constants and its coefficients.
-Written = tuple[Any, Sequence[Any], Sequence[Any]]
+Written = tuple[ufl.Form, Sequence[ufl.Constant], Sequence[ufl.Coefficient]]
 
 
 class Template:
     """A compiled form, its constants and its coefficients."""
 
     def __init__(
-        self, comm: MPI.Comm, form: Any, constants: Sequence[Any], coefficients: Sequence[Any] = ()
+        self,
+        comm: MPI.Comm,
+        form: ufl.Form,
+        constants: Sequence[ufl.Constant],
+        coefficients: Sequence[ufl.Coefficient] = (),
     ) -> None:
         """Compile ``form``. Collective on ``comm``."""
         self._form = _dolfinx.CompiledForm(comm, form)
@@ -43,13 +48,13 @@ class Template:
 
     def bind(
         self,
-        spaces: Sequence[Any],
+        spaces: Sequence[_dolfinx.fem.FunctionSpace],
         values: Sequence[float],
-        functions: Sequence[Any] = (),
-        facets: Any = None,
-        mesh: Any = None,
+        functions: Sequence[_dolfinx.fem.Function] = (),
+        facets: tuple[np.ndarray, np.ndarray] | None = None,
+        mesh: _dolfinx.mesh.Mesh | None = None,
         cells: Mapping[int, np.ndarray] | None = None,
-    ) -> Any:
+    ) -> _dolfinx.fem.Form:
         """Return the form on one mesh, with values for its constants and Functions for its coefficients.
 
         Args:
@@ -82,10 +87,10 @@ class Templates:
         self._comm = comm
         self._by_key: dict[Hashable, Template] = {}
         self._by_text: dict[Hashable, Template] = {}
-        self._names: list[tuple[Any, ...]] = []
+        self._names: list[tuple[object, ...]] = []
 
     @property
-    def names(self) -> tuple[tuple[Any, ...], ...]:
+    def names(self) -> tuple[tuple[object, ...], ...]:
         """Names of the compiled forms, in order."""
         return tuple(self._names)
 
@@ -96,7 +101,7 @@ class Templates:
     def __contains__(self, key: Hashable) -> bool:
         return key in self._by_key
 
-    def get(self, key: Hashable, name: tuple[Any, ...], write: Callable[[], Written]) -> Template:
+    def get(self, key: Hashable, name: tuple[object, ...], write: Callable[[], Written]) -> Template:
         """Return the template under ``key``. Collective when it is new, on all ranks or on none.
 
         Args:
@@ -121,7 +126,7 @@ class Templates:
         return self._by_key[key]
 
 
-def _check_numbers(form: Any, what: str) -> None:
+def _check_numbers(form: ufl.Form, what: str) -> None:
     """Reject non-finite numbers in a form."""
     bad = [number for number in extract_type(form, FloatValue) if not np.isfinite(float(number))]
     if bad:
@@ -131,11 +136,13 @@ def _check_numbers(form: Any, what: str) -> None:
         )
 
 
-def _called(part: Any) -> str:
+def _called(part: object) -> str:
     return part.__name__ if isinstance(part, type) else str(part)
 
 
-def _text(form: Any, constants: Sequence[Any], coefficients: Sequence[Any]) -> Hashable:
+def _text(
+    form: ufl.Form, constants: Sequence[ufl.Constant], coefficients: Sequence[ufl.Coefficient]
+) -> Hashable:
     """Return the key that two forms share if one can replace the other."""
     used = form.constants(), form.coefficients()
     places = tuple(
@@ -145,12 +152,12 @@ def _text(form: Any, constants: Sequence[Any], coefficients: Sequence[Any]) -> H
     return form.signature(), places
 
 
-def scalar_constants(cell_type: str, count: int) -> tuple[Any, ...]:
+def scalar_constants(cell_type: str, count: int) -> Constants:
     """Return ``count`` UFL constants on the template."""
     return tuple(ufl.Constant(_dolfinx.template(cell_type)) for _ in range(count))
 
 
-def volume_measure(cell_type: str, degree: int | None = None) -> Any:
+def volume_measure(cell_type: str, degree: int | None = None) -> ufl.Measure:
     """Return dx on the template with the package's quadrature degree, or the given one.
 
     The given one is for linear cells; it is doubled on quadratic ones.
@@ -160,7 +167,7 @@ def volume_measure(cell_type: str, degree: int | None = None) -> Any:
     return ufl.dx(domain=_dolfinx.template(cell_type), metadata=metadata)
 
 
-def surface_measure(cell_type: str) -> Any:
+def surface_measure(cell_type: str) -> ufl.Measure:
     """Return ds of the loaded surface on the template."""
     degree = 2 * _dolfinx.degree(cell_type)
     return ufl.ds(domain=_dolfinx.template(cell_type), metadata={"quadrature_degree": degree})(LOADED)
