@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
 
 import numpy as np
 import ufl
+from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
 from fenics_contact.errors import InvalidInputError, calling
@@ -29,7 +29,7 @@ from fenics_contact.feti import Subdomain, TornSystem
 from fenics_contact.scene import Load, Material, ThermalStrain, VolumeLoad
 
 #: Builds an integrand (UFL) from a displacement u, the coordinate x and the stress σ(u).
-Integrand = Callable[[Any, Any, Any], Any]
+Integrand = Callable[[Expr, Expr, Expr], Expr]
 Materials = tuple[Material, ...]
 
 
@@ -49,7 +49,7 @@ class ShapeForms:
         self._templates = Templates(torn.decomposition.comm)
 
     @property
-    def compiled(self) -> tuple[tuple[Any, ...], ...]:
+    def compiled(self) -> tuple[tuple[object, ...], ...]:
         """Names of the forms compiled so far."""
         return self._templates.names
 
@@ -98,7 +98,7 @@ class ShapeForms:
             x = ufl.SpatialCoordinate(_dolfinx.template(cell_type))
             change, numbers, fields = temperature.write(cell_type)
 
-            def density(material: Material, constants: Sequence[Any]) -> Any:
+            def density(material: Material, constants: tuple[ufl.Constant, ...]) -> Expr:
                 with calling(f"the integrand of {name!r}"):
                     return integrand(u, x, stress_left(material, u, constants, change))
 
@@ -114,7 +114,7 @@ class ShapeForms:
         return self._templates.get(key, (name, by, *types, cell_type), write)
 
 
-def _by_shape(form: Any, cell_type: str) -> Any:
+def _by_shape(form: ufl.Form, cell_type: str) -> ufl.Form:
     velocity = ufl.TestFunction(_dolfinx.displacement_space(cell_type))
     return ufl.derivative(form, ufl.SpatialCoordinate(_dolfinx.template(cell_type)), velocity)
 
@@ -141,7 +141,7 @@ def work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndar
                 if load.body == name:
                     forms.load_by_shape(load, materials, body.mesh.cell_type)
 
-    def on_subdomain(subdomain: Subdomain, functions: Sequence[Any]) -> np.ndarray:
+    def on_subdomain(subdomain: Subdomain, functions: Sequence[_dolfinx.fem.Function]) -> np.ndarray:
         space, parts = subdomain.mesh.space, subdomain.material
         cell_type = torn.scene.bodies[subdomain.mesh.body].mesh.cell_type
         template = forms.virtual_work_by_shape(parts.materials, cell_type)
@@ -198,7 +198,7 @@ def check_differentiable(loads: Sequence[Load]) -> None:
 def sum_over_subdomains(
     torn: TornSystem,
     fields: Sequence[np.ndarray],
-    evaluate: Callable[[Subdomain, Sequence[Any]], np.ndarray],
+    evaluate: Callable[[Subdomain, Sequence[_dolfinx.fem.Function]], np.ndarray],
     moving: np.ndarray | None = None,
 ) -> np.ndarray:
     """Add up vectors of nodal derivatives over this rank's subdomains, shape (n_nodes, dim) for all bodies.
@@ -220,7 +220,7 @@ def sum_over_subdomains(
 
 def subdomain_fields(
     torn: TornSystem, fields: Sequence[np.ndarray], moving: np.ndarray | None = None
-) -> Iterator[tuple[Subdomain, list[Any]]]:
+) -> Iterator[tuple[Subdomain, list[_dolfinx.fem.Function]]]:
     """Yield each of this rank's subdomains with the fields as Functions on it.
 
     Args:

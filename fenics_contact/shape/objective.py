@@ -26,8 +26,10 @@ from fenics_contact.shape.forms import (
     work_by_shape,
 )
 
+Functions = Sequence["_dolfinx.fem.Function"]
+Spaces = Sequence["_dolfinx.fem.FunctionSpace"]
 #: Binds a functional to a subdomain, with Functions for its fields and spaces for its arguments.
-Bind = Callable[[Subdomain, Sequence[Any], Sequence[Any]], Any]
+Bind = Callable[[Subdomain, Functions, Spaces], "_dolfinx.fem.Form"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +117,7 @@ class VolumeIntegral:
         check_differentiable(temperature_of(torn.scene.loads, self.body).loads)
         by_shape, by_displacement = (self._prepare(state, forms, by) for by in ("shape", "displacement"))
 
-        def assemble(bind: Bind, subdomain: Subdomain, functions: Any) -> np.ndarray:
+        def assemble(bind: Bind, subdomain: Subdomain, functions: Functions) -> np.ndarray:
             if subdomain.mesh.body != self.body:
                 return np.zeros(subdomain.mesh.size)
             return _dolfinx.assemble_vector(bind(subdomain, functions, [subdomain.mesh.space]))
@@ -136,7 +138,7 @@ class VolumeIntegral:
         for materials in material_sets(body):
             forms.functional(self.name, self.integrand, materials, cell_type, by, temperature)
 
-        def bind(subdomain: Subdomain, functions: Sequence[Any], spaces: Sequence[Any]) -> Any:
+        def bind(subdomain: Subdomain, functions: Functions, spaces: Spaces) -> _dolfinx.fem.Form:
             parts, mesh = subdomain.material, subdomain.mesh.space.mesh
             template = forms.functional(
                 self.name, self.integrand, parts.materials, cell_type, by, temperature
