@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import ufl
+from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
 from fenics_contact._libraries import MPI
@@ -23,7 +22,7 @@ from fenics_contact.feti import Decomposition
 from fenics_contact.scene import Body, Material
 
 
-def body_mesh(decomposition: Decomposition, name: str, body: Body) -> Any:
+def body_mesh(decomposition: Decomposition, name: str, body: Body) -> _dolfinx.mesh.Mesh:
     """Build the mesh of one body; a cell lives on the rank that owns its subdomain. Collective."""
     tearing, mesh = decomposition.tearing, body.mesh
     first = tearing.subdomain_offset[tearing.body_names.index(name)]
@@ -31,7 +30,7 @@ def body_mesh(decomposition: Decomposition, name: str, body: Body) -> Any:
     return _dolfinx.rank_mesh(decomposition.comm, mesh.points, mesh.cells, rank, mesh.cell_type)
 
 
-def displacement_function(mesh: Any, values: np.ndarray) -> Any:
+def displacement_function(mesh: _dolfinx.mesh.Mesh, values: np.ndarray) -> _dolfinx.fem.Function:
     """Return the displacement as a Function on a body's mesh. Collective.
 
     Args:
@@ -45,7 +44,7 @@ def displacement_function(mesh: Any, values: np.ndarray) -> Any:
     return function
 
 
-def nodal_function(mesh: Any, name: str, values: np.ndarray) -> Any:
+def nodal_function(mesh: _dolfinx.mesh.Mesh, name: str, values: np.ndarray) -> _dolfinx.fem.Function:
     """Return a scalar field on a body's mesh from its nodal values. Collective.
 
     Args:
@@ -60,7 +59,9 @@ def nodal_function(mesh: Any, name: str, values: np.ndarray) -> Any:
     return function
 
 
-def von_mises(displacement: Any, body: Body, comm: MPI.Comm, temperature: Temperature = Temperature()) -> Any:
+def von_mises(
+    displacement: _dolfinx.fem.Function, body: Body, comm: MPI.Comm, temperature: Temperature = Temperature()
+) -> _dolfinx.fem.Function:
     """Return the von Mises stress averaged over each cell, [force / length²], a piecewise constant Function.
 
     The stress is that in space: for plane bodies with the component normal to the plane. Collective on
@@ -90,12 +91,12 @@ def von_mises(displacement: Any, body: Body, comm: MPI.Comm, temperature: Temper
     return result
 
 
-def _weighted(materials: tuple[Material, ...], cell_type: str, q: Any, temperature: Temperature) -> Written:
+def _weighted(materials: tuple[Material, ...], cell_type: str, q: Expr, temperature: Temperature) -> Written:
     """Return ∫ σ_M q dx (a form), its constants and its coefficients."""
     (u,) = _dolfinx.field_symbols(cell_type, 1)
     change, numbers, fields = temperature.write(cell_type)
 
-    def density(material: Material, constants: Any) -> Any:
+    def density(material: Material, constants: tuple[ufl.Constant, ...]) -> Expr:
         stress = stress_in_space(material, u, constants, change)
         deviator = stress - ufl.tr(stress) / 3 * ufl.Identity(3)
         return ufl.sqrt(1.5 * ufl.inner(deviator, deviator)) * q
@@ -104,7 +105,7 @@ def _weighted(materials: tuple[Material, ...], cell_type: str, q: Any, temperatu
     return form, (*numbers, *constants), [u, *fields]
 
 
-def _composition(mesh: Any, body: Body) -> Composition:
+def _composition(mesh: _dolfinx.mesh.Mesh, body: Body) -> Composition:
     """Return all materials of a body's mesh on every rank, wherever their cells are."""
     count = len(body.materials)
     if count == 1:
@@ -113,7 +114,7 @@ def _composition(mesh: Any, body: Body) -> Composition:
     return Composition(body.materials, {k + 1: np.flatnonzero(number == k) for k in range(count)})
 
 
-def _cells_of_body(mesh: Any, cells: np.ndarray) -> np.ndarray:
+def _cells_of_body(mesh: _dolfinx.mesh.Mesh, cells: np.ndarray) -> np.ndarray:
     """Return the number in the body of each cell owned by this rank, shape (n_owned,)."""
     owned = mesh.topology.index_map(mesh.topology.dim).size_local
     mine = _dolfinx.cell_nodes(mesh).reshape(-1, cells.shape[1])[:owned]
@@ -125,7 +126,7 @@ def _cells_of_body(mesh: Any, cells: np.ndarray) -> np.ndarray:
     return place[key[len(cells) :]]
 
 
-def cell_values(function: Any, cells: np.ndarray) -> np.ndarray:
+def cell_values(function: _dolfinx.fem.Function, cells: np.ndarray) -> np.ndarray:
     """Gather a cellwise constant Function in the order of a body's cells. Collective on its mesh.
 
     Args:

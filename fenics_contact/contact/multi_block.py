@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from fenics_contact.contact.gathered import GatheredFields, in_space
 from fenics_contact.errors import InvalidInputError, MissingRequirementError, together
 
 if TYPE_CHECKING:
+    import pyvista
     from mpi4py import MPI
 
     from fenics_contact.mesh import BodyMesh
@@ -34,7 +36,7 @@ def multi_block(
     deformed: float,
     *,
     linear: bool,
-) -> Any:
+) -> pyvista.MultiBlock:
     """Return the result of `State.to_pyvista` from meshes and a function that gathers fields. Collective."""
     with together(comm):
         pv = _pyvista()
@@ -56,13 +58,13 @@ def multi_block(
     return blocks
 
 
-def body_grid(mesh: BodyMesh, points: np.ndarray) -> Any:
+def body_grid(mesh: BodyMesh, points: np.ndarray) -> pyvista.UnstructuredGrid:
     """Return the cells of a body on points in space, (n_nodes, 3), as pyvista's UnstructuredGrid."""
     pv = _pyvista()
     return pv.UnstructuredGrid({pv.CellType[_VTK_NAMES[mesh.cell_type]]: mesh.cells}, points)
 
 
-def _pyvista() -> Any:
+def _pyvista() -> ModuleType:
     try:
         import pyvista
     except ImportError as error:

@@ -30,6 +30,9 @@ from fenics_contact.qp import DualSolution
 from fenics_contact.scene import Scene
 
 if TYPE_CHECKING:
+    import dolfinx
+    import pyvista
+
     from fenics_contact.accuracy import StateErrors
 
 
@@ -148,7 +151,7 @@ class State:
 
     @cached_property
     @collectively("State.displacement", _comm)
-    def displacement(self) -> dict[str, Any]:
+    def displacement(self) -> dict[str, dolfinx.fem.Function]:
         """Displacement of each body as a Function on its own mesh, [length]. Collective on first use."""
         decomposition = self.torn.decomposition
         return {
@@ -158,7 +161,7 @@ class State:
 
     @cached_property
     @collectively("State.von_mises", _comm)
-    def von_mises(self) -> dict[str, Any]:
+    def von_mises(self) -> dict[str, dolfinx.fem.Function]:
         """Von Mises stress of each body, constant on cells, [force / length²]. Collective on first use."""
         return {
             name: von_mises(
@@ -169,7 +172,7 @@ class State:
 
     @cached_property
     @collectively("State.contact_pressure", _comm)
-    def contact_pressure(self) -> dict[str, Any]:
+    def contact_pressure(self) -> dict[str, dolfinx.fem.Function]:
         """Contact pressure of each body as a Function on its own mesh, [force / length²].
 
         At the nodes of slave surfaces it is that of the contact points, at all other nodes, also on masters,
@@ -220,7 +223,7 @@ class State:
         return contact_fields(self.contact, self.torn.decomposition.tearing, body)
 
     @collectively("State.to_pyvista", _comm)
-    def to_pyvista(self, deformed: float = 0.0, *, linear: bool = False) -> Any:
+    def to_pyvista(self, deformed: float = 0.0, *, linear: bool = False) -> pyvista.MultiBlock:
         """Return all bodies with their fields for pyvista, the same on every rank. Collective.
 
         Args:
