@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from fenics_contact import _dolfinx
 from fenics_contact._libraries import MPI
@@ -47,7 +46,9 @@ def write_xdmf(state: State, path: str | Path) -> dict[str, Path]:
 _XINCLUDE, _UNKNOWN = "http://www.w3.org/2001/XInclude", "https://www.w3.org/2001/XInclude"
 
 
-def _write(comm: MPI.Comm, target: Path, displacement: Any, von_mises: Any) -> None:
+def _write(
+    comm: MPI.Comm, target: Path, displacement: _dolfinx.fem.Function, von_mises: _dolfinx.fem.Function
+) -> None:
     mesh = displacement.function_space.mesh
     # The XDMF file names its HDF5 file: both keep their names and are written in a separate folder.
     replacing_together(
@@ -59,7 +60,7 @@ def _write(comm: MPI.Comm, target: Path, displacement: Any, von_mises: Any) -> N
     )
 
 
-def parallel_size(mesh: Any) -> int:
+def parallel_size(mesh: _dolfinx.mesh.Mesh) -> int:
     """Return the approximate bytes of a file with a mesh, its displacement and a field on its cells."""
     nodes = mesh.geometry.index_map().size_global
     cells = mesh.topology.index_map(mesh.topology.dim).size_global

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from fenics_contact.mesh_io.tagged_mesh import Label, TaggedMesh
 from fenics_contact.mesh_io.xdmf_grids import Grid, chosen_grid, grids_of
 
 if TYPE_CHECKING:
+    import dolfinx
     from mpi4py import MPI
 
     from fenics_contact._dolfinx import MeshArrays, TagArrays
@@ -87,18 +88,18 @@ def read_xdmf(
 
 
 def from_dolfinx(
-    mesh: Any,
-    cell_tags: Any = None,
-    facet_tags: Any = None,
+    mesh: dolfinx.mesh.Mesh,
+    cell_tags: dolfinx.mesh.MeshTags | None = None,
+    facet_tags: dolfinx.mesh.MeshTags | None = None,
     bodies: Bodies | None = None,
     surfaces: Surfaces | None = None,
 ) -> dict[str, BodyMesh]:
     """Build bodies from a dolfinx mesh on one rank.
 
     Args:
-        mesh: A `dolfinx.mesh.Mesh` on a communicator of one rank.
-        cell_tags: Its MeshTags of cells, if any.
-        facet_tags: Its MeshTags of facets, if any.
+        mesh: A mesh on a communicator of one rank.
+        cell_tags: Its tags of cells, if any.
+        facet_tags: Its tags of facets, if any.
         bodies: As in `read_xdmf`.
         surfaces: As in `read_xdmf`.
 
@@ -128,7 +129,7 @@ def _read(path: Path, facet_path: Path, names: tuple[str | None, str | None, str
         others, names[2], "facet_tags", lambda grid: grid.tags_facets(place), facet_path, True
     )
 
-    def tags(file: Path, grid: Grid | None) -> Any:
+    def tags(file: Path, grid: Grid | None) -> dolfinx.mesh.MeshTags | None:
         return (
             None if grid is None else _dolfinx.read_tags(file, mesh, grid.name, grid.inline, grid.has_points)
         )
@@ -144,7 +145,12 @@ def _read(path: Path, facet_path: Path, names: tuple[str | None, str | None, str
         ) from reason
 
 
-def _tagged_mesh(mesh: Any, cell_tags: Any, facet_tags: Any, source: str) -> TaggedMesh:
+def _tagged_mesh(
+    mesh: dolfinx.mesh.Mesh,
+    cell_tags: dolfinx.mesh.MeshTags | None,
+    facet_tags: dolfinx.mesh.MeshTags | None,
+    source: str,
+) -> TaggedMesh:
     from fenics_contact import _dolfinx
 
     arrays = _dolfinx.mesh_arrays(mesh)
