@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from fenics_contact import _dolfinx
 from fenics_contact.fem import Composition, FormLibrary, stiffness_of_cell
 from fenics_contact.mesh import CELL_TYPES
 from fenics_contact.scene import Material
@@ -28,16 +27,13 @@ def moduli(forms: FormLibrary, material: Material, cell_type: str) -> np.ndarray
     """
     parts = Composition((material,))
 
-    def bind(space: Any) -> Any:
+    def bind(space: _dolfinx.fem.FunctionSpace) -> _dolfinx.fem.Form:
         return forms.stiffness(parts, cell_type, space)
 
-    large, small = (_on_cell_of(size, cell_type, bind) for size in (1.0, 0.5))
-    return np.asarray((4 * small - large) / 3)
+    def on_cell_of(size: float) -> np.ndarray:
+        K, points = stiffness_of_cell(size * CELL_TYPES[cell_type].nodes, cell_type, bind)
+        n, dim = points.shape
+        motions = np.einsum("ki,nj->nikj", np.eye(dim), points).reshape(n * dim, dim * dim)
+        return np.asarray(motions.T @ K @ motions / (CELL_TYPES[cell_type].reference_volume * size**dim))
 
-
-def _on_cell_of(size: float, cell_type: str, bind: Any) -> np.ndarray:
-    K, points = stiffness_of_cell(size * CELL_TYPES[cell_type].nodes, cell_type, bind)
-    n, dim = points.shape
-    motions = np.einsum("ki,nj->nikj", np.eye(dim), points).reshape(n * dim, dim * dim)
-    volume = CELL_TYPES[cell_type].reference_volume * size**dim
-    return np.asarray(motions.T @ K @ motions / volume)
+    return np.asarray((4 * on_cell_of(0.5) - on_cell_of(1.0)) / 3)

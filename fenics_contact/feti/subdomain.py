@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -35,7 +34,7 @@ class SubdomainMesh:
     body: str
     cells: np.ndarray
     nodes: np.ndarray
-    space: Any
+    space: _dolfinx.fem.FunctionSpace
     facets: dict[str, tuple[np.ndarray, np.ndarray]]
 
     @property

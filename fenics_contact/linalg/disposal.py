@@ -12,21 +12,24 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mpi4py import MPI
+    from petsc4py import PETSc
 
 #: Size of the communicator and index in the order of registration there: the same on all its ranks.
 Key = tuple[int, int]
 
 #: Objects of several ranks whose owner is gone on this rank.
-_waiting: dict[Key, tuple[tuple[Any, ...], Any]] = {}
+_waiting: dict[Key, tuple[tuple[PETSc.Object, ...], object]] = {}
 _registered: Counter[int] = Counter()
 
 
-def dispose_with(owner: Any, *objects: Any, comm: MPI.Comm | None = None, keep: Any = None) -> None:
+def dispose_with(
+    owner: object, *objects: PETSc.Object, comm: MPI.Comm | None = None, keep: object = None
+) -> None:
     """Destroy PETSc objects when their owner is no longer used.
 
     Args:
         owner: The Python object that holds them.
-        *objects: PETSc objects. They must not refer to the owner.
+        *objects: They must not refer to the owner.
         comm: Communicator they live on: that of the scene or of its first ranks, or None for this rank alone.
             Objects of one rank are destroyed at once, others by `sweep`; they must be registered by all ranks
             in the same order.
@@ -51,10 +54,10 @@ def sweep(comm: MPI.Comm) -> None:
             _destroy(*_waiting.pop(key))
 
 
-def _retire(key: Key, objects: tuple[Any, ...], keep: Any) -> None:
+def _retire(key: Key, objects: tuple[PETSc.Object, ...], keep: object) -> None:
     _waiting[key] = objects, keep
 
 
-def _destroy(objects: tuple[Any, ...], keep: Any) -> None:
+def _destroy(objects: tuple[PETSc.Object, ...], keep: object) -> None:
     for part in objects:
         part.destroy()

@@ -111,13 +111,15 @@ def solve(program: QuadraticProgram) -> QuadraticSolution:
     return _solution(program, almost, exact=False)
 
 
-def _solution(program: QuadraticProgram, answer: Any, *, exact: bool) -> QuadraticSolution:
+def _solution(
+    program: QuadraticProgram, answer: clarabel.DefaultSolution, *, exact: bool
+) -> QuadraticSolution:
     first = program.equality_values.size
     multipliers = np.maximum(np.array(answer.z, dtype=float)[first:], 0.0)
     return QuadraticSolution(np.array(answer.x, dtype=float), multipliers, str(answer.status), exact)
 
 
-def _run_clarabel(program: QuadraticProgram, changes: Mapping[str, Any]) -> Any:
+def _run_clarabel(program: QuadraticProgram, changes: Mapping[str, Any]) -> clarabel.DefaultSolution:
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.max_threads = 1
