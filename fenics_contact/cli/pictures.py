@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from fenics_contact.cli.desk import Desk
 from fenics_contact.contact import State
@@ -65,13 +65,13 @@ def draw_state(desk: Desk, file: SceneFile, states: Mapping[str, State], suffix:
     return drawn
 
 
-def _stress(file: SceneFile, states: Any, state: State, path: Path) -> None:
+def _stress(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:
     from fenics_contact.viz import plot_stress
 
     plot_stress(state, path, title=file.title, units=units_of(file))
 
 
-def _pressure(file: SceneFile, states: Any, state: State, path: Path) -> None:
+def _pressure(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:
     from fenics_contact.viz import plot_contact_pressure
 
     plot_contact_pressure(state, path, title=file.title, units=units_of(file))
@@ -83,20 +83,20 @@ def _status(file: SceneFile, states: Mapping[str, State], state: State, path: Pa
     plot_contact_status(states, path, title=file.title, units=units_of(file))
 
 
-def _decomposition(file: SceneFile, states: Any, state: State, path: Path) -> None:
+def _decomposition(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:
     from fenics_contact.viz import plot_decomposition
 
     plot_decomposition(file.scene, file.partitions, path, comm=file.comm)
 
 
-def _error(file: SceneFile, states: Any, state: State, path: Path) -> None:
+def _error(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:
     from fenics_contact.viz import plot_error
 
     parts = {body: state.errors.by_cell(body) for body in state.scene.bodies}
     plot_error(state, path, parts, title=file.title, units=units_of(file))
 
 
-_DRAWN: dict[str, Callable[[SceneFile, Any, State, Path], None]] = {
+_DRAWN: dict[str, Callable[[SceneFile, Mapping[str, State], State, Path], None]] = {
     "stress": _stress,
     "pressure": _pressure,
     "status": _status,

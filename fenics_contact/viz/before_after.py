@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 
 from fenics_contact.contact import State
@@ -169,7 +170,7 @@ def _draw_in_plane(first: State, best: State, paper: BinaryIO, look: _Look) -> N
         right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
 
 
-def _draw_profile(axes: Any, profile: Profile, factor: float, units: Units) -> None:
+def _draw_profile(axes: Axes, profile: Profile, factor: float, units: Units) -> None:
     for number, (name, lines) in enumerate(profile.before.items()):
         after = lines + factor * profile.moves[name]
         words = ("before", f"after, movement × {factor:g}") if not number else (None, None)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
+from typing import TYPE_CHECKING, BinaryIO, TypeAlias
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import BLUE, GREEN, GREY, INK, ORANGE
@@ -113,13 +114,13 @@ def _columns(names: Sequence[str]) -> int:
     return max(1, min(len(names), 110 // (longest + 8)))
 
 
-def _draw_reference(axes: Any, curves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> None:
+def _draw_reference(axes: Axes, curves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> None:
     styles = ("-", "--", ":", "-.")
     for number, (name, (x, y)) in enumerate(curves.items()):
         axes.plot(x, y, styles[number % 4], color=INK, lw=1.6, label=name, zorder=2)
 
 
-def _draw_series(axes: Any, curves: Mapping[str, tuple[np.ndarray, np.ndarray]], connected: bool) -> None:
+def _draw_series(axes: Axes, curves: Mapping[str, tuple[np.ndarray, np.ndarray]], connected: bool) -> None:
     for number, (name, (x, y)) in enumerate(curves.items()):
         colour, symbol = LOOKS[number % len(LOOKS)]
         few = len(x) <= MOST_SYMBOLS

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
+import pyvista as pv
+from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 
 from fenics_contact.contact import body_grid, in_space
@@ -127,7 +129,7 @@ def _draw_in_plane(
         axes.set_axis_off()
 
 
-def _draw_plane_body(axes: Any, mesh: BodyMesh, partition: np.ndarray, family: int, explode: float) -> None:
+def _draw_plane_body(axes: Axes, mesh: BodyMesh, partition: np.ndarray, family: int, explode: float) -> None:
     colours = colour_subdomains(neighbours(mesh.cells, partition), family)
     for number in np.unique(partition):
         cells = mesh.cells[partition == number]
@@ -138,11 +140,13 @@ def _draw_plane_body(axes: Any, mesh: BodyMesh, partition: np.ndarray, family: i
         draw_outline(axes, points, cells, width=2.0)
 
 
-def subdomain_layers(grid: Any, partition: np.ndarray, family: int, explode: float = 0.0) -> list[Layer]:
+def subdomain_layers(
+    grid: pv.UnstructuredGrid, partition: np.ndarray, family: int, explode: float = 0.0
+) -> list[Layer]:
     """Draw the subdomains of a body, neighbours in different colours, and the seams between them.
 
     Args:
-        grid: The body's linear cells, pyvista's UnstructuredGrid.
+        grid: The body's linear cells.
         partition: Subdomain of every cell, (n_cells,).
         family: Preferred family of colours.
         explode: Shrinkage of each subdomain towards its centre.

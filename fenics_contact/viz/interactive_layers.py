@@ -13,7 +13,7 @@ from fenics_contact.contact import State, Status, in_space
 from fenics_contact.scene import ContactPair
 from fenics_contact.viz.colours import GREY, INK, PALE, PRESSURE_MAP, STRESS_MAP
 from fenics_contact.viz.decomposition import subdomain_layers
-from fenics_contact.viz.fields import contact_places, lengths, nodal
+from fenics_contact.viz.fields import Bodies, contact_places, lengths, nodal
 from fenics_contact.viz.stage import Layer, balls
 from fenics_contact.viz.stress import stress_range
 from fenics_contact.viz.symbols import symbols_of
@@ -55,7 +55,7 @@ class Subject:
     """
 
     state: State
-    bodies: Mapping[str, Any]
+    bodies: Bodies
     clim: tuple[float, float] | None
     units: Units
 
@@ -160,7 +160,7 @@ def _glass(subject: Subject) -> list[Layer]:
     return [Layer(body.extract_surface(algorithm=None), look) for body in subject.bodies.values()]
 
 
-def _slave_surface(subject: Subject, pair: ContactPair) -> Any:
+def _slave_surface(subject: Subject, pair: ContactPair) -> pv.UnstructuredGrid:
     """Return the facets of a slave surface with the fields of its body's nodes."""
     facets, body = subject.state.scene.facets(pair.slave), subject.bodies[pair.slave.body]
     kind = {2: pv.CellType.LINE, 3: pv.CellType.TRIANGLE, 4: pv.CellType.QUAD}[facets.shape[1]]

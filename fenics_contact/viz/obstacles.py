@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pyvista as pv
+from matplotlib.axes import Axes
 
 from fenics_contact.scene import RigidObstacle, Scene, Surface
 from fenics_contact.surface_shapes import Cylinder, Plane, Sphere
@@ -31,11 +30,11 @@ def obstacles_of(scene: Scene) -> list[RigidObstacle]:
     return obstacles
 
 
-def shade_obstacles(axes: Any, scene: Scene, frame: Frame) -> None:
+def shade_obstacles(axes: Axes, scene: Scene, frame: Frame) -> None:
     """Shade the inside of a plane scene's obstacles of any shape, where the distance is negative.
 
     Args:
-        axes: matplotlib Axes.
+        axes: Where to.
         scene: A scene in the plane.
         frame: The visible frame.
     """

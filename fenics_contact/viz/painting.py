@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from fenics_contact.contact import State
 from fenics_contact.scene import Scene
 from fenics_contact.viz.colours import INK
-from fenics_contact.viz.fields import cells_of, contact_places, moved, points_of
+from fenics_contact.viz.fields import Bodies, cells_of, contact_places, moved, points_of
 from fenics_contact.viz.obstacles import obstacle_layers, shade_obstacles
 from fenics_contact.viz.paints import Paints
 from fenics_contact.viz.picture import Picture, draw_picture
@@ -42,12 +43,10 @@ class _Part:
     """A part of the picture, and the function that draws it on matplotlib's axes."""
 
     frame: Frame
-    draw: Callable[[Any], None]
+    draw: Callable[[Axes], None]
 
 
-def paint(
-    state: State, bodies: Mapping[str, Any], paints: Paints, path: Path | None, *, sections: bool
-) -> Picture:
+def paint(state: State, bodies: Bodies, paints: Paints, path: Path | None, *, sections: bool) -> Picture:
     """Draw a field on all bodies, with details of the strongest contact in true deformation. Collective.
 
     Args:
@@ -92,7 +91,7 @@ def _draw(parts: Sequence[_Part], paper: BinaryIO, paints: Paints, *, below: boo
         paints.add_bar(figure, panels)
 
 
-def _in_plane(scene: Scene, bodies: Mapping[str, Any], spot: Spot | None, paints: Paints) -> list[_Part]:
+def _in_plane(scene: Scene, bodies: Bodies, spot: Spot | None, paints: Paints) -> list[_Part]:
     """All bodies, and the contact if it is small."""
     everything = moved(bodies, paints.scale)
     frame = frame_around(IN_PLANE, points_of(everything), 0.04)
@@ -106,9 +105,7 @@ def _in_plane(scene: Scene, bodies: Mapping[str, Any], spot: Spot | None, paints
     return parts
 
 
-def _draw_plane(
-    scene: Scene, bodies: Mapping[str, Any], frame: Frame, paints: Paints, title: str, axes: Any
-) -> None:
+def _draw_plane(scene: Scene, bodies: Bodies, frame: Frame, paints: Paints, title: str, axes: Axes) -> None:
     shade_obstacles(axes, scene, frame)
     for body in bodies.values():
         points, cells = np.asarray(body.points)[:, :2], cells_of(body)
@@ -120,7 +117,7 @@ def _draw_plane(
     frame.fit(axes)
 
 
-def _in_space(scene: Scene, bodies: Mapping[str, Any], spot: Spot | None, paints: Paints) -> list[_Part]:
+def _in_space(scene: Scene, bodies: Bodies, spot: Spot | None, paints: Paints) -> list[_Part]:
     """All bodies, and two sections through the contact."""
     everything = moved(bodies, paints.scale)
     points = points_of(everything)
@@ -144,7 +141,7 @@ def _in_space(scene: Scene, bodies: Mapping[str, Any], spot: Spot | None, paints
 def _image(layers: Sequence[Layer], view: View, frame: Frame, paints: Paints, title: str = "") -> _Part:
     image = render(layers, view, frame, round(paints.width * (0.45 if title else WIDE)))
 
-    def draw(axes: Any) -> None:
+    def draw(axes: Axes) -> None:
         show_image(axes, image, frame, title)
         if title:
             scale_bar(axes, frame, paints.units.length)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pyvista as pv
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, Normalize
+from matplotlib.figure import Figure
 
 from fenics_contact.viz.sheet import add_colour_bar
 from fenics_contact.viz.units import Units
@@ -20,8 +23,8 @@ class Paints:
 
     Attributes:
         values: Body name -> values on its nodes or its cells.
-        colours: matplotlib's colour map.
-        norm: matplotlib's norm, from values to colours.
+        colours: Colour map.
+        norm: From values to colours.
         label: Label of the colour bar, with the unit.
         headline: The title.
         scale: Factor of the displacement in the main picture.
@@ -44,8 +47,8 @@ class Paints:
         """Return the values of a body scaled to 0 to 1, the range of the colours."""
         return np.ma.filled(self.norm(self.values[body], clip=False), 0.0)
 
-    def on(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
-        """Return pyvista's data sets of the bodies with the field ``shown``."""
+    def on(self, bodies: Mapping[str, pv.UnstructuredGrid]) -> dict[str, pv.UnstructuredGrid]:
+        """Return the bodies with the field ``shown``."""
         painted = {}
         for name, body in bodies.items():
             painted[name], shown = body.copy(deep=False), self.shown(name)
@@ -53,7 +56,7 @@ class Paints:
             data["shown"] = shown
         return painted
 
-    def add_bar(self, figure: Any, panels: Any) -> None:
+    def add_bar(self, figure: Figure, panels: Iterable[Axes]) -> None:
         """Add a colour bar beside axes; its ends are pointed where values lie beyond."""
         low = min(float(values.min()) for values in self.values.values()) < self.norm.vmin
         high = max(float(values.max()) for values in self.values.values()) > self.norm.vmax

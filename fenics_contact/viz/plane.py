@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.tri import Triangulation
@@ -18,12 +19,12 @@ CLOSEST = 0.009
 
 
 def draw_field(
-    axes: Any, points: np.ndarray, cells: np.ndarray, values: np.ndarray, look: dict[str, Any]
+    axes: Axes, points: np.ndarray, cells: np.ndarray, values: np.ndarray, look: dict[str, Any]
 ) -> None:
     """Colour plane cells by nodal or cell values.
 
     Args:
-        axes: matplotlib Axes.
+        axes: Where to.
         points: Coordinates, (n_nodes, 2).
         cells: Node numbers, (n_cells, 3 | 4).
         values: Shape (n_nodes,) or (n_cells,).
@@ -59,13 +60,13 @@ def refined(points: np.ndarray, cells: np.ndarray, values: np.ndarray) -> tuple[
     return Triangulation(*places.T, triangles), (values[cells] @ shape.T).ravel()
 
 
-def draw_outline(axes: Any, points: np.ndarray, cells: np.ndarray, *, width: float = 1.2) -> None:
+def draw_outline(axes: Axes, points: np.ndarray, cells: np.ndarray, *, width: float = 1.2) -> None:
     """Draw the boundary of a plane body."""
     edges, _ = boundary_faces(cells, 2)
     axes.add_collection(LineCollection(points[edges], colors=INK, linewidths=width, capstyle="round"))
 
 
-def draw_cell_edges(axes: Any, points: np.ndarray, cells: np.ndarray, frame: Frame) -> None:
+def draw_cell_edges(axes: Axes, points: np.ndarray, cells: np.ndarray, frame: Frame) -> None:
     """Draw the edges of cells inside a frame faintly, and fainter the smaller the cells are."""
     corners = points[cells]
     inside = np.all((corners.max(axis=1) > frame.low) & (corners.min(axis=1) < frame.high), axis=1)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
+from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 
 from fenics_contact.contact import State
@@ -99,7 +100,7 @@ def _draw(
         figure.legend(handles, labels, loc="outside lower right", ncols=3, handletextpad=0.2)
 
 
-def draw_pressure(axes: Any, patch: ContactPatch, clim: tuple[float, float]) -> None:
+def draw_pressure(axes: Axes, patch: ContactPatch, clim: tuple[float, float]) -> None:
     """Draw the pressure on projected facets."""
     look = {"cmap": PRESSURE_MAP, "vmin": clim[0], "vmax": clim[1]}
     draw_field(axes, patch.places, patch.facets, patch.pressure, look)

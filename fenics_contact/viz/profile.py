@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+import pyvista as pv
 from scipy.spatial import cKDTree
 
 from fenics_contact.contact import State, body_grid, in_space
@@ -95,7 +95,7 @@ def profiles(first: State, best: State, reach: float | None) -> list[Profile]:
     return outlines
 
 
-def _profile(title: str, faces: Mapping[str, Any], view: View, frame: Frame) -> Profile:
+def _profile(title: str, faces: Mapping[str, pv.DataSet], view: View, frame: Frame) -> Profile:
     """Return the outlines of plane faces, how they move, and the middles of their cells."""
     before, moves, inside = {}, {}, {}
     for name, face in faces.items():

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from fenics_contact.errors import InvalidInputError
@@ -115,7 +116,7 @@ def _draw(
 
 
 def _draw_residuals(
-    axes: Any, steps: tuple[SolverStep, ...], products: np.ndarray, tolerance: float | None
+    axes: Axes, steps: tuple[SolverStep, ...], products: np.ndarray, tolerance: float | None
 ) -> None:
     values = {
         name: np.array([getattr(step.residuals, name) for step in steps], dtype=float) for name in _RESIDUALS
@@ -138,7 +139,7 @@ def _draw_residuals(
     axes.set_ylim(low, high * (high / low) ** 0.16)  # room for the legend
 
 
-def _draw_counts(axes: Any, steps: tuple[SolverStep, ...], products: np.ndarray) -> None:
+def _draw_counts(axes: Axes, steps: tuple[SolverStep, ...], products: np.ndarray) -> None:
     for name, (colour, words, line) in _COUNTS.items():
         counts = [getattr(step, name) for step in steps]
         axes.plot(products, counts, color=colour, lw=1.8, ls=line, label=words, zorder=3)
@@ -154,7 +155,7 @@ def _borders(labels: Sequence[object], products: np.ndarray) -> list[tuple[objec
     return [(labels[k], start, float(products[k])) for k, start in zip(ends, starts, strict=True)]
 
 
-def _stripes(axes: Any, steps: tuple[SolverStep, ...], products: np.ndarray) -> None:
+def _stripes(axes: Axes, steps: tuple[SolverStep, ...], products: np.ndarray) -> None:
     for number, (_, start, end) in enumerate(_borders([step.outer for step in steps], products)):
         if number % 2:
             axes.axvspan(start, end, color=PALE, alpha=0.6, lw=0, zorder=0)
@@ -162,7 +163,7 @@ def _stripes(axes: Any, steps: tuple[SolverStep, ...], products: np.ndarray) -> 
         axes.axvline(start, color=INK, lw=1.0)
 
 
-def _name_stripes(axes: Any, steps: tuple[SolverStep, ...], products: np.ndarray) -> None:
+def _name_stripes(axes: Axes, steps: tuple[SolverStep, ...], products: np.ndarray) -> None:
     """Number the outer steps above the axes and name the methods where they begin, if there are several."""
     places = axes.get_xaxis_transform()
     outer = _borders([step.outer for step in steps], products)

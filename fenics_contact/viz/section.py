@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pyvista as pv
 
 from fenics_contact.contact import ContactResult
 from fenics_contact.viz.colours import INK
+from fenics_contact.viz.fields import Bodies
 from fenics_contact.viz.stage import Layer
 from fenics_contact.viz.view import Frame, View, frame_around, looking_along
 
@@ -94,7 +96,7 @@ def section_frame(view: View, spot: Spot, points: np.ndarray, reach: float | Non
     )
 
 
-def cut(body: Any, view: View, origin: np.ndarray) -> Any:
+def cut(body: pv.DataSet, view: View, origin: np.ndarray) -> pv.PolyData:
     """Cut a body, or its surface, by the plane through a point normal to a view.
 
     Slightly offset: where it runs along faces of cells, both neighbours would be cut or none.
@@ -103,9 +105,7 @@ def cut(body: Any, view: View, origin: np.ndarray) -> Any:
     return body.slice(normal=view.towards, origin=beside)
 
 
-def section_layers(
-    bodies: Mapping[str, Any], view: View, origin: np.ndarray, look: Mapping[str, Any]
-) -> list[Layer]:
+def section_layers(bodies: Bodies, view: View, origin: np.ndarray, look: Mapping[str, Any]) -> list[Layer]:
     """Cut all bodies by a plane through ``origin``, normal to the view, and draw the cut in colours.
 
     Args:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 
@@ -41,7 +43,7 @@ _STYLE = {
 
 
 @contextmanager
-def sheet(paper: BinaryIO, size: tuple[int, int], title: str) -> Iterator[Any]:
+def sheet(paper: BinaryIO, size: tuple[int, int], title: str) -> Iterator[Figure]:
     """Open an empty figure with automatic layout, and save it at the end.
 
     Args:
@@ -50,7 +52,7 @@ def sheet(paper: BinaryIO, size: tuple[int, int], title: str) -> Iterator[Any]:
         title: Title above everything.
 
     Yields:
-        A matplotlib Figure.
+        The figure.
     """
     dpi = size[0] / INCHES
     with mpl.rc_context({**mpl.rcParamsDefault, **_STYLE}):
@@ -64,7 +66,7 @@ def sheet(paper: BinaryIO, size: tuple[int, int], title: str) -> Iterator[Any]:
         figure.savefig(paper, dpi=dpi, format="png")
 
 
-def show_image(axes: Any, image: np.ndarray, frame: Frame, title: str = "") -> None:
+def show_image(axes: Axes, image: np.ndarray, frame: Frame, title: str = "") -> None:
     """Show an image of a frame's content, in the frame's coordinates, without axes."""
     (left, low), (right, high) = frame.low, frame.high
     axes.imshow(image, extent=(left, right, low, high))
@@ -72,12 +74,14 @@ def show_image(axes: Any, image: np.ndarray, frame: Frame, title: str = "") -> N
     axes.set_title(title)
 
 
-def add_colour_bar(figure: Any, panels: Any, key: Any, label: str, extend: str = "neither") -> None:
+def add_colour_bar(
+    figure: Figure, panels: Iterable[Axes], key: ScalarMappable, label: str, extend: str = "neither"
+) -> None:
     """Draw a colour bar to the right of panels without moving them."""
     figure.colorbar(key, ax=panels, label=label, extend=extend, aspect=30, shrink=0.95, panchor=False)
 
 
-def scale_bar(axes: Any, frame: Frame, unit: str) -> None:
+def scale_bar(axes: Axes, frame: Frame, unit: str) -> None:
     """Draw a scale bar of round length in the lower left corner of axes that show a frame."""
     length = nice_number(float(frame.size[0]) / 3)
     words, height = f"{written(length, 1)} {unit}", 0.012 * float(frame.size[1])

@@ -23,15 +23,15 @@ class Layer:
     """A mesh and how to draw it.
 
     Attributes:
-        mesh: pyvista data set.
+        mesh: What to draw.
         options: Keywords of ``pyvista.Plotter.add_mesh``.
     """
 
-    mesh: Any
+    mesh: pv.DataSet
     options: Mapping[str, Any] = field(default_factory=dict)
 
 
-def balls(points: np.ndarray, radius: float) -> Any:
+def balls(points: np.ndarray, radius: float) -> pv.PolyData:
     """Return points (n, 3) as spheres."""
     return pv.PolyData(np.asarray(points)).glyph(geom=pv.Sphere(radius=radius), scale=False, orient=False)
 
@@ -57,7 +57,7 @@ def render(layers: Iterable[Layer], view: View, frame: Frame, width: int) -> np.
 
 
 @contextmanager
-def staged(layers: Iterable[Layer], view: View, frame: Frame, size: tuple[int, int]) -> Iterator[Any]:
+def staged(layers: Iterable[Layer], view: View, frame: Frame, size: tuple[int, int]) -> Iterator[pv.Plotter]:
     """Set up meshes, lamp and camera, and close them at the end.
 
     Args:
@@ -67,7 +67,7 @@ def staged(layers: Iterable[Layer], view: View, frame: Frame, size: tuple[int, i
         size: Width and height in pixels.
 
     Yields:
-        A ``pyvista.Plotter``.
+        The plotter.
 
     Raises:
         MissingRequirementError: If this machine cannot render.
@@ -91,7 +91,7 @@ def staged(layers: Iterable[Layer], view: View, frame: Frame, size: tuple[int, i
             plotter.close()
 
 
-def _aim(plotter: Any, view: View, frame: Frame, middle: np.ndarray) -> None:
+def _aim(plotter: pv.Plotter, view: View, frame: Frame, middle: np.ndarray) -> None:
     target = frame.centre[0] * view.right + frame.centre[1] * view.up + (middle @ view.towards) * view.towards
     camera = plotter.camera
     camera.parallel_projection = True

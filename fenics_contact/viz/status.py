@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 
 from fenics_contact.contact import State
@@ -98,7 +99,7 @@ def _words(patch: ContactPatch, units: Units) -> str:
     return f"{share}, by up to {written(longest, 2)} {units.length}" if longest > 0 else "none slips"
 
 
-def draw_status(axes: Any, patch: ContactPatch, *, counted: bool = True) -> None:
+def draw_status(axes: Axes, patch: ContactPatch, *, counted: bool = True) -> None:
     """Draw projected facets, a symbol on each contact point, and arrows for slip."""
     axes.add_collection(PolyCollection(patch.places[patch.facets], facecolors=PALE, edgecolors="white"))
     places = patch.places[patch.points]

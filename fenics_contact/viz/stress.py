@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.colors import Normalize
@@ -12,7 +10,7 @@ from matplotlib.colors import Normalize
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import STRESS_MAP
-from fenics_contact.viz.fields import drawn_bodies, lengths, nodal, points_of
+from fenics_contact.viz.fields import Bodies, drawn_bodies, lengths, nodal, points_of
 from fenics_contact.viz.obstacles import obstacles_of
 from fenics_contact.viz.painting import paint
 from fenics_contact.viz.paints import Paints
@@ -95,7 +93,7 @@ def plot_stress(
     return paint(state, bodies, paints, target, sections=sections)
 
 
-def stress_range(bodies: Mapping[str, Any]) -> tuple[float, float]:
+def stress_range(bodies: Bodies) -> tuple[float, float]:
     """Return the default range of the colours, from zero to a round number above a high quantile."""
     top = float(np.quantile(np.concatenate([body["von_mises"] for body in bodies.values()]), QUANTILE))
     if top <= 0:
@@ -104,7 +102,7 @@ def stress_range(bodies: Mapping[str, Any]) -> tuple[float, float]:
     return 0.0, float(step * np.ceil(top / step))
 
 
-def chosen_scale(bodies: Mapping[str, Any]) -> float:
+def chosen_scale(bodies: Bodies) -> float:
     """Return the round factor, at least 1, that makes the displacement visible."""
     moved, extent = max(float(lengths(body).max()) for body in bodies.values()), np.ptp(points_of(bodies), 0)
     return max(1.0, nice_number(VISIBLE * float(extent.max()) / moved)) if moved > 0 else 1.0

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from fenics_contact.contact import Status
@@ -56,7 +57,7 @@ def draw_traction(
         figure.legend(handles, labels, loc="outside lower right", ncols=3, handletextpad=0.2)
 
 
-def _draw_friction(axes: Any, trace: ContactTrace, units: Units) -> None:
+def _draw_friction(axes: Axes, trace: ContactTrace, units: Units) -> None:
     places, bound = trace.broken(trace.places), trace.broken(trace.bound)
     axes.fill_between(places, -bound, bound, color=PALE, linewidth=0)
     for side in (-bound, bound):
@@ -74,7 +75,7 @@ def _draw_friction(axes: Any, trace: ContactTrace, units: Units) -> None:
     axes.set_title(f"tangential traction on the slave, slip bound dashed{end}")
 
 
-def _draw_slip(axes: Any, trace: ContactTrace, longest: float) -> None:
+def _draw_slip(axes: Axes, trace: ContactTrace, longest: float) -> None:
     """Draw slip by arrows, at a subset of the points if these are many."""
     low, high = trace.window(None)
     places = trace.places[trace.points]
@@ -86,11 +87,11 @@ def _draw_slip(axes: Any, trace: ContactTrace, longest: float) -> None:
     axes.quiver(places[seen], heights, lengths, 0 * lengths, color=INK, zorder=4, **look)
 
 
-def _curve(axes: Any, trace: ContactTrace, values: np.ndarray, colour: str) -> None:
+def _curve(axes: Axes, trace: ContactTrace, values: np.ndarray, colour: str) -> None:
     axes.plot(trace.broken(trace.places), trace.broken(values), color=colour, lw=1.8, zorder=2.5)
 
 
-def _symbols(axes: Any, trace: ContactTrace, values: np.ndarray) -> None:
+def _symbols(axes: Axes, trace: ContactTrace, values: np.ndarray) -> None:
     low, high = trace.window(None)
     seen = np.count_nonzero((trace.places > low) & (trace.places < high))
     size = float(np.clip(60 / max(seen, 1), 0.12, 0.6))

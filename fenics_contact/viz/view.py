@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)
@@ -60,8 +60,8 @@ class Frame:
         """Return which points, (..., 2), are visible."""
         return np.asarray(np.all((places > self.low) & (places < self.high), axis=-1))
 
-    def fit(self, axes: Any) -> None:
-        """Let matplotlib's axes show the rectangle with equal scales."""
+    def fit(self, axes: Axes) -> None:
+        """Let axes show the rectangle with equal scales."""
         axes.set(aspect="equal", xlim=(self.low[0], self.high[0]), ylim=(self.low[1], self.high[1]))
 
     @property
