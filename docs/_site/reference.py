@@ -37,7 +37,10 @@ OUTSIDE = [
         r"(numpy|np|scipy|sp|mpi4py|MPI|PETSc|petsc4py|dolfinx|ufl|pyvista|matplotlib|npt|rich|typer|pydantic|tomlkit)\b.*",
     ),
     ("py:.*", r"(abc|collections|enum|pathlib|typing)\..*|Path"),
-    ("py:.*", "ArrayLike|Console|Table|FilePath|NDArray|ndarray|dtype|generic|bool_|float64|int64"),
+    (
+        "py:.*",
+        "ArrayLike|Console|Expr|Figure|Table|FilePath|NDArray|ndarray|dtype|generic|bool_|float64|int64",
+    ),
     ("py:.*", "ModuleType"),
 ]
 
@@ -257,7 +260,7 @@ def resolve(
     app: Sphinx, env: BuildEnvironment, node: pending_xref, contnode: nodes.Element
 ) -> nodes.Element | None:
     """Find what a reference means that names a thing where it is defined, or by its bare name."""
-    if node.get("refdomain") != "py":
+    if node.get("refdomain") != "py" or node["reftarget"].startswith("dolfinx."):
         return None
     domain = env.domains.python_domain
     for name in candidates(node["reftarget"]):

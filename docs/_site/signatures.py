@@ -11,7 +11,7 @@ from sphinx.application import Sphinx
 from sphinx.util.inspect import stringify_signature
 
 #: Short names of the package's inside, and what they stand for.
-PLAIN = {"Array": "np.ndarray", "Vector": "np.ndarray", "Marks": "np.ndarray"}
+PLAIN = {"Array": "np.ndarray", "Vector": "np.ndarray", "Marks": "np.ndarray", "_dolfinx": "dolfinx"}
 _PLAIN = re.compile(r"(?<![\w.])(" + "|".join(PLAIN) + r")\b")
 
 
