@@ -21,7 +21,7 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demos notebooks test test-slow test-hard test-claims mutants docs benchmark studies study-optimisation study-optimisers study-surfaces lint setup
+.PHONY: help demo demos notebooks test test-slow test-hard test-claims mutants docs benchmark studies study-constants study-optimisation study-optimisers study-surfaces lint setup
 
 help: ## Show this list
 	@echo "Targets:"
@@ -64,6 +64,9 @@ mutants: $(prepare) ## Make mistakes in a copy of the package, which the quick t
 docs: $(prepare) ## Build the documentation; output/docs/index.html
 	$(launch) 1 $(python) -m sphinx -W --keep-going -q -c docs -d output/docs-doctrees . output/docs
 	@echo "Open output/docs/index.html in a browser"
+
+study-constants: $(prepare) ## Halve and double every constant of the library; docs/studies/
+	$(python) -m benchmarks constants $(if $(filter quick,$(BENCH)),--quick)
 
 study-optimisation: $(prepare) ## Measure what state tolerances do to an optimisation; docs/studies/
 	$(python) -m benchmarks optimisation_tolerance $(if $(filter quick,$(BENCH)),--quick)

@@ -20,6 +20,7 @@ from fenics_contact.study.runner import Store, fingerprint, measure_all
 #: Study -> module that defines it as ``study``.
 STUDIES = {
     "speed": "benchmarks.speed",
+    "constants": "benchmarks.constants.report",
     "effects": "benchmarks.effects",
     "optimisation_tolerance": "benchmarks.optimisation_tolerance.report",
     "optimisers": "benchmarks.optimisers.report",

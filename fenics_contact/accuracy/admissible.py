@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.accuracy.nearest import evening, nearest
+from fenics_contact.linalg import ROUNDING
 from fenics_contact.qp import (
     CoarseSpace,
     ContactLayout,
@@ -22,8 +23,6 @@ from fenics_contact.qp import (
     global_max,
 )
 
-#: Imbalance below this fraction of all forces is rounding.
-ROUNDING = 1e-13
 #: Imbalance above this fraction of all forces, at which duality gives no bound.
 UNBALANCED = 1e-9
 #: Rounds of alternating projections on the cone and on equilibrium.

@@ -7,14 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.accuracy.admissible import UNBALANCED, Admissible, admissible
-from fenics_contact.accuracy.lifted import ROUNDING, Lifted, lift
+from fenics_contact.accuracy.lifted import UNLIFTED, Lifted, lift
 from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem
+from fenics_contact.linalg import LAST_PLACES, ROUNDING
 from fenics_contact.qp import DualProblem, DualSolution, Vector, global_max, global_sum
-
-#: A relative change of the multiplier below this counts as none.
-UNMOVED = 1e-14
-#: Friction within this relative distance of its bound counts as on it.
-ON_CIRCLE = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +72,7 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
     follows = system.torn.friction_coefficient[system.owned_discs()] > 0.0
     known = admissible(problem, solution.slip_bound, follows, solution.multiplier, residual)
     change = known.multiplier - solution.multiplier
-    if problem.norm(change) > UNMOVED * problem.norm(solution.multiplier):
+    if problem.norm(change) > LAST_PLACES * problem.norm(solution.multiplier):
         product = system.apply(change)
         moved = float(np.sqrt(max(problem.dot(change, product), 0.0)))
         residual = known.statuses.settled(residual + product)
@@ -85,7 +81,7 @@ def certify(system: DualSystem, solution: DualSolution) -> Certificate:
     gap = 0.5 * lifted.energy + rest
     radius = 0.5 * float(np.sqrt(lifted.energy + 4.0 * rest))
     bound = max(_distances(system, solution, lifted)) + radius + moved
-    if lifted.left > ROUNDING or known.unbalanced > UNBALANCED:
+    if lifted.left > UNLIFTED or known.unbalanced > UNBALANCED:
         bound = np.inf
     return Certificate(bound, moved, gap, known, change + lifted.multiplier)
 
@@ -122,7 +118,7 @@ def _rubbed(problem: DualProblem, known: Admissible, residual: Vector) -> float:
     tau, slid = known.multiplier[problem.layout.tangential], -residual[problem.layout.tangential]
     force, way = np.linalg.norm(tau, axis=1), np.linalg.norm(slid, axis=1)
     short = known.slip_bound - force
-    short[short <= ON_CIRCLE * known.slip_bound] = 0.0
+    short[short <= ROUNDING * known.slip_bound] = 0.0
     turned = slid / np.where(way > 0.0, way, 1.0)[:, None] - tau / np.where(force > 0.0, force, 1.0)[:, None]
     lost = way * (short + 0.5 * force * np.einsum("ia,ia->i", turned, turned))
     return float(global_sum(problem.comm, lost.sum())[0])

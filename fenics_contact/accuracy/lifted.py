@@ -10,12 +10,13 @@ import scipy.sparse as sp
 
 from fenics_contact.accuracy.admissible import Admissible, basis
 from fenics_contact.feti import DualSystem
+from fenics_contact.linalg import LAST_PLACES
 from fenics_contact.qp import Marks, Vector, contact_step, global_max, global_sum
 
 #: Number of corrections for the regularisation of the contact block.
 REFINEMENTS = 12
-#: Rounding relative to the initial violation, and to the displacements that cancel in the rows.
-ROUNDING, CANCELLED = 1e-9, 1e-14
+#: Largest remaining violation relative to the initial one.
+UNLIFTED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +60,7 @@ def lift(system: DualSystem, known: Admissible, residual: Vector, cancelled: flo
     across = statuses.slip & (step * slid < known.slip_bound)
     rows = _Rows(system, known, statuses.closed, statuses.stick, across)
     closing = _close(rows, residual, cancelled)
-    if closing.left > ROUNDING:  # a node of two pairs may be set to stick where it should close
+    if closing.left > UNLIFTED:  # a node of two pairs may be set to stick where it should close
         nothing = np.zeros_like(across)
         closing = _close(replace(rows, stick=nothing, across=nothing), residual, cancelled)
     energy, force = system.inverse.energy(closing.displacement)
@@ -84,7 +85,7 @@ def _close(rows: _Rows, residual: Vector, cancelled: float) -> _Closing:
     system = rows.system
     comm, w = system.problem.comm, np.zeros(len(system.inverse.interface))
     start = global_max(comm, np.abs(rows.wanted(residual)).max(initial=0.0))
-    small = max(ROUNDING * start, CANCELLED * cancelled)
+    small = max(UNLIFTED * start, LAST_PLACES * cancelled)
     lifting, current, violation = system.preconditioner.lifting(rows.restriction), residual, start
     for _ in range(REFINEMENTS):
         w += lifting.jump(rows.spread(rows.wanted(current)))

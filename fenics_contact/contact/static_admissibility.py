@@ -9,7 +9,8 @@ import scipy.sparse as sp
 
 from fenics_contact.contact.unheld import motion_in_words
 from fenics_contact.errors import ConvergenceError, InfeasibleError, together
-from fenics_contact.feti import LOAD_ROUNDING, TornSystem, common_kernel
+from fenics_contact.feti import TornSystem, common_kernel
+from fenics_contact.linalg import ROUNDING
 from fenics_contact.pairing import ContactPoints
 from fenics_contact.scene import RANK_TOLERANCE, Body, resisted_motions, rigid_body_modes
 
@@ -42,7 +43,7 @@ def check_held(torn: TornSystem) -> None:
     with together(comm):
         bodies = [_RigidBody(torn, index) for index in range(len(torn.scene.bodies))]
     loads = comm.allreduce(np.array([body.load_wrench(torn) for body in bodies]))
-    loads[np.abs(loads) <= LOAD_ROUNDING * comm.allreduce(np.abs(torn.load).sum())] = 0.0
+    loads[np.abs(loads) <= ROUNDING * comm.allreduce(np.abs(torn.load).sum())] = 0.0
     with together(comm):
         floating = [index for index, body in enumerate(bodies) if not body.held]
         if comm.rank == 0 and floating:

@@ -2,7 +2,7 @@
 
 from fenics_contact.feti.decomposition import Decomposition, decompose
 from fenics_contact.feti.direct import DirectSolution, DirectSystem
-from fenics_contact.feti.dual import LOAD_ROUNDING, DualSystem
+from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.inverse import LocalKind
 from fenics_contact.feti.nodal_mean import nodal_mean, nodal_mean_at
 from fenics_contact.feti.same_input import check_same_input
@@ -11,7 +11,6 @@ from fenics_contact.feti.subdomain import Subdomain, common_kernel
 from fenics_contact.feti.torn import TornSystem, build_torn_system
 
 __all__ = [
-    "LOAD_ROUNDING",
     "Decomposition",
     "DirectSolution",
     "DirectSystem",

@@ -15,16 +15,12 @@ from fenics_contact.feti.dirichlet import DirichletPreconditioner
 from fenics_contact.feti.inverse import LocalKind, TornInverse, kernel_matrix
 from fenics_contact.feti.kernel_basis import whole_motions
 from fenics_contact.feti.torn import TornSystem
-from fenics_contact.linalg import sweep
+from fenics_contact.linalg import ROUNDING, sweep
 from fenics_contact.qp import EVEN, CoarseSpace, ContactLayout, DualProblem, Scaling
 from fenics_contact.timing import PhaseTimer
 
 #: Substitute flexibility of rows that have none, relative to the mean of all contact rows.
 STIFF = 1e-6
-#: Entries of G below this fraction of the largest are rounding: a body's motion has no jump in gluing rows.
-UNFELT = 1e-13
-#: A resultant below this fraction of the loads' sum is rounding: the loads balance each other.
-LOAD_ROUNDING = 1e-13
 #: Work of the loads on an unresisted motion, relative to their sum, above which it is not rounding.
 UNBALANCED = 1e-8
 
@@ -242,7 +238,7 @@ class DualSystem:
         order = scipy.linalg.qr(unfelt.T, mode="r", pivoting=True)[-1] if k else np.arange(coarse.m)
         # Each in terms of its own mode: then motions of bodies that are not connected share no entries.
         unfelt = unfelt @ np.linalg.inv(unfelt[order[:k]])
-        unfelt[np.abs(unfelt) <= UNFELT * np.abs(unfelt).max(initial=0.0)] = 0.0
+        unfelt[np.abs(unfelt) <= ROUNDING * np.abs(unfelt).max(initial=0.0)] = 0.0
         self.unheld = (self.kernel @ sp.csr_matrix(unfelt)).tocsr()
         if k == 0:
             return coarse
@@ -266,13 +262,13 @@ class DualSystem:
     def _resultants(self, comm: MPI.Comm) -> np.ndarray:
         """Return e = Rᵀ f, replicated; rounding of balanced loads is set to zero."""
         resultants = np.asarray(comm.allreduce(self.kernel.T @ self.torn.load))
-        resultants[np.abs(resultants) <= LOAD_ROUNDING * comm.allreduce(np.abs(self.torn.load).sum())] = 0.0
+        resultants[np.abs(resultants) <= ROUNDING * comm.allreduce(np.abs(self.torn.load).sum())] = 0.0
         return resultants
 
     def _coarse_columns(self) -> sp.csr_matrix:
         """Return this rank's owned columns of G = Rᵀ Bᵀ, shape (n_modes, n_owned)."""
         columns = self.torn.numbering.sum_rows(self._B @ self.kernel).T.tocsr()
-        columns.data[np.abs(columns.data) <= UNFELT * np.abs(columns.data).max(initial=0.0)] = 0.0
+        columns.data[np.abs(columns.data) <= ROUNDING * np.abs(columns.data).max(initial=0.0)] = 0.0
         columns.eliminate_zeros()
         return columns
 

@@ -27,7 +27,7 @@ from fenics_contact.mesh.plane import flattened, turned_counter_clockwise, turne
 from fenics_contact.mesh.quadratic import quadratic
 from fenics_contact.mesh.quadratic_nodes import in_vtk_order
 from fenics_contact.mesh.quality import cell_volumes, determinants
-from fenics_contact.mesh.rounding import coordinate_rounding
+from fenics_contact.mesh.rounding import computed_rounding, coordinate_rounding
 from fenics_contact.mesh.shape_functions import quadrature, shape_gradients, shape_values
 
 __all__ = [
@@ -41,6 +41,7 @@ __all__ = [
     "cell_faces",
     "cell_type_of",
     "cell_volumes",
+    "computed_rounding",
     "coordinate_rounding",
     "corners_of",
     "determinants",

@@ -8,13 +8,10 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh.rounding import coordinate_rounding
-
-TOLERANCE = 1e-10
-"""Nodes coincide if their distance is below this fraction of the bounding box's diagonal, plus rounding."""
+from fenics_contact.mesh.rounding import NOTHING, coordinate_rounding
 
 
-def coincident_pairs(points: np.ndarray, tolerance: float = TOLERANCE) -> np.ndarray:
+def coincident_pairs(points: np.ndarray, tolerance: float = NOTHING) -> np.ndarray:
     """Return the pairs of nodes that coincide.
 
     Args:
@@ -53,7 +50,7 @@ def check_no_coincident_nodes(points: np.ndarray) -> None:
 
 
 def merge_duplicate_nodes(
-    points: np.ndarray, cells: np.ndarray, tolerance: float = TOLERANCE
+    points: np.ndarray, cells: np.ndarray, tolerance: float = NOTHING
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Merge coincident nodes, also through chains of others. The two sides of a crack are merged.
 

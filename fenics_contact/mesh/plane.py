@@ -8,10 +8,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.cell_types import cell_type_of
 from fenics_contact.mesh.faces import cell_faces, corners_of, number_faces, start_at_smallest
 from fenics_contact.mesh.quality import jacobians
-from fenics_contact.mesh.rounding import coordinate_rounding
-
-FLAT = 1e-10
-"""A mesh is plane if its z coordinates differ by less than this fraction of its size, plus rounding."""
+from fenics_contact.mesh.rounding import NOTHING, coordinate_rounding
 
 _MIRRORED = {
     "triangle": [0, 2, 1],
@@ -46,7 +43,7 @@ def flattened(points: np.ndarray, used: np.ndarray, source: str) -> np.ndarray:
     if points.shape[1] == 2:
         return points
     extent = np.ptp(points[used], axis=0)
-    if extent[2] > FLAT * np.linalg.norm(extent) + coordinate_rounding(points[used]):
+    if extent[2] > NOTHING * np.linalg.norm(extent) + coordinate_rounding(points[used]):
         raise InvalidInputError(
             f"plane cells must lie in a plane of constant z, those of {source} reach over {extent[2]:.6g} in "
             "z: put a plane body into the x-y plane; of a solid save the volume cells too (gmsh -3)"

@@ -7,6 +7,12 @@ import numpy as np
 LAST_BITS = 8.0
 """A rotated and shifted coordinate is off by a few units in the last place; a difference by twice as many."""
 
+OPERATIONS = 8.0
+"""So many roundings of coordinates a few operations on them add up to."""
+
+NOTHING = 1e-10
+"""Lengths below this fraction of a body's size, plus the rounding of its coordinates, are none."""
+
 
 def coordinate_rounding(points: np.ndarray) -> float:
     """Return the largest distance of nodes that are meant to coincide, [length].
@@ -15,3 +21,12 @@ def coordinate_rounding(points: np.ndarray) -> float:
         points: Coordinates, (n_nodes, 3 | 2).
     """
     return float(LAST_BITS * np.finfo(np.float64).eps * np.abs(points).max(initial=0.0))
+
+
+def computed_rounding(points: np.ndarray) -> float:
+    """Return how far off a length may be that a few operations make of coordinates, [length].
+
+    Args:
+        points: Coordinates, (n_nodes, 3 | 2).
+    """
+    return OPERATIONS * coordinate_rounding(points)

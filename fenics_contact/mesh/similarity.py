@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.mesh.rounding import coordinate_rounding
-
-#: Largest deviation from a similarity in roundings of the coordinates, due to the operations in between.
-ROUNDINGS = 8.0
+from fenics_contact.mesh.rounding import computed_rounding
 
 
 def similarity(points: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, float] | None:
@@ -36,8 +33,6 @@ def similarity(points: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.nd
     rotation = np.where(np.abs(rotation - np.round(rotation)) < 1e-14, np.round(rotation), rotation)
     shift = there - scale * rotation @ centre
     off = np.abs(scale * points @ rotation.T + shift - moved).max()
-    if not (
-        scale > 0 and off <= ROUNDINGS * (coordinate_rounding(moved) + scale * coordinate_rounding(points))
-    ):
+    if not (scale > 0 and off <= computed_rounding(moved) + scale * computed_rounding(points)):
         return None
     return rotation, shift, scale

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import InvalidInputError, tell, together
 from fenics_contact.fingerprint import described, require_alike
-from fenics_contact.mesh import coordinate_rounding
+from fenics_contact.mesh import computed_rounding, coordinate_rounding
 from fenics_contact.pairing.contact_points import (
     ContactPoints,
     in_free_frames,
@@ -25,9 +25,6 @@ from fenics_contact.pairing.surface_doubts import warn_of_surface
 from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie, master_share, surface_of
 from fenics_contact.surface_shapes import asked
 from fenics_contact.surfaces import FacetedSurface, Geometry, Projection, join, project, shape_functions
-
-#: Gaps below this many roundings of the coordinates count as zero, as a few operations lie in between.
-ROUNDING = 8
 
 _LOG = logging.getLogger(__name__)
 
@@ -66,7 +63,7 @@ def without_rounding(gap: np.ndarray, points: np.ndarray) -> np.ndarray:
         gap: Gaps, shape (n,), [length].
         points: Coordinates of one of the surfaces, shape (m, dim), [length].
     """
-    return np.where(np.abs(gap) <= ROUNDING * coordinate_rounding(points), 0.0, gap)
+    return np.where(np.abs(gap) <= computed_rounding(points), 0.0, gap)
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.linalg import ROUNDING
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.reductions import Vector
-
-BOUNDARY_TOLERANCE = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +123,7 @@ class FeasibleSet:
 
     def _on_circle(self, x: Vector) -> npt.NDArray[np.bool_]:
         length = np.linalg.norm(x[self.layout.tangential], axis=1)
-        return length >= self.slip_bound * (1.0 - BOUNDARY_TOLERANCE)
+        return length >= self.slip_bound * (1.0 - ROUNDING)
 
 
 def _unit(vectors: Vector) -> Vector:

@@ -8,10 +8,10 @@ from enum import Enum
 import numpy as np
 
 from fenics_contact._libraries import MPI
+from fenics_contact.linalg import LAST_PLACES
 from fenics_contact.qp.face_system import CoupledSystem, FaceSystem
 from fenics_contact.qp.reductions import Vector, global_sum
 
-CURVATURE_TOLERANCE = 1e-14
 DIVERGENCE_FACTOR = 1e6
 
 
@@ -156,7 +156,7 @@ def _image(
     projected = image - system.coarse.transpose(system.coarse.solve(sums[:m]))
     slope, curvature = float(sums[m]), float(sums[m + 1])
     lengths = np.sqrt(sums[m + 2 :])
-    return projected, slope, curvature, CURVATURE_TOLERANCE * float(lengths[0] * lengths[1])
+    return projected, slope, curvature, LAST_PLACES * float(lengths[0] * lengths[1])
 
 
 #: A recomputed residual above this many tolerances means that the recursion has lost accuracy.

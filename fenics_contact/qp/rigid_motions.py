@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact.linalg import LAST_PLACES, ROUNDING
 from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.feasible import FeasibleSet
 from fenics_contact.qp.problem import DualProblem
@@ -14,16 +15,12 @@ from fenics_contact.qp.reductions import Vector, global_max, global_sum
 
 #: Imbalance relative to the sum of all forces at which bodies count as in equilibrium.
 BALANCED = 1e-11
-#: Imbalance relative to the multipliers of the whole problem that counts as rounding.
-ROUNDING = 1e-14
-#: As the first, where the bounds of friction were updated as often as allowed.
+#: The same, where the bounds of friction were updated as often as allowed.
 NEARLY = 1e-6
 #: Steps of Newton's method, coupled or with frozen bounds, and updates of frozen bounds.
 COUPLED_STEPS, FROZEN_STEPS, REFRESHES = 30, 60, 30
 #: Motions that contact resists less than this, relative to the others, are left unchanged.
 UNRESISTED = 1e-10
-#: Entry of a row for a motion of length one, relative to the row's norm, that counts as rounding.
-UNFELT = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +58,7 @@ class RigidMotionCorrection:
         rows = np.asarray(problem.coarse.matrix.T @ motions)
         # Rows that are rounding would let forces of rounding size move a body arbitrarily far.
         felt = np.sqrt(problem.coarse.matrix.power(2).sum(axis=0)).reshape(-1, 1)
-        rows[np.abs(rows) <= UNFELT * np.asarray(felt)] = 0.0
+        rows[np.abs(rows) <= ROUNDING * np.asarray(felt)] = 0.0
         return cls(problem, motions, rows)
 
     def __call__(self, multiplier: Vector, residual: Vector, step: Vector) -> Vector:
@@ -174,7 +171,7 @@ class _Springs:
         others.
         """
         largest = global_max(self.problem.comm, float(np.abs(self.rows).max(initial=0.0)))
-        return max(BALANCED * self._scale(balance), ROUNDING * largest * self.forces)
+        return max(BALANCED * self._scale(balance), LAST_PLACES * largest * self.forces)
 
     def _scale(self, balance: _Balance) -> float:
         """Return the norm of all forces. Collective."""

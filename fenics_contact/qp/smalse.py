@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fenics_contact.errors import ConvergenceError, InvalidInputError
+from fenics_contact.linalg import ROUNDING
 from fenics_contact.qp.augmented import AugmentedLagrangian
 from fenics_contact.qp.iterate import Start, certify, count_status
 from fenics_contact.qp.mpgp import Mpgp, minimise
@@ -15,9 +16,6 @@ from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector
 from fenics_contact.qp.slip_law import TrescaLaw
 from fenics_contact.qp.solution import DualSolution, Residuals, SmalseMemory, SolverStep, measure
-
-#: A deficit in the increase of the Lagrangian below this fraction of it is not significant for M.
-ROUNDING = 1e-13
 
 
 @dataclass(frozen=True)

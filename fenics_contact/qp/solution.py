@@ -6,13 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fenics_contact.linalg import LAST_PLACES
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import Vector, global_max, global_sum
 
 FORCE_FLOOR = 1e-10
-#: Errors of contact forces below this fraction of the largest force are rounding, and count as zero.
-ROUNDING = 1e-14  # also for jumps relative to those that the loads alone would cause
 
 
 @dataclass(frozen=True)
@@ -115,15 +114,16 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
         force_scale = max(force, force_mapped)
     force_scale = max(force_scale, FORCE_FLOOR * max(everything, closing))
     gluing_scale = max(cancelled, load) or rhs
-    rounding = ROUNDING * max(everything, closing)
+    # Errors below the last places of all forces, and jumps of what the loads alone would open, are none.
+    rounding = LAST_PLACES * max(everything, closing)
     distance = np.hypot(
         distance if distance > rounding else 0.0,
-        distance_held if distance_held > max(rounding, ROUNDING * closing_held) else 0.0,
+        distance_held if distance_held > max(rounding, LAST_PLACES * closing_held) else 0.0,
     )
     violation = global_max(problem.comm, feasible.violation(multiplier))
     return Residuals(
         natural=_ratio(distance, force_scale),
-        gluing=_ratio(jump if jump > ROUNDING * load else 0.0, gluing_scale),
+        gluing=_ratio(jump if jump > LAST_PLACES * load else 0.0, gluing_scale),
         coarse=_ratio(unbalanced, max(everything, problem.coarse.norm(problem.coarse.load))),
         violation=_ratio(violation if violation > rounding else 0.0, force_scale),
         force_scale=force_scale,

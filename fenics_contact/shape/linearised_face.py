@@ -9,14 +9,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.contact import State
+from fenics_contact.linalg import ROUNDING
 from fenics_contact.qp import ContactLayout, DualProblem, DualSolution, Face, classify, contact_step
 from fenics_contact.scene import Surface
 from fenics_contact.surfaces import edge_distance
 
 #: A contact point is weakly active if it is closer to a switch of the contact law than this many residuals.
 UNCERTAINTY = 3.0
-#: Relative rounding error of the forces, and of those that would close the gaps.
-ROUNDING = 1e-13
 #: Weak points further from the switch than this fraction of the forces are assigned to the closer side.
 LEANING = 1e-5
 #: A projection within this distance of a facet's edge, in local coordinates, counts as on the edge.

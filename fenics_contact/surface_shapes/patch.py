@@ -8,13 +8,12 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
+from fenics_contact.surface_shapes.closest import ROUNDING
 from fenics_contact.surface_shapes.foot import Feet
 
 #: Largest number of steps to a closest point, and size of the last one relative to the range of the
 #: parameters.
 STEPS, LAST = 60, 1e-10
-#: Relative rounding of distances.
-ROUNDING = 16 * float(np.finfo(float).eps)
 #: A closest point is held at the border if its parameter would leave the range by more than this fraction.
 HELD = 1e-8
 

@@ -10,7 +10,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh import BodyMesh, coordinate_rounding
+from fenics_contact.mesh import BodyMesh, computed_rounding
 from fenics_contact.surface_shapes import Joined, SurfaceShape, asked
 from fenics_contact.surfaces.facet_areas import nodal_areas
 from fenics_contact.surfaces.facets import FacetedSurface, Relief, facet_shape_values, faceted_surface
@@ -90,7 +90,7 @@ def _is_flat(surface: FacetedSurface) -> bool:
     relief = surface.relief
     assert relief is not None
     edges = np.linalg.norm(edges_at_corners(surface.points[surface.facets]), axis=3)
-    limit = FLAT * edges.min() + 8.0 * coordinate_rounding(surface.points)
+    limit = FLAT * edges.min() + computed_rounding(surface.points)
     bends = np.abs(slopes(surface, np.arange(len(surface.facets)))).max(), np.abs(relief.rest).max()
     return bool(max(bends) <= limit and np.abs(relief.normals).max() <= limit / edges.min())
 

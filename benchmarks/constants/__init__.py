@@ -1,0 +1,1 @@
+"""What each numeric constant of the library does to its answers."""
