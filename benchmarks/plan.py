@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from benchmarks.cases.scene_data import PAPER_BOXES, PAPER_CELLS
+from benchmarks.cases.scene_data import PAPER_CELLS
 from benchmarks.held import HELD
 from fenics_contact.study.runner import Job
 
@@ -30,8 +30,8 @@ def run(name: str, case: str, settings: dict[str, Any] | None = None, ranks: int
 
 
 def _refined(k: int) -> dict[str, Any]:
-    """Return the chain with k times the cells and boxes in each direction."""
-    return {"cells": [k * n for n in PAPER_CELLS], "boxes": [k * n for n in PAPER_BOXES]}
+    """Return the chain with k times the cells in each direction, cut as it is by default."""
+    return {"cells": [k * n for n in PAPER_CELLS], "default_partition": True}
 
 
 def chain_runs() -> list[Job]:

@@ -15,6 +15,11 @@ from benchmarks.report import chain_sizes
 from benchmarks.targets import Summaries, newton_names, unknowns
 from fenics_contact.study.figures.phases import draw_stacked
 
+#: Where seconds stand beside a marker, so that those of lines close to each other do not meet.
+ABOVE = {"xytext": (0, 8), "ha": "center"}
+BESIDE = {"xytext": (10, 0), "va": "center"}
+BELOW = {"xytext": (0, -8), "ha": "center", "va": "top"}
+
 
 def plot_results(path: Path, summaries: Summaries) -> None:
     """Write the picture as PNG."""
@@ -32,7 +37,7 @@ def _plot_phases(axes: Any, summaries: Summaries) -> None:
     draw_stacked(axes, bars, labels, " µs")
     axes.set_xlim(-0.6, len(runs) + 0.5)
     axes.set_xlabel("torn unknowns of the chain")
-    axes.set_ylabel("wall time an unknown [µs]")
+    axes.set_ylabel("wall time per unknown [µs]")
     axes.set_title("Chain with friction, gmsh to state, 2 ranks")
     handles, names = axes.get_legend_handles_labels()
     axes.legend(handles[::-1], names[::-1], frameon=False, loc="center right", fontsize="small")
@@ -41,13 +46,13 @@ def _plot_phases(axes: Any, summaries: Summaries) -> None:
 
 def _plot_blocks(axes: Any, summaries: Summaries) -> None:
     series = {
-        "GetFEM, its contact brick": (["getfem-{}"], "s", "#b279a2"),
-        "monolithic Newton + MUMPS": (newton_names("{}"), "^", "#4c78a8"),
-        "one linear solve by CG + GAMG": (["gamg-{}"], "v", "#54a24b"),
-        "one linear solve by MUMPS's Cholesky": (["cholesky-{}"], "D", "#bab0ac"),
-        "fenics_contact": (["block-{}"], "o", "#f58518"),
+        "GetFEM, its contact brick": (["getfem-{}"], "s", "#b279a2", ABOVE),
+        "monolithic Newton + MUMPS": (newton_names("{}"), "^", "#4c78a8", ABOVE),
+        "one linear solve by CG + GAMG": (["gamg-{}"], "v", "#54a24b", BELOW),
+        "one linear solve by MUMPS's Cholesky": (["cholesky-{}"], "D", "#bab0ac", ABOVE),
+        "fenics_contact": (["block-{}"], "o", "#f58518", BESIDE),
     }
-    for label, (names, marker, colour) in series.items():
+    for label, (names, marker, colour, place) in series.items():
         points = []
         for size in BLOCKS:
             runs = [summaries.get(name.format(size), {}) for name in names]
@@ -58,7 +63,7 @@ def _plot_blocks(axes: Any, summaries: Summaries) -> None:
             axes.loglog(x, y, marker=marker, color=colour, label=label, linewidth=2, markersize=7)
             for n, s in zip(x, y, strict=True):
                 text = f"{s:.1f} s" if s < 10 else f"{s:.0f} s"
-                axes.annotate(text, (n, s), (0, 8), textcoords="offset points", ha="center", fontsize="small")
+                axes.annotate(text, (n, s), textcoords="offset points", fontsize="small", **place)
     sizes = [unknowns(summaries[f"block-{s}"]) for s in BLOCKS if f"block-{s}" in summaries]
     axes.set_xticks(sizes, [f"{size / 1e3:.0f} k" for size in sizes])
     axes.minorticks_off()

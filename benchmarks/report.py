@@ -43,7 +43,7 @@ def page(summaries: Summaries) -> str:
         phases_table(summaries),
         "## The block beside other solvers",
         blocks_table(summaries),
-        "![Seconds an unknown by phase, and the block beside other solvers](results.png)",
+        "![Seconds per unknown by phase, and the block beside other solvers](results.png)",
     ]
     return "\n\n".join(section for section in sections if section) + "\n"
 
@@ -97,7 +97,7 @@ def chain_sizes(summaries: Summaries) -> dict[str, Record]:
 
 
 def phases_table(summaries: Summaries) -> str:
-    """Return microseconds an unknown by phase for each size of the chain, and seconds on one rank."""
+    """Return microseconds per unknown by phase for each size of the chain, and seconds on one rank."""
     runs = {**{n: summaries[n] for n in ("chain-1-rank",) if n in summaries}, **chain_sizes(summaries)}
     if not runs:
         return "Not measured."
@@ -109,7 +109,7 @@ def phases_table(summaries: Summaries) -> str:
         (phase, *(f"{s:.2f} s, {1e6 * s / n:.1f} µs" for s, n in zip(seconds, sizes, strict=True)))
         for phase, seconds in spent.items()
     ]
-    return table(("phase: seconds, microseconds an unknown", *runs), body)
+    return table(("phase: seconds, microseconds per unknown", *runs), body)
 
 
 def blocks_table(summaries: Summaries) -> str:

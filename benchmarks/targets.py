@@ -190,11 +190,11 @@ ROWS = (
         "lower", _ratio("chain-default", "chain", _seconds), "chain-default",
     ),
     Row(
-        "growth", "seconds an unknown, chain refined three times / not refined", "ratio", 1.5, "lower",
+        "growth", "seconds per unknown, chain refined three times / not refined", "ratio", 1.5, "lower",
         _ratio("chain-refined-3", "chain", lambda run: run["seconds"] / unknowns(run)), "chain-refined-3",
     ),
     Row(
-        "memory", "peak memory an unknown, chain refined three times", "kB", 6, "lower",
+        "memory", "peak memory per unknown, chain refined three times", "kB", 6, "lower",
         lambda s: s["chain-refined-3"]["peak_memory"] / 1000 / unknowns(s["chain-refined-3"]),
         "chain-refined-3",
     ),

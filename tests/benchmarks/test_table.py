@@ -13,7 +13,7 @@ from benchmarks.held import HELD
 from benchmarks.plan import OPTIONAL, runs
 from benchmarks.plot import plot_results
 from benchmarks.report import broken, results, work
-from benchmarks.speed import write_results
+from benchmarks.speed import summaries_of, write_results
 from benchmarks.targets import ROWS
 from fenics_contact.errors import InvalidInputError
 from tests.benchmarks.small_records import all_summaries, record
@@ -181,3 +181,10 @@ def test_the_picture_is_drawn_from_all_runs_and_from_few(tmp_path: Path, names: 
     every = all_summaries()
     plot_results(tmp_path / "results.png", every if names is None else {n: every[n] for n in names})
     assert (tmp_path / "results.png").stat().st_size > 10_000
+
+
+def test_iterations_of_petsc_s_multigrid_are_the_middle_ones() -> None:
+    found = [record(counts={"unknowns": 9, "iterations": count}) for count in (12, 10, 11)]
+    assert summaries_of({"gamg-28k": found})["gamg-28k"]["counts"]["iterations"] == 11
+    with pytest.raises(ValueError, match="counts of cholesky-28k must be equal in all repetitions"):
+        summaries_of({"cholesky-28k": found})
