@@ -91,14 +91,15 @@ def _run_line(name: str, run: Record) -> tuple[str, ...]:
 
 
 def chain_sizes(summaries: Summaries) -> dict[str, Record]:
-    """Return the runs of the chain by size that were measured."""
-    names = ("chain", "chain-refined-2", "chain-refined-3")
+    """Return the runs of the chain by size that were measured, all cut as they are by default."""
+    names = ("chain-default", "chain-refined-2", "chain-refined-3")
     return {name: summaries[name] for name in names if name in summaries}
 
 
 def phases_table(summaries: Summaries) -> str:
-    """Return microseconds per unknown by phase for each size of the chain, and seconds on one rank."""
-    runs = {**{n: summaries[n] for n in ("chain-1-rank",) if n in summaries}, **chain_sizes(summaries)}
+    """Return seconds by phase for the chain in boxes on one and two ranks, and for each size of it."""
+    boxes = {name: summaries[name] for name in ("chain-1-rank", "chain") if name in summaries}
+    runs = {**boxes, **chain_sizes(summaries)}
     if not runs:
         return "Not measured."
     phases = list(next(iter(runs.values()))["phases"])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from benchmarks.plan import WARM_UP, runs
 from benchmarks.plot import plot_results
-from benchmarks.report import broken, page, results
+from benchmarks.report import broken, page, results, work
 from benchmarks.study import ROOT, Records, Study
 from benchmarks.targets import Summaries
 from fenics_contact.io import json_text
@@ -28,9 +28,8 @@ def summaries_of(records: Records) -> Summaries:
 
 
 def _with_middle_counts(records: Sequence[Record]) -> list[Record]:
-    by_work = sorted(records, key=lambda record: record["counts"]["iterations"])
-    middle = by_work[len(by_work) // 2]["counts"]
-    return [{**record, "counts": middle} for record in records]
+    middle = sorted(records, key=lambda record: work(record) or 0)[len(records) // 2]
+    return [{**record, "counts": middle.get("counts", {})} for record in records]
 
 
 def write_results(folder: Path, summaries: Summaries) -> None:
