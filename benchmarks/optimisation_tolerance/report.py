@@ -139,7 +139,7 @@ def _plot_products(axes: Any, optima: list[dict[str, Any]]) -> None:
         colours = [GREEN if "adaptive" in name else BLUE for name in names]
         heights = [runs[name]["products"] for name in names]
         bars = axes.bar(place + 0.4 * shift - 0.2, heights, 0.38, color=colours, alpha=shade)
-        axes.bar_label(bars, fontsize="small")
+        axes.bar_label(bars, fontsize="x-small", padding=2)
     axes.set_xticks(place, [name.replace(" from", "\nfrom") for name in names], fontsize="small")
     axes.set_xlabel("tolerance of the states")
     axes.set_ylabel("products of the minimisation")
