@@ -21,17 +21,11 @@ ORANGE, BLUE, GREEN = "#f58518", "#4c78a8", "#54a24b"
 #: What the adaptive runs are compared with.
 USUAL = "1e-08"
 
-#: Of records that do not tell how far cells are graded.
-EQUAL_CELLS = "Measured on links of equal cells and flat facets; those of the demo are graded since.\n"
-
 
 def tables(studies: list[dict[str, Any]]) -> dict[str, str]:
     """Return the tables of the page by their names."""
-    graded = all("grading" in study for study in studies)
     return {
-        f"{study['size']} chain": "\n".join(
-            [*([] if graded else [EQUAL_CELLS]), _errors(study), _wrong(study), _optima(study)]
-        )
+        f"{study['size']} chain": "\n".join([_errors(study), _wrong(study), _optima(study)])
         for study in studies
     }
 

@@ -31,13 +31,10 @@ USUAL = "bundle"
 #: Smallest distance to the best value that the picture tells apart from none.
 LEAST = 1e-6
 
-#: Of records that do not tell how far cells are graded.
-EQUAL_CELLS = "Measured on links of equal cells and flat facets; those of the demo are graded since.\n"
-
 
 def tables(study: dict[str, Any]) -> dict[str, str]:
     """Return the tables of the page by their names, all problems in one."""
-    parts = [] if all("grading" in run for run in study["runs"]) else [EQUAL_CELLS]
+    parts = []
     for case in dict.fromkeys(run["case"] for run in study["runs"]):
         runs = [run for run in study["runs"] if run["case"] == case]
         first = runs[0]
