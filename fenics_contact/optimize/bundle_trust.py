@@ -54,9 +54,9 @@ class BundleTrust:
 
     * CONVERGED where w ≤ ε (s + \|J\|) at the present t and the first one and σ + r‖z‖ ≤ 10 ε (s + \|J\|),
     * STATIONARY where σ + r‖z‖ ≤ ε (s + \|J\|),
-    * ITERATION_LIMIT, EVALUATION_LIMIT where ``max_iterations`` or ``max_evaluations`` is reached, *
-    NO_DESCENT, INVALID_DESIGNS where t or the radius is practically 0, * STEP_FAILED where the quadratic
-    programme cannot be solved,
+    * ITERATION_LIMIT, EVALUATION_LIMIT where ``max_iterations`` or ``max_evaluations`` is reached,
+    * NO_DESCENT, INVALID_DESIGNS where t or the radius is practically 0,
+    * STEP_FAILED where the quadratic programme cannot be solved,
 
     with ε ``tolerance``, s ``value_scale`` and r the length of the first step, or of the present one where
     that is longer. On the published convex test functions the error of J at the stop is below ε (s + \|J\|);

@@ -10,7 +10,12 @@ from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidInpu
 from fenics_contact.qp.forcing import Forcing
 from fenics_contact.qp.iterate import Certificate, Iterate, Start, certify
 from fenics_contact.qp.newton_steps import NewtonState, NewtonSteps
-from fenics_contact.qp.not_held import HARDLY_WEDGED, FrictionAlone, require_contact
+from fenics_contact.qp.not_held import (
+    HARDLY_WEDGED,
+    FrictionAlone,
+    error_without_contact,
+    without_contact,
+)
 from fenics_contact.qp.problem import DualProblem
 from fenics_contact.qp.reductions import global_sum
 from fenics_contact.qp.rescue import DIVERGED, Rescue, Rescued
@@ -200,7 +205,9 @@ class _Run:
         newton = replace(newton, iterate=iterate)
         if answer is not None:
             return replace(state, newton=newton, history=history, answer=answer)
-        require_contact(history, self.parameters.patience)
+        lost = without_contact(history, self.parameters.patience)
+        if lost and state.rescues:  # an active set may also lose bodies that contact can hold
+            raise error_without_contact(line)
         before, after = state.best.residuals, iterate.residuals
         progress = after.worst_beside(before) < 0.5 * before.worst_beside(after)
         since_best = 0 if progress else state.since_best + 1
@@ -211,7 +218,7 @@ class _Run:
             best=iterate if progress else state.best,
             since_best=since_best,
             care=1.0 if progress else state.care * CARE if since_best > CARELESS else state.care,
-            stuck=since_best >= self.parameters.patience or not after.worst_beside(before) < DIVERGED,
+            stuck=lost or since_best >= self.parameters.patience or not after.worst_beside(before) < DIVERGED,
         )
 
     def rescued(self, state: _State) -> _State:

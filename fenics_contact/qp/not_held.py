@@ -25,28 +25,30 @@ WEDGED, HARDLY_WEDGED = 100.0, 2.0
 PLAIN = 1e-2
 
 
-def require_contact(history: Sequence[SolverStep], count: int) -> None:
-    """Reject a problem whose contacts stay open while only they could balance the load.
+def without_contact(history: Sequence[SolverStep], count: int) -> bool:
+    """Return whether all contacts stay open while only they could balance the load.
 
     Args:
         history: Steps of Newton's method and rescues.
-        count: Number of last Newton steps that must agree.
-
-    Raises:
-        InfeasibleError: They do.
+        count: Number of last Newton steps that must agree; those before a rescue do not count.
     """
-    late = [step for step in history if "rescue" not in step.method][-count:]
-    if len(late) == count and all(_lost(step) for step in late):
-        raise InfeasibleError(
-            "every loaded body must be held, but all contacts stay open, and "
-            f"{100 * late[-1].residuals.coarse:.2g} % of the load drive motions that only contact or "
-            "friction could hold: close the gaps, support the bodies or press them together"
-        )
+    late = history[-count:]
+    return len(late) == count and all(_open(step) for step in late)
 
 
-def _lost(step: SolverStep) -> bool:
+def _open(step: SolverStep) -> bool:
     residuals = step.residuals
-    return step.closed == 0 and residuals.natural == 0.0 and residuals.gluing < PLAIN < residuals.coarse
+    lost = step.closed == 0 and residuals.natural == 0.0 and residuals.gluing < PLAIN < residuals.coarse
+    return lost and "rescue" not in step.method
+
+
+def error_without_contact(step: SolverStep) -> InfeasibleError:
+    """Return the error of a problem whose contacts stay open, given the last step."""
+    return InfeasibleError(
+        "every loaded body must be held, but all contacts stay open, and "
+        f"{100 * step.residuals.coarse:.2g} % of the load drive motions that only contact or "
+        "friction could hold: close the gaps, support the bodies or press them together"
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -130,7 +130,7 @@ class ContactPair:
 @dataclass(frozen=True)
 @checked()
 class Tie:
-    """Two surfaces that stay together: they neither separate nor, unless `sliding`, shift.
+    """Two surfaces that stay together: they neither separate nor, unless ``sliding``, shift.
 
     An initial gap between their meshes stays as it is.
 

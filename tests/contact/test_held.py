@@ -25,6 +25,7 @@ from fenics_contact.scene import (
     Support,
     Surface,
     TotalForce,
+    Traction,
     Tresca,
 )
 from tests.contact.gallery import (
@@ -209,6 +210,23 @@ def test_solving_refuses_what_is_not_held() -> None:
     scene = block_on_plane(Coulomb(0.3))
     with pytest.raises(InfeasibleError, match="body 'block' can move away"):
         solve_scene(scene, MPI.COMM_SELF, partitions=partitions(scene))
+
+
+@pytest.mark.parametrize("scale", [1e-5, 1e-6, 1e-7])
+def test_a_brick_that_rolls_far_under_next_to_no_load_is_not_given_up(scale: float) -> None:
+    """On the way the active set loses all contacts for some steps; a rescue finds them again."""
+    mesh = block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (6, 3, 3))
+    x, _, z = mesh.points.T
+    crowned = mesh.moved(mesh.points + np.outer(0.02 * (x - 1.0) ** 2 * (1.0 - z), (0.0, 0.0, 1.0)))
+    scene = Scene(
+        {"brick": Body(crowned, SOFT)},
+        loads=[Traction("brick", "z1", (scale, 0.3 * scale, -2.0 * scale))],
+        contacts=[ContactPair(Surface("brick", "z0"), FLOOR, Coulomb(0.7))],
+    )
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-9)
+    np.testing.assert_allclose(
+        state.contact.force.sum(axis=0), np.array([-2.0, -0.6, 4.0]) * scale, rtol=1e-6
+    )
 
 
 def test_friction_of_a_gap_that_supports_keep_open_holds_nothing() -> None:

@@ -13,8 +13,6 @@ from mpi4py import MPI
 from fenics_contact.scene_file import read_scene_file
 from tests.docs.pages import DOCS, GUIDE, ROOT, Snippet, agrees, fences_of, snippets_of
 
-#: Pages that every test run executes; the others take longer together.
-QUICK = {"first_scene"}
 FILES = [*GUIDE.glob("*.md"), DOCS / "theory.md", ROOT / "README.md"]
 PAGES = sorted(path.relative_to(ROOT) for path in FILES)
 
@@ -34,9 +32,7 @@ def run(snippet: Snippet, names: dict[str, object], page: Path) -> str:
     return printed.getvalue()
 
 
-@pytest.mark.parametrize(
-    "page", [pytest.param(p, id=p.stem, marks=[] if p.stem in QUICK else pytest.mark.slow) for p in PAGES]
-)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_a_page_does_what_it_says(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     snippets = [snippet for snippet in snippets_of((ROOT / page).read_text()) if snippet.is_run]
     monkeypatch.chdir(tmp_path)
@@ -51,7 +47,7 @@ def test_a_page_does_what_it_says(page: Path, tmp_path: Path, monkeypatch: pytes
 
 def test_the_guide_has_pages_and_they_have_code() -> None:
     stems = {page.stem for page in PAGES}
-    assert stems >= QUICK
+    assert "first_scene" in stems
     assert len(stems) > 10
     running = [s for page in PAGES for s in snippets_of((ROOT / page).read_text()) if s.is_run]
     assert len(running) > 90
