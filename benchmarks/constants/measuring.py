@@ -84,13 +84,13 @@ def solved(names: Collection[str]) -> Answers:
     try:
         scenes = importlib.import_module(SCENES).SCENES
     except Exception as error:  # of a constant with which a module cannot be loaded
-        return {"import": {"failed": _told(error)}}
+        return {"import": {"failed": _in_one_line(error)}}
     for name in names:
         try:
             with _at_most(LONGEST):
                 found[name] = scenes[name]()
         except Exception as error:
-            found[name] = {"failed": _told(error)}
+            found[name] = {"failed": _in_one_line(error)}
     return found
 
 
@@ -152,7 +152,7 @@ def _at_most(seconds: int) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-def _told(error: Exception) -> str:
+def _in_one_line(error: Exception) -> str:
     """Return an error in one line."""
     words = str(error).splitlines() or [""]
     return f"{type(error).__name__}: {words[0]}"[:200]

@@ -138,7 +138,12 @@ def write(folder: Path, records: Records, quick: bool) -> None:
     new = dict(before.get("constants", {}))
     for record in measured:
         new |= record.get("constants", {})
-    found = {each.key: described(each) | new[each.key] for each in constants() if each.key in new}
+    # The value is the one that was measured, the comment the present one.
+    found = {
+        each.key: described(each) | new[each.key] | {"meaning": each.meaning}
+        for each in constants()
+        if each.key in new
+    }
     # As a reader of the file has it: tuples are lists there.
     found = json.loads(json.dumps(found))
     known = {"answers": answers[0] if answers else before.get("answers", {}), "constants": found}

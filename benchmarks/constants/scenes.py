@@ -72,7 +72,7 @@ def _figures(*states: State, **more: Any) -> Figures:
     }
 
 
-def _judged(state: State) -> Figures:
+def _balanced_figures(state: State) -> Figures:
     """Return the figures of a balanced state, which is as good as its mesh deserves, and its errors."""
     errors, wanted = state.errors, state.tolerance
     solver = [errors.algebraic, errors.friction]
@@ -113,7 +113,7 @@ def _cut(scene: Scene, parts: int) -> dict[str, np.ndarray]:
 
 def floating_block() -> Figures:
     """Sticks and slips on a rigid floor, in the default partition, with its errors."""
-    return _judged(solve_scene(_on_floor(Coulomb(0.7), (1.0, 0.3, -2.0), (14, 7, 7)), COMM))
+    return _balanced_figures(solve_scene(_on_floor(Coulomb(0.7), (1.0, 0.3, -2.0), (14, 7, 7)), COMM))
 
 
 def hardly_held_block() -> Figures:
@@ -147,14 +147,14 @@ def pressed_ball() -> Figures:
         [ContactPair(Surface("block", "z1"), Surface("ball", "contact"), geometry="reconstructed")],
     )
     state = solve_scene(scene, COMM, tolerance=Balanced(share=1e-5))
-    found = _judged(state)
+    found = _balanced_figures(state)
     return found | {"estimate": [*found["estimate"], contact_area(state)]}
 
 
 def mortar_blocks() -> Figures:
     """Tetrahedra on tetrahedra that do not match, by mortar and reconstructed surfaces, with errors."""
     by_mortar = {"discretisation": "mortar", "geometry": "reconstructed"}
-    return _judged(solve_scene(_two_blocks(Coulomb(0.38), "tetrahedron", by_mortar), COMM))
+    return _balanced_figures(solve_scene(_two_blocks(Coulomb(0.38), "tetrahedron", by_mortar), COMM))
 
 
 def tresca_far_away() -> Figures:
@@ -242,7 +242,7 @@ def heated_stack() -> Figures:
         contacts=[ContactPair(Surface("lower", "z0"), FLOOR, Coulomb(0.5))],
         ties=[Tie(Surface("upper", "z0"), Surface("lower", "z1"), discretisation="node")],
     )
-    return _judged(solve_scene(scene, COMM))
+    return _balanced_figures(solve_scene(scene, COMM))
 
 
 def _largest(contact: ContactResult) -> tuple[float, np.ndarray, np.ndarray]:
@@ -269,7 +269,7 @@ def small_design() -> Figures:
     mesh = scene.bodies["block"].mesh
     nodes = np.unique(mesh.surfaces["z0"])
     nodes = nodes[np.lexsort(mesh.points[nodes, 1::-1].T.round(9))]
-    parameters = (mesh.points[nodes, :2] - [0.0, 0.0]) / [2.0, 1.0]
+    parameters = mesh.points[nodes, :2] / [2.0, 1.0]
     surface = DesignSurface(nodes, parameters, np.tile([0.0, 0.0, -1.0], (len(nodes), 1)), (7, 4))
     contact = ContactProblem(scene, COMM, partitions=_cut(scene, 2))
     design = SurfaceDesign("block", surface, (3, 2))

@@ -8,10 +8,10 @@ LAST_BITS = 8.0
 """A rotated and shifted coordinate is off by a few units in the last place; a difference by twice as many."""
 
 OPERATIONS = 8.0
-"""So many roundings of coordinates a few operations on them add up to."""
+"""Number of roundings of coordinates that a few operations on them add up to."""
 
 NOTHING = 1e-10
-"""Lengths below this fraction of a body's size, plus the rounding of its coordinates, are none."""
+"""Lengths below this fraction of a body's size, plus the rounding of its coordinates, count as zero."""
 
 
 def coordinate_rounding(points: np.ndarray) -> float:
