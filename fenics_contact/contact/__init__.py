@@ -1,14 +1,17 @@
 """Equilibrium of scenes with contact and friction."""
 
 from fenics_contact.contact.area import contact_area
+from fenics_contact.contact.balance import Balance
 from fenics_contact.contact.coulomb import FixedPoint
 from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.equilibrium import default_solver
 from fenics_contact.contact.fields import body_mesh
 from fenics_contact.contact.gathered import GatheredFields, in_space
 from fenics_contact.contact.multi_block import body_grid
+from fenics_contact.contact.pair_resultants import PairResultants
 from fenics_contact.contact.problem import ContactProblem, solve_scene
 from fenics_contact.contact.result import ContactResult, Status
+from fenics_contact.contact.resultant import Resultant, Resultants
 from fenics_contact.contact.slip_bounds import Damping
 from fenics_contact.contact.state import State
 from fenics_contact.contact.static_admissibility import check_held
@@ -18,6 +21,7 @@ from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.contact.unheld import UnheldMotion
 
 __all__ = [
+    "Balance",
     "ContactProblem",
     "ContactResult",
     "Damping",
@@ -25,6 +29,9 @@ __all__ = [
     "FixedPoint",
     "GatheredFields",
     "LoadSequence",
+    "PairResultants",
+    "Resultant",
+    "Resultants",
     "State",
     "Status",
     "Tolerance",

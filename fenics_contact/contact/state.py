@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from fenics_contact._libraries import MPI
+from fenics_contact.checks import GivenVector
+from fenics_contact.contact.balance import Balance, force_balance
 from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.fields import (
     body_mesh,
@@ -19,7 +21,10 @@ from fenics_contact.contact.fields import (
     von_mises,
 )
 from fenics_contact.contact.gathered import GatheredFields, contact_fields
+from fenics_contact.contact.pair_resultants import PairResultants, pair_resultants
+from fenics_contact.contact.reactions import support_reactions
 from fenics_contact.contact.result import ContactResult
+from fenics_contact.contact.resultant import Resultants
 from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.contact.unheld import UnheldMotion, unheld_motions
 from fenics_contact.errors import InvalidInputError, collectively
@@ -221,6 +226,47 @@ class State:
 
     def _contact_fields(self, body: str) -> dict[str, np.ndarray]:
         return contact_fields(self.contact, self.torn.decomposition.tearing, body)
+
+    @collectively("State.reactions", _comm)
+    def reactions(self, about: GivenVector | np.ndarray | None = None) -> Resultants:
+        """Return force and moment that every support exerts on its body, in the scene's order. Collective.
+
+        They are the multipliers of the prescribed displacements less what contacts and ties exert on
+        prescribed components: exact in the sense that they balance the other forces (see `balance`), and as
+        accurate as the tolerance of the solver. A component that several supports prescribe at a node is
+        shared by the areas that belong to the node on their surfaces.
+
+        Args:
+            about: Point for all moments, shape (dim,), [length]; by default the centroid of the surface of
+                each support.
+
+        Example:
+            >>> print(state.reactions())  # doctest: +SKIP
+            >>> state.reactions()[0].torque((0, 0, 0), (0, 0, 1))  # doctest: +SKIP
+        """
+        return support_reactions(self, about)
+
+    @collectively("State.resultants", _comm)
+    def resultants(self, about: GivenVector | np.ndarray | None = None) -> PairResultants:
+        """Return force and moment on the slave of every contact pair and tie. Collective.
+
+        The torque about an axis is `Resultant.torque`.
+
+        Args:
+            about: Point for all moments, shape (dim,), [length]; by default the centroid of each slave
+                surface.
+        """
+        return pair_resultants(self, about)
+
+    @collectively("State.balance", _comm)
+    def balance(self, about: GivenVector | np.ndarray | None = None) -> Balance:
+        """Return loads, reactions and forces of rigid obstacles and what is missing between them. Collective.
+
+        Args:
+            about: Point for all moments, shape (dim,), [length]; by default the middle of the box around all
+                bodies.
+        """
+        return force_balance(self, about)
 
     @collectively("State.to_pyvista", _comm)
     def to_pyvista(self, deformed: float = 0.0, *, linear: bool = False) -> pyvista.MultiBlock:

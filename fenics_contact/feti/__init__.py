@@ -5,6 +5,7 @@ from fenics_contact.feti.direct import DirectSolution, DirectSystem
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.inverse import LocalKind
 from fenics_contact.feti.nodal_mean import nodal_mean, nodal_mean_at
+from fenics_contact.feti.nodal_sum import nodal_sum
 from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.feti.sharing import Sharing
 from fenics_contact.feti.subdomain import Subdomain, common_kernel
@@ -25,4 +26,5 @@ __all__ = [
     "decompose",
     "nodal_mean",
     "nodal_mean_at",
+    "nodal_sum",
 ]

@@ -1,0 +1,109 @@
+"""The balance of all forces on the bodies of a scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fenics_contact.checks import GivenVector
+from fenics_contact.contact.nodal_forces import NodalForces, by_node, nodal_forces
+from fenics_contact.contact.resultant import Resultant, moment_of, point_of, resultant, table
+from fenics_contact.linalg import ROUNDING
+from fenics_contact.scene import Surface
+
+if TYPE_CHECKING:
+    from fenics_contact.contact.state import State
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """Forces and moments on all bodies together, about one point, and what is missing to equilibrium.
+
+    Moments are those of the undeformed geometry, as in the linear theory of the state. The imbalance is
+    governed by the equilibrium of the multipliers with the load (`State.solution.coarse_residual`), which
+    every step of a solver keeps to rounding: it says that no force was forgotten, not how accurate the
+    forces are. That is governed by the tolerance of the solver, and by the mesh.
+
+    Attributes:
+        loads: Of the loads.
+        reactions: Of all supports.
+        obstacles: Of rigid obstacles.
+        gaps: Of contacts and ties between bodies: both sides together have no force, but a moment where
+            friction, a tie or a mean over facets transmits forces across a gap between the meshes.
+        beds: Of materials that resist rigid motions, such as elastic beds; zero otherwise.
+        force_scale: Largest sum of the sizes of the nodal forces of one of these, [force].
+        moment_scale: Largest sum of the sizes of their moments, [force·length].
+    """
+
+    loads: Resultant
+    reactions: Resultant
+    obstacles: Resultant
+    gaps: Resultant
+    beds: Resultant
+    force_scale: float
+    moment_scale: float
+
+    @property
+    def parts(self) -> dict[str, Resultant]:
+        """All parts by name."""
+        return {name: getattr(self, name) for name in ("loads", "reactions", "obstacles", "gaps", "beds")}
+
+    @property
+    def total(self) -> Resultant:
+        """The sum of all parts, zero in equilibrium."""
+        forces, moments = zip(*((part.force, part.moment) for part in self.parts.values()), strict=True)
+        return Resultant(np.sum(forces, axis=0), np.sum(moments, axis=0), self.loads.about)
+
+    @property
+    def imbalance(self) -> float:
+        """The larger of the total force and moment, each relative to its scale, dimensionless."""
+        return self._relative(self.total)
+
+    def _relative(self, part: Resultant) -> float:
+        force, moment = np.linalg.norm(part.force), np.linalg.norm(np.atleast_1d(part.moment))
+        return float(max(force / (self.force_scale or 1.0), moment / (self.moment_scale or 1.0)))
+
+    def __str__(self) -> str:
+        """Return a table of all parts that are not zero, their total and the imbalance."""
+        shown = {name: part for name, part in self.parts.items() if self._relative(part) > ROUNDING}
+        shown["total"] = self.total
+        lines = table([(name,) for name in shown], tuple(shown.values()))
+        return f"{lines}\nimbalance {self.imbalance:.1e}"
+
+
+def force_balance(state: State, about: GivenVector | np.ndarray | None) -> Balance:
+    """Return the balance of all forces. Collective."""
+    forces = nodal_forces(state)
+    point = _middle(forces.places) if about is None else point_of(about, state.scene.dim)
+    parts = _parts(state, forces)
+    resultants = {name: resultant(force, forces.places, point) for name, force in parts.items()}
+    arms = forces.places - point
+    sizes = [np.linalg.norm(force, axis=1) for force in parts.values()]
+    moments = [np.abs(moment_of(force, arms)) for force in parts.values()]
+    return Balance(
+        **resultants,
+        force_scale=float(max(size.sum() for size in sizes)),
+        moment_scale=float(max(moment.sum() for moment in moments)),
+    )
+
+
+def _parts(state: State, forces: NodalForces) -> dict[str, np.ndarray]:
+    """Return the nodal forces of each part, shape (n_nodes, dim)."""
+    torn = state.torn
+    between = np.array([isinstance(pair.master, Surface) for pair in state.scene.contacts], dtype=bool)
+    meets_body = between[torn.points.pair]
+    tied = by_node(torn.ties, forces.tie, np.arange(torn.ties.count))
+    return {
+        "loads": forces.load,
+        "reactions": forces.reaction,
+        "obstacles": by_node(torn.points, forces.contact, np.flatnonzero(~meets_body)),
+        "gaps": by_node(torn.points, forces.contact, np.flatnonzero(meets_body)) + tied,
+        "beds": forces.bed,
+    }
+
+
+def _middle(places: np.ndarray) -> np.ndarray:
+    """Return the middle of the box around all bodies, shape (dim,)."""
+    return np.asarray(0.5 * (places.min(axis=0) + places.max(axis=0)))

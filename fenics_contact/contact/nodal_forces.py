@@ -1,0 +1,89 @@
+"""The forces on the nodes of all bodies by what exerts them: loads, supports, contact, ties, beds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fenics_contact.feti import nodal_sum
+from fenics_contact.pairing import ContactPoints
+
+if TYPE_CHECKING:
+    from fenics_contact.contact.state import State
+
+
+@dataclass(frozen=True, eq=False)
+class NodalForces:
+    """Forces on nodes; all replicated, [force].
+
+    The multipliers act on the torn bodies as f − Bᵀλ = K u. Summed over the copies of a node, gluing cancels,
+    and −Bᵀλ is the reaction, where a component is prescribed, less what contacts and ties exert there (their
+    rows of B leave prescribed components out).
+
+    Attributes:
+        places: Undeformed positions of the nodes of all bodies, shape (n_nodes, dim), [length].
+        load: f, shape (n_nodes, dim); thermal strain included, which has no resultant.
+        reaction: Of supports, zero on free components, shape (n_nodes, dim).
+        contact: On the slave at each contact point, shape (n_contact, dim).
+        tie: On the slave at each tied point, shape (n_ties, dim).
+        bed: What materials exert that resist rigid motions (elastic beds), shape (n_nodes, dim).
+    """
+
+    places: np.ndarray
+    load: np.ndarray
+    reaction: np.ndarray
+    contact: np.ndarray
+    tie: np.ndarray
+    bed: np.ndarray
+
+
+def nodal_forces(state: State) -> NodalForces:
+    """Return the forces on all nodes. Collective."""
+    torn, decomposition = state.torn, state.torn.decomposition
+    contact, tie = state.contact.force, tie_forces(state)
+    joined = torn.points.jump.T @ contact + torn.ties.jump.T @ tie
+    connecting = -nodal_sum(decomposition, state.system.force(state.solution.multiplier))
+    return NodalForces(
+        np.concatenate([body.mesh.points for body in state.scene.bodies.values()]),
+        nodal_sum(decomposition, torn.load),
+        np.where(decomposition.fixed, connecting - joined, 0.0),
+        contact,
+        tie,
+        nodal_sum(decomposition, -_resisted(state)),
+    )
+
+
+def tie_forces(state: State) -> np.ndarray:
+    """Return the forces on the slave nodes of ties, shape (n_ties, dim), replicated, [force]. Collective."""
+    torn, rows = state.torn, state.torn.relations[0]
+    multiplier = torn.numbering.gather(state.solution.multiplier, np.arange(torn.n_gluing, torn.n_equality))
+    # A row that supports determine is not in B.
+    acting = np.where(rows.held(torn.decomposition.fixed), 0.0, multiplier)
+    force = np.zeros((torn.ties.count, torn.dim))
+    np.add.at(force, rows.which, -acting[:, None] * rows.directions)
+    return force
+
+
+def by_node(points: ContactPoints, force: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Return the forces of chosen points on the nodes of slaves and masters, shape (n_nodes, dim).
+
+    Args:
+        points: Contact or tied points.
+        force: Force on the slave at each of all points, shape (n, dim), [force].
+        chosen: Numbers of the points.
+    """
+    return np.asarray(points.jump[chosen].T @ force[chosen])
+
+
+def _resisted(state: State) -> np.ndarray:
+    """Return K u of the subdomains whose material resists a rigid motion, zero on others, (torn_size,)."""
+    torn, dim = state.torn, state.torn.dim
+    parts = np.split(state.torn_displacement, np.cumsum([part.mesh.size for part in torn.subdomains])[:-1])
+    return np.concatenate(
+        [
+            part.stiffness @ u if part.kernel.shape[1] < 3 * (dim - 1) else np.zeros(part.mesh.size)
+            for part, u in zip(torn.subdomains, parts, strict=True)
+        ]
+    )

@@ -1,0 +1,59 @@
+"""The reactions of supports: what holds each of them, as force and moment."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fenics_contact.checks import GivenVector
+from fenics_contact.contact.nodal_forces import nodal_forces
+from fenics_contact.contact.resultant import Resultants, point_of, resultant
+from fenics_contact.pairing import NodeNumbers
+from fenics_contact.scene import Scene, Surface
+from fenics_contact.surfaces import nodal_areas, quadrature_areas
+
+if TYPE_CHECKING:
+    from fenics_contact.contact.state import State
+
+
+def support_reactions(state: State, about: GivenVector | np.ndarray | None) -> Resultants:
+    """Return the reaction of every support. Collective."""
+    scene, forces = state.scene, nodal_forces(state)
+    shares = support_shares(scene, state.torn.decomposition.tearing)
+    entries = []
+    for support, share in zip(scene.supports, shares, strict=True):
+        surface = Surface(support.body, support.surface)
+        point = centroid(scene, surface) if about is None else point_of(about, scene.dim)
+        entries.append(resultant(share * forces.reaction, forces.places, point, surface))
+    return Resultants("reaction", tuple(entries))
+
+
+def support_shares(scene: Scene, numbers: NodeNumbers) -> list[np.ndarray]:
+    """Return the part of each support in the reaction on every component of a node.
+
+    A component that several supports prescribe at a node is shared by the areas that belong to the node on
+    their surfaces: the forces of an even pressure on both. The parts sum to one.
+
+    Returns:
+        For each support the parts, shape (n_nodes, dim), zero where it holds nothing.
+    """
+    areas = []
+    for support in scene.supports:
+        mesh = scene.bodies[support.body].mesh
+        facets = mesh.surfaces[support.surface]
+        own = np.bincount(facets.ravel(), nodal_areas(mesh.points, facets).ravel(), minlength=mesh.n_nodes)
+        area = np.zeros((numbers.n_nodes, scene.dim))
+        held = [component is not None for component in support.value]
+        area[numbers.global_nodes(support.body, np.arange(mesh.n_nodes))] = own[:, None] * held
+        areas.append(area)
+    total = sum(areas, np.zeros((numbers.n_nodes, scene.dim)))
+    return [area / np.where(total > 0.0, total, 1.0) for area in areas]
+
+
+def centroid(scene: Scene, surface: Surface) -> np.ndarray:
+    """Return the centroid of a surface, each facet counting at the mean of its nodes, shape (dim,)."""
+    mesh = scene.bodies[surface.body].mesh
+    facets = mesh.surfaces[surface.name]
+    areas = quadrature_areas(mesh.points, facets)
+    return np.asarray(areas @ mesh.points[facets].mean(axis=1) / areas.sum())
