@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fenics_contact.checks import GivenVector
-from fenics_contact.contact.nodal_forces import NodalForces, by_node, nodal_forces
+from fenics_contact.contact.nodal_forces import NodalForces, by_node
 from fenics_contact.contact.resultant import Resultant, moment_of, point_of, resultant, table
+from fenics_contact.feti import TornSystem
 from fenics_contact.linalg import ROUNDING
 from fenics_contact.scene import Surface
-
-if TYPE_CHECKING:
-    from fenics_contact.contact.state import State
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,11 +70,10 @@ class Balance:
         return f"{lines}\nimbalance {self.imbalance:.1e}"
 
 
-def force_balance(state: State, about: GivenVector | np.ndarray | None) -> Balance:
-    """Return the balance of all forces. Collective."""
-    forces = nodal_forces(state)
-    point = _middle(forces.places) if about is None else point_of(about, state.scene.dim)
-    parts = _parts(state, forces)
+def force_balance(torn: TornSystem, forces: NodalForces, about: GivenVector | np.ndarray | None) -> Balance:
+    """Return the balance of all forces, about a point or the middle of the box around all bodies."""
+    point = _middle(forces.places) if about is None else point_of(about, torn.dim)
+    parts = _parts(torn, forces)
     resultants = {name: resultant(force, forces.places, point) for name, force in parts.items()}
     arms = forces.places - point
     sizes = [np.linalg.norm(force, axis=1) for force in parts.values()]
@@ -89,10 +85,9 @@ def force_balance(state: State, about: GivenVector | np.ndarray | None) -> Balan
     )
 
 
-def _parts(state: State, forces: NodalForces) -> dict[str, np.ndarray]:
+def _parts(torn: TornSystem, forces: NodalForces) -> dict[str, np.ndarray]:
     """Return the nodal forces of each part, shape (n_nodes, dim)."""
-    torn = state.torn
-    between = np.array([isinstance(pair.master, Surface) for pair in state.scene.contacts], dtype=bool)
+    between = np.array([isinstance(pair.master, Surface) for pair in torn.scene.contacts], dtype=bool)
     meets_body = between[torn.points.pair]
     tied = by_node(torn.ties, forces.tie, np.arange(torn.ties.count))
     return {

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fenics_contact.feti import nodal_sum
+from fenics_contact.feti import DirectSystem, DualSystem, TornSystem, nodal_sum
 from fenics_contact.pairing import ContactPoints
-
-if TYPE_CHECKING:
-    from fenics_contact.contact.state import State
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,28 +35,37 @@ class NodalForces:
     bed: np.ndarray
 
 
-def nodal_forces(state: State) -> NodalForces:
-    """Return the forces on all nodes. Collective."""
-    torn, decomposition = state.torn, state.torn.decomposition
-    contact, tie = state.contact.force, tie_forces(state)
+def nodal_forces(
+    system: DualSystem | DirectSystem, multiplier: np.ndarray, displacement: np.ndarray, contact: np.ndarray
+) -> NodalForces:
+    """Return the forces on all nodes. Collective.
+
+    Args:
+        system: The solved system.
+        multiplier: λ, owned, [force].
+        displacement: Torn displacement of this rank as the solver returned it, shape (torn_size,), [length].
+        contact: Force on the slave at each contact point, shape (n_contact, dim), [force].
+    """
+    torn, decomposition = system.torn, system.torn.decomposition
+    tie = _tie_forces(torn, multiplier)
     joined = torn.points.jump.T @ contact + torn.ties.jump.T @ tie
-    connecting = -nodal_sum(decomposition, state.system.force(state.solution.multiplier))
+    connecting = -nodal_sum(decomposition, system.force(multiplier))
     return NodalForces(
-        np.concatenate([body.mesh.points for body in state.scene.bodies.values()]),
+        np.concatenate([body.mesh.points for body in torn.scene.bodies.values()]),
         nodal_sum(decomposition, torn.load),
         np.where(decomposition.fixed, connecting - joined, 0.0),
         contact,
         tie,
-        nodal_sum(decomposition, -_resisted(state)),
+        nodal_sum(decomposition, -_resisted(torn, displacement)),
     )
 
 
-def tie_forces(state: State) -> np.ndarray:
+def _tie_forces(torn: TornSystem, multiplier: np.ndarray) -> np.ndarray:
     """Return the forces on the slave nodes of ties, shape (n_ties, dim), replicated, [force]. Collective."""
-    torn, rows = state.torn, state.torn.relations[0]
-    multiplier = torn.numbering.gather(state.solution.multiplier, np.arange(torn.n_gluing, torn.n_equality))
+    rows = torn.relations[0]
+    of_ties = torn.numbering.gather(multiplier, np.arange(torn.n_gluing, torn.n_equality))
     # A row that supports determine is not in B.
-    acting = np.where(rows.held(torn.decomposition.fixed), 0.0, multiplier)
+    acting = np.where(rows.held(torn.decomposition.fixed), 0.0, of_ties)
     force = np.zeros((torn.ties.count, torn.dim))
     np.add.at(force, rows.which, -acting[:, None] * rows.directions)
     return force
@@ -77,13 +82,13 @@ def by_node(points: ContactPoints, force: np.ndarray, chosen: np.ndarray) -> np.
     return np.asarray(points.jump[chosen].T @ force[chosen])
 
 
-def _resisted(state: State) -> np.ndarray:
+def _resisted(torn: TornSystem, displacement: np.ndarray) -> np.ndarray:
     """Return K u of the subdomains whose material resists a rigid motion, zero on others, (torn_size,)."""
-    torn, dim = state.torn, state.torn.dim
-    parts = np.split(state.torn_displacement, np.cumsum([part.mesh.size for part in torn.subdomains])[:-1])
+    motions = 3 * (torn.dim - 1)
+    parts = np.split(displacement, np.cumsum([part.mesh.size for part in torn.subdomains])[:-1])
     return np.concatenate(
         [
-            part.stiffness @ u if part.kernel.shape[1] < 3 * (dim - 1) else np.zeros(part.mesh.size)
+            part.stiffness @ u if part.kernel.shape[1] < motions else np.zeros(part.mesh.size)
             for part, u in zip(torn.subdomains, parts, strict=True)
         ]
     )

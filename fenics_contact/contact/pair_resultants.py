@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fenics_contact.checks import GivenVector
-from fenics_contact.contact.nodal_forces import tie_forces
+from fenics_contact.contact.nodal_forces import NodalForces
 from fenics_contact.contact.reactions import centroid
 from fenics_contact.contact.resultant import Resultant, Resultants, point_of, resultant
+from fenics_contact.feti import TornSystem
 from fenics_contact.pairing import ContactPoints
 from fenics_contact.scene import Surface
-
-if TYPE_CHECKING:
-    from fenics_contact.contact.state import State
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,17 +33,17 @@ class PairResultants:
         return "\n".join(tables) or "none"
 
 
-def pair_resultants(state: State, about: GivenVector | np.ndarray | None) -> PairResultants:
-    """Return force and moment on the slave of every contact pair and tie. Collective."""
-    scene, torn = state.scene, state.torn
-    places = np.concatenate([body.mesh.points for body in scene.bodies.values()])
+def pair_resultants(
+    torn: TornSystem, forces: NodalForces, about: GivenVector | np.ndarray | None
+) -> PairResultants:
+    """Return force and moment on the slave of every pair, about a point or the centroid of its surface."""
+    scene = torn.scene
 
     def of_pair(points: ContactPoints, force: np.ndarray, number: int, slave: Surface) -> Resultant:
         mine = np.flatnonzero(points.pair == number)
         point = centroid(scene, slave) if about is None else point_of(about, scene.dim)
-        return resultant(force[mine], places[points.slave[mine]], point, slave)
+        return resultant(force[mine], forces.places[points.slave[mine]], point, slave)
 
-    tied = tie_forces(state)
-    contacts = (of_pair(torn.points, state.contact.force, k, c.slave) for k, c in enumerate(scene.contacts))
-    ties = (of_pair(torn.ties, tied, k, tie.slave) for k, tie in enumerate(scene.ties))
+    contacts = (of_pair(torn.points, forces.contact, k, pair.slave) for k, pair in enumerate(scene.contacts))
+    ties = (of_pair(torn.ties, forces.tie, k, tie.slave) for k, tie in enumerate(scene.ties))
     return PairResultants(Resultants("contact", tuple(contacts)), Resultants("tie", tuple(ties)))

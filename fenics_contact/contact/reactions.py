@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from fenics_contact.checks import GivenVector
-from fenics_contact.contact.nodal_forces import nodal_forces
+from fenics_contact.contact.nodal_forces import NodalForces
 from fenics_contact.contact.resultant import Resultants, point_of, resultant
 from fenics_contact.pairing import NodeNumbers
 from fenics_contact.scene import Scene, Surface
 from fenics_contact.surfaces import nodal_areas, quadrature_areas
 
-if TYPE_CHECKING:
-    from fenics_contact.contact.state import State
 
-
-def support_reactions(state: State, about: GivenVector | np.ndarray | None) -> Resultants:
-    """Return the reaction of every support. Collective."""
-    scene, forces = state.scene, nodal_forces(state)
-    shares = support_shares(scene, state.torn.decomposition.tearing)
+def support_reactions(
+    scene: Scene, forces: NodalForces, about: GivenVector | np.ndarray | None
+) -> Resultants:
+    """Return the reaction of every support, about a point or the centroid of its surface."""
+    shares = support_shares(scene, NodeNumbers.of(scene))
     entries = []
     for support, share in zip(scene.supports, shares, strict=True):
         surface = Surface(support.body, support.surface)

@@ -21,6 +21,7 @@ from fenics_contact.contact.fields import (
     von_mises,
 )
 from fenics_contact.contact.gathered import GatheredFields, contact_fields
+from fenics_contact.contact.nodal_forces import NodalForces, nodal_forces
 from fenics_contact.contact.pair_resultants import PairResultants, pair_resultants
 from fenics_contact.contact.reactions import support_reactions
 from fenics_contact.contact.result import ContactResult
@@ -244,7 +245,7 @@ class State:
             >>> print(state.reactions())  # doctest: +SKIP
             >>> state.reactions()[0].torque((0, 0, 0), (0, 0, 1))  # doctest: +SKIP
         """
-        return support_reactions(self, about)
+        return support_reactions(self.scene, self._nodal_forces, about)
 
     @collectively("State.resultants", _comm)
     def resultants(self, about: GivenVector | np.ndarray | None = None) -> PairResultants:
@@ -256,7 +257,7 @@ class State:
             about: Point for all moments, shape (dim,), [length]; by default the centroid of each slave
                 surface.
         """
-        return pair_resultants(self, about)
+        return pair_resultants(self.torn, self._nodal_forces, about)
 
     @collectively("State.balance", _comm)
     def balance(self, about: GivenVector | np.ndarray | None = None) -> Balance:
@@ -266,7 +267,12 @@ class State:
             about: Point for all moments, shape (dim,), [length]; by default the middle of the box around all
                 bodies.
         """
-        return force_balance(self, about)
+        return force_balance(self.torn, self._nodal_forces, about)
+
+    @cached_property
+    def _nodal_forces(self) -> NodalForces:
+        multiplier, contact = self.solution.multiplier, self.contact.force
+        return nodal_forces(self.system, multiplier, self.torn_displacement, contact)
 
     @collectively("State.to_pyvista", _comm)
     def to_pyvista(self, deformed: float = 0.0, *, linear: bool = False) -> pyvista.MultiBlock:
