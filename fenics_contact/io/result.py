@@ -13,6 +13,7 @@ from fenics_contact.contact import State, Status, UnheldMotion, contact_area
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.feti import DirectSystem
 from fenics_contact.io.described_scene import described_scene, readable
+from fenics_contact.io.forces_record import forces_record
 from fenics_contact.io.json_file import write_json
 from fenics_contact.io.names import checked_name
 from fenics_contact.io.provenance import versions
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
 
 UNITS = (
     "those of the input: a scene in N and mm has forces in N, stresses, moduli and pressures in N/mm², "
-    "energies in N mm; seconds are wall time of rank 0; residuals and errors are relative; plane bodies "
-    "have forces and energies a unit of thickness"
+    "energies and moments in N mm; seconds are wall time of rank 0; residuals and errors are relative; "
+    "plane bodies have forces, moments and energies a unit of thickness"
 )
 
 
@@ -61,6 +62,8 @@ that was read from a checkpoint says so and has no tolerance |
 ``normal_force``, ``peak_pressure``, ``smallest_gap``, ``largest_slip`` in the last load step; without \
 friction closed points count as ``slip`` |
     | ``unheld`` | rigid motions that nothing resists and nothing loads, in words; `State.unheld` |
+    | ``forces`` | ``reactions`` of the supports, ``contacts`` and ``ties`` (on the slave): each with body, \
+surface, ``force``, ``moment`` and the point ``about`` which it is; ``balance`` of all with the loads |
     | ``more`` | further results of the caller |
 
     Entries may be added without a new version; changing or removing one requires a new version.
@@ -82,9 +85,9 @@ friction closed points count as ``slip`` |
     Example:
         >>> write_result(state, "output", more={"drop_percent": 12.4})  # doctest: +SKIP
     """
-    comm, unheld = state.torn.decomposition.comm, state.unheld
+    comm, unheld, forces = state.torn.decomposition.comm, state.unheld, forces_record(state)
     with together(comm):
-        record = {**_head("state", comm), **_state_record(state, unheld)}
+        record = {**_head("state", comm), **_state_record(state, unheld), "forces": forces}
         target = checked_name(folder, name, ".json")
     record["errors"] = _errors(state) if errors or _knows_errors(state) else None
     return write_json(target, {**record, "more": dict(more or {})}, comm=comm)
@@ -127,6 +130,7 @@ an evaluation; None where a trial point was rejected as invalid |
     """
     first, best, comm = problem.first, problem.best, problem.comm
     unheld = () if best is None else best.state.unheld
+    forces = {} if best is None else forces_record(best.state)
     with together(comm):
         target = checked_name(folder, name, ".json")
         if first is None or best is None:
@@ -134,7 +138,7 @@ an evaluation; None where a trial point was rejected as invalid |
                 "an optimisation's result needs designs that were evaluated, the problem has none: give the "
                 "problem that was handed to minimize"
             )
-        record = {**_head("optimisation", comm), **_state_record(best.state, unheld)}
+        record = {**_head("optimisation", comm), **_state_record(best.state, unheld), "forces": forces}
         record["counts"]["f_products"] = problem.products
         record["seconds"] = dict(problem.seconds)
         record["optimisation"] = {

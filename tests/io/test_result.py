@@ -79,6 +79,23 @@ def test_energies_residuals_and_contact_are_the_states(tmp_path: Path) -> None:
     assert pair["largest_slip"] > 0.0
 
 
+def test_forces_and_moments_are_the_states_and_in_balance(tmp_path: Path) -> None:
+    state = touching_blocks()
+    forces = read_result(write_result(state, tmp_path))["forces"]
+    assert len(forces["reactions"]) == len(state.scene.supports) > 0
+    for told, support, reaction in zip(
+        forces["reactions"], state.scene.supports, state.reactions(), strict=True
+    ):
+        assert (told["body"], told["surface"]) == (support.body, support.surface)
+        for name in ("force", "moment", "about"):
+            np.testing.assert_array_equal(told[name], getattr(reaction, name))
+    (pair,) = forces["contacts"]
+    np.testing.assert_allclose(pair["force"], state.contact.force.sum(axis=0))
+    assert forces["ties"] == []
+    assert forces["balance"]["imbalance"] == state.balance().imbalance <= 1e-9
+    np.testing.assert_array_equal(forces["balance"]["loads"]["force"], state.balance().loads.force)
+
+
 def test_errors_are_told_where_they_are_known_or_asked_for(tmp_path: Path) -> None:
     scene = Scene({"block": Body(block((0, 0, 0), (2, 1, 1), (4, 2, 2)), IsotropicElasticity(1e3, 0.3))},
                   [Support("block", "x0")], [Pressure("block", "z1", 1.0)])  # fmt: skip
