@@ -20,6 +20,7 @@ from fenics_contact._dolfinx.loading import fem, mesh, release, version
 from fenics_contact._dolfinx.meshes import local_mesh, rank_mesh
 from fenics_contact._dolfinx.numbering import (
     cell_dofs,
+    cell_field,
     cell_nodes,
     coefficient,
     global_dofs,
@@ -56,6 +57,7 @@ __all__ = [
     "assemble_scalar",
     "assemble_vector",
     "cell_dofs",
+    "cell_field",
     "cell_nodes",
     "cellwise_space",
     "coefficient",

@@ -32,6 +32,22 @@ def scalar_space(mesh: dolfinx.mesh.Mesh, degree: int) -> dolfinx.fem.FunctionSp
     return _space(mesh, scalar_element(cell_type) if degree == 1 else cellwise_element(cell_type))
 
 
+def cell_field(mesh: dolfinx.mesh.Mesh, name: str, values: np.ndarray) -> dolfinx.fem.Function:
+    """Return a field on ``mesh`` that is constant on each cell, by the values on this rank's own cells.
+
+    Args:
+        mesh: The mesh.
+        name: Name of the field (a C identifier).
+        values: Shape (n_owned, ...): numbers, vectors or tensors.
+    """
+    element = cellwise_element(cell_type_of_mesh(mesh), values.shape[1:])
+    field = dolfinx.fem.Function(_space(mesh, element), name=name)
+    dofs = cell_dofs(field.function_space).ravel()[: len(values)]
+    field.x.array.reshape(-1, int(np.prod(values.shape[1:])))[dofs] = values.reshape(len(values), -1)
+    field.x.scatter_forward()
+    return field
+
+
 def table(adjacency: np.ndarray | cpp.graph.AdjacencyList_int32, rows: int) -> np.ndarray:
     """Return a list of lists of equal length as an array, (rows, length)."""
     flat = np.asarray(getattr(adjacency, "array", adjacency))

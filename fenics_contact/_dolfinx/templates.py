@@ -32,13 +32,17 @@ def scalar_element(cell_type: str) -> ufl.finiteelement.AbstractFiniteElement:
     return _element(cell_type, ())
 
 
-def cellwise_element(cell_type: str) -> ufl.finiteelement.AbstractFiniteElement:
-    """Return the element of scalars that are constant on each cell."""
-    if old():
-        return ufl.FiniteElement("DG", ufl.Cell(shape_of(cell_type)), 0)
-    import basix.ufl
+def cellwise_element(cell_type: str, shape: tuple[int, ...] = ()) -> ufl.finiteelement.AbstractFiniteElement:
+    """Return the element of scalars, vectors or tensors that are constant on each cell."""
+    if not old():
+        import basix.ufl
 
-    return basix.ufl.element("DG", shape_of(cell_type), 0)
+        return basix.ufl.element("DG", shape_of(cell_type), 0, shape=shape)
+    cell = ufl.Cell(shape_of(cell_type))
+    if len(shape) < 2:
+        family = ufl.VectorElement if shape else ufl.FiniteElement
+        return family("DG", cell, 0, *shape)
+    return ufl.TensorElement("DG", cell, 0, shape=shape)
 
 
 @lru_cache(maxsize=16)

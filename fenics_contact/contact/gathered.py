@@ -17,8 +17,9 @@ class GatheredFields:
     Attributes:
         points: Fields on nodes by their names: ``displacement``, (n_nodes, dim), [length], and what
             `contact_fields` returns.
-        cells: Fields on cells: ``von_mises``, (n_cells,), [force / length²], and ``subdomain``, numbered over
-            all bodies, (n_cells,) int.
+        cells: Fields on cells: ``von_mises``, (n_cells,), ``stress``, the components xx, yy, zz, xy, yz, xz,
+            (n_cells, 6), and ``principal_stress``, the largest first, (n_cells, 3), all means over the cell,
+            [force / length²]; ``subdomain``, numbered over all bodies, (n_cells,) int.
     """
 
     points: dict[str, np.ndarray]

@@ -53,7 +53,7 @@ def multi_block(
         for key, values in fields.points.items():
             grid.point_data[key] = in_space(values)
         for key, values in fields.cells.items():
-            grid.cell_data[key] = np.repeat(values, mesh.n_cells // whole.n_cells)
+            grid.cell_data[key] = np.repeat(values, mesh.n_cells // whole.n_cells, axis=0)
         blocks[name] = grid
     return blocks
 

@@ -12,14 +12,15 @@ import numpy as np
 from fenics_contact._libraries import MPI
 from fenics_contact.checks import GivenVector
 from fenics_contact.contact.balance import Balance, force_balance
-from fenics_contact.contact.energies import Energies
-from fenics_contact.contact.fields import (
-    body_mesh,
-    cell_values,
-    displacement_function,
-    nodal_function,
+from fenics_contact.contact.cell_stress import (
+    components_of,
+    principal,
+    principal_stress,
+    stress,
     von_mises,
 )
+from fenics_contact.contact.energies import Energies
+from fenics_contact.contact.fields import body_mesh, cell_values, displacement_function, nodal_function
 from fenics_contact.contact.gathered import GatheredFields, contact_fields
 from fenics_contact.contact.nodal_forces import NodalForces, nodal_forces
 from fenics_contact.contact.pair_resultants import PairResultants, pair_resultants
@@ -177,6 +178,30 @@ class State:
         }
 
     @cached_property
+    @collectively("State.stress", _comm)
+    def stress(self) -> dict[str, dolfinx.fem.Function]:
+        """Stress tensor of each body, its mean on each cell, shape (3, 3), [force / length²].
+
+        Plane bodies have the component normal to the plane, too. Collective on first use.
+        """
+        return {
+            name: stress(self.displacement[name], body, _comm(self), temperature_of(self.scene.loads, name))
+            for name, body in self.scene.bodies.items()
+        }
+
+    @cached_property
+    @collectively("State.principal_stress", _comm)
+    def principal_stress(self) -> dict[str, dolfinx.fem.Function]:
+        """Principal values σ₁ ≥ σ₂ ≥ σ₃ of `stress`, shape (3,), [force / length²].
+
+        Collective on first use.
+        """
+        return {
+            name: principal_stress(self.stress[name], body.mesh.cells)
+            for name, body in self.scene.bodies.items()
+        }
+
+    @cached_property
     @collectively("State.contact_pressure", _comm)
     def contact_pressure(self) -> dict[str, dolfinx.fem.Function]:
         """Contact pressure of each body as a Function on its own mesh, [force / length²].
@@ -214,15 +239,47 @@ class State:
         """Return the von Mises stress of a body's cells on every rank, shape (n_cells,). Collective."""
         return cell_values(self.von_mises[body], self.scene.bodies[body].mesh.cells)
 
+    @collectively("State.gather_stress", _comm)
+    def gather_stress(self, body: str) -> np.ndarray:
+        """Return the mean stress of a body's cells on every rank, shape (n_cells, 3, 3). Collective."""
+        return cell_values(self.stress[body], self.scene.bodies[body].mesh.cells)
+
+    @collectively("State.gather_nodal_stress", _comm)
+    def gather_nodal_stress(self, body: str) -> np.ndarray:
+        """Return the stress of a body at its nodes, averaged within one material, on every rank. Collective.
+
+        It is made of the displacements around each node and more accurate than the means of the cells, above
+        all on surfaces, where the largest stresses are.
+
+        Returns:
+            Shape (n_materials, n_nodes, 3, 3), materials in the order of `Body.materials`; NaN where a node
+            has no cell of the material, [force / length²].
+        """
+        return self._nodal_stress[body]
+
+    @cached_property
+    def _nodal_stress(self) -> dict[str, np.ndarray]:
+        # Recovery is part of estimates, which a state with a fixed tolerance need not import.
+        from fenics_contact.contact.nodal_stress import nodal_stress
+
+        meshes = {name: u.function_space.mesh for name, u in self.displacement.items()}
+        return nodal_stress(self.torn, self._nodal_displacement, meshes)
+
     @collectively("State.gather_fields", _comm)
     def gather_fields(self, body: str) -> GatheredFields:
         """Return all fields of a body on every rank. Collective."""
         decomposition = self.torn.decomposition
         first = decomposition.tearing.subdomain_offset[decomposition.tearing.body_names.index(body)]
         subdomain = np.asarray(decomposition.partitions[body], dtype=np.int32) + np.int32(first)
+        tensor = self.gather_stress(body)
         return GatheredFields(
             {"displacement": self.gather_displacement(body), **self._contact_fields(body)},
-            {"von_mises": self.gather_von_mises(body), "subdomain": subdomain},
+            {
+                "von_mises": self.gather_von_mises(body),
+                "stress": components_of(tensor),
+                "principal_stress": principal(tensor),
+                "subdomain": subdomain,
+            },
         )
 
     def _contact_fields(self, body: str) -> dict[str, np.ndarray]:
@@ -285,8 +342,8 @@ class State:
         Returns:
             A ``pyvista.MultiBlock`` with an ``UnstructuredGrid`` for each body under its name, which holds
             the fields that `io.write_vtu` writes: on points ``displacement``, ``contact_status``,
-            ``contact_pressure``, ``contact_force`` and ``contact_slip``, on cells ``von_mises`` and
-            ``subdomain``; see `GatheredFields`. Plane bodies lie in the plane z = 0.
+            ``contact_pressure``, ``contact_force`` and ``contact_slip``, on cells ``von_mises``, ``stress``,
+            ``principal_stress`` and ``subdomain``; see `GatheredFields`. Plane bodies lie in the plane z = 0.
 
         Raises:
             InvalidInputError: If ``deformed`` is not finite.

@@ -8,10 +8,11 @@ from fenics_contact.fem.load_forms import Symbol, is_scalar, load_key, load_name
 from fenics_contact.fem.model_checks import check_kernel, kernel_of, stiffness_of_cell
 from fenics_contact.fem.nodal_stiffness import cell_stiffness
 from fenics_contact.fem.temperature import Temperature, stress_in_space, stress_left, temperature_of
-from fenics_contact.fem.templates import Templates, Written, scalar_constants
+from fenics_contact.fem.templates import Constants, Templates, Written, scalar_constants
 
 __all__ = [
     "Composition",
+    "Constants",
     "FormLibrary",
     "Symbol",
     "Temperature",

@@ -1,0 +1,112 @@
+"""Stress at the nodes, averaged around each node within one material.
+
+The displacement gradient is recovered at each node from the displacements of the nodes around it (see
+`accuracy.recovery`), which is more accurate than the means of the cells, above all on surfaces. Where
+materials meet a node has a stress for each of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fenics_contact import _dolfinx
+from fenics_contact.accuracy import Sites, find_sites, recovered_gradients
+from fenics_contact.contact.cell_stress import COMPONENTS, CellStress, tensors
+from fenics_contact.contact.fields import cells_of_body, displacement_function
+from fenics_contact.fem import temperature_of
+from fenics_contact.feti import TornSystem
+
+
+def nodal_stress(
+    torn: TornSystem, displacement: np.ndarray, meshes: Mapping[str, _dolfinx.mesh.Mesh]
+) -> dict[str, np.ndarray]:
+    """Return the stress of all bodies at their nodes, material by material. Collective.
+
+    Args:
+        torn: The torn system.
+        displacement: Displacement of all nodes, valid on those of this rank, shape (n_nodes, dim), [length].
+        meshes: The bodies' meshes by name, see `body_mesh`.
+
+    Returns:
+        For each body, shape (n_materials, n_nodes, 3, 3), NaN where a node has no cell of the material,
+        replicated, [force / length²].
+    """
+    found = {}
+    for order in sorted({body.mesh.order for body in torn.scene.bodies.values()}):
+        sites = find_sites(torn, order)
+        gradients = recovered_gradients(sites, displacement[sites.node])
+        for name, body in torn.scene.bodies.items():
+            if body.mesh.order == order:
+                own = _at_sites(torn, name, sites, gradients, meshes[name])
+                found[name] = _gathered(torn, name, sites, own)
+    return found
+
+
+def _at_sites(
+    torn: TornSystem, name: str, sites: Sites, gradients: np.ndarray, mesh: _dolfinx.mesh.Mesh
+) -> np.ndarray:
+    """Return the components of the stress at the sites of a body, shape (n_sites, 6). Collective.
+
+    The stress is affine in the gradient. Its coefficients are the stresses of unit gradients, averaged over
+    the cells around a site; they are the same in all of them unless the material or the temperature varies.
+    """
+    body, dim = torn.scene.bodies[name], torn.dim
+    temperature = temperature_of(torn.scene.loads, name)
+    means = CellStress(mesh, body, torn.decomposition.comm, temperature)
+    places = body.mesh.points - body.mesh.points.mean(axis=0)
+
+    def of_gradient(gradient: np.ndarray) -> np.ndarray:
+        components = means.components(displacement_function(mesh, places @ gradient.T))
+        return _around_sites(torn, name, sites, components, cells_of_body(mesh, body.mesh.cells))
+
+    at_rest = of_gradient(np.zeros((dim, dim)))
+    total = at_rest.copy()
+    for i in range(dim):
+        for j in range(i, dim):
+            unit = np.zeros((dim, dim))
+            unit[i, j] = 1.0
+            # A rotation has no stress: the gradients (i, j) and (j, i) have the same.
+            size = gradients[:, i, j] if i == j else gradients[:, i, j] + gradients[:, j, i]
+            total += size[:, None] * (of_gradient(unit) - at_rest)
+    return total
+
+
+def _around_sites(
+    torn: TornSystem, name: str, sites: Sites, values: np.ndarray, number: np.ndarray
+) -> np.ndarray:
+    """Return the means of values on cells over the cells around each site, shape (n_sites, 6). Collective.
+
+    Args:
+        torn: The torn system.
+        name: The body.
+        sites: The sites.
+        values: On this rank's cells of the body, shape (n_owned, 6).
+        number: Number in the body of each of them, shape (n_owned,).
+    """
+    of_body = np.zeros((torn.scene.bodies[name].mesh.n_cells, values.shape[1]))
+    of_body[number] = values
+    total = np.zeros((sites.count, values.shape[1] + 1))
+    for mesh in torn.decomposition.meshes:
+        if mesh.body == name:
+            places = sites.of_cells[mesh.number]
+            with_count = np.pad(of_body[mesh.cells], ((0, 0), (0, 1)), constant_values=1.0)
+            np.add.at(total, places.ravel(), np.repeat(with_count, places.shape[1], axis=0))
+    total = sites.sharing.add_up(total)
+    return np.asarray(total[:, :-1] / np.maximum(total[:, -1:], 1.0))
+
+
+def _gathered(torn: TornSystem, name: str, sites: Sites, values: np.ndarray) -> np.ndarray:
+    """Return values at the sites of a body by material and node, on every rank. Collective."""
+    body, decomposition = torn.scene.bodies[name], torn.decomposition
+    total = np.zeros((len(body.materials), body.mesh.n_nodes, len(COMPONENTS) + 1))
+    for mesh in decomposition.meshes:
+        if mesh.body == name:
+            site, node = sites.of_cells[mesh.number], body.mesh.cells[mesh.cells]
+            material = np.broadcast_to(body.material_of_cells[mesh.cells][:, None], node.shape)
+            total[material, node, :-1] = values[site]
+            total[material, node, -1] = 1.0
+    total = decomposition.comm.allreduce(total)
+    count = total[..., -1:]
+    return tensors(np.where(count > 0, total[..., :-1] / np.maximum(count, 1.0), np.nan))
