@@ -66,7 +66,8 @@ class Balance:
         """Return a table of all parts that are not zero, their total and the imbalance."""
         shown = {name: part for name, part in self.parts.items() if self._relative(part) > ROUNDING}
         shown["total"] = self.total
-        lines = table([(name,) for name in shown], tuple(shown.values()))
+        scales = self.force_scale, self.moment_scale
+        lines = table([(name,) for name in shown], tuple(shown.values()), scales)
         return f"{lines}\nimbalance {self.imbalance:.1e}"
 
 

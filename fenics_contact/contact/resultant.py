@@ -98,10 +98,18 @@ class Resultants:
         return table([(f"{self.kind} {i}", name) for i, name in enumerate(names)], self.entries)
 
 
-def table(names: list[tuple[str, ...]], resultants: tuple[Resultant, ...]) -> str:
+def table(
+    names: list[tuple[str, ...]],
+    resultants: tuple[Resultant, ...],
+    scales: tuple[float, float] | None = None,
+) -> str:
     """Return forces and moments of several resultants, one per line behind its names, with their units.
 
-    What is only rounding beside the largest force or moment is shown as zero.
+    Args:
+        names: Names of each line.
+        resultants: The resultants, all in space or all in the plane.
+        scales: A force and a moment beside which what is only rounding is shown as zero; by default the
+            largest components.
     """
     if not resultants:
         return "none"
@@ -109,22 +117,29 @@ def table(names: list[tuple[str, ...]], resultants: tuple[Resultant, ...]) -> st
         np.stack([each.force for each in resultants]),
         np.stack([_row(each.moment) for each in resultants]),
     ]
-    values = np.hstack(
-        [np.where(np.abs(part) > ROUNDING * np.abs(part).max(), part, 0.0) for part in columns]
-    )
-    cells = [(*name, *(f"{value:.5g}" for value in row)) for name, row in zip(names, values, strict=True)]
+    sizes = scales or tuple(float(np.abs(part).max()) for part in columns)
+    shown = [
+        np.where(np.abs(part) > ROUNDING * size, part, 0.0) for part, size in zip(columns, sizes, strict=True)
+    ]
+    cells = [
+        (*name, *(f"{value:.5g}" for value in row)) for name, row in zip(names, np.hstack(shown), strict=True)
+    ]
     dim = len(resultants[0].force)
     moments = ("Mx", "My", "Mz") if dim == 3 else ("M",)
     head = (*[""] * len(names[0]), *("Fx", "Fy", "Fz")[:dim], *moments)
-    width = [max(len(row[k]) for row in (head, *cells)) for k in range(len(head))]
-    lines = [
+    return "\n".join([*_aligned([head, *cells], len(names[0])), "F in [force], M in [force·length]"])
+
+
+def _aligned(rows: list[tuple[str, ...]], names: int) -> list[str]:
+    """Return rows of cells as lines, the first ``names`` columns to the left and the others to the right."""
+    width = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
         "  ".join(
-            cell.ljust(size) if k < len(names[0]) else cell.rjust(size)
+            cell.ljust(size) if k < names else cell.rjust(size)
             for k, (cell, size) in enumerate(zip(row, width, strict=True))
         ).rstrip()
-        for row in (head, *cells)
+        for row in rows
     ]
-    return "\n".join([*lines, "F in [force], M in [force·length]"])
 
 
 def resultant(

@@ -31,7 +31,7 @@ def rates(errors: list[float]) -> np.ndarray:
     return np.log2(np.divide(errors[:-1], errors[1:]))
 
 
-@pytest.mark.parametrize(("order", "coarsest", "rate"), [(1, 6, 1.7), (2, 3, 1.8)])
+@pytest.mark.parametrize(("order", "coarsest", "rate"), [(1, 6, 1.8), (2, 3, 2.6)])
 def test_the_stress_of_a_thick_cylinder_converges_to_lame(order: int, coarsest: int, rate: float) -> None:
     on_cells, on_nodes, at_wall = [], [], []
     for cells in (coarsest, 2 * coarsest, 4 * coarsest):
@@ -43,7 +43,7 @@ def test_the_stress_of_a_thick_cylinder_converges_to_lame(order: int, coarsest: 
         at_wall.append(error[np.unique(mesh.surfaces["x0"])].max())
         middle = mesh.points[mesh.cells].mean(axis=1)
         on_cells.append(np.abs(state.gather_stress("ring") - lame(middle)).max())
-    assert rates(on_cells)[-1] > rate, on_cells
+    assert rates(on_cells)[-1] > 1.8, on_cells
     assert rates(on_nodes)[-1] > rate, on_nodes
     assert at_wall[-1] < 0.02 * np.abs(lame(np.array([[1.0, 0.0]]))).max()
 

@@ -53,6 +53,9 @@ def test_vtu_files_hold_mesh_displacement_and_stress(cell: str, tmp_path: Path) 
         assert np.abs(displacement).max() > 0
         np.testing.assert_array_equal(read[name].point_data["displacement"], displacement)
         assert_stress_of(state, name, read[name])
+        components = state.gather_stress(name)[:, (0, 1, 2, 0, 1, 0), (0, 1, 2, 1, 2, 2)]
+        np.testing.assert_array_equal(read[name].cell_data["stress"], components)
+        assert read[name].cell_data["principal_stress"].shape == (body.mesh.n_cells, 3)
 
 
 def test_vtu_files_number_the_subdomains_of_all_bodies(tmp_path: Path) -> None:

@@ -43,3 +43,4 @@ def test_quadratic_cells_are_cut_into_linear_ones_that_repeat_their_values() -> 
     assert body.n_points == whole.n_points
     assert body.n_cells == 8 * whole.n_cells
     np.testing.assert_allclose(body["von_mises"], np.repeat(whole["von_mises"], 8))
+    np.testing.assert_allclose(body["stress"], np.repeat(whole["stress"], 8, axis=0))
