@@ -66,6 +66,8 @@ class Violations:
     penetration: float
     complementarity: float
     friction: float
+    reaction: float
+    imbalance: float
 
     @property
     def law(self) -> float:
@@ -79,7 +81,9 @@ def assert_holds(found: Violations, tolerance: float, amplification: float) -> N
     assert found.cone <= tolerance, found
     assert found.gluing <= 10 * tolerance, found
     assert found.balance <= 10 * tolerance, found
-    for value in (found.nodal, found.penetration, found.complementarity, found.friction):
+    assert found.imbalance <= 1e-12, found
+    nodal = found.nodal, found.reaction
+    for value in (*nodal, found.penetration, found.complementarity, found.friction):
         assert value <= amplification * tolerance, found
 
 
@@ -120,7 +124,15 @@ def violations(state: State, force_scale: float = 0.0) -> Violations:
         penetration=max(0.0, -gap.min(initial=0.0)) / length,
         complementarity=np.abs(normal * gap).max(initial=0.0) / (size * length),
         friction=max(0.0, unopposed) / (size * length),
+        reaction=_reaction(state, whole, internal - applied, float(cancelling.max(initial=0.0))),
+        imbalance=state.balance().imbalance,
     )
+
+
+def _reaction(state: State, whole: Whole, lacking: np.ndarray, scale: float) -> float:
+    """Return how far the reactions at nodes are from what is lacking there, relative to a force."""
+    held = np.where(whole.fixed, lacking, 0.0)
+    return float(np.abs(state._nodal_forces.reaction - held).max(initial=0.0)) / (scale or 1.0)
 
 
 def _forces(state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
