@@ -156,7 +156,7 @@ def test_view_draws_to_a_file(result: Path, tmp_path: Path, capsys: pytest.Captu
         (("nowhere",), "a result needs a folder or file that exists, got 'nowhere'"),
         (("{result}/scene.toml",), "a result must be a whole JSON file"),
         (("{result}", "--save", "a.jpg"), "a picture must be a PNG file, got 'a.jpg'"),
-        (("{result}", "--save", "a.png", "--field", "stress"), "--field must be one of ['contact_force'"),
+        (("{result}", "--save", "a.png", "--field", "strain"), "--field must be one of ['contact_force'"),
     ],
 )
 def test_view_refuses_what_is_no_result(
