@@ -85,7 +85,7 @@ with show_progress(comm):
 # The force on the slave at each of the four contacts, and how far the links move.
 
 contact = state.contact
-forces = np.array([contact.force[contact.on_pair(pair)].sum(axis=0) for pair in range(len(links.pairs))])
+forces = np.array([pair.force for pair in state.resultants().contacts])
 moved = [state.gather_displacement(name)[:, 0].mean() for name in names]
 record = {"forces": -forces[:, 0], "displacements": moved}
 write_result(state, output, more=record)

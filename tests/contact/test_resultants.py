@@ -255,3 +255,6 @@ def test_points_and_axes_must_fit_the_space() -> None:
         state.reactions(about=(0, 0, 0))
     with pytest.raises(InvalidInputError, match="their only axis is normal to the plane"):
         state.reactions()[0].torque((0, 0, 0), (0, 0, 1))
+    solid = pushed(Bedded(1e3, 0.3), (1, 1, 1)).resultants().contacts[0]
+    with pytest.raises(InvalidInputError, match=r"the direction of an axis must be 3 finite numbers"):
+        solid.torque((0, 0, 0), (0, 0, 0))
