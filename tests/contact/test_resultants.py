@@ -194,17 +194,21 @@ def test_a_block_on_a_plane_carries_its_weight(dim: int, cells: str) -> None:
 
 def test_supports_that_share_nodes_share_their_reaction() -> None:
     """An even pull on a wall in two pieces of different size: each carries its area, the sum is the whole."""
-    mesh = block((0.0, 0.0, 0.0), (4.0, 1.0, 1.0), (6, 4, 2))
+    even = block((0.0, 0.0, 0.0), (4.0, 1.0, 1.0), (6, 4, 2))
+    # Rows of cells of widths 1/16, 3/16, 5/16 and 7/16.
+    mesh = even.moved(
+        even.points * np.stack([np.ones(even.n_nodes), even.points[:, 1], np.ones(even.n_nodes)], 1)
+    )
     facets = mesh.surfaces["x0"]
-    left = mesh.points[facets].mean(axis=1)[:, 1] < 0.25
+    left = mesh.points[facets].mean(axis=1)[:, 1] < 1.0 / 16.0
     mesh = replace(mesh, surfaces={**mesh.surfaces, "narrow": facets[left], "wide": facets[~left]})
     roll = [Support("bar", "y0", (None, 0.0, None)), Support("bar", "z0", (None, None, 0.0))]
     pulled = [Support("bar", name, (0.0, None, None)) for name in ("narrow", "wide")]
     load = Traction("bar", "x1", (8.0, 0.0, 0.0))
     state = solve_scene(Scene({"bar": Body(mesh, STEEL)}, [*pulled, *roll], [load]), COMM)
     narrow, wide, *_ = state.reactions()
-    np.testing.assert_allclose(narrow.force, (-2.0, 0.0, 0.0), atol=1e-9)
-    np.testing.assert_allclose(wide.force, (-6.0, 0.0, 0.0), atol=1e-9)
+    np.testing.assert_allclose(narrow.force, (-0.5, 0.0, 0.0), atol=1e-9)
+    np.testing.assert_allclose(wide.force, (-7.5, 0.0, 0.0), atol=1e-9)
     np.testing.assert_allclose(narrow.moment, 0.0, atol=1e-9)
     np.testing.assert_allclose(wide.moment, 0.0, atol=1e-9)
 

@@ -60,10 +60,31 @@ MUTATIONS = (
     ),
     Mutation(
         "von Mises stress is too small by 0.3 percent",
-        "contact/fields.py",
+        "contact/cell_stress.py",
         "ufl.sqrt(1.5 * ufl.inner(deviator, deviator))",
         "ufl.sqrt(1.49 * ufl.inner(deviator, deviator))",
         ("tests/models/test_plane.py::test_a_plate_is_stretched_and_contracts",),
+    ),
+    Mutation(
+        "nodal stress forgets half of the shear",
+        "contact/nodal_stress.py",
+        "if i == j else gradients[:, i, j] + gradients[:, j, i]",
+        "if i == j else gradients[:, i, j]",
+        ("tests/contact/test_stress.py::test_the_stress_of_a_thick_cylinder_converges_to_lame",),
+    ),
+    Mutation(
+        "reactions contain what contact exerts on prescribed components",
+        "contact/nodal_forces.py",
+        "connecting - joined",
+        "connecting",
+        ("tests/contact/test_resultants.py::test_all_forces_balance",),
+    ),
+    Mutation(
+        "supports that meet have equal parts of the reaction",
+        "contact/reactions.py",
+        "own[:, None] * held",
+        "(own > 0)[:, None] * held",
+        ("tests/contact/test_resultants.py::test_supports_that_share_nodes_share_their_reaction",),
     ),
     Mutation(
         "load steps forget the slip before",
