@@ -27,8 +27,9 @@ FLOORS = [
     [Room("errors", "what is needed, given, to do; on all ranks", "ground")],
     [
         Room("progress", "how far work is", "ground"),
-        Room("fingerprint", "what was given, in words", "ground"),
+        Room("fingerprint", "what was given", "ground"),
         Room("checks", "types of arguments", "ground"),
+        Room("display", "objects on a screen", "ground"),
     ],
     [
         Room("_requirements", "libraries", "ground"),

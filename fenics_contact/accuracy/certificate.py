@@ -8,11 +8,13 @@ import numpy as np
 
 from fenics_contact.accuracy.admissible import UNBALANCED, Admissible, admissible
 from fenics_contact.accuracy.lifted import UNLIFTED, Lifted, lift
+from fenics_contact.display import displayed
 from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem
 from fenics_contact.linalg import LAST_PLACES, ROUNDING
 from fenics_contact.qp import DualProblem, DualSolution, Vector, global_max, global_sum
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class Certificate:
     """Bounds of the algebraic error of a state in energy norm, [√(force · length)].

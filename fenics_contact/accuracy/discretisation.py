@@ -13,12 +13,14 @@ from fenics_contact.accuracy.recovery import recovered_gradients
 from fenics_contact.accuracy.sites import find_sites
 from fenics_contact.accuracy.strain_energy import energy_of_difference
 from fenics_contact.accuracy.varying_moduli import compile_energy, energy_on_subdomain
+from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.fem import Template
 from fenics_contact.feti import Subdomain, TornSystem, nodal_mean
 from fenics_contact.scene import Body
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class DiscretisationError:
     """Estimates of the discretisation error in the norm √∫ C ε : ε, [√(force · length)].

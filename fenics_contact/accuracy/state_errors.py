@@ -71,17 +71,23 @@ class StateErrors:
         values = self._estimate.by_cell(body)
         return values / self.norm if self.norm > 0.0 else values
 
-    def __str__(self) -> str:
-        """Return one line for each error."""
-        lines = {
+    @property
+    def in_words(self) -> dict[str, str]:
+        """Name of each error -> its size and what is known of it."""
+        parts = {
             "algebraic": (self.algebraic, f"at most{', at the slip bounds of the state' * self.own_bounds}"),
             "friction": (self.friction, "estimate"),
             "discretisation": (self.discretisation, "estimate"),
             "geometry": (self.geometry, "estimate"),
         }
-        text = "\n".join(f"{name:15s} {_in_percent(value, kind)}" for name, (value, kind) in lines.items())
-        in_peak = f", {100 * self.peak_by_geometry:.2g} % in peak pressure"
-        return text + in_peak * (self.geometry > 0.0)
+        words = {name: _in_percent(value, kind) for name, (value, kind) in parts.items()}
+        if self.geometry > 0.0:
+            words["geometry"] += f", {100 * self.peak_by_geometry:.2g} % in peak pressure"
+        return words
+
+    def __str__(self) -> str:
+        """Return one line for each error."""
+        return "\n".join(f"{name:15s} {words}" for name, words in self.in_words.items())
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from fenics_contact.cli.options import (
 from fenics_contact.cli.pictures import can_draw, draw_state
 from fenics_contact.cli.plans import show_outputs, show_plan
 from fenics_contact.cli.resumable import resumable
-from fenics_contact.cli.tables import pairs
+from fenics_contact.contact import pairs_in_words
 from fenics_contact.io import ResultSeries, only_run_in, write_optimisation_result
 from fenics_contact.optimize import Result
 from fenics_contact.progress import show_progress
@@ -106,7 +106,8 @@ def _facts(file: SceneFile, task: ShapeTask, result: Result) -> dict[str, str]:
         "stopped because": result.reason.value,
     }
     for name, point in (("before", before), ("after", after)):
-        for number, words in enumerate(pairs(point.state, units)):
+        state = point.state
+        for number, words in enumerate(pairs_in_words(state.scene, state.contact, units.force, units.stress)):
             rows[f"contact {number} {name}"] = words
     volume, start = problem.volume(result.x)[0], problem.volume(task.start)[0]
     rows["volume"] = f"{volume / start:.6f} of that at the start"

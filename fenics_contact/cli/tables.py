@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -10,8 +9,7 @@ import numpy as np
 from rich import box
 from rich.table import Table
 
-from fenics_contact.contact import State, Status
-from fenics_contact.scene import ContactPair, Surface
+from fenics_contact.contact import State, Status, pairs_in_words
 from fenics_contact.scene_file import SceneFile
 
 if TYPE_CHECKING:
@@ -30,47 +28,14 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
         "total potential": f"{state.energies.total_potential:.6g} {energy}",
         "displacement": f"up to {_largest_displacement(state):.4g} {units.length}",
     }
-    for number, words in enumerate(pairs(state, units)):
+    for number, words in enumerate(pairs_in_words(state.scene, state.contact, units.force, units.stress)):
         rows[f"contact {number}"] = words
     if state.unheld:
         rows["held by nothing"] = " and ".join(map(str, state.unheld)) + ": stays where it is"
     if state.known_errors is not None:
-        for line in str(state.known_errors).splitlines():
-            name, _, value = line.partition(" ")
-            rows[f"error, {name}"] = value.strip()
+        rows |= {f"error, {name}": words for name, words in state.known_errors.in_words.items()}
     rows["seconds"] = ", ".join(f"{name} {spent:.2f}" for name, spent in state.seconds.items())
     return rows
-
-
-def pairs(state: State, units: UnitNames) -> list[str]:
-    """Return a summary of each contact pair."""
-    contact, rows = state.contact, []
-    for number, pair in enumerate(state.scene.contacts):
-        mine = contact.on_pair(number)
-        force = np.linalg.norm(contact.force[mine].sum(axis=0))
-        pressure = contact.pressure[mine].max(initial=0.0)
-        rows.append(
-            f"{_place(pair)}: {len(mine)} points, {_kinds(pair, contact.status[mine])}; "
-            f"force {force:.6g} {units.force}, pressure up to {pressure:.5g} {units.stress}"
-        )
-    return rows
-
-
-def _kinds(pair: ContactPair, status: np.ndarray) -> str:
-    """Return the numbers of points by status; without friction open or closed."""
-    counts = {kind.name.lower(): int(np.count_nonzero(status == kind)) for kind in Status}
-    if not pair.has_friction:
-        counts = {"open": counts["open"], "closed": len(status) - counts["open"]}
-    return ", ".join(f"{count} {name}" for name, count in counts.items())
-
-
-def _place(pair: ContactPair) -> str:
-    """Return the surfaces of a pair: "upper z0 on lower z1", "block z0 on rigid plane"."""
-    slave, master = pair.slave, pair.master
-    if isinstance(master, Surface):
-        return f"{slave.body} {slave.name} on {master.body} {master.name}"
-    words = re.sub(r"(?<!^)(?=[A-Z])", " ", type(master).__name__).lower()
-    return f"{slave.body} {slave.name} on {words}"
 
 
 def step_row(number: int, name: str, state: State) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from fenics_contact.contact.fields import body_mesh
 from fenics_contact.contact.gathered import GatheredFields, in_space
 from fenics_contact.contact.multi_block import body_grid
 from fenics_contact.contact.pair_resultants import PairResultants
+from fenics_contact.contact.pairs_in_words import pairs_in_words
 from fenics_contact.contact.problem import ContactProblem, solve_scene
 from fenics_contact.contact.result import ContactResult, Status
 from fenics_contact.contact.resultant import Resultant, Resultants
@@ -42,6 +43,7 @@ __all__ = [
     "contact_area",
     "default_solver",
     "in_space",
+    "pairs_in_words",
     "solve_scene",
     "solve_steps",
     "stored_state",

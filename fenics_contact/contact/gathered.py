@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.contact.result import ContactResult
+from fenics_contact.display import displayed
 from fenics_contact.pairing import NodeNumbers
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class GatheredFields:
     """The fields of one body, replicated on all ranks.

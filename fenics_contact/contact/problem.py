@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from fenics_contact.contact.state import State
 from fenics_contact.contact.static_admissibility import check_held
 from fenics_contact.contact.stored import Stored, restored_solution, with_stored_slip
 from fenics_contact.contact.tolerance import Tolerance, checked_tolerance
+from fenics_contact.display import displayed
 from fenics_contact.errors import collectively, together
 from fenics_contact.feti import (
     Decomposition,
@@ -33,6 +34,7 @@ from fenics_contact.scene import Scene, SolverKind, choose_solver
 from fenics_contact.timing import PhaseTimer
 
 
+@displayed
 class ContactProblem:
     """Successive equilibria of a scene; each starts from the one before.
 
@@ -70,6 +72,16 @@ class ContactProblem:
 
     state: State | None
     _decomposition: Decomposition | None
+
+    def _facts(self) -> dict[str, Any]:
+        return {
+            "scene": {name: body.in_words for name, body in self.scene.bodies.items()},
+            "ranks": self.comm.size,
+            "solver": "that of the scene's plan" if self.solver is None else self.solver,
+            "tolerance": "by default" if self.tolerance is None else self.tolerance,
+            "state": "none yet" if self.state is None else self.state.contact,
+            "seconds": self.timer.seconds,
+        }
 
     @property
     def partitions(self) -> Mapping[str, np.ndarray]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
+from fenics_contact.display import displayed
 from fenics_contact.pairing import ContactPoints
 
 
@@ -21,6 +23,7 @@ class Status(IntEnum):
     SLIP = 2
 
 
+@displayed
 @dataclass(frozen=True)
 class ContactResult:
     """Forces, distances and status of every contact point, replicated on all ranks.
@@ -46,6 +49,18 @@ class ContactResult:
     slip: np.ndarray
     slip_before: np.ndarray
     status: np.ndarray
+
+    def _facts(self) -> dict[str, Any]:
+        normal = self.normal_force
+        counts = ", ".join(f"{self.count(status)} {status.name.lower()}" for status in Status)
+        return {
+            "points": f"{self.points.count}: {counts}",
+            "normal force": f"up to {normal.max(initial=0.0):.6g}, sum {normal.sum():.6g}",
+            "friction force": f"up to {_longest(self.friction_force):.6g}",
+            "pressure": f"up to {self.pressure.max(initial=0.0):.6g}",
+            "gap": self.gap,
+            "slip": f"up to {_longest(self.slip):.3g}",
+        }
 
     @property
     def pressure(self) -> np.ndarray:
@@ -95,6 +110,10 @@ class ContactResult:
     def on_pair(self, pair: int) -> np.ndarray:
         """Return the numbers of the points of one contact pair."""
         return np.flatnonzero(self.points.pair == pair)
+
+
+def _longest(vectors: np.ndarray) -> float:
+    return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
 
 
 def no_contact(points: ContactPoints) -> ContactResult:

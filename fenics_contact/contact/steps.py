@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from fenics_contact.checkpoint import Checkpoint, reporting_what_is_stored, safe_point
 from fenics_contact.contact.problem import ContactProblem
 from fenics_contact.contact.state import State
 from fenics_contact.contact.step_checkpoint import StepCheckpoint
+from fenics_contact.display import displayed
 from fenics_contact.errors import collectively, together
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.progress import Task
 from fenics_contact.scene import LoadStep
 
 
+@displayed
 class LoadSequence:
     """The quasi-static history of a scene, one step at a time.
 
@@ -62,6 +65,10 @@ class LoadSequence:
         )
         self._done = StepCheckpoint(checkpoint, problem)
         self._task, self._count, self._number = Task("load steps", unit="done", total=count), count, 0
+
+    def _facts(self) -> dict[str, Any]:
+        total = "" if self._count is None else f" of {self._count}"
+        return {"steps": f"{self._number}{total} done", "problem": self.problem}
 
     @property
     def state(self) -> State | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact.display import displayed
 from fenics_contact.feti import DualSystem
 from fenics_contact.scene import rigid_body_modes
 
@@ -14,6 +15,7 @@ from fenics_contact.scene import rigid_body_modes
 ROUNDING = 1e-9
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class UnheldMotion:
     """A rigid motion that no support, tie or contact resists and no load drives.
@@ -24,6 +26,9 @@ class UnheldMotion:
     """
 
     bodies: Mapping[str, np.ndarray]
+
+    def _facts(self) -> dict[str, str]:
+        return {name: motion_in_words(motion) for name, motion in self.bodies.items()}
 
     def __str__(self) -> str:
         """Return it in words."""

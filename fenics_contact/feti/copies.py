@@ -8,11 +8,13 @@ from functools import cached_property
 
 import numpy as np
 
+from fenics_contact.display import displayed
 from fenics_contact.linalg import expected_seconds
 from fenics_contact.pairing import NodeNumbers
 from fenics_contact.scene import Scene
 
 
+@displayed
 @dataclass(frozen=True)
 class Tearing(NodeNumbers):
     """The subdomains of the bodies of a scene, and the rank that owns each.
@@ -63,6 +65,7 @@ class Tearing(NodeNumbers):
     def n_subdomains(self) -> int:
         """Number of subdomains of all bodies."""
         return int(self.subdomain_offset[-1])
+
 
 def tear(
     scene: Scene, partitions: Mapping[str, np.ndarray], ranks: int, stiffness: Mapping[str, np.ndarray]

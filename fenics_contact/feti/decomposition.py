@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fenics_contact._libraries import MPI, start
+from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.fem import FormLibrary, cell_stiffness
 from fenics_contact.feti.condensation import Condensations
@@ -20,6 +21,7 @@ from fenics_contact.partition import check_face_connected
 from fenics_contact.scene import Scene
 
 
+@displayed
 @dataclass(frozen=True)
 class Decomposition:
     """A scene cut into subdomains; each rank holds the meshes of its own.

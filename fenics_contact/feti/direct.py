@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact.display import displayed
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti.factor import Factor
 from fenics_contact.feti.torn import TornSystem
@@ -15,6 +16,7 @@ from fenics_contact.timing import PhaseTimer
 WRONG = 1e-4
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class DirectSolution:
     """Displacement and reactions of one body.

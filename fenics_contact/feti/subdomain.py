@@ -9,12 +9,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact import _dolfinx
+from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.fem import Composition, FormLibrary, check_kernel, composition, kernel_of
 from fenics_contact.mesh import corners_of
 from fenics_contact.scene import Body, Load, Material, SurfaceLoad, Ufl
 
 
+@displayed
 @dataclass(frozen=True)
 class SubdomainMesh:
     """The part of a subdomain that does not depend on the geometry: mesh, numbering, tagged facets.
@@ -58,6 +60,7 @@ class SubdomainMesh:
         return self.facets[surface]
 
 
+@displayed
 @dataclass(frozen=True)
 class Subdomain:
     """A subdomain with its matrices for one geometry and one load.

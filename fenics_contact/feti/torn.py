@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact.display import displayed
 from fenics_contact.errors import tell, together
 from fenics_contact.fem import as_tractions
 from fenics_contact.feti.contact_rows import (
@@ -35,6 +36,7 @@ from fenics_contact.scene import Scene
 _LOG = logging.getLogger(__name__)
 
 
+@displayed
 @dataclass(frozen=True)
 class TornSystem:
     """min ½ uᵀK u − fᵀu + Σ Ψ_i ‖T_i u‖ subject to B_E u = c_E, B_N u ≤ c_N, distributed over ranks.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
+from fenics_contact.display import displayed
 from fenics_contact.errors import FenicsContactError, together
 from fenics_contact.gallery.memory import require_room
 from fenics_contact.gallery.ring import LinkShape, crown_indices, crown_shapes, ring_lattice, stations
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class DesignSurface:
     """Nodes of a surface that a design may move, with smooth coordinates on it.
@@ -38,6 +40,7 @@ class DesignSurface:
     counts: tuple[int, int]
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class Link:
     """A chain link for a scene.

@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
+from fenics_contact.display import displayed
 from fenics_contact.mesh import quality
 from fenics_contact.mesh.cell_types import cell_type_of
 from fenics_contact.mesh.coincidence import check_no_coincident_nodes
@@ -25,6 +27,7 @@ from fenics_contact.mesh.validation import (
 from fenics_contact.surface_shapes import SurfaceShape, placed
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class BodyMesh:
     """Cells of one body, replicated on all ranks.
@@ -96,6 +99,23 @@ class BodyMesh:
     def _set(self, **values: object) -> None:
         for name, value in values.items():
             object.__setattr__(self, name, value)
+
+    def _facts(self) -> dict[str, Any]:
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        return {
+            "cells": self.cells_in_words,
+            "nodes": self.n_nodes,
+            "extent": " × ".join(f"{a:.6g} to {b:.6g}" for a, b in zip(low, high, strict=True)),
+            "surfaces": _sizes(self.surfaces),
+            "regions": _sizes(self.regions),
+            "shapes": {name: type(shape).__name__ for name, shape in self.shapes.items()},
+        }
+
+    @property
+    def cells_in_words(self) -> str:
+        """Number and type of the cells: "24 hexahedra"."""
+        kind = cell_type_of(self.cells, self.dim)
+        return f"{self.n_cells} {kind.plural}"
 
     @property
     def cell_type(self) -> str:
@@ -245,3 +265,7 @@ class BodyMesh:
             },
         )
         return result
+
+
+def _sizes(parts: Mapping[str, np.ndarray]) -> str:
+    return ", ".join(f"{name} ({len(rows)})" for name, rows in parts.items()) or "none"

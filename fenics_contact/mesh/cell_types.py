@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class CellType:
     """One type of cells.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.optimize.quadratic_program import QuadraticProgram, solve
 
@@ -31,6 +32,7 @@ def _frozen(values: ArrayLike, name: str, dimensions: int) -> Array:
     return array
 
 
+@displayed
 @dataclass(frozen=True)
 class Bounds:
     """The box lower ≤ x ≤ upper; ±inf where there is no bound.
@@ -55,6 +57,7 @@ class Bounds:
         return ScipyBounds(lower, upper, keep_feasible)
 
 
+@displayed
 @dataclass(frozen=True)
 class LinearConstraints:
     """Rows A x ≤ b and, optionally, E x = e.
@@ -109,6 +112,7 @@ class Surroundings:
     miss: Array
 
 
+@displayed
 @dataclass(frozen=True)
 class FeasibleSet:
     """{x : lower ≤ x ≤ upper, A x ≤ b, E x = e}, checked and complete (empty where there is no constraint).

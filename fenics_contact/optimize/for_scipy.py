@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
 from fenics_contact.optimize.constraints import Bounds, LinearConstraints, ranges
 from fenics_contact.optimize.objective import Evaluation, Fun, evaluate
@@ -26,6 +27,7 @@ _TINY = float(np.finfo(float).tiny)
 _SLOPE = 10.0  # of the wall around invalid designs, in scaled values over scaled variables
 
 
+@displayed
 @dataclass(frozen=True)
 class Visit:
     """One evaluation.
@@ -43,6 +45,7 @@ class Visit:
     note: str = ""
 
 
+@displayed
 class ForScipy:
     r"""min J(x) over a box and linear constraints, for `scipy.optimize.minimize`.
 
@@ -99,6 +102,13 @@ class ForScipy:
         self.visits: list[Visit] = []
 
     visits: list[Visit]
+
+    def _facts(self) -> dict[str, Any]:
+        return {
+            "variables": self._problem.start.size,
+            "fun": self._problem.fun,
+            "visits": f"{len(self.visits)}, {sum(bool(visit.note) for visit in self.visits)} of them invalid",
+        }
 
     @property
     def best(self) -> Visit:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.optimize.constraints import Bounds, FeasibleSet, LinearConstraints, feasible_set
 from fenics_contact.optimize.objective import Fun
@@ -14,6 +15,7 @@ from fenics_contact.optimize.objective import Fun
 Array = NDArray[np.float64]
 
 
+@displayed
 @dataclass(frozen=True)
 class PosedProblem:
     """min J(x) over a feasible set, checked.

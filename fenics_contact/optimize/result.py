@@ -9,6 +9,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from fenics_contact.display import displayed
 from fenics_contact.errors import ConvergenceError
 
 Array = NDArray[np.float64]
@@ -97,6 +98,7 @@ class Record:
     note: str = ""
 
 
+@displayed
 @dataclass(frozen=True)
 class Result:
     """The best point and how it was reached.

@@ -9,10 +9,13 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact.display import displayed
+
 #: Weights of nodes below this fraction of all are rounding, which must not keep a supported point free.
 HELD = 1e-6
 
 
+@displayed
 @dataclass(frozen=True)
 class ContactPoints:
     """Contact points of a scene, replicated on all ranks, in the order pair by pair, node by node.

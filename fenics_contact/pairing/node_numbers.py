@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact.display import displayed
 from fenics_contact.scene import Scene
 
 
+@displayed
 @dataclass(frozen=True)
 class NodeNumbers:
     """Numbers of the nodes of all bodies, body after body.

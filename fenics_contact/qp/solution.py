@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fenics_contact.display import displayed
 from fenics_contact.linalg import LAST_PLACES
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.problem import DualProblem
@@ -191,6 +192,7 @@ class SmalseMemory:
     balance: float
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class DualSolution:
     """A multiplier that satisfies every residual to the solver's tolerance.

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.checks import checked
+from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene.materials import Material
 
 
+@displayed
 @dataclass(frozen=True)
 @checked("material")
 class Body:
@@ -43,6 +45,11 @@ class Body:
             if self.material[region] not in different:
                 different.append(self.material[region])
         return tuple(different)
+
+    @property
+    def in_words(self) -> str:
+        """Its cells and materials in a few words."""
+        return f"{self.mesh.cells_in_words} of {', '.join(type(each).__name__ for each in self.materials)}"
 
     @property
     def material_of_cells(self) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -119,6 +120,11 @@ class ContactPair:
             )
 
     @property
+    def place(self) -> str:
+        """Its surfaces: "upper z0 on lower z1", "block z0 on rigid plane"."""
+        return _place(self.slave, self.master)
+
+    @property
     def has_friction(self) -> bool:
         """Whether tangential forces can be transmitted at all."""
         match self.friction:
@@ -154,3 +160,15 @@ class Tie:
                 f"body {self.slave.body!r} cannot be tied to itself: a tie joins two bodies; mesh its parts "
                 "together, or as two bodies"
             )
+
+    @property
+    def place(self) -> str:
+        """Its surfaces: "upper z0 on lower z1"."""
+        return _place(self.slave, self.master)
+
+
+def _place(slave: Surface, master: Surface | RigidObstacle) -> str:
+    if isinstance(master, Surface):
+        return f"{slave.body} {slave.name} on {master.body} {master.name}"
+    words = re.sub(r"(?<!^)(?=[A-Z])", " ", type(master).__name__).lower()
+    return f"{slave.body} {slave.name} on {words}"

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from fenics_contact.display import displayed
 from fenics_contact.partition import default_partition
 from fenics_contact.scene.effects import Effect, effects_of
 from fenics_contact.scene.parts import SceneParts
 from fenics_contact.scene.plan import Plan, make_plan
 
 
+@displayed
 @dataclass(frozen=True)
 class Scene(SceneParts):
     """Elastic bodies that may touch.
@@ -54,6 +57,19 @@ class Scene(SceneParts):
         """
         each = -(-ranks // len(self.bodies))
         return {name: default_partition(body.mesh, each, body=name) for name, body in self.bodies.items()}
+
+    def _facts(self) -> dict[str, Any]:
+        return {
+            "bodies": {name: body.in_words for name, body in self.bodies.items()},
+            "nodes": f"{sum(body.mesh.n_nodes for body in self.bodies.values())} in {self.dim} dimensions",
+            "supports": [support.in_words for support in self.supports],
+            "loads": [
+                f"{type(load).__name__} {load.body} {getattr(load, 'surface', '')}".rstrip()
+                for load in self.loads
+            ],
+            "contacts": [f"{pair.place}, {pair.friction or 'without friction'}" for pair in self.contacts],
+            "ties": [tie.place for tie in self.ties],
+        }
 
     def effects(self) -> tuple[Effect, ...]:
         """List the effects in the scene; only what these need is built."""

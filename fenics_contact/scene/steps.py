@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from fenics_contact.checks import checked
+from fenics_contact.display import displayed
 from fenics_contact.scene.loads import Load
 from fenics_contact.scene.scene import Scene
 from fenics_contact.scene.supports import Support
 
 
+@displayed
 @dataclass(frozen=True)
 @checked()
 class LoadStep:

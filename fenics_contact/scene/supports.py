@@ -56,6 +56,13 @@ class Support:
         """Dimension of the body that it is for."""
         return len(self.value)
 
+    @property
+    def in_words(self) -> str:
+        """Where it is and what it prescribes."""
+        named = [self.value[k] for k in range(self.dim)]
+        given = ("free" if each is None else "function" if callable(each) else f"{each:g}" for each in named)
+        return f"{self.body} {self.surface} ({', '.join(given)})"
+
     def values(self, points: np.ndarray) -> np.ndarray:
         """Return the prescribed displacement, NaN where a component is free.
 

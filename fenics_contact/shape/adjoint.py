@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fenics_contact.contact import State
+from fenics_contact.display import displayed
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti import DualSystem
 from fenics_contact.progress import Task
@@ -27,6 +28,7 @@ from fenics_contact.shape.objective import Partials
 UNFELT = 1e-9
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class Adjoint:
     """Solution of the adjoint system.

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fenics_contact._libraries import MPI
+from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.gallery import DesignSurface
@@ -21,6 +22,7 @@ TRANSITION = 0.15
 FAR = 0.4
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class SurfaceDesign:
     """A net of control points over a design surface; each moves along the surface's normals.

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fenics_contact.contact import State
+from fenics_contact.display import displayed
 from fenics_contact.linalg import ROUNDING
 from fenics_contact.qp import ContactLayout, DualProblem, DualSolution, Face, classify, contact_step
 from fenics_contact.scene import Surface
@@ -67,6 +68,7 @@ class WeakPoints:
         return self.count > 1 or (self.contacts > 0 and self.choice is WeakChoice.HELD)
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class LinearisedFace:
     """Face of a state with the two bases of its linearised contact law.

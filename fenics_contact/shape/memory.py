@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from fenics_contact.contact import State, stored_state
+from fenics_contact.display import displayed
 from fenics_contact.shape.linearised_face import WeakChoice, WeakPoints
 
 Stored = dict[str, np.ndarray]
@@ -17,6 +18,7 @@ _START = "start"
 _SAME = "same"
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class DesignPoint:
     """An evaluated design.
@@ -45,7 +47,7 @@ class DesignPoint:
     tolerance: float
     correction: float
     error: float
-    adjoint_multiplier: np.ndarray
+    adjoint_multiplier: np.ndarray = field(repr=False)
 
 
 class DesignMemory:

@@ -10,6 +10,7 @@ import ufl
 from fenics_contact import _dolfinx
 from fenics_contact._libraries import MPI, PETSc, check_not_forked
 from fenics_contact.contact import body_mesh
+from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.fem import Template, volume_measure
 from fenics_contact.feti import Decomposition
@@ -18,6 +19,7 @@ from fenics_contact.scene import Body, Scene, SurfaceLoad
 from fenics_contact.shape.design import SurfaceDesign
 
 
+@displayed
 class HarmonicExtension:
     """Each component of the mesh displacement is harmonic, prescribed on the design surface, zero where held.
 
@@ -28,6 +30,9 @@ class HarmonicExtension:
         moving: Nodes of the design surface.
         held: Nodes that do not move.
     """
+
+    def _facts(self) -> dict[str, np.ndarray]:
+        return {"moving": self.moving, "held": self.held}
 
     def __init__(
         self, decomposition: Decomposition, name: str, body: Body, moving: np.ndarray, held: np.ndarray

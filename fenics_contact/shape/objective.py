@@ -13,6 +13,7 @@ import numpy as np
 from fenics_contact import _dolfinx
 from fenics_contact._libraries import MPI
 from fenics_contact.contact import ContactResult, State
+from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError, calling, collective, together
 from fenics_contact.fem import material_sets, temperature_of
 from fenics_contact.feti import Subdomain
@@ -32,6 +33,7 @@ Spaces = Sequence["_dolfinx.fem.FunctionSpace"]
 Bind = Callable[[Subdomain, Functions, Spaces], "_dolfinx.fem.Form"]
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class Partials:
     """An objective J(u, λ, X) at a state, with its partial derivatives.

@@ -1,4 +1,4 @@
-"""Which pairs of surfaces a design may move: those whose rows have shape derivatives."""
+"""Which scenes and pairs of surfaces a design may move: those whose rows have shape derivatives."""
 
 from __future__ import annotations
 
@@ -8,6 +8,18 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene import Scene, Surface
+
+
+def check_dimension(scene: Scene) -> None:
+    """Reject scenes in the plane.
+
+    Raises:
+        InvalidInputError: If the scene has two dimensions.
+    """
+    if scene.dim != 3:
+        raise InvalidInputError(
+            "shape problems need three dimensions, the scene has two: make it one layer thick"
+        )
 
 
 def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:

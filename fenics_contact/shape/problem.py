@@ -10,6 +10,7 @@ import numpy as np
 
 from fenics_contact._libraries import MPI
 from fenics_contact.contact import ContactProblem, State
+from fenics_contact.display import displayed
 from fenics_contact.errors import (
     ConvergenceError,
     InfeasibleError,
@@ -29,10 +30,10 @@ from fenics_contact.shape.linearised_face import WeakChoice, linearise_face
 from fenics_contact.shape.memory import DesignMemory, DesignPoint, Stored
 from fenics_contact.shape.motion import motion_of, moving_nodes
 from fenics_contact.shape.objective import Objective, asking
-from fenics_contact.shape.pairs import check_pairs
+from fenics_contact.shape.pairs import check_dimension, check_pairs
 from fenics_contact.shape.state_error import state_error
 from fenics_contact.shape.tolerance import AdaptiveTolerance, tightest_of
-from fenics_contact.shape.volume import volume_by_points
+from fenics_contact.shape.volume import volume_of
 
 #: Tolerance of the adjoint relative to that of its state, and the smallest: no looser than the state's.
 ADJOINT_SHARE, ADJOINT_FLOOR = 1e-1, 1e-11
@@ -44,6 +45,7 @@ def _comm(problem: ShapeProblem, *_: Any, **__: Any) -> MPI.Comm:
     return problem.comm
 
 
+@displayed
 class ShapeProblem:
     """J(α) with a subgradient, for one or more moving surfaces of a scene.
 
@@ -93,14 +95,17 @@ class ShapeProblem:
         self.evaluations, self.products = 0, 0
         self._memory = DesignMemory(self._restored)
         self._forms: ShapeForms | None = None
-        if scene.dim != 3:
-            message = "shape problems need three dimensions, the scene has two: make it one layer thick"
-            raise InvalidInputError(message)
+        check_dimension(scene)
         decomposition = contact.decomposition
         with self._timer.phase("mesh motion"):
             self._motions = [motion_of(decomposition, scene, design) for design in self.designs]
         self._moving = moving_nodes(scene, self.designs, self._motions)
         check_pairs(scene, self._moving)
+
+    def _facts(self) -> dict[str, Any]:
+        work = f"{self.evaluations} designs, {self.products} products with F"
+        return {"variables": self.size, "designs": self.designs, "objective": self.objective,
+                "choice": self.choice, "work": work, "contact": self.contact}  # fmt: skip
 
     @property
     def size(self) -> int:
@@ -363,14 +368,8 @@ class ShapeProblem:
     @collectively("ShapeProblem.volume", _comm)
     def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the volume of the designed bodies and its gradient, [length³]. Collective."""
-        scene = self.scene_of(alpha)
         names = sorted({design.body for design in self.designs})
-        tearing = self.contact.decomposition.tearing
-        total, by_points = 0.0, np.zeros((int(tearing.node_offset[-1]), 3))
-        for name in names:
-            mesh = scene.bodies[name].mesh
-            total += mesh.volume
-            by_points[tearing.global_nodes(name, np.arange(mesh.n_nodes))] = volume_by_points(mesh)
+        total, by_points = volume_of(self.scene_of(alpha), names, self.contact.decomposition.tearing)
         return total, self._by_design(by_points)
 
     def _by_points(

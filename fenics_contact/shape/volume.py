@@ -2,10 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fenics_contact.mesh import BodyMesh, boundary_faces, vector_areas
+from fenics_contact.pairing import NodeNumbers
+from fenics_contact.scene import Scene
 from fenics_contact.surfaces import shape_functions
+
+
+def volume_of(scene: Scene, names: Sequence[str], numbers: NodeNumbers) -> tuple[float, np.ndarray]:
+    """Return the volume of some bodies and its derivative by the nodes of all, shape (n_nodes, 3).
+
+    Args:
+        scene: The scene.
+        names: Names of the bodies.
+        numbers: Numbers of the nodes of all bodies.
+    """
+    total, by_points = 0.0, np.zeros((int(numbers.node_offset[-1]), 3))
+    for name in names:
+        mesh = scene.bodies[name].mesh
+        total += mesh.volume
+        by_points[numbers.global_nodes(name, np.arange(mesh.n_nodes))] = volume_by_points(mesh)
+    return total, by_points
 
 
 def volume_by_points(mesh: BodyMesh) -> np.ndarray:

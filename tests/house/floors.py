@@ -5,7 +5,7 @@ from __future__ import annotations
 #: From the ground up; rooms on one floor do not know each other.
 FLOORS = [
     {"errors"},
-    {"progress", "fingerprint", "checks"},
+    {"progress", "fingerprint", "checks", "display"},
     {"_requirements", "launching", "timing", "checkpoint"},
     {"_libraries"},
     {"_dolfinx"},

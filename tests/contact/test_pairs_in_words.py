@@ -1,4 +1,4 @@
-"""What tables say of contact."""
+"""What is said of each contact pair."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ import re
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.cli.tables import pairs
-from fenics_contact.contact import solve_scene
+from fenics_contact.contact import pairs_in_words, solve_scene
 from fenics_contact.scene import Coulomb, Scene
-from fenics_contact.scene_file.document import UnitNames
 from tests.contact.gallery import partitions, pressed_block, two_blocks
 
 RUBBING = r"\w+ \w+ on \w+ \w+: \d+ points, \d+ open, \d+ stick, \d+ slip; force [1-9.]"
@@ -24,5 +22,6 @@ SMOOTH = r"\w+ \w+ on rigid plane: \d+ points, \d+ open, [1-9]\d* closed; force 
 )
 def test_a_pair_is_told_by_its_surfaces_and_its_points_by_what_they_can_do(scene: Scene, told: str) -> None:
     state = solve_scene(scene, MPI.COMM_SELF, partitions=partitions(scene))
-    (words,) = pairs(state, UnitNames())
+    (words,) = pairs_in_words(scene, state.contact, "N", "MPa")
     assert re.match(told, words), words
+    assert re.search(r"force \S+ N, pressure up to \S+ MPa$", words), words

@@ -1,0 +1,148 @@
+"""Objects on a screen: a few lines of facts instead of their arrays, and a table in notebooks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from html import escape
+from typing import Any, TypeVar
+
+import numpy as np
+
+__all__ = ["displayed", "in_lines", "in_short"]
+
+Class = TypeVar("Class", bound=type)
+
+#: Largest number of lines, and of columns, of a `repr`.
+LINES, COLUMNS = 10, 110
+#: Largest number of columns of a part inside another object.
+INSIDE = 64
+#: Largest number of entries of a mapping or sequence that are shown.
+ENTRIES = 4
+
+
+def displayed(cls: Class) -> Class:
+    """Let a class show facts, one per line, as its `repr`, and as a table in notebooks.
+
+    The facts are what its method ``_facts`` returns, name -> value; without one the fields of a dataclass
+    that take part in its `repr`. Arrays are shown by shape and range. Place it above ``@dataclass``.
+
+    Example:
+        >>> from dataclasses import dataclass
+        >>> @displayed
+        ... @dataclass(frozen=True)
+        ... class Wire:
+        ...     radius: float
+        ...     points: np.ndarray
+        >>> Wire(0.5, np.arange(12.0).reshape(4, 3))
+        Wire
+          radius  0.5
+          points  float64 (4, 3), 0 to 11
+    """
+    cls.__repr__ = in_lines  # type: ignore[assignment]
+    cls._repr_html_ = _in_table  # type: ignore[attr-defined]
+    return cls
+
+
+def in_lines(shown: Any, most: int = LINES, columns: int = COLUMNS) -> str:
+    """Return an object's name and facts, one per line.
+
+    Args:
+        shown: An object of a `displayed` class.
+        most: Largest number of lines; facts beyond it are only named.
+        columns: Largest number of characters in a line.
+    """
+    facts = _facts(shown)
+    names, more = list(facts), []
+    if len(names) >= most:
+        names, more = names[: most - 2], names[most - 2 :]
+    width = max(map(len, names), default=0)
+    lines = [f"  {name:{width}s}  {in_short(facts[name], columns - width - 4)}" for name in names]
+    rest = [_cut(f"  and {', '.join(more)}", columns)] if more else []
+    return "\n".join([type(shown).__name__, *lines, *rest])
+
+
+def _in_table(shown: Any) -> str:
+    """Return the facts as a table in HTML, as notebooks show it."""
+    rows = "".join(
+        f'<tr><th style="text-align: left">{escape(name)}</th>'
+        f'<td style="text-align: left">{escape(in_short(value, 2 * COLUMNS))}</td></tr>'
+        for name, value in _facts(shown).items()
+    )
+    return f"<table><caption>{escape(type(shown).__name__)}</caption>{rows}</table>"
+
+
+def _facts(shown: Any) -> Mapping[str, Any]:
+    if hasattr(shown, "_facts"):
+        return dict(shown._facts())
+    return {field.name: getattr(shown, field.name) for field in fields(shown) if field.repr}
+
+
+def in_short(value: Any, width: int = INSIDE, *, inside: bool = False) -> str:
+    """Return a value in one line: texts as they are, arrays by shape and range, long lists by their length.
+
+    Args:
+        value: Any value.
+        width: Largest number of characters.
+        inside: Whether it is a part of an object in the same line; objects in it are only named.
+    """
+    return _cut(" ".join(_words(value, inside).split()), width)
+
+
+def _cut(text: str, width: int) -> str:
+    return text if len(text) <= width else f"{text[: width - 2]} …"
+
+
+def _words(value: Any, inside: bool) -> str:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, Enum):
+        return value.name
+    if isinstance(value, float | np.floating):
+        return f"{value:.6g}"
+    if isinstance(value, np.ndarray):
+        return _array(value)
+    if isinstance(value, Mapping):
+        parts = [f"{name}: {in_short(part, inside=inside)}" for name, part in list(value.items())[:ENTRIES]]
+        return "; ".join(parts + _more(len(value))) or "none"
+    if isinstance(value, list | tuple | Set):
+        return _sequence(value, inside)
+    if callable(value) and hasattr(value, "__qualname__"):
+        return str(value.__qualname__)
+    if type(value).__repr__ is in_lines or is_dataclass(value):
+        return _object(value, inside)
+    if isinstance(value, int | None):
+        return repr(value)
+    return f"{type(value).__name__}(…)" if inside else repr(value)
+
+
+def _object(value: Any, inside: bool) -> str:
+    if inside:
+        return f"{type(value).__name__}(…)"
+    parts = (f"{name} {in_short(fact, inside=True)}" for name, fact in _facts(value).items())
+    return f"{type(value).__name__}({', '.join(parts)})"
+
+
+def _array(array: np.ndarray) -> str:
+    known = f"{array.dtype} {array.shape}"
+    if array.size == 0 or array.dtype.kind not in "biuf":
+        return known
+    if array.dtype.kind == "b":
+        return f"{known}, {np.count_nonzero(array)} true"
+    nan = int(np.count_nonzero(np.isnan(array)))
+    low, high = (np.nan, np.nan) if nan == array.size else (np.nanmin(array), np.nanmax(array))
+    return f"{known}, {low:.6g} to {high:.6g}{f', {nan} nan' if nan else ''}"
+
+
+def _sequence(values: Sequence[Any] | Set[Any], inside: bool) -> str:
+    kinds = {type(value).__name__ for value in values}
+    if len(values) > ENTRIES and len(kinds) == 1 and kinds != {"str"}:
+        return f"{len(values)} × {kinds.pop()}"
+    shown = [in_short(value, inside=inside) for value in list(values)[:ENTRIES]] + _more(len(values))
+    numbers = all(isinstance(value, int | float | np.number | None) for value in values)
+    return f"({', '.join(shown)})" if values and numbers else "; ".join(shown) or "none"
+
+
+def _more(count: int) -> list[str]:
+    return [f"… {count - ENTRIES} more"] if count > ENTRIES else []

@@ -1,0 +1,238 @@
+"""What every public object says of itself on a screen: a few lines, and no arrays."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import re
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from enum import Enum
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.accuracy import Balanced, certify, solver_errors
+from fenics_contact.contact import (
+    ContactProblem,
+    FixedPoint,
+    LoadSequence,
+    State,
+    Status,
+    UnheldMotion,
+    solve_scene,
+)
+from fenics_contact.display import COLUMNS, LINES, displayed, in_lines
+from fenics_contact.gallery import block
+from fenics_contact.mesh import CELL_TYPES, BodyMesh
+from fenics_contact.optimize import (
+    Bounds,
+    BundleTrust,
+    Checkpoint,
+    ForScipy,
+    LinearConstraints,
+    minimize,
+    pose,
+)
+from fenics_contact.qp import FaceNewton
+from fenics_contact.scene import (
+    BodyForce,
+    Coulomb,
+    DistanceObstacle,
+    LoadStep,
+    OrthotropicElasticity,
+    OrthotropicPlaneStress,
+    PlaneStrain,
+    PlaneStress,
+    Pressure,
+    RigidCylinder,
+    RigidPlane,
+    RigidSphere,
+    Support,
+    Surface,
+    ThermalStrain,
+    Tie,
+    TotalForce,
+    Tresca,
+    Ufl,
+)
+from fenics_contact.shape import (
+    AdaptiveTolerance,
+    ContactForces,
+    ShapeProblem,
+    TotalPotential,
+    VolumeIntegral,
+    WeakChoice,
+    linearise_face,
+    solve_adjoint,
+)
+from tests.contact.gallery import partitions
+from tests.shape.blocks import block_on_floor, designs_of
+
+FACES = ("scene", "mesh", "contact", "shape", "optimize", "accuracy")
+MOST_PRINTED = 25
+#: Protocols, and classes to derive from.
+NO_OBJECTS = {
+    "Elasticity", "EnergyModel", "Inexact", "Kinked", "Material", "Objective", "Resumable", "RigidObstacle",
+    "SurfaceShape", "Thermoelastic", "Transverse",
+}  # fmt: skip
+
+
+def bowl(x: np.ndarray) -> tuple[float, np.ndarray]:
+    return float(x @ x), 2.0 * x
+
+
+@cache
+def objects() -> dict[str, Any]:
+    """Return an object of every public class by the name of the class, and what they hold."""
+    scene = block_on_floor(Coulomb(0.4), load=(0.4, 0.1, -2.0))
+    contact = ContactProblem(scene, MPI.COMM_SELF, partitions=partitions(scene), tolerance=1e-8)
+    shape = ShapeProblem(contact, designs_of(scene), TotalPotential())
+    point = shape.evaluate(np.zeros(shape.size))
+    state = point.state
+    partials = shape.objective.partials(state, shape._shape_forms(state))
+    limits = LinearConstraints(np.ones((40, 60)), np.ones(40))
+    search = ForScipy(bowl, np.zeros(60), constraints=limits)
+    search.arguments("SLSQP")["fun"](np.zeros(60))
+    weights = [BodyForce("block", (0, 0, float(k))) for k in range(50)]
+    roots = [
+        shape, point, state, scene, scene.plan(), state.errors, state.gather_fields("block"), partials,
+        solve_adjoint(state, partials, linearise_face(state, WeakChoice.RELEASED)),
+        certify(state.dual, state.dual_solution), solver_errors(state.system, state.solution),
+        Balanced(), FixedPoint(FaceNewton()), LoadSequence(shape.contact), AdaptiveTolerance(),
+        UnheldMotion({"block": np.eye(6)[0]}), *shape._motions,
+        limits, Bounds(np.zeros(60), np.ones(60)), BundleTrust(), Checkpoint("run.npz"), search,
+        pose(bowl, np.zeros(60), constraints=limits), minimize(bowl, np.ones(60)),
+        Support("block", "z1", (None, lambda x: x[:, 0], 0.0)), LoadStep("push", loads=weights),
+        *CELL_TYPES.values(), ThermalStrain("block", 20.0), TotalForce("block", "z1", (0, 0, -1)),
+        Pressure("block", "z1", 1.0), Tresca(1.0), Tie(Surface("a", "z0"), Surface("b", "z1")),
+        PlaneStrain(1.0, 0.3), PlaneStress(1.0, 0.3), Ufl(lambda x: x[0]),
+        DistanceObstacle(lambda x: x[:, 2]), RigidSphere((0, 0, 0), 1.0),
+        RigidCylinder((0, 0, 0), (0, 0, 1), 1.0), OrthotropicPlaneStress((2.0, 1.0), 0.1, 1.0),
+        OrthotropicElasticity((3.0, 2.0, 1.0), (0.1, 0.1, 0.1), (1.0, 1.0, 1.0)),
+        ContactForces(lambda contact: (0.0, np.zeros(1), np.zeros((1, 2)))),
+        VolumeIntegral("motion", lambda u, x, stress: u[0], "block"),
+    ]  # fmt: skip
+    found: dict[str, Any] = {}
+    for root in roots:
+        _collect(root, found)
+    return found
+
+
+def _collect(value: Any, found: dict[str, Any]) -> None:
+    """Add an object and the objects that it holds, one of each class."""
+    if isinstance(value, dict | list | tuple):
+        for part in value.values() if isinstance(value, dict) else value:
+            _collect(part, found)
+    name = type(value).__name__
+    if type(value).__module__.startswith("fenics_contact") and name not in found:
+        found[name] = value
+        held = [field.name for field in fields(value)] if is_dataclass(value) else list(vars(value))
+        for part in held:
+            _collect(getattr(value, part), found)
+
+
+def public_classes() -> list[str]:
+    """Return the names of the classes that the faces offer and of which there are objects."""
+    offered = [
+        getattr(module, name)
+        for module in (importlib.import_module(f"fenics_contact.{face}") for face in FACES)
+        for name in module.__all__
+    ]
+    classes = [one for one in offered if inspect.isclass(one) and not issubclass(one, Enum | BaseException)]
+    return sorted({one.__name__ for one in classes} - NO_OBJECTS)
+
+
+#: What NumPy writes where it shows an array.
+DUMPED = re.compile(r"array\(|\[ *-?\d[\d.e+-]*[ ,]+-?\d")
+
+
+@pytest.mark.parametrize("name", public_classes())
+def test_a_public_object_shows_a_few_lines_and_no_array(name: str) -> None:
+    shown = repr(objects()[name])
+    assert len(shown.splitlines()) <= LINES, shown
+    assert not DUMPED.search(shown), shown
+    assert len(shown) > len(name), "it says nothing of itself"
+    assert max(map(len, shown.splitlines())) <= COLUMNS or "\n" not in shown, shown
+    assert len(str(objects()[name]).splitlines()) <= MOST_PRINTED
+
+
+def test_a_dumped_array_would_be_found() -> None:
+    assert DUMPED.search(repr(np.arange(3)))
+    assert DUMPED.search(str(np.linspace(0.0, 1.0, 3)))
+    assert DUMPED.search(repr(np.zeros((2, 2))))
+    assert not DUMPED.search("float64 (2, 2), 0 to 1")
+
+
+def test_everything_inside_a_state_shows_a_few_lines() -> None:
+    inside = {name: repr(part) for name, part in objects().items() if type(part).__repr__ is in_lines}
+    assert {"DualSolution", "TornSystem", "Decomposition", "ContactPoints", "DesignSurface"} <= set(inside)
+    assert [name for name, shown in inside.items() if len(shown.splitlines()) > LINES] == []
+    assert [name for name, shown in inside.items() if DUMPED.search(shown)] == []
+
+
+def test_a_printed_state_says_what_was_found_and_what_it_cost() -> None:
+    state: State = objects()["State"]
+    lines = {line[2:].split("  ")[0].strip(): line for line in str(state).splitlines()}
+    counts = [state.contact.count(status) for status in Status]
+    assert "{} open, {} stick, {} slip".format(*counts) in lines["contact"]
+    assert f"{state.counts['torn_unknowns']} in {state.counts['subdomains']} subdomains" in lines["unknowns"]
+    largest = np.linalg.norm(state.contact.force, axis=1).max()
+    assert float(lines["largest force"].split()[-1]) == pytest.approx(largest, rel=1e-5)
+    assert f"{state.solution.products} products" in lines["work"]
+    assert float(lines["strain energy"].split()[-1]) == pytest.approx(state.energies.strain, rel=1e-5)
+    assert {"error, algebraic", "error, discretisation", "seconds", "total potential", "residuals"} <= set(
+        lines
+    )
+
+
+def test_printing_a_state_estimates_no_errors() -> None:
+    state = solve_scene(objects()["Scene"], MPI.COMM_SELF, tolerance=1e-4)
+    assert "errors" in str(state)
+    assert "ask for state.errors" in str(state)
+    assert "errors" not in state.__dict__
+
+
+def test_many_contact_pairs_are_cut_short() -> None:
+    scene = objects()["Scene"]
+    pair = scene.contacts[0]
+    walls = [replace(pair, master=RigidPlane((0.0, 0.0, -1.0 - k), (0.0, 0.0, 1.0))) for k in range(20)]
+    state = solve_scene(replace(scene, contacts=[pair, *walls]), MPI.COMM_SELF, tolerance=1e-4)
+    assert len(str(state).splitlines()) <= MOST_PRINTED
+    assert "13 further contact pairs" in str(state)
+
+
+@pytest.mark.parametrize("name", ["Scene", "BodyMesh", "State", "Result"])
+def test_notebooks_show_a_small_table(name: str) -> None:
+    table = ET.fromstring(objects()[name]._repr_html_())
+    rows = {row[0].text: row[1].text for row in table.iter("tr")}
+    assert table[0].text == name
+    assert 5 <= len(rows) <= MOST_PRINTED
+    assert all(not DUMPED.search(text or "") for text in rows.values())
+
+
+def test_a_table_escapes_the_names_that_users_choose() -> None:
+    mesh = block((0, 0, 0), (1, 1, 1), (1, 1, 1))
+    named = BodyMesh(mesh.points, mesh.cells, {"<b>&": mesh.surfaces["z0"]})
+    assert "&lt;b&gt;&amp; (1)" in named._repr_html_()
+
+
+def test_unusual_values_are_shown() -> None:
+    @displayed
+    @dataclass(frozen=True)
+    class Odd:
+        empty: np.ndarray
+        unknown: np.ndarray
+        marks: np.ndarray
+        some: np.ndarray
+        many: tuple[float, ...]
+        hidden: int = field(default=0, repr=False)
+
+    odd = Odd(np.zeros((0, 3)), np.full(2, np.nan), np.eye(2) > 0, np.array([1.0, np.nan]), (1.0,) * 9)
+    assert [line.split("  ", 2)[2].strip() for line in repr(odd).splitlines()[1:]] == [
+        "float64 (0, 3)", "float64 (2,), nan to nan, 2 nan", "bool (2, 2), 2 true",
+        "float64 (2,), 1 to 1, 1 nan", "9 × float",
+    ]  # fmt: skip
