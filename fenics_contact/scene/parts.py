@@ -39,6 +39,9 @@ class SceneParts:
         for part in (*self.supports, *self.loads):
             surface = part.surface if isinstance(part, SurfaceLoad | Support) else None
             self._require(part.body, surface, type(part).__name__)
+        held = tuple(support.held_in(self.bodies[support.body].mesh.dim) for support in self.supports)
+        object.__setattr__(self, "supports", held)
+        for part in (*self.supports, *self.loads):
             self._require_components(part)
             if isinstance(part, ThermalStrain):
                 self._require_expansion(part)

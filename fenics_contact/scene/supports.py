@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,8 +23,9 @@ class Support:
     Attributes:
         body: Name of the body.
         surface: Name of its surface.
-        value: Displacement [length] for x, y, z (for x, y on a plane body). None leaves a component free; a
-            function receives points, shape (n, dim), and returns the component there, shape (n,).
+        value: Displacement [length] for x, y, z (for x, y on a plane body), by default zero in all directions
+            of the body's space. None leaves a component free; a function receives points, shape (n, dim), and
+            returns the component there, shape (n,).
 
     Raises:
         InvalidInputError: If nothing is prescribed, or something other than a finite number or a function.
@@ -51,16 +52,15 @@ class Support:
             )
         object.__setattr__(self, "value", tuple(self.value))
 
-    @property
-    def dim(self) -> int:
-        """Dimension of the body that it is for."""
-        return len(self.value)
+    def held_in(self, dim: int) -> Support:
+        """Return the support of a body of a dimension: zeros for three directions hold a plane body, too."""
+        plane = dim == 2 and self.value == (0.0, 0.0, 0.0)
+        return replace(self, value=(0.0, 0.0)) if plane else self
 
     @property
     def in_words(self) -> str:
         """Where it is and what it prescribes."""
-        named = [self.value[k] for k in range(self.dim)]
-        given = ("free" if each is None else "function" if callable(each) else f"{each:g}" for each in named)
+        given = ("free" if v is None else "function" if callable(v) else f"{v:g}" for v in self.value)
         return f"{self.body} {self.surface} ({', '.join(given)})"
 
     def values(self, points: np.ndarray) -> np.ndarray:

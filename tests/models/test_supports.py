@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import solve_scene
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene import Body, Scene, Support
+from fenics_contact.scene import Body, LoadStep, Scene, Support, Traction
 from tests.models.bodies import bent, box, steel
 from tests.models.elements import CELLS
 
@@ -50,4 +50,34 @@ def test_a_linear_displacement_all_around_is_taken_on_inside(cell: str) -> None:
 def test_a_support_of_three_components_does_not_suit_a_plane_body() -> None:
     message = r"Support.value of body 'plate' must hold two entries, for x and y, as the body is plane, got"
     with pytest.raises(InvalidInputError, match=message):
-        Scene({"plate": Body(box("triangle"), steel(2))}, [Support("plate", "x0")])
+        Scene({"plate": Body(box("triangle"), steel(2))}, [Support("plate", "x0", (0.0, 0.1, 0.0))])
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_support_holds_all_directions_of_its_body_by_default(cell: str) -> None:
+    mesh = box(cell)
+    scene = Scene({"body": Body(mesh, steel(mesh.dim))}, [Support("body", "x0")])
+    assert scene.supports == (Support("body", "x0", (0.0,) * mesh.dim),)
+    held = np.unique(mesh.surfaces["x0"])
+    assert scene.fixed("body")[held].all()
+    assert not np.delete(scene.fixed("body"), held, axis=0).any()
+
+
+def test_a_plane_body_that_is_held_by_default_is_solved() -> None:
+    body = Body(box("triangle"), steel(2))
+    pull = Traction("plate", "x1", (1.0, 0.0))
+    states = [
+        solve_scene(Scene({"plate": body}, [support], [pull]), MPI.COMM_SELF)
+        for support in (Support("plate", "x0"), Support("plate", "x0", (0.0, 0.0)))
+    ]
+    moved = [state.gather_displacement("plate") for state in states]
+    assert np.abs(moved[0]).max() > 0.0
+    np.testing.assert_array_equal(*moved)
+
+
+def test_a_load_step_holds_a_plane_body_by_default() -> None:
+    scene = Scene({"plate": Body(box("triangle"), steel(2))}, [Support("plate", "x0", (0.1, 0.0))])
+    assert LoadStep("back", supports=[Support("plate", "x0")]).applied_to(scene).supports[0].value == (
+        0.0,
+        0.0,
+    )
