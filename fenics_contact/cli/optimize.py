@@ -22,7 +22,7 @@ from fenics_contact.cli.options import (
     checkpoint_of,
     read,
 )
-from fenics_contact.cli.pictures import can_draw, draw_state
+from fenics_contact.cli.pictures import Gallery, can_draw, draw_state
 from fenics_contact.cli.plans import show_outputs, show_plan
 from fenics_contact.cli.resumable import resumable
 from fenics_contact.contact import pairs_in_words
@@ -63,12 +63,15 @@ def optimize(
         with only_run_in(file.folder, desk.comm):
             result = _minimised(desk, file, task, resume)
             desk.show(facts(_facts(file, task, result)))
-            drawn = _draw(desk, file, task, result) if pictures and can_draw(desk) else []
-    names = ", ".join(["result.json", *_films(file), *(path.name for path in drawn)])
+            gallery = Gallery()
+            if pictures and can_draw(desk):
+                _draw(desk, file, task, result, gallery)
+    names = ", ".join(["result.json", *_films(file), *(path.name for path in gallery.drawn)])
     desk.say(f"results in {file.folder}/: {names}")
     if not result.reason.success:
         desk.say(f"not converged: {result.reason.value}")
         raise typer.Exit(int(Ending.NOT_CONVERGED))
+    gallery.require_all()
 
 
 def _films(file: SceneFile) -> list[str]:
@@ -115,24 +118,24 @@ def _facts(file: SceneFile, task: ShapeTask, result: Result) -> dict[str, str]:
     return rows
 
 
-def _draw(desk: Desk, file: SceneFile, task: ShapeTask, result: Result) -> list[Path]:
+def _draw(desk: Desk, file: SceneFile, task: ShapeTask, result: Result, gallery: Gallery) -> None:
     """Draw the states before and after, the control net and the history. Collective."""
     from fenics_contact.viz import plot_control_net, plot_convergence
 
-    problem, drawn = task.problem, []
+    problem = task.problem
     for name, point in (("before", problem.first), ("after", problem.best)):
         assert point is not None
-        drawn += draw_state(desk, file, {name: point.state}, f"_{name}")
+        draw_state(desk, file, {name: point.state}, gallery, f"_{name}")
     moved, at = problem.points_of(result.x), 0
     for number, design in enumerate(problem.designs):
         points, part = file.scene.bodies[design.body].mesh.points, result.x[at : at + design.size]
         nets: Any = tuple(design.control_points(points, alpha) for alpha in (np.zeros(design.size), part))
         path = file.folder / ("control_net.png" if number == 0 else f"control_net_{number + 1}.png")
-        plot_control_net(design.surface, (points, moved[design.body]), nets, path, comm=desk.comm)
-        drawn.append(path)
+        plot_control_net(design.lattice, (points, moved[design.body]), nets, path, comm=desk.comm)
+        gallery.drawn.append(path)
         at += design.size
     values = [record.value for record in result.history]
     kinds = [record.kind.value for record in result.history]
     path = file.folder / "convergence.png"
     plot_convergence(values, kinds, path, title=file.title, comm=desk.comm)
-    return [*drawn, path]
+    gallery.drawn.append(path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,28 +42,54 @@ def units_of(file: SceneFile) -> Units:
     return Units(length=names.length, force=names.force, stress=names.stress)
 
 
-def draw_state(desk: Desk, file: SceneFile, states: Mapping[str, State], suffix: str = "") -> list[Path]:
+@dataclass
+class Gallery:
+    """The pictures of a run: those that were drawn, and those that could not be.
+
+    Attributes:
+        drawn: The files.
+        missing: Names of the others.
+    """
+
+    drawn: list[Path] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
+
+    def require_all(self) -> None:
+        """Refuse to end well without a picture that the scene file requests, once everything else is written.
+
+        Raises:
+            InvalidInputError: If one is missing; the reason was said where it was drawn.
+        """
+        if self.missing:
+            raise InvalidInputError(
+                f"the pictures that a scene file requests must be possible, {', '.join(self.missing)} could "
+                "not be drawn, everything else is written: take it out of [output] pictures, or run with "
+                "--no-pictures"
+            )
+
+
+def draw_state(
+    desk: Desk, file: SceneFile, states: Mapping[str, State], gallery: Gallery, suffix: str = ""
+) -> None:
     """Draw the pictures that a file requests. Collective.
 
     Args:
         desk: Output for messages about omitted pictures.
         file: The scene file.
         states: Name -> state; the last one is drawn, all of them in maps of the status.
+        gallery: Receives the names of the pictures.
         suffix: End of the files' names, before ".png".
-
-    Returns:
-        The pictures that were drawn.
     """
-    state, drawn = list(states.values())[-1], []
+    state = list(states.values())[-1]
     for kind in file.document.output.pictures:
         path = file.folder / f"{kind}{suffix}.png"
         try:
             _DRAWN[kind](file, states, state, path)
         except InvalidInputError as error:
             desk.say(f"no picture {path.name}: {error}")
+            gallery.missing.append(path.name)
         else:
-            drawn.append(path)
-    return drawn
+            gallery.drawn.append(path)
 
 
 def _stress(file: SceneFile, states: Mapping[str, State], state: State, path: Path) -> None:

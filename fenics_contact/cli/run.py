@@ -22,7 +22,7 @@ from fenics_contact.cli.options import (
     checkpoint_of,
     read,
 )
-from fenics_contact.cli.pictures import can_draw, draw_state
+from fenics_contact.cli.pictures import Gallery, can_draw, draw_state
 from fenics_contact.cli.plans import show_outputs, show_plan
 from fenics_contact.cli.resumable import resumable
 from fenics_contact.cli.tables import state_facts, step_row, step_table
@@ -62,9 +62,12 @@ def run(
             return
         with only_run_in(file.folder, desk.comm):
             states = _through_steps(desk, file, resume) if file.steps else _at_once(desk, file)
-            drawn = draw_state(desk, file, states) if pictures and _wanted(file) and can_draw(desk) else []
-    names = ", ".join(["result.json", *_files(file), *(path.name for path in drawn)])
+            gallery = Gallery()
+            if pictures and _wanted(file) and can_draw(desk):
+                draw_state(desk, file, states, gallery)
+    names = ", ".join(["result.json", *_files(file), *(path.name for path in gallery.drawn)])
     desk.say(f"results in {file.folder}/: {names}")
+    gallery.require_all()
 
 
 def _files(file: SceneFile) -> list[str]:

@@ -204,14 +204,19 @@ def test_pictures_are_drawn_with_the_names_of_units(
     assert json.loads((tmp_path / "result.json").read_text())["more"]["unit_names"]["stress"] == "kN/cm²"
 
 
-def test_a_picture_that_does_not_suit_the_scene_is_left_out_with_the_reason(
+def test_a_picture_that_cannot_be_drawn_is_named_once_all_else_is_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = GOOD[: GOOD.index("[[contacts]]")].replace('body = "upper"', 'body = "lower"')
     one_body = text[: text.index("[bodies.upper]")] + text[text.index("[[supports]]") :]
-    path = scene(tmp_path, f'{one_body}[output]\npictures = ["pressure"]\n')
-    assert run("run", path, "-o", tmp_path) == 0
-    assert "no picture pressure.png: " in capsys.readouterr().out
+    path = scene(tmp_path, f'{one_body}[output]\npictures = ["stress", "pressure"]\n')
+    assert run("run", path, "-o", tmp_path) == cli.Ending.WRONG_INPUT
+    told = capsys.readouterr()
+    assert "no picture pressure.png: " in told.out
+    assert "result.json, state.vtm, stress.png\n" in told.out
+    assert (tmp_path / "stress.png").exists()
+    assert "error: the pictures that a scene file requests must be possible, pressure.png could" in told.err
+    assert run("run", path, "-o", tmp_path, "--no-pictures") == 0
 
 
 @pytest.mark.slow
