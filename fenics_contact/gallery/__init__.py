@@ -11,6 +11,7 @@ from fenics_contact.gallery.hemisphere import half_cylinder, hemisphere
 from fenics_contact.gallery.link import DesignSurface, Link, chain_link
 from fenics_contact.gallery.rectangle import rectangle, rectangle_lattice, split_quadrilaterals
 from fenics_contact.gallery.ring import LinkShape
+from fenics_contact.gallery.side import side_of
 from fenics_contact.gallery.structured import split_hexahedra
 from fenics_contact.gallery.touch import PULL_AXIS, TwoLinks, two_links
 
@@ -34,6 +35,7 @@ __all__ = [
     "hemisphere",
     "rectangle",
     "rectangle_lattice",
+    "side_of",
     "split_hexahedra",
     "split_quadrilaterals",
     "two_links",

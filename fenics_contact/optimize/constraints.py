@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.optimize.from_scipy import rows_of
 from fenics_contact.optimize.quadratic_program import QuadraticProgram, solve
 
 if TYPE_CHECKING:
     import scipy.optimize
 
 Array = NDArray[np.float64]
+#: Linear constraints, as this package or as SciPy writes them.
+Constraints: TypeAlias = (
+    "LinearConstraints | scipy.optimize.LinearConstraint | Sequence[scipy.optimize.LinearConstraint]"
+)
 
 # A row counts as satisfied within this fraction of the size of its terms, which is rounding.
 _FEASIBILITY = 1e-9
@@ -223,14 +229,14 @@ def ranges(allowed: FeasibleSet) -> list[tuple[Array, Array, Array]]:
 def feasible_set(
     n: int,
     bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
-    constraints: LinearConstraints | None = None,
+    constraints: Constraints | None = None,
 ) -> FeasibleSet:
     """Check the caller's constraints and fill in the defaults.
 
     Args:
         n: Number of variables.
         bounds: Box, or None for none.
-        constraints: Rows, or None for none.
+        constraints: Rows, or those of SciPy, or None for none.
 
     Returns:
         The feasible set; the caller's arrays are copied.
@@ -239,7 +245,8 @@ def feasible_set(
         InvalidInputError: If a shape does not fit, a value is nan, or a lower bound lies above its upper one.
     """
     lower, upper = _box(n, bounds)
-    rows = constraints or LinearConstraints(np.zeros((0, n)), np.zeros(0))
+    given = () if constraints is None else constraints
+    rows = given if isinstance(given, LinearConstraints) else LinearConstraints(*rows_of(given, n))
     matrix, limit = _rows(n, rows.matrix, rows.limit, "A", "b")
     if (rows.equality_matrix is None) != (rows.equality_value is None):
         raise InvalidInputError("an equality needs both equality_matrix and equality_value, got only one")
@@ -285,7 +292,7 @@ def _rows(n: int, matrix: ArrayLike, limit: ArrayLike, name: str, right: str) ->
 def nearest_feasible(
     x: ArrayLike,
     bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
-    constraints: LinearConstraints | None = None,
+    constraints: Constraints | None = None,
 ) -> Array:
     """Return the feasible point nearest to x in the Euclidean norm.
 

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
-from fenics_contact.optimize.constraints import Bounds, LinearConstraints, ranges
-from fenics_contact.optimize.objective import Evaluation, Fun, evaluate
+from fenics_contact.optimize.constraints import Bounds, Constraints, ranges
+from fenics_contact.optimize.objective import Fun, evaluate, require_finite
 from fenics_contact.optimize.problem import pose
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class ForScipy:
         x0: ArrayLike,
         *,
         bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
-        constraints: LinearConstraints | None = None,
+        constraints: Constraints | None = None,
         scale: ArrayLike | None = None,
         value: Callable[[Array], float] | None = None,
         invalid: float | None = None,
@@ -87,7 +87,7 @@ class ForScipy:
             fun: Returns J(x) and one subgradient; raises `InvalidDesignError` where there is none.
             x0: Feasible starting point, shape (n,).
             bounds: Box, or a pair (lower, upper), or None.
-            constraints: Linear constraints, or None.
+            constraints: Linear constraints, as for `minimize`.
             scale: Size of each variable, as for `minimize`.
             value: J(x) alone, where that is cheaper (`ShapeProblem.value_of`), for methods that take no
                 derivative.
@@ -186,9 +186,11 @@ class ForScipy:
             return self(z)[0]
         x = self.design(z)
         try:
-            value = Evaluation(x, float(self._value(x.copy())), x).value
+            value = float(self._value(x.copy()))
         except InvalidDesignError as error:
             return self._refused(x, error)[0]
+        where = f"at evaluation {self.evaluations + 1}"
+        require_finite("value must return a finite number", np.array([value]), where)
         self._keep(x, value)
         return value / self._unit
 

@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 
 from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.optimize.bundle_trust import BundleTrust
-from fenics_contact.optimize.constraints import Bounds, LinearConstraints
+from fenics_contact.optimize.constraints import Bounds, Constraints
 from fenics_contact.optimize.objective import Fun
 from fenics_contact.optimize.problem import pose
 from fenics_contact.optimize.progress import Callback
@@ -19,7 +19,7 @@ def minimize(
     method: BundleTrust | None = None,
     *,
     bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
-    constraints: LinearConstraints | None = None,
+    constraints: Constraints | None = None,
     scale: ArrayLike | None = None,
     callback: Callback | None = None,
     checkpoint: Checkpoint | None = None,
@@ -36,7 +36,7 @@ def minimize(
         x0: Feasible starting point, shape (n,).
         method: Parameters; None for the default ones.
         bounds: Box, or a pair (lower, upper), or None.
-        constraints: Linear constraints, or None.
+        constraints: Linear constraints, also SciPy's `LinearConstraint` or a list of them, or None.
         scale: Size of each variable, shape (n,) or a number. None takes the widths of the box where it is
             bounded on all sides, so choose meaningful bounds; else 1.
         callback: Called after every evaluation with its record and the best point so far, and before the

@@ -167,11 +167,25 @@ def _checked(answer: Any, x: Array, where: str) -> Evaluation:
             f"fun must return a number and a subgradient of shape {x.shape}, got shapes {value.shape} and "
             f"{subgradient.shape} {where}"
         )
-    for name, numbers in (("value", value.ravel()), ("subgradient", subgradient)):
-        bad = np.flatnonzero(~np.isfinite(numbers))
-        if bad.size:
-            raise InvalidInputError(
-                f"fun must return a finite {name}, got {numbers[bad[0]]} in entry {bad[0]} {where}: raise "
-                "InvalidDesignError for a design that cannot be evaluated"
-            )
+    require_finite("fun must return a finite value", value, where)
+    require_finite("fun must return a finite subgradient", subgradient, where)
     return Evaluation(x.copy(), float(value.item()), subgradient)
+
+
+def require_finite(needed: str, numbers: Array, where: str) -> None:
+    """Refuse numbers that are not finite.
+
+    Args:
+        needed: What is needed, for the message.
+        numbers: The numbers, of any shape.
+        where: Place for the message.
+
+    Raises:
+        InvalidInputError: If an entry is nan or infinite.
+    """
+    bad = np.flatnonzero(~np.isfinite(numbers))
+    if bad.size:
+        raise InvalidInputError(
+            f"{needed}, got {numbers.ravel()[bad[0]]} in entry {bad[0]} {where}: raise InvalidDesignError "
+            "for a design that cannot be evaluated"
+        )

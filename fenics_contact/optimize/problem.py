@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize.constraints import Bounds, FeasibleSet, LinearConstraints, feasible_set
+from fenics_contact.optimize.constraints import Bounds, Constraints, FeasibleSet, feasible_set
 from fenics_contact.optimize.objective import Fun
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ def pose(
     fun: Fun,
     x0: ArrayLike,
     bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
-    constraints: LinearConstraints | None = None,
+    constraints: Constraints | None = None,
     scale: ArrayLike | None = None,
 ) -> PosedProblem:
     """Check a problem and choose its scales.

@@ -5,7 +5,15 @@ from fenics_contact.shape.design import SurfaceDesign
 from fenics_contact.shape.linearised_face import WeakChoice, WeakPoints, linearise_face
 from fenics_contact.shape.memory import DesignPoint
 from fenics_contact.shape.motion import HarmonicExtension
-from fenics_contact.shape.objective import ContactForces, Objective, Partials, TotalPotential, VolumeIntegral
+from fenics_contact.shape.objective import (
+    ContactForces,
+    Objective,
+    Partials,
+    TotalPotential,
+    VolumeIntegral,
+    Weighable,
+    WeightedSum,
+)
 from fenics_contact.shape.problem import ShapeProblem
 from fenics_contact.shape.tolerance import AdaptiveTolerance
 
@@ -23,6 +31,8 @@ __all__ = [
     "VolumeIntegral",
     "WeakChoice",
     "WeakPoints",
+    "Weighable",
+    "WeightedSum",
     "linearise_face",
     "solve_adjoint",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -11,8 +11,9 @@ from fenics_contact._libraries import MPI
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.fingerprint import described, require_alike
-from fenics_contact.gallery import DesignSurface
+from fenics_contact.gallery import DesignSurface, side_of
 from fenics_contact.mesh import BodyMesh, boundary_faces
+from fenics_contact.scene import Scene
 from fenics_contact.shape.bernstein import tensor_bernstein
 
 #: Default width of the transition strip, relative to the extent of the design surface.
@@ -33,7 +34,8 @@ class SurfaceDesign:
 
     Attributes:
         body: Name of the body.
-        surface: Nodes of the surface, their parameters and directions.
+        surface: Nodes of the surface, their parameters and directions; or the name of a side of a structured
+            mesh, see `gallery.side_of`.
         net: Number of control points along s and t.
         transition: Width of the strip of boundary around the surface that follows it smoothly; the rest of
             the boundary is fixed, [length]. By default 0.15 times the extent of the surface. Inner nodes far
@@ -41,7 +43,7 @@ class SurfaceDesign:
     """
 
     body: str
-    surface: DesignSurface
+    surface: DesignSurface | str
     net: tuple[int, int] = (7, 4)
     transition: float | None = None
 
@@ -51,11 +53,41 @@ class SurfaceDesign:
             raise InvalidInputError(
                 f"a net needs at least one control point each way, got {self.net}: try (7, 4)"
             )
-        if any(points > nodes for points, nodes in zip(self.net, self.surface.counts, strict=True)):
+        if isinstance(self.surface, str):
+            return  # its nodes are counted once it is `on` a scene
+        if any(points > nodes for points, nodes in zip(self.net, self.lattice.counts, strict=True)):
             raise InvalidInputError(
                 f"a net of {self.net} control points needs at least as many nodes each way, the surface has "
-                f"{self.surface.counts}: use fewer control points or a finer mesh"
+                f"{self.lattice.counts}: use fewer control points or a finer mesh"
             )
+
+    def on(self, scene: Scene) -> SurfaceDesign:
+        """Return the design with the nodes of its surface, where that is given by name.
+
+        Raises:
+            InvalidInputError: If the scene has no such body, the surface is no grid, or the net is too fine.
+        """
+        if self.body not in scene.bodies:
+            raise InvalidInputError(
+                f"a design names body {self.body!r}, the scene has {sorted(scene.bodies)}: use one of them"
+            )
+        if isinstance(self.surface, str):
+            return replace(self, surface=side_of(scene.bodies[self.body].mesh, self.surface))
+        return self
+
+    @property
+    def lattice(self) -> DesignSurface:
+        """The surface with its nodes.
+
+        Raises:
+            InvalidInputError: If it is given by name and was not put `on` a scene.
+        """
+        if isinstance(self.surface, str):
+            raise InvalidInputError(
+                f"the nodes of surface {self.surface!r}, given by name, are not known yet: take the design "
+                "from ShapeProblem.designs, or put it on a scene with design.on(scene)"
+            )
+        return self.surface
 
     @property
     def size(self) -> int:
@@ -65,7 +97,7 @@ class SurfaceDesign:
     @property
     def basis(self) -> np.ndarray:
         """Values of the B_k at the surface's nodes, shape (n_nodes, size)."""
-        return tensor_bernstein(self.surface.parameters, self.net)
+        return tensor_bernstein(self.lattice.parameters, self.net)
 
     def displacement(self, alpha: np.ndarray) -> np.ndarray:
         """Return the displacement of the surface's nodes, shape (n_nodes, 3), [length].
@@ -73,7 +105,7 @@ class SurfaceDesign:
         Args:
             alpha: Design variables, shape (size,), [length].
         """
-        return (self.basis @ alpha)[:, None] * self.surface.directions
+        return (self.basis @ alpha)[:, None] * self.lattice.directions
 
     def pull_back(self, gradient: np.ndarray) -> np.ndarray:
         """Return the gradient by the design variables from that by the surface's nodes.
@@ -84,7 +116,7 @@ class SurfaceDesign:
         Returns:
             Derivative by α, shape (size,).
         """
-        return self.basis.T @ np.einsum("nd,nd->n", gradient, self.surface.directions)
+        return self.basis.T @ np.einsum("nd,nd->n", gradient, self.lattice.directions)
 
     def nodes_beyond_transition(self, mesh: BodyMesh) -> np.ndarray:
         """Return the nodes of the body that do not follow the surface.
@@ -94,13 +126,13 @@ class SurfaceDesign:
         Args:
             mesh: The body in its reference shape.
         """
-        surface = mesh.points[self.surface.nodes]
+        surface = mesh.points[self.lattice.nodes]
         extent = float(np.linalg.norm(np.ptp(surface, axis=0)))
         width = TRANSITION * extent if self.transition is None else self.transition
         distance, _ = cKDTree(surface).query(mesh.points)
         far = distance > max(FAR * extent, width)
         facets, _ = boundary_faces(mesh.cells, mesh.dim)
-        boundary = np.setdiff1d(facets, self.surface.nodes)
+        boundary = np.setdiff1d(facets, self.lattice.nodes)
         far[boundary] |= distance[boundary] > width
         return np.flatnonzero(far)
 
@@ -115,10 +147,10 @@ class SurfaceDesign:
         """
         s, t = (np.linspace(0, 1, count) if count > 1 else np.array([0.5]) for count in self.net)
         wanted = np.stack(np.meshgrid(s, t, indexing="ij"), axis=-1).reshape(-1, 2)
-        distance = np.linalg.norm(self.surface.parameters[None] - wanted[:, None], axis=2)
+        distance = np.linalg.norm(self.lattice.parameters[None] - wanted[:, None], axis=2)
         nearest = np.argmin(distance, axis=1)
-        on_surface = points[self.surface.nodes[nearest]]
-        return (on_surface + alpha[:, None] * self.surface.directions[nearest]).reshape(*self.net, 3)
+        on_surface = points[self.lattice.nodes[nearest]]
+        return (on_surface + alpha[:, None] * self.lattice.directions[nearest]).reshape(*self.net, 3)
 
 
 def checked_variables(alpha: np.ndarray, size: int, comm: MPI.Comm) -> np.ndarray:

@@ -143,19 +143,15 @@ def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign)
     """Return the extension that moves the mesh of a body with its design. Collective.
 
     Raises:
-        InvalidInputError: If the scene has no such body, or a moving surface is held or loaded.
+        InvalidInputError: If a moving surface is held or loaded.
     """
     name = design.body
-    if name not in scene.bodies:
-        raise InvalidInputError(
-            f"a design names body {name!r}, the scene has {sorted(scene.bodies)}: use one of them"
-        )
     body = scene.bodies[name]
     surfaces = {part.surface for part in scene.supports if part.body == name}
     surfaces |= {load.surface for load in scene.loads if load.body == name and isinstance(load, SurfaceLoad)}
     held = [body.mesh.surfaces[surface].ravel() for surface in sorted(surfaces)]
     held.append(design.nodes_beyond_transition(body.mesh))
-    return HarmonicExtension(decomposition, name, body, design.surface.nodes, np.unique(np.concatenate(held)))
+    return HarmonicExtension(decomposition, name, body, design.lattice.nodes, np.unique(np.concatenate(held)))
 
 
 def moving_nodes(

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 
@@ -52,8 +52,40 @@ class Partials:
     by_shape: np.ndarray
 
 
+class Weighable:
+    """An objective that can be added to others and scaled: ``TotalPotential() + 2.0 * penalty``."""
+
+    #: NumPy's numbers leave products to this class.
+    __array_ufunc__ = None
+
+    def __mul__(self, weight: float) -> WeightedSum:
+        """Return the objective times a number."""
+        return WeightedSum(((weight, cast(Objective, self)),))
+
+    __rmul__ = __mul__
+
+    def __add__(self, other: Objective) -> WeightedSum:
+        """Return the sum of two objectives."""
+        return WeightedSum((*_terms(self), *_terms(other)))
+
+    def __radd__(self, other: Objective) -> WeightedSum:
+        """Return the sum with an objective that defines no sum itself."""
+        return WeightedSum((*_terms(other), *_terms(self)))
+
+    def __neg__(self) -> WeightedSum:
+        """Return the objective with the other sign."""
+        return -1.0 * self
+
+    def __sub__(self, other: Objective) -> WeightedSum:
+        """Return the difference of two objectives."""
+        return self + -1.0 * WeightedSum(_terms(other))
+
+
 class Objective(Protocol):
-    """A function of the state; `TotalPotential`, `VolumeIntegral`, `ContactForces` come with the package."""
+    """A function of the state; `TotalPotential`, `VolumeIntegral`, `ContactForces` come with the package.
+
+    These can be added and scaled; own classes can be added to them, or derive from `Weighable`.
+    """
 
     def value(self, state: State, forms: ShapeForms) -> float:
         """Return J alone. Collective."""
@@ -67,8 +99,100 @@ def asking(comm: MPI.Comm) -> AbstractContextManager[None]:
     return collective(comm, "the objective", closed=True, users=True)
 
 
+def finite(name: str, numbers: np.ndarray) -> np.ndarray:
+    """Return what an objective gave.
+
+    Raises:
+        InvalidInputError: If an entry is no finite number.
+    """
+    bad = np.flatnonzero(~np.isfinite(numbers))
+    if bad.size:
+        raise InvalidInputError(
+            f"an objective must have a finite {name}, got {np.ravel(numbers)[bad[0]]} in entry {bad[0]}: "
+            "check divisions, roots and logarithms of what may be zero, or raise InvalidDesignError for a "
+            "design that has no value"
+        )
+    return numbers
+
+
+def finite_value(value: float) -> float:
+    """Return the value of an objective; raises as `finite` does."""
+    return float(finite("value", np.asarray(value, dtype=float)))
+
+
+def finite_partials(partials: Partials) -> Partials:
+    """Return an objective and its derivatives; raises as `finite` does.
+
+    The derivative by the shape may hold anything at nodes that no design moves; it is judged as gradient.
+    """
+    finite_value(partials.value)
+    finite("derivative by displacements", partials.by_displacement)
+    finite("derivative by contact forces", partials.by_multiplier)
+    return partials
+
+
 @dataclass(frozen=True)
-class TotalPotential:
+class WeightedSum(Weighable):
+    """J = Σ w_k J_k, what sums and multiples of objectives are.
+
+    Attributes:
+        terms: Weights w_k and objectives J_k, at least one.
+
+    Raises:
+        InvalidInputError: If there is no term, a weight is no finite number, or a term no objective.
+
+    Example:
+        >>> light = TotalPotential() + 2.0 * VolumeIntegral("area", lambda u, x, stress: u[0] ** 2, "link")
+        >>> [weight for weight, _ in light.terms]
+        [1.0, 2.0]
+    """
+
+    terms: tuple[tuple[float, Objective], ...]
+
+    def __post_init__(self) -> None:
+        """Check weights and objectives."""
+        if not self.terms:
+            raise InvalidInputError("WeightedSum needs a term, got none: give (weight, objective)")
+        for weight, objective in self.terms:
+            if not isinstance(weight, int | float | np.number) or not np.isfinite(weight):
+                raise InvalidInputError(
+                    f"an objective can be multiplied by a finite number, got {weight!r}: give its weight, "
+                    "such as 2.0 * objective"
+                )
+            if not callable(getattr(objective, "partials", None)):
+                raise InvalidInputError(
+                    f"an objective can be added to another one, got {type(objective).__name__}: add an "
+                    "object with value and partials, such as TotalPotential()"
+                )
+
+    def __mul__(self, weight: float) -> WeightedSum:
+        """Return the sum times a number."""
+        return WeightedSum(tuple((weight * own, objective) for own, objective in self.terms))
+
+    __rmul__ = __mul__
+
+    def value(self, state: State, forms: ShapeForms) -> float:
+        """Return the sum alone. Collective."""
+        return float(sum(weight * objective.value(state, forms) for weight, objective in self.terms))
+
+    def partials(self, state: State, forms: ShapeForms) -> Partials:
+        """Add the partial derivatives. Collective."""
+        parts = [(weight, objective.partials(state, forms)) for weight, objective in self.terms]
+        return Partials(
+            float(sum(weight * part.value for weight, part in parts)),
+            *(
+                np.sum([weight * getattr(part, name) for weight, part in parts], axis=0)
+                for name in ("by_displacement", "by_multiplier", "by_shape")
+            ),
+        )
+
+
+def _terms(objective: Any) -> tuple[tuple[float, Objective], ...]:
+    return objective.terms if isinstance(objective, WeightedSum) else ((1.0, objective),)
+
+
+@dataclass(frozen=True)
+class TotalPotential(Weighable):
     """J = ½ uᵀK u − fᵀu, [force · length]."""
 
     def value(self, state: State, forms: ShapeForms) -> float:
@@ -85,7 +209,7 @@ class TotalPotential:
 
 
 @dataclass(frozen=True)
-class VolumeIntegral:
+class VolumeIntegral(Weighable):
     """J = ∫ integrand(u, x, σ) dx over one body.
 
     Attributes:
@@ -167,7 +291,7 @@ ForceFunction = Callable[[ContactResult], tuple[float, np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
-class ContactForces:
+class ContactForces(Weighable):
     """J = φ(λ_N, τ), a function of the contact forces alone, [any].
 
     Attributes:

@@ -6,20 +6,27 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene import Scene, Surface
 
 
-def check_dimension(scene: Scene) -> None:
-    """Reject scenes in the plane.
+def checked_contact(contact: ContactProblem) -> ContactProblem:
+    """Return the contact problem of a shape problem.
 
     Raises:
-        InvalidInputError: If the scene has two dimensions.
+        InvalidInputError: If it is none, or its scene has two dimensions.
     """
-    if scene.dim != 3:
+    if not isinstance(contact, ContactProblem):
+        raise InvalidInputError(
+            f"ShapeProblem needs a ContactProblem, got {type(contact).__name__}: write "
+            "ShapeProblem(ContactProblem(scene, comm), designs, objective)"
+        )
+    if contact.scene.dim != 3:
         raise InvalidInputError(
             "shape problems need three dimensions, the scene has two: make it one layer thick"
         )
+    return contact
 
 
 def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:

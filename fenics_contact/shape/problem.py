@@ -29,8 +29,8 @@ from fenics_contact.shape.forms import ShapeForms, work_by_shape
 from fenics_contact.shape.linearised_face import WeakChoice, linearise_face
 from fenics_contact.shape.memory import DesignMemory, DesignPoint, Stored
 from fenics_contact.shape.motion import motion_of, moving_nodes
-from fenics_contact.shape.objective import Objective, asking
-from fenics_contact.shape.pairs import check_dimension, check_pairs
+from fenics_contact.shape.objective import Objective, asking, finite, finite_partials, finite_value
+from fenics_contact.shape.pairs import check_pairs, checked_contact
 from fenics_contact.shape.state_error import state_error
 from fenics_contact.shape.tolerance import AdaptiveTolerance, tightest_of
 from fenics_contact.shape.volume import volume_of
@@ -87,15 +87,15 @@ class ShapeProblem:
                 requests the accuracy that it needs; None for that of ``contact``, or of its solver, as a
                 balanced state leaves the statuses uncertain on which derivatives depend.
         """
-        self.contact, self.objective, self.choice = contact, objective, choice
-        self.designs = (designs,) if isinstance(designs, SurfaceDesign) else tuple(designs)
+        self.contact, self.objective, self.choice = checked_contact(contact), objective, choice
+        given = (designs,) if isinstance(designs, SurfaceDesign) else designs
+        self.designs = tuple(design.on(contact.scene) for design in given)
         self._adaptive = tolerance if isinstance(tolerance, AdaptiveTolerance) else None
         self._tightest = tightest_of(contact, tolerance)
         self._timer, scene = contact.timer, contact.scene
         self.evaluations, self.products = 0, 0
         self._memory = DesignMemory(self._restored)
         self._forms: ShapeForms | None = None
-        check_dimension(scene)
         decomposition = contact.decomposition
         with self._timer.phase("mesh motion"):
             self._motions = [motion_of(decomposition, scene, design) for design in self.designs]
@@ -221,7 +221,7 @@ class ShapeProblem:
         """Return J(α) alone, without adjoint. Collective."""
         state = self.state_of(alpha)
         with asking(self.comm):
-            return self.objective.value(state, self._shape_forms(state))
+            return finite_value(self.objective.value(state, self._shape_forms(state)))
 
     @collectively("ShapeProblem.evaluate", _comm)
     def evaluate(self, alpha: np.ndarray) -> DesignPoint:
@@ -334,7 +334,7 @@ class ShapeProblem:
         before = state.dual.products
         forms = self._shape_forms(state)
         with self._timer.phase("objective"), asking(self.comm):
-            partials = self.objective.partials(state, forms)
+            partials = finite_partials(self.objective.partials(state, forms))
         with self._timer.phase("adjoint"):
             linearised = linearise_face(state, self.choice)
             adjoint = solve_adjoint(
@@ -351,6 +351,7 @@ class ShapeProblem:
         value = partials.value + (error.correction if self.inexact else 0.0)
         # Ranks must take the same decisions, whatever the rounding in sums over ranks.
         value, gradient, error = self.comm.bcast((value, gradient, error))
+        finite("gradient", gradient)
         tell(logger.info, "J = %.9g ± %.1e, %d products", value, error.size, state.dual.products)
         return DesignPoint(
             alpha=np.array(alpha, dtype=float),

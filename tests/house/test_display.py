@@ -77,7 +77,7 @@ MOST_PRINTED = 25
 #: Protocols, and classes to derive from.
 NO_OBJECTS = {
     "Elasticity", "EnergyModel", "Inexact", "Kinked", "Material", "Objective", "Resumable", "RigidObstacle",
-    "SurfaceShape", "Thermoelastic", "Transverse",
+    "SurfaceShape", "Thermoelastic", "Transverse", "Weighable",
 }  # fmt: skip
 
 
@@ -114,7 +114,7 @@ def objects() -> dict[str, Any]:
         RigidCylinder((0, 0, 0), (0, 0, 1), 1.0), OrthotropicPlaneStress((2.0, 1.0), 0.1, 1.0),
         OrthotropicElasticity((3.0, 2.0, 1.0), (0.1, 0.1, 0.1), (1.0, 1.0, 1.0)),
         ContactForces(lambda contact: (0.0, np.zeros(1), np.zeros((1, 2)))),
-        VolumeIntegral("motion", lambda u, x, stress: u[0], "block"),
+        TotalPotential() + 2.0 * VolumeIntegral("motion", lambda u, x, stress: u[0], "block"),
     ]  # fmt: skip
     found: dict[str, Any] = {}
     for root in roots:

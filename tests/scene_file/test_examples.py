@@ -55,7 +55,7 @@ def test_a_side_of_a_block_can_be_designed() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"surface": "z7"}, "a design needs the surface 'contact' of a chain link or a flat side of a block"),
+        ({"surface": "z7"}, "body 'upper': a design by the name of a surface needs .* grid"),
         ({"net": [9, 9]}, "a net of \\(9, 9\\) control points needs at least as many nodes each way"),
         ({"body": "uper"}, 'design.surfaces.0.body must be a body, one of .*, got "uper"'),
     ],

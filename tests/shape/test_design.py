@@ -48,7 +48,7 @@ def test_equal_variables_move_the_surface_along_its_normals_by_as_much() -> None
     design = crown()
     assert design.size == 12
     moved = design.displacement(np.full(12, 0.3))
-    assert moved == pytest.approx(0.3 * design.surface.directions)
+    assert moved == pytest.approx(0.3 * design.lattice.directions)
     assert np.linalg.norm(moved, axis=1) == pytest.approx(np.full(len(moved), 0.3))
 
 
@@ -61,7 +61,7 @@ def test_positive_variables_add_material() -> None:
 
 def test_pulling_back_is_the_transpose_of_displacing() -> None:
     design, rng = crown(), np.random.default_rng(2)
-    alpha, by_points = rng.standard_normal(12), rng.standard_normal(design.surface.directions.shape)
+    alpha, by_points = rng.standard_normal(12), rng.standard_normal(design.lattice.directions.shape)
     forth, back = np.sum(design.displacement(alpha) * by_points), alpha @ design.pull_back(by_points)
     assert abs(forth) > 0.1
     assert back == pytest.approx(forth, rel=1e-12)
@@ -71,7 +71,7 @@ def test_control_points_are_drawn_on_the_surface_and_move_with_their_variables()
     design, mesh = crown((5, 3)), crossed_links().first.mesh
     at_rest = design.control_points(mesh.points, np.zeros(15))
     assert at_rest.shape == (5, 3, 3)
-    corners = design.surface.nodes.reshape(design.surface.counts)[[0, 0, -1, -1], [0, -1, 0, -1]]
+    corners = design.lattice.nodes.reshape(design.lattice.counts)[[0, 0, -1, -1], [0, -1, 0, -1]]
     assert at_rest[[0, 0, -1, -1], [0, -1, 0, -1]] == pytest.approx(mesh.points[corners])
     moved = design.control_points(mesh.points, np.eye(15)[7])
     distance = np.linalg.norm(moved - at_rest, axis=2).ravel()

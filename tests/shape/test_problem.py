@@ -9,11 +9,19 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, ContactResult
+from fenics_contact.contact import ContactProblem, ContactResult, State
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
 from fenics_contact.gallery import rectangle
 from fenics_contact.scene import Body, Coulomb, PlaneStrain, Scene, Surface, Tie
-from fenics_contact.shape import ContactForces, ShapeProblem, SurfaceDesign, TotalPotential, VolumeIntegral
+from fenics_contact.shape import (
+    ContactForces,
+    Partials,
+    ShapeProblem,
+    SurfaceDesign,
+    TotalPotential,
+    VolumeIntegral,
+)
+from fenics_contact.shape.forms import ShapeForms
 from tests.contact.gallery import partitions
 from tests.shape.blocks import block_on_block, designs_of, problem, side
 from tests.shape.chains import SOLVER
@@ -202,3 +210,91 @@ def test_a_plane_scene_is_refused() -> None:
             (),
             TotalPotential(),
         )
+
+
+@pytest.mark.parametrize("given", ["scene", None])
+def test_what_is_no_contact_problem_is_refused(given: object) -> None:
+    what = scene() if given == "scene" else given
+    message = (
+        rf"needs a ContactProblem, got {type(what).__name__}: write ShapeProblem\(ContactProblem\(scene, c"
+    )
+    with pytest.raises(InvalidInputError, match=message):
+        ShapeProblem(what, designs_of(scene()), TotalPotential())  # type: ignore[arg-type]
+
+
+class Broken:
+    """The energy with a number that is none in one place."""
+
+    def __init__(self, place: str, number: float) -> None:
+        self.place, self.number = place, number
+
+    def value(self, state: State, forms: ShapeForms) -> float:
+        return self.number if self.place == "value" else state.energies.total_potential
+
+    def partials(self, state: State, forms: ShapeForms) -> Partials:
+        partials = TotalPotential().partials(state, forms)
+        if self.place == "value":
+            return replace(partials, value=self.number)
+        broken = np.array(getattr(partials, self.place))
+        broken[0] = self.number
+        return replace(partials, **{self.place: broken})
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf])
+@pytest.mark.parametrize(
+    ("place", "told"),
+    [
+        ("value", "value"),
+        ("by_displacement", "derivative by displacements"),
+        ("by_multiplier", "derivative by contact forces"),
+    ],
+)
+def test_an_objective_that_is_no_number_is_refused(place: str, told: str, number: float) -> None:
+    with pytest.raises(
+        InvalidInputError, match=f"must have a finite {told}, got {number} in entry 0: check d"
+    ):
+        solved().evaluate_by(Broken(place, number), DESIGN)
+    assert np.isfinite(solved().evaluate_by(TotalPotential(), DESIGN).value)
+
+
+def test_a_gradient_that_is_no_number_is_refused() -> None:
+    class Steep:
+        def value(self, state: State, forms: ShapeForms) -> float:
+            return 0.0
+
+        def partials(self, state: State, forms: ShapeForms) -> Partials:
+            partials = TotalPotential().partials(state, forms)
+            return replace(partials, by_shape=np.full_like(partials.by_shape, np.nan))
+
+    with pytest.raises(InvalidInputError, match="must have a finite gradient, got nan in entry 0"):
+        solved().evaluate_by(Steep(), DESIGN)
+
+
+def test_a_value_alone_that_is_no_number_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match="must have a finite value, got nan"):
+        solved().value_by(Broken("value", np.nan), DESIGN)
+
+
+def test_a_design_by_the_name_of_its_surface_is_that_of_its_nodes() -> None:
+    contact = ContactProblem(scene(), MPI.COMM_SELF, partitions=partitions(scene()))
+    named = ShapeProblem(contact, SurfaceDesign("lower", "z1", (3, 2)), TotalPotential())
+    (design,), known = named.designs, SurfaceDesign("lower", side(scene().bodies["lower"].mesh, "z1"), (3, 2))
+    assert design.lattice.counts == known.lattice.counts
+    alpha = np.arange(6.0)
+    np.testing.assert_array_equal(design.lattice.nodes, known.lattice.nodes)
+    np.testing.assert_allclose(design.displacement(alpha), known.displacement(alpha), atol=1e-12)
+    assert np.abs(design.displacement(alpha)).max() > 1.0
+
+
+def test_a_design_by_name_says_what_its_surface_needs() -> None:
+    contact = ContactProblem(scene(), MPI.COMM_SELF, partitions=partitions(scene()))
+    with pytest.raises(InvalidInputError, match=r"a rectangular grid .* got 'front' of a mesh with \['x0', "):
+        ShapeProblem(contact, SurfaceDesign("lower", "front"), TotalPotential())
+    with pytest.raises(
+        InvalidInputError, match=r"a net of \(7, 7\) control points needs at least as many nodes"
+    ):
+        ShapeProblem(contact, SurfaceDesign("lower", "z1", (7, 7)), TotalPotential())
+    with pytest.raises(
+        InvalidInputError, match="nodes of surface 'z1', given by name, are not known yet: take"
+    ):
+        _ = SurfaceDesign("lower", "z1").basis

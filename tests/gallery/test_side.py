@@ -1,0 +1,66 @@
+"""Sides of structured meshes that a design may move by name."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import block, hemisphere, rectangle, side_of
+from fenics_contact.mesh import BodyMesh, quadratic
+
+BOX = block((0.0, 0.0, 0.0), (4.0, 2.0, 1.0), (8, 4, 2))
+
+
+@pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])
+@pytest.mark.parametrize(
+    ("name", "axis", "counts"), [("z1", 2, (9, 5)), ("x0", 0, (5, 3)), ("y1", 1, (9, 3))]
+)
+def test_a_side_of_a_block_is_a_grid(cell: str, name: str, axis: int, counts: tuple[int, int]) -> None:
+    mesh = block((0.0, 0.0, 0.0), (4.0, 2.0, 1.0), (8, 4, 2), cell)
+    side = side_of(mesh, name)
+    assert side.counts == counts
+    np.testing.assert_array_equal(np.sort(side.nodes), np.unique(mesh.surfaces[name]))
+    outward = np.zeros(3)
+    outward[axis] = 1.0 if name.endswith("1") else -1.0
+    np.testing.assert_allclose(side.directions, np.tile(outward, (len(side.nodes), 1)), atol=1e-14)
+    places = np.delete(mesh.points[side.nodes], axis, axis=1)
+    np.testing.assert_allclose(side.parameters, places / places.max(axis=0), atol=1e-14)
+    first = side.parameters[:, 0].reshape(counts)
+    assert np.ptp(first, axis=1).max() < 1e-12
+    assert np.all(np.diff(first[:, 0]) > 0.0)
+
+
+def test_nodes_of_a_bent_side_move_along_its_normals() -> None:
+    points = BOX.points.copy()
+    points[:, 2] += 0.1 * points[:, 0] * points[:, 2]
+    side = side_of(BOX.moved(points), "z1")
+    np.testing.assert_allclose(
+        side.directions, np.tile([-0.1, 0.0, 1.0] / np.sqrt(1.01), (45, 1)), atol=1e-12
+    )
+
+
+def without_a_facet() -> BodyMesh:
+    return BodyMesh(BOX.points, BOX.cells, {"z1": BOX.surfaces["z1"][[0, 5]]})
+
+
+def roof() -> BodyMesh:
+    points = BOX.points.copy()
+    points[:, 2] += 2.0 * np.abs(points[:, 0] - 2.0)
+    return BOX.moved(points)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "name"),
+    [
+        (BOX, "top"), (quadratic(BOX), "z1"), (rectangle((0, 0), (1, 1), (2, 2)), "y1"),
+        (without_a_facet(), "z1"),
+        (hemisphere(1.0, 4), "contact"), (roof(), "z1"),
+    ],
+    ids=["no such surface", "quadratic", "plane", "two facets apart", "ball", "roof"],
+)  # fmt: skip
+def test_what_is_no_grid_is_refused_with_what_is_needed(mesh: BodyMesh, name: str) -> None:
+    with pytest.raises(
+        InvalidInputError, match=rf"rectangular grid seen along x, y or z, .* got '{name}' of a"
+    ):
+        side_of(mesh, name)
