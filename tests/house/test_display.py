@@ -216,7 +216,7 @@ def test_notebooks_show_a_small_table(name: str) -> None:
 
 def test_a_table_escapes_the_names_that_users_choose() -> None:
     mesh = block((0, 0, 0), (1, 1, 1), (1, 1, 1))
-    named = BodyMesh(mesh.points, mesh.cells, {"<b>&": mesh.surfaces["z0"]})
+    named: Any = BodyMesh(mesh.points, mesh.cells, {"<b>&": mesh.surfaces["z0"]})
     assert "&lt;b&gt;&amp; (1)" in named._repr_html_()
 
 
