@@ -14,7 +14,7 @@ __all__ = ["displayed", "in_lines", "in_short"]
 
 Class = TypeVar("Class", bound=type)
 
-#: Largest number of lines, and of columns, of a `repr`.
+#: Largest number of lines, and of columns, of a ``repr``.
 LINES, COLUMNS = 10, 110
 #: Largest number of columns of a part inside another object.
 INSIDE = 64
@@ -23,10 +23,10 @@ ENTRIES = 4
 
 
 def displayed(cls: Class) -> Class:
-    """Let a class show facts, one per line, as its `repr`, and as a table in notebooks.
+    """Let a class show facts, one per line, as its ``repr``, and as a table in notebooks.
 
     The facts are what its method ``_facts`` returns, name -> value; without one the fields of a dataclass
-    that take part in its `repr`. Arrays are shown by shape and range. Place it above ``@dataclass``.
+    that take part in its ``repr``. Arrays are shown by shape and range. Place it above ``@dataclass``.
 
     Example:
         >>> from dataclasses import dataclass
