@@ -9,12 +9,12 @@ from fenics_contact.contact.fields import body_mesh
 from fenics_contact.contact.gathered import GatheredFields, in_space
 from fenics_contact.contact.multi_block import body_grid
 from fenics_contact.contact.pair_resultants import PairResultants
-from fenics_contact.contact.pairs_in_words import pairs_in_words
 from fenics_contact.contact.problem import ContactProblem, solve_scene
 from fenics_contact.contact.result import ContactResult, Status
 from fenics_contact.contact.resultant import Resultant, Resultants
 from fenics_contact.contact.slip_bounds import Damping
 from fenics_contact.contact.state import State
+from fenics_contact.contact.state_in_words import pairs_in_words
 from fenics_contact.contact.static_admissibility import check_held
 from fenics_contact.contact.steps import LoadSequence, solve_steps
 from fenics_contact.contact.stored import stored_state

@@ -24,10 +24,10 @@ from fenics_contact.contact.fields import body_mesh, cell_values, displacement_f
 from fenics_contact.contact.gathered import GatheredFields, contact_fields
 from fenics_contact.contact.nodal_forces import NodalForces, nodal_forces
 from fenics_contact.contact.pair_resultants import PairResultants, pair_resultants
-from fenics_contact.contact.pairs_in_words import pairs_in_words
 from fenics_contact.contact.reactions import support_reactions
-from fenics_contact.contact.result import ContactResult, Status
+from fenics_contact.contact.result import ContactResult
 from fenics_contact.contact.resultant import Resultants
+from fenics_contact.contact.state_in_words import answer_in_words, errors_in_words, first_pairs
 from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.contact.unheld import UnheldMotion, unheld_motions
 from fenics_contact.display import displayed, in_lines
@@ -43,9 +43,6 @@ if TYPE_CHECKING:
     import pyvista
 
     from fenics_contact.accuracy import StateErrors
-
-#: Largest number of contact pairs that a printed state describes one by one.
-MOST_PAIRS = 8
 
 
 def _comm(state: State, *_: Any, **__: Any) -> MPI.Comm:
@@ -92,29 +89,13 @@ class State:
         return in_lines(self, 25, 200)
 
     def _facts(self) -> dict[str, str]:
-        counts, contact = self.counts, self.contact
-        total = ", ".join(f"{contact.count(status)} {status.name.lower()}" for status in Status)
-        natural, gluing = self.solution.natural_residual, self.solution.gluing_residual
-        facts = {
-            "unknowns": f"{counts['torn_unknowns']} in {counts['subdomains']} subdomains",
-            "contact": f"{contact.points.count} points, {total}",
-            "largest force": f"{np.linalg.norm(contact.force, axis=1).max(initial=0.0):.6g}",
-            "strain energy": f"{self.energies.strain:.6g}",
-            "total potential": f"{self.energies.total_potential:.6g}",
-            "work": f"{counts['solver_steps']} steps, {counts['f_products']} products with F",
-            "residuals": f"natural {natural:.1e}, gluing {gluing:.1e}",
-            "seconds": ", ".join(f"{name} {spent:.2f}" for name, spent in self.seconds.items()),
-        }
         errors = self.__dict__.get("errors", self.known_errors)
-        if errors is None:
-            facts["errors"] = "not estimated yet: ask for state.errors"
-        else:
-            facts |= {f"error, {name}": words for name, words in errors.in_words.items()}
-        words = pairs_in_words(self.scene, contact)
-        facts |= {f"contact {number}": line for number, line in enumerate(words[:MOST_PAIRS])}
-        if len(words) > MOST_PAIRS:
-            facts["more"] = f"{len(words) - MOST_PAIRS} further contact pairs"
-        return facts
+        return {
+            **answer_in_words(self.contact, self.solution, self.energies, self.counts),
+            "seconds": ", ".join(f"{name} {spent:.2f}" for name, spent in self.seconds.items()),
+            **errors_in_words(errors and errors.in_words),
+            **first_pairs(self.scene, self.contact),
+        }
 
     @property
     def torn(self) -> TornSystem:

@@ -1,0 +1,79 @@
+"""What was found in a state and what it cost, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fenics_contact.contact.energies import Energies
+from fenics_contact.contact.result import ContactResult, Status
+from fenics_contact.feti import DirectSolution
+from fenics_contact.qp import DualSolution
+from fenics_contact.scene import ContactPair, Scene
+
+#: Largest number of contact pairs that are described one by one.
+MOST_PAIRS = 8
+
+
+def answer_in_words(
+    contact: ContactResult,
+    solution: DualSolution | DirectSolution,
+    energies: Energies,
+    counts: Mapping[str, int],
+) -> dict[str, str]:
+    """Return the size of a problem, its answer and the work of its solver, by name."""
+    total = ", ".join(f"{contact.count(status)} {status.name.lower()}" for status in Status)
+    return {
+        "unknowns": f"{counts['torn_unknowns']} in {counts['subdomains']} subdomains",
+        "contact": f"{contact.points.count} points, {total}",
+        "largest force": f"{np.linalg.norm(contact.force, axis=1).max(initial=0.0):.6g}",
+        "strain energy": f"{energies.strain:.6g}",
+        "total potential": f"{energies.total_potential:.6g}",
+        "work": f"{counts['solver_steps']} steps, {counts['f_products']} products with F",
+        "residuals": f"natural {solution.natural_residual:.1e}, gluing {solution.gluing_residual:.1e}",
+    }
+
+
+def errors_in_words(errors: Mapping[str, str] | None) -> dict[str, str]:
+    """Return the errors of a state by name, or where to get them."""
+    if errors is None:
+        return {"errors": "not estimated yet: ask for state.errors"}
+    return {f"error, {name}": words for name, words in errors.items()}
+
+
+def first_pairs(scene: Scene, contact: ContactResult) -> dict[str, str]:
+    """Return a summary of the first contact pairs, and how many there are beside, by name."""
+    words = pairs_in_words(scene, contact)
+    shown = {f"contact {number}": line for number, line in enumerate(words[:MOST_PAIRS])}
+    more = len(words) - MOST_PAIRS
+    return shown | ({"more": f"{more} further contact pairs"} if more > 0 else {})
+
+
+def pairs_in_words(scene: Scene, contact: ContactResult, force: str = "", stress: str = "") -> list[str]:
+    """Return a summary of each contact pair.
+
+    Args:
+        scene: The scene.
+        contact: The result on its contact surfaces.
+        force: Name of the unit of force.
+        stress: Name of the unit of stress.
+    """
+    rows = []
+    for number, pair in enumerate(scene.contacts):
+        mine = contact.on_pair(number)
+        resultant = f"{np.linalg.norm(contact.force[mine].sum(axis=0)):.6g} {force}".rstrip()
+        pressure = f"{contact.pressure[mine].max(initial=0.0):.5g} {stress}".rstrip()
+        rows.append(
+            f"{pair.place}: {len(mine)} points, {_kinds(pair, contact.status[mine])}; "
+            f"force {resultant}, pressure up to {pressure}"
+        )
+    return rows
+
+
+def _kinds(pair: ContactPair, status: np.ndarray) -> str:
+    """Return the numbers of points by status; without friction open or closed."""
+    counts = {kind.name.lower(): int(np.count_nonzero(status == kind)) for kind in Status}
+    if not pair.has_friction:
+        counts = {"open": counts["open"], "closed": len(status) - counts["open"]}
+    return ", ".join(f"{count} {name}" for name, count in counts.items())
