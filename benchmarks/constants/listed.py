@@ -23,6 +23,7 @@ NOT_RUN = {
     "_dolfinx": "cell types",
     "checkpoint": "format",
     "cli": "command line",
+    "display": "lines and columns on a screen",
     "errors": "ranks that wait for each other",
     "fingerprint": "words of messages",
     "gallery": "meshes of examples",

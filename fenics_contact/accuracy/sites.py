@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from fenics_contact.display import displayed
 from fenics_contact.feti import Sharing, TornSystem
 
 
+@displayed
 @dataclass(frozen=True)
 class Sites:
     """The nodes of this rank's cells of one order, one site for every material that meets there.

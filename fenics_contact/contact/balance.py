@@ -9,11 +9,13 @@ import numpy as np
 from fenics_contact.checks import GivenVector
 from fenics_contact.contact.nodal_forces import NodalForces, by_node
 from fenics_contact.contact.resultant import Resultant, moment_of, point_of, resultant, table
+from fenics_contact.display import displayed
 from fenics_contact.feti import TornSystem
 from fenics_contact.linalg import ROUNDING
 from fenics_contact.scene import Surface
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class Balance:
     """Forces and moments on all bodies together, about one point, and what is missing to equilibrium.

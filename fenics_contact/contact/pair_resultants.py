@@ -10,11 +10,13 @@ from fenics_contact.checks import GivenVector
 from fenics_contact.contact.nodal_forces import NodalForces
 from fenics_contact.contact.reactions import centroid
 from fenics_contact.contact.resultant import Resultant, Resultants, point_of, resultant
+from fenics_contact.display import displayed
 from fenics_contact.feti import TornSystem
 from fenics_contact.pairing import ContactPoints
 from fenics_contact.scene import Surface
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class PairResultants:
     """Forces and moments on the slaves of all pairs.

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.checks import GivenVector, unit_vector
+from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.linalg import ROUNDING
 from fenics_contact.scene import Surface
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class Resultant:
     """The resultant of forces that act on a body, in the undeformed geometry.
@@ -68,6 +70,7 @@ class Resultant:
         )
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class Resultants:
     """Resultants in the order of a list of the scene.

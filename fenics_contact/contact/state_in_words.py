@@ -12,9 +12,6 @@ from fenics_contact.feti import DirectSolution
 from fenics_contact.qp import DualSolution
 from fenics_contact.scene import ContactPair, Scene
 
-#: Largest number of contact pairs that are described one by one.
-MOST_PAIRS = 8
-
 
 def answer_in_words(
     contact: ContactResult,
@@ -42,11 +39,11 @@ def errors_in_words(errors: Mapping[str, str] | None) -> dict[str, str]:
     return {f"error, {name}": words for name, words in errors.items()}
 
 
-def first_pairs(scene: Scene, contact: ContactResult) -> dict[str, str]:
+def first_pairs(scene: Scene, contact: ContactResult, most: int = 8) -> dict[str, str]:
     """Return a summary of the first contact pairs, and how many there are beside, by name."""
     words = pairs_in_words(scene, contact)
-    shown = {f"contact {number}": line for number, line in enumerate(words[:MOST_PAIRS])}
-    more = len(words) - MOST_PAIRS
+    shown = {f"contact {number}": line for number, line in enumerate(words[:most])}
+    more = len(words) - most
     return shown | ({"more": f"{more} further contact pairs"} if more > 0 else {})
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.accuracy import Balanced, certify, solver_errors
+from fenics_contact.accuracy import Balanced, certify, find_sites, solver_errors
 from fenics_contact.contact import (
     ContactProblem,
     FixedPoint,
@@ -100,6 +100,7 @@ def objects() -> dict[str, Any]:
     weights = [BodyForce("block", (0, 0, float(k))) for k in range(50)]
     roots = [
         shape, point, state, scene, scene.plan(), state.errors, state.gather_fields("block"), partials,
+        state.balance(), state.resultants(), find_sites(state.torn),
         solve_adjoint(state, partials, linearise_face(state, WeakChoice.RELEASED)),
         certify(state.dual, state.dual_solution), solver_errors(state.system, state.solution),
         Balanced(), FixedPoint(FaceNewton()), LoadSequence(shape.contact), AdaptiveTolerance(),
