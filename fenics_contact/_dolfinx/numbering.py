@@ -43,7 +43,8 @@ def cell_field(mesh: dolfinx.mesh.Mesh, name: str, values: np.ndarray) -> dolfin
     element = cellwise_element(cell_type_of_mesh(mesh), values.shape[1:])
     field = dolfinx.fem.Function(_space(mesh, element), name=name)
     dofs = cell_dofs(field.function_space).ravel()[: len(values)]
-    field.x.array.reshape(-1, int(np.prod(values.shape[1:])))[dofs] = values.reshape(len(values), -1)
+    size = int(np.prod(values.shape[1:]))
+    field.x.array.reshape(-1, size)[dofs] = values.reshape(-1, size)  # a rank may have no cells
     field.x.scatter_forward()
     return field
 
