@@ -114,6 +114,7 @@ if comm.rank == 0:
 # percent that we look for.
 
 moved, pulled, clamped, counts = [0.0, 0.02, 0.04, 0.06, 0.08, 0.11], [], [], []
+imbalance = 0.0
 steps = LoadSequence(ContactProblem(scene, comm, solver=FaceNewton(tolerance=1e-5)), count=len(moved))
 series = ResultSeries(output, "pulling", comm)
 with show_progress(comm):
@@ -124,6 +125,7 @@ with show_progress(comm):
         between = np.concatenate([contact.on_pair(0), contact.on_pair(1)])
         pulled.append(-2 * contact.force[between, 0].sum())
         clamped.append(2 * contact.normal_force[contact.on_pair(2)].sum())
+        imbalance = max(imbalance, state.balance().imbalance)
         counts.append([int(np.sum(contact.status[between] == kind)) for kind in (Status.STICK, Status.SLIP)])
         if displacement == 0.0:
             plot_contact_pressure(
@@ -146,6 +148,7 @@ if comm.rank == 0:
     for displacement, pull, P, (stick, slip) in zip(moved, pulled, clamped, counts, strict=True):
         ratio = pull / (2 * friction.friction_coefficient * P)
         print(f"  {displacement:14.3f} {pull:10.1f} {P:16.1f} {ratio:14.4f} {stick:7d} {slip:6d}")
+    print(f"  loads, reactions and contact forces balance to {imbalance:.1e}")
 
 # ## Pictures
 #
@@ -169,12 +172,14 @@ if comm.rank == 0:
     print(f"pictures and files in {output}/")
 
 # The pull ends at the closed formula to 1 %; the rest of it is what the bent straps press beside the bolt.
-# While less is pulled, some of the joint sticks; in the end all of it slides.
+# While less is pulled, some of the joint sticks; in the end all of it slides. Loads, reactions and forces of
+# contacts and ties balance in every step, forces and moments, to rounding.
 
 assert abs(pulled[-1] / (2 * friction.friction_coefficient * clamped[-1]) - 1) < 0.01
 assert counts[1][0] > 0
 assert counts[-1][0] == 0
 assert counts[-1][1] > 10
+assert imbalance < 1e-9
 
 # ## What to try next
 #

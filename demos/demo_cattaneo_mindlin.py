@@ -182,6 +182,7 @@ record = {
     "largest_error": error,
 }
 write_result(last, output, more=record)
+imbalance = max(state.balance().imbalance for state in states.values())
 
 # Every rank has the same numbers; one prints them.
 
@@ -194,11 +195,14 @@ if comm.rank == 0:
     print("              computed     theory      error")
     for ratio, measured, exact in found.values():
         print(f"  {ratio:6.4f} {measured:13.4f} {exact:10.4f} {measured / exact - 1:10.2%}")
+    print(f"  loads, reactions and contact forces balance to {imbalance:.1e}")
     print(f"pictures and files in {output}/")
 
-# Stick width to 2 % in all three steps.
+# Stick width to 2 % in all three steps. Reactions and forces of contact balance, forces and moments, to
+# rounding.
 
 assert error < 0.02
+assert imbalance < 1e-9
 
 # ## What to try next
 #

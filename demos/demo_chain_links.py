@@ -220,6 +220,7 @@ record = {
     "seconds_beside": timer.seconds,
 }
 write_optimisation_result(result, problem, output, more=record)
+imbalance = max(point.state.balance().imbalance for point in points.values())
 
 # Every rank has the same numbers; one prints them.
 
@@ -244,15 +245,18 @@ if comm.rank == 0:
     print(f"  iterations      {result.iterations:14d}       {result.evaluations} evaluations")
     print(f"  F-products      {problem.products:14d}       first state: {before.state.solution.products}")
     print(f"  contact points  {contact.points.count:14d}       {status}")
+    print(f"  forces balance  {imbalance:14.1e}       loads, reactions and contact forces")
     for phase, spent in sorted(seconds.items(), key=lambda item: -item[1]):
         print(f"  {phase:15s} {spent:14.2f} s")
     print(f"  {'all phases':15s} {sum(seconds.values()):14.2f} s")
     print(f"pictures and files in {output}/")
 
-# The energy must fall, and the link must not have lost volume beyond the linearisation.
+# The energy must fall, and the link must not have lost volume beyond the linearisation. The grip of link 1
+# holds what pulls link 2, forces and moments, to rounding.
 
 assert after.value < before.value
 assert record["volume_final"] > volume * (1 - 1e-4)
+assert imbalance < 1e-9
 
 # ## What to try next
 #

@@ -89,6 +89,7 @@ forces = np.array([pair.force for pair in state.resultants().contacts])
 moved = [state.gather_displacement(name)[:, 0].mean() for name in names]
 record = {"forces": -forces[:, 0], "displacements": moved}
 write_result(state, output, more=record)
+balance = state.balance()
 
 if comm.rank == 0:
     ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"
@@ -99,6 +100,7 @@ if comm.rank == 0:
         kinds = f"{np.sum(status == Status.STICK)} stick, {np.sum(status == Status.SLIP)} slip"
         print(f"  {names[i]} to {names[j]}   force {-forces[pair, 0]:11.4f} N   {kinds}")
     print(f"  mean displacement of the links  {', '.join(f'{u:.4f}' for u in moved)} mm")
+    print(balance)
 
 # ## Pictures and files for ParaView
 #
@@ -114,12 +116,13 @@ if comm.rank == 0:
     print(f"pictures and files in {output}/")
 
 # Every contact transmits the whole force, along the chain and nowhere else. The chain is periodic: inner
-# links follow one another at equal distances.
+# links follow one another at equal distances. The support holds what pulls, forces and moments, to rounding.
 
 assert np.abs(forces - [-pull, 0.0, 0.0]).max() < 1e-4 * pull
 steps = np.diff(moved)
 assert np.abs(steps[1:3] / steps[1:3].mean() - 1).max() < 0.01
 assert steps.min() > 0
+assert balance.imbalance < 1e-9
 
 # ## What to try next
 #

@@ -137,6 +137,7 @@ turned = np.degrees(np.arccos(abs(axes[:, 1] @ fibre[:2])))
 difference = np.abs(force - compared.contact.normal_force).max() / force.max()
 record = {"force": force.sum(), "half_axes": [long, short], "angle": turned}
 write_result(state, output, more=record)
+imbalance = max(each.balance().imbalance for each in (state, compared))
 
 if comm.rank == 0:
     ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"
@@ -146,6 +147,7 @@ if comm.rank == 0:
     print(f"  half axes of patch   {long:9.3f} mm and {short:.3f} mm")
     print(f"  long axis to fibres  {turned:9.1f} °")
     print(f"  own model against the package's: contact forces differ by {difference:.1e}")
+    print(f"  loads, reactions and contact forces balance to {imbalance:.1e}")
 
 # ## Pictures and files for ParaView
 #
@@ -161,11 +163,13 @@ if comm.rank == 0:
     print(f"pictures and files in {output}/")
 
 # Both models are the same material. The patch is longer across the fibres: these are stiff, and resist being
-# bent to the curvature of the ball.
+# bent to the curvature of the ball. What the ball presses and what the base holds balance, forces and
+# moments, to rounding.
 
 assert difference < 1e-6
 assert long > 1.15 * short
 assert abs(turned - 90) < 3
+assert imbalance < 1e-9
 
 # ## What to try next
 #

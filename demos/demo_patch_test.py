@@ -55,11 +55,12 @@ def pressed(slave: str, master: str, discretisation: str) -> Scene:
 # The von Mises stress of the exact answer is $p$.
 
 CELLS = [("hexahedron", "hexahedron"), ("tetrahedron", "tetrahedron"), ("tetrahedron", "hexahedron")]
-errors = {}
+errors, imbalance = {}, 0.0
 for slave, master in CELLS:
     for discretisation in ("node", "mortar"):
         scene = pressed(slave, master, discretisation)
         state = solve_scene(scene, comm, solver=FaceNewton(tolerance=1e-12))
+        imbalance = max(imbalance, state.balance().imbalance)
         stress = np.concatenate([state.gather_von_mises(name) for name in scene.bodies])
         errors[slave, master, discretisation] = float(np.abs(stress - pressure).max() / pressure)
         if slave == master == "hexahedron":
@@ -83,12 +84,15 @@ if comm.rank == 0:
     for slave, master in CELLS:
         node, mortar = (errors[slave, master, kind] for kind in ("node", "mortar"))
         print(f"  {slave:12s} {master:12s} {node:10.1e} {mortar:10.1e}")
+    print(f"  loads, reactions and contact forces balance to {imbalance:.1e}")
     print(f"pictures and files in {output}/")
 
-# Mortar passes, node to surface does not.
+# Mortar passes, node to surface does not. Either way load, reactions and forces of contact balance, forces
+# and moments, to rounding.
 
 assert max(error for names, error in errors.items() if names[2] == "mortar") < 1e-10
 assert min(error for names, error in errors.items() if names[2] == "node") > 0.01
+assert imbalance < 1e-9
 
 # ## What to try next
 #

@@ -107,6 +107,7 @@ record = {
     "errors": errors,
 }
 write_result(state, output, more=record)
+imbalance = state.balance().imbalance
 
 # Every rank has the same numbers; one prints them.
 
@@ -118,11 +119,13 @@ if comm.rank == 0:
     print("                   computed      Hertz      error")
     print(f"  half width     {found_half_width:10.4f} {half_width:10.4f} {errors['half_width']:10.2%}   mm")
     print(f"  peak pressure  {found_peak:10.2f} {peak:10.2f} {errors['peak_pressure']:10.2%}   MPa")
+    print(f"  loads, reactions and contact forces balance to {imbalance:.1e}")
     print(f"pictures and files in {output}/")
 
-# Half width and peak must be Hertz's to 1 %.
+# Half width and peak must be Hertz's to 1 %, and what holds the block must balance what presses the punch.
 
 assert max(abs(error) for error in errors.values()) < 0.01
+assert imbalance < 1e-9
 
 # ## What to try next
 #

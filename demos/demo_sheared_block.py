@@ -130,6 +130,7 @@ record = {
     "dissipated_energy": work,
 }
 write_result(states[-1], output, more=record)
+imbalance = max(state.balance().imbalance for state in states)
 
 # Every rank has the same numbers; one prints them.
 
@@ -141,12 +142,15 @@ if comm.rank == 0:
         print(f"  {path[k]:z10.2f} {shear[k]:z11.2f} {bound[k]:14.2f} {sticking[k]:10d} {slipping[k]:10d}")
     print(f"  dissipated in a loop {work:.2f} N mm")
     print(f"  plateau / μN at the ends of the strokes: {', '.join(f'{value:.4f}' for value in plateau)}")
+    print(f"  loads, reactions and contact forces balance to {imbalance:.1e}")
     print(f"pictures and files in {output}/")
 
-# At the ends of the strokes nothing sticks, and the plateau is $\mu N$ to 1 %.
+# At the ends of the strokes nothing sticks, and the plateau is $\mu N$ to 1 %. In every step the reactions of
+# the top and the forces of the floor balance, forces and moments, to rounding.
 
 assert np.all(sticking[ends] == 0)
 assert np.all(np.abs(plateau - 1.0) < 0.01)
+assert imbalance < 1e-9
 
 # ## What to try next
 #

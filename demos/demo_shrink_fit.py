@@ -164,6 +164,7 @@ record = {
     "torque": torques,
 }
 write_result(states[-1], output, more=record)
+imbalance = max(state.balance().imbalance for state in states)
 
 # Every rank has the same numbers; one prints them.
 
@@ -176,12 +177,15 @@ if comm.rank == 0:
         f"  pressure      {found_pressure:10.3f} {pressure:10.3f} {found_pressure / pressure - 1:10.2%}   MPa"
     )
     print(f"  torque limit  {found_limit:10.0f} {limit:10.0f} {found_limit / limit - 1:10.2%}   N mm/mm")
+    print(f"  loads, reactions and contact forces balance to {imbalance:.1e}")
     print(f"pictures and files in {output}/")
 
-# Lamé's pressure, and the torque that it holds, to 1 %.
+# Lamé's pressure, and the torque that it holds, to 1 %. The reactions of arbor and housing balance, forces
+# and moments, to rounding.
 
 assert abs(found_pressure / pressure - 1) < 0.01
 assert abs(found_limit / limit - 1) < 0.01
+assert imbalance < 1e-9
 
 # ## What to try next
 #

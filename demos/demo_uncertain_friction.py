@@ -77,6 +77,7 @@ quantities = {
     "largest pressure": lambda state: state.contact.pressure.max(),  # N/mm²
     "sticking points": lambda state: state.contact.count(Status.STICK),
     "closed points": lambda state: np.count_nonzero(state.contact.normal_force > 0.0),
+    "imbalance": lambda state: state.balance().imbalance,
 }
 response = SceneResponse(shoe, median, quantities, comm, failures="nan")
 
@@ -94,7 +95,7 @@ answers = []
 with served(response, comm) as call:
     if call is not None:
         answers = [call(sample).array for sample in samples]
-pressure, sticking, closed = np.array(comm.bcast(answers)).T
+pressure, sticking, closed, imbalances = np.array(comm.bcast(answers)).T
 
 # ## Slides or holds
 #
@@ -141,6 +142,7 @@ write_vtu(response.state, output, "last_held")
 # ## Result
 
 ratio = pressure[~slides] / hertz[~slides]
+imbalance = imbalances[~slides].max()
 record = {
     "samples": len(samples),
     "slide": int(np.count_nonzero(slides)),
@@ -162,11 +164,13 @@ if comm.rank == 0:
     print(f"                   {record['largest_pressure_95']:8.1f} MPa at 95 %")
     print(f"  sticking         {100 * record['stick_share_median']:8.1f} %   of the contact, median")
     print(f"  products         {response.products:8d}     {response.products / len(samples):.1f} a sample")
+    print(f"  loads, reactions and contact forces balance to {imbalance:.1e}")
     print(f"pictures and files in {output}/")
 
 assert np.array_equal(slides, expected)
 assert abs(record["slide"] / len(samples) - probability) < 2.5 / len(samples)
 assert abs(np.median(ratio) - 1) < 0.02  # friction adds a little to Hertz's frictionless pressure
+assert imbalance < 1e-9  # in every sample that holds
 
 # ## What to try next
 #

@@ -10,6 +10,7 @@ import typer
 
 from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.cli.desk import Desk, desk_of, facts
+from fenics_contact.cli.forces import forces_table
 from fenics_contact.cli.options import (
     DryOption,
     OutputOption,
@@ -27,7 +28,15 @@ from fenics_contact.cli.plans import show_outputs, show_plan
 from fenics_contact.cli.resumable import resumable
 from fenics_contact.cli.tables import state_facts, step_row, step_table
 from fenics_contact.contact import State
-from fenics_contact.io import ResultSeries, only_run_in, write_result, write_vtu, write_vtx, write_xdmf
+from fenics_contact.io import (
+    ResultSeries,
+    forces_record,
+    only_run_in,
+    write_result,
+    write_vtu,
+    write_vtx,
+    write_xdmf,
+)
 from fenics_contact.progress import show_progress
 from fenics_contact.scene_file import SceneFile
 
@@ -85,7 +94,7 @@ def _wanted(file: SceneFile) -> bool:
 def _at_once(desk: Desk, file: SceneFile) -> dict[str, State]:
     """Solve a scene without load steps and write its files. Collective."""
     state, kinds = file.solve(), file.document.output.files
-    desk.show(facts(state_facts(state, file.document.units)))
+    _show(desk, file, state)
     if "vtu" in kinds:
         write_vtu(state, file.folder)
     if "xdmf" in kinds:
@@ -94,6 +103,13 @@ def _at_once(desk: Desk, file: SceneFile) -> dict[str, State]:
         write_vtx(state, file.folder)
     write_result(state, file.folder, more=_origin(file))
     return {file.title: state}
+
+
+def _show(desk: Desk, file: SceneFile, state: State, title: str = "") -> None:
+    """Print what was found, and forces and moments. Collective."""
+    desk.show(facts(state_facts(state, file.document.units), title))
+    desk.say()
+    desk.show(forces_table(forces_record(state), file.document.units.model_dump()))
 
 
 def _through_steps(desk: Desk, file: SceneFile, resume: bool | None) -> dict[str, State]:
@@ -117,7 +133,7 @@ def _through_steps(desk: Desk, file: SceneFile, resume: bool | None) -> dict[str
                 drawn[f"{number}: {step.name}"] = state
         sequence.finish()
     desk.show(step_table(rows, file))
-    desk.show(facts(state_facts(state, file.document.units), f"{file.title}: after the last step"))
+    _show(desk, file, state, f"{file.title}: after the last step")
     write_result(state, file.folder, more={**_origin(file), "steps": _steps(rows)})
     _done(desk, checkpoint)
     return drawn

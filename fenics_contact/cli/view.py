@@ -10,6 +10,7 @@ from rich.table import Table
 
 from fenics_contact.cli.desk import Desk, desk_of, facts
 from fenics_contact.cli.field_files import FIELD_FILES, draw, fields_in, newest_member
+from fenics_contact.cli.forces import forces_table
 from fenics_contact.errors import InvalidInputError, MissingRequirementError, together
 from fenics_contact.io import read_result
 
@@ -113,6 +114,8 @@ def show_record(desk: Desk, record: dict[str, Any]) -> None:
             desk.say()
         else:
             desk.show(facts({name: value}))
+    if record.get("forces"):
+        desk.show(forces_table(record["forces"], record.get("more", {}).get("unit_names")))
 
 
 def evaluations(history: dict[str, list[Any]]) -> Table:

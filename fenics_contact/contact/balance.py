@@ -8,7 +8,7 @@ import numpy as np
 
 from fenics_contact.checks import GivenVector
 from fenics_contact.contact.nodal_forces import NodalForces, by_node
-from fenics_contact.contact.resultant import Resultant, moment_of, point_of, resultant, table
+from fenics_contact.contact.resultant import Resultant, point_of, resultant, table
 from fenics_contact.display import displayed
 from fenics_contact.feti import TornSystem
 from fenics_contact.linalg import ROUNDING
@@ -34,7 +34,8 @@ class Balance:
             friction, a tie or a mean over facets transmits forces across a gap between the meshes.
         beds: Of materials that resist rigid motions, such as elastic beds; zero otherwise.
         force_scale: Largest sum of the sizes of the nodal forces of one of these, [force].
-        moment_scale: Largest sum of the sizes of their moments, [force·length].
+        moment_scale: Largest sum of the sizes of nodal forces times their distances from the point,
+            [force·length]; never zero by symmetry, as are the moments of forces that point at the point.
     """
 
     loads: Resultant
@@ -81,11 +82,11 @@ def force_balance(torn: TornSystem, forces: NodalForces, about: GivenVector | np
     resultants = {name: resultant(force, forces.places, point) for name, force in parts.items()}
     arms = forces.places - point
     sizes = [np.linalg.norm(force, axis=1) for force in parts.values()]
-    moments = [np.abs(moment_of(force, arms)) for force in parts.values()]
+    reach = np.linalg.norm(arms, axis=1)
     return Balance(
         **resultants,
         force_scale=float(max(size.sum() for size in sizes)),
-        moment_scale=float(max(moment.sum() for moment in moments)),
+        moment_scale=float(max(size @ reach for size in sizes)),
     )
 
 

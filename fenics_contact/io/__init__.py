@@ -3,6 +3,7 @@
 On several ranks rank 0 writes (XDMF: all ranks together), and all raise if one fails.
 """
 
+from fenics_contact.io.forces_record import forces_record
 from fenics_contact.io.json_file import json_text, write_json
 from fenics_contact.io.one_run import only_run_in
 from fenics_contact.io.provenance import versions
@@ -17,6 +18,7 @@ from fenics_contact.io.xdmf import write_xdmf
 __all__ = [
     "OutputError",
     "ResultSeries",
+    "forces_record",
     "json_text",
     "only_run_in",
     "read_result",

@@ -18,6 +18,8 @@ def forces_record(state: State) -> dict[str, Any]:
             "about": balance.total.about,
             **{name: {"force": part.force, "moment": part.moment} for name, part in balance.parts.items()},
             "imbalance": balance.imbalance,
+            "force_scale": balance.force_scale,
+            "moment_scale": balance.moment_scale,
         },
     }
 

@@ -63,7 +63,8 @@ that was read from a checkpoint says so and has no tolerance |
 friction closed points count as ``slip`` |
     | ``unheld`` | rigid motions that nothing resists and nothing loads, in words; `State.unheld` |
     | ``forces`` | ``reactions`` of the supports, ``contacts`` and ``ties`` (on the slave): each with body, \
-surface, ``force``, ``moment`` and the point ``about`` which it is; ``balance`` of all with the loads |
+surface, ``force``, ``moment`` and the point ``about`` which it is; ``balance`` of all with the loads, its \
+``imbalance`` and the scales to which that is relative |
     | ``more`` | further results of the caller |
 
     Entries may be added without a new version; changing or removing one requires a new version.

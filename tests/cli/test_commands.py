@@ -120,7 +120,14 @@ def test_an_example_scene_is_copied_with_its_schema_and_run(
 def test_view_shows_numbers_and_fields(result: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("view", result, "--no-window") == 0
     printed = capsys.readouterr().out
-    for words in ("torn_unknowns", "normal_force", "fields of state.vtm", "von_mises", "no window without"):
+    for words in (
+        "torn_unknowns",
+        "normal_force",
+        "fields of state.vtm",
+        "von_mises",
+        "no window without",
+        "sum of loads",
+    ):
         assert words in printed
     assert run("view", result / "result.json", "--no-window") == 0
 

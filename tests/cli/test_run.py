@@ -46,10 +46,24 @@ def test_a_scene_is_solved_and_written(tmp_path: Path, capsys: pytest.CaptureFix
     assert printed.index("cone ") < printed.index("total potential")
     assert f"results in {output}/: result.json, state.vtm\n" in printed
     assert "\x1b" not in printed, "no colours where there is no terminal"
+    table = [line.split() for line in printed.splitlines()]
+    state = read_scene_file(path, MPI.COMM_SELF).solve()
+    assert ["forces", "(N)", "and", "moments", "(N", "mm)"] in table
+    rows = {
+        "reaction 0 lower z0": state.reactions()[0],
+        "contact 0 upper z0": state.resultants().contacts[0],
+        "sum of loads": state.balance().loads,
+        "sum of reactions": state.balance().reactions,
+    }
+    for name, found in rows.items():
+        row = [line for line in table if line[: len(name.split())] == name.split()][-1]
+        expected = [*found.force, *np.asarray(found.moment)]
+        assert np.abs(expected).max() > 1.0
+        np.testing.assert_allclose([float(cell) for cell in row[-6:]], expected, rtol=1e-4, atol=1e-6)
+    assert float(next(row for row in table if row[:1] == ["imbalance"])[-1]) < 1e-9
     assert not [line for line in printed.splitlines() if line != line.rstrip()]
     record = read_result(output)
     assert record["more"]["scene_file"] == "scene.toml"
-    state = read_scene_file(path, MPI.COMM_SELF).solve()
     assert record["energies"]["total_potential"] == pytest.approx(state.energies.total_potential, rel=1e-12)
     assert {file.name for file in output.iterdir()} >= {"state.vtm", "state_upper.xdmf", "result.json"}
     assert not list(output.glob("*.png"))

@@ -262,3 +262,12 @@ def test_points_and_axes_must_fit_the_space() -> None:
     solid = pushed(Bedded(1e3, 0.3), (1, 1, 1)).resultants().contacts[0]
     with pytest.raises(InvalidInputError, match=r"the direction of an axis must be 3 finite numbers"):
         solid.torque((0, 0, 0), (0, 0, 0))
+
+
+def test_forces_that_all_point_at_one_place_balance_there() -> None:
+    swollen = tuple(lambda x, k=k: 0.01 * (x[:, k] - 0.5) for k in range(2))
+    supports = [Support("plate", side, swollen) for side in ("x0", "x1", "y0", "y1")]
+    plate = Body(rectangle((0.0, 0.0), (1.0, 1.0), (2, 2)), PlaneStress(1000.0, 0.3))
+    balance = solve_scene(Scene({"plate": plate}, supports), COMM).balance(about=(0.5, 0.5))
+    assert balance.force_scale > 1.0
+    assert balance.imbalance < 1e-13
