@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fenics_contact.mesh_io.cad_choice import InBox, OnCylinder, OnPlane
+from fenics_contact.mesh_io.cad_faces import CadFace
 from fenics_contact.mesh_io.cad_files import read_cad
 from fenics_contact.mesh_io.cad_shapes import cad_shapes
 from fenics_contact.mesh_io.dolfinx_import import from_dolfinx, read_xdmf
@@ -10,6 +12,10 @@ from fenics_contact.mesh_io.gmsh_session import gmsh_model
 from fenics_contact.mesh_io.meshio_import import from_meshio, read_mesh
 
 __all__ = [
+    "CadFace",
+    "InBox",
+    "OnCylinder",
+    "OnPlane",
     "cad_shapes",
     "from_dolfinx",
     "from_gmsh_model",

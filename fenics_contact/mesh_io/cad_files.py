@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -10,7 +12,10 @@ from typing import TYPE_CHECKING
 from fenics_contact.checks import check_numbers, require_file
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.mesh import BodyMesh
-from fenics_contact.mesh_io.gmsh_import import Bodies, Surfaces, from_gmsh_model
+from fenics_contact.mesh_io.cad_choice import FaceChoice, chosen_faces
+from fenics_contact.mesh_io.cad_faces import faces_of, name_of
+from fenics_contact.mesh_io.gmsh_elements import physical_groups
+from fenics_contact.mesh_io.gmsh_import import Bodies, from_gmsh_model
 from fenics_contact.mesh_io.gmsh_session import gmsh_model
 
 if TYPE_CHECKING:
@@ -18,16 +23,13 @@ if TYPE_CHECKING:
 
 #: Formats that gmsh reads as geometry.
 SUFFIXES = (".step", ".stp", ".iges", ".igs", ".brep", ".geo", ".geo_unrolled")
-#: Default name of the library that writes STEP files.
-NO_NAME = "Open CASCADE"
-_SIZE = "Mesh.MeshSizeMax"
 
 
 def read_cad(
     path: str | Path,
     size: float | None = None,
     bodies: Bodies | None = None,
-    surfaces: Surfaces | None = None,
+    surfaces: FaceChoice | None = None,
     *,
     comm: MPI.Comm | None = None,
 ) -> dict[str, BodyMesh]:
@@ -41,22 +43,27 @@ def read_cad(
         path: A file .step, .stp, .iges, .igs, .brep, .geo or .geo_unrolled; .geo is a script: gmsh runs it.
         size: Largest edge of a cell, [length]; that of the file unless given.
         bodies: As in `read_msh`.
-        surfaces: As in `read_msh`.
+        surfaces: The wanted surfaces: names or numbers of faces, or name of the surface to what chooses its
+            faces: a name, a number, `InBox`, `OnPlane`, `OnCylinder`, a function that says of a `CadFace`
+            whether it is one, or several of these. Every face unless given.
         comm: If given, rank 0 reads the file and all ranks receive the bodies.
 
     Returns:
-        Name to body, with `BodyMesh.shapes`. gmsh reads STEP and IGES files in millimetres.
+        Name to body, with `BodyMesh.shapes`. Whatever unit a STEP or IGES file names, its coordinates come in
+        millimetres; `BodyMesh.placed` scales them to another unit. Other files name no unit.
 
     Raises:
-        InvalidInputError: As `read_msh`, or if gmsh cannot read or mesh the file.
+        InvalidInputError: As `read_msh`, or if gmsh cannot read or mesh the file, nothing is chosen for a
+            surface, or a face for two; these messages list all faces.
         MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
 
     Note:
         Collective on ``comm`` if given.
 
     Example:
-        ``read_cad("bracket.step", 2.0, surfaces={"hole": ["4", "7"]})`` makes bodies of tetrahedra of at most
-        2 mm; faces 4 and 7, two halves of a hole, become the surface "hole", whose shape is a `Cylinder`.
+        ``read_cad("bracket.step", 2.0, surfaces={"foot": [4, 7], "hole": OnCylinder(5.0)})`` makes bodies of
+        tetrahedra of at most 2 mm. Faces 4 and 7 are the surface "foot"; all on cylinders of radius 5 mm the
+        surface "hole", whose shape is a `Cylinder`.
     """
     if comm is None:
         return _read(Path(path), size, bodies, surfaces)
@@ -67,7 +74,10 @@ def read_cad(
 
 
 def _read(
-    path: Path, size: float | None, bodies: Bodies | None, surfaces: Surfaces | None
+    path: Path,
+    size: float | None,
+    bodies: Bodies | None,
+    surfaces: FaceChoice | None,
 ) -> dict[str, BodyMesh]:
     require_file(path)
     if path.suffix.lower() not in SUFFIXES:
@@ -79,37 +89,52 @@ def _read(
         check_numbers(size=size)
         if size <= 0:
             raise InvalidInputError(f"size must be above zero, got {size}: give the largest edge of a cell")
-    with gmsh_model("fenics_contact CAD") as gmsh:
-        previous = gmsh.option.getNumber(_SIZE)
-        try:
+    options = {} if size is None else {"Mesh.MeshSizeMax": size}
+    with gmsh_model("fenics_contact CAD", **options) as gmsh:
+        with _reasons(path):
             gmsh.merge(str(path))
-            dim = max((dim for dim, _ in gmsh.model.getEntities()), default=0)
-            if size is not None:
-                gmsh.option.setNumber(_SIZE, size)
-            for each in (dim, dim - 1):
-                _name(gmsh, each, unique=each == dim)
+        dim = max((dim for dim, _ in gmsh.model.getEntities()), default=0)
+        for each in (dim, dim - 1):
+            _name(gmsh, each, unique=each == dim)
+        if surfaces is not None and dim > 1:
+            _choose(gmsh, dim - 1, surfaces, f"file '{path}'")
+        with _reasons(path):
             gmsh.model.mesh.generate(dim)
-        except Exception as reason:  # gmsh raises no other class
-            raise InvalidInputError(
-                f"file '{path}' must be one that gmsh can read and mesh, it says: {reason}: look at it with "
-                "gmsh, or give another size"
-            ) from reason
-        finally:
-            gmsh.option.setNumber(_SIZE, previous)
-        return from_gmsh_model(bodies, surfaces)
+        return from_gmsh_model(bodies)
+
+
+@contextmanager
+def _reasons(path: Path) -> Iterator[None]:
+    """Say what gmsh says."""
+    try:
+        yield
+    except Exception as reason:  # gmsh raises no other class
+        raise InvalidInputError(
+            f"file '{path}' must be one that gmsh can read and mesh, it says: {reason}: look at it with "
+            "gmsh, or give another size"
+        ) from reason
 
 
 def _name(gmsh: ModuleType, dim: int, *, unique: bool) -> None:
     """Add physical groups of entities if there are none of their dimension."""
     if dim < 1 or gmsh.model.getPhysicalGroups(dim):
         return
-    names = {}
-    for _, tag in gmsh.model.getEntities(dim):
-        name = gmsh.model.getEntityName(dim, tag).rpartition("/")[2]
-        names[tag] = str(tag) if not name or name.startswith(NO_NAME) else name
+    names = {tag: name_of(gmsh, dim, tag) for _, tag in gmsh.model.getEntities(dim)}
     times = Counter(names.values())
     groups: dict[str, list[int]] = {}
     for tag, name in names.items():
         groups.setdefault(f"{name} {tag}" if unique and times[name] > 1 else name, []).append(tag)
+    _add_groups(gmsh, dim, groups)
+
+
+def _choose(gmsh: ModuleType, dim: int, surfaces: FaceChoice, source: str) -> None:
+    """Replace the physical groups of faces by those that are chosen."""
+    groups = physical_groups(gmsh, dim)
+    chosen = chosen_faces(faces_of(gmsh, dim), groups, surfaces, source)
+    gmsh.model.removePhysicalGroups([(dim, tag) for _, tag in gmsh.model.getPhysicalGroups(dim)])
+    _add_groups(gmsh, dim, chosen)
+
+
+def _add_groups(gmsh: ModuleType, dim: int, groups: Mapping[str, Sequence[int]]) -> None:
     for name, tags in groups.items():
         gmsh.model.setPhysicalName(dim, gmsh.model.addPhysicalGroup(dim, tags), name)

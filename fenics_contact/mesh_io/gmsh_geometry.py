@@ -42,6 +42,11 @@ def shape_of_entity(
     return shape if _leads_out(shape, middles, outwards) else replace(shape, flipped=True)
 
 
+def shape_seen(gmsh: ModuleType, entity: tuple[int, int]) -> SurfaceShape | None:
+    """Return the plane, sphere, cylinder, cone or torus that a face is, facing either side; else None."""
+    return recognised(*_normals(gmsh, entity))
+
+
 def _leads_out(shape: SurfaceShape, middles: np.ndarray, outwards: np.ndarray) -> bool:
     return bool(np.einsum("nd,nd->", shape.normals(middles), outwards) > 0)
 

@@ -26,7 +26,7 @@ _OPTIONS = {
 
 
 @contextmanager
-def gmsh_model(name: str) -> Iterator[ModuleType]:
+def gmsh_model(name: str, **more: float) -> Iterator[ModuleType]:
     """Open an empty gmsh model and remove it afterwards.
 
     If gmsh is already initialised the caller's models, current model and options are restored; if not, it is
@@ -34,6 +34,7 @@ def gmsh_model(name: str) -> Iterator[ModuleType]:
 
     Args:
         name: Name of the model.
+        **more: Further options of gmsh by their names, such as ``{"Mesh.MeshSizeMax": 2.0}``.
 
     Yields:
         The module ``gmsh`` with the new model current.
@@ -46,12 +47,13 @@ def gmsh_model(name: str) -> Iterator[ModuleType]:
         foreign = _is_initialised(gmsh)
         if not foreign:
             _initialise(gmsh)
-        options = {option: gmsh.option.getNumber(option) for option in _OPTIONS}
+        wanted = {**_OPTIONS, **more}
+        options = {option: gmsh.option.getNumber(option) for option in wanted}
         current = gmsh.model.getCurrent()
         while name in gmsh.model.list():
             name += "'"
         try:
-            for option, value in _OPTIONS.items():
+            for option, value in wanted.items():
                 gmsh.option.setNumber(option, value)
             gmsh.model.add(name)
             yield gmsh

@@ -11,6 +11,7 @@ from pydantic import Field, PositiveFloat
 from fenics_contact import mesh_io
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import BodyMesh
+from fenics_contact.scene_file.face_choices import SurfaceGroups, by_place, made_choice
 from fenics_contact.scene_file.placing import Placed, Shaped
 from fenics_contact.scene_file.values import PlaceOfFile, Read, said
 
@@ -23,7 +24,6 @@ CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 _Label = str | int
 _Labels = Annotated[list[_Label], Field(min_length=1, strict=False)]
 _OfBodies = Annotated[dict[str, _Label | _Labels | dict[str, _Label]], Field(min_length=1)]
-_OfSurfaces = dict[str, _Label | _Labels]
 BodyGroups: TypeAlias = Annotated[
     Any,
     Read(
@@ -33,15 +33,6 @@ BodyGroups: TypeAlias = Annotated[
                 "a list of groups, or a table: body = group, body = [groups], or body = {region = group}, "
                 "where a group is a name or a number"
             ),
-        ]
-    ),
-]
-SurfaceGroups: TypeAlias = Annotated[
-    Any,
-    Read(
-        Annotated[
-            _Labels | _OfSurfaces,
-            said("a list of groups, or a table: surface = group, or surface = [groups]"),
         ]
     ),
 ]
@@ -55,7 +46,9 @@ class MeshFile(Placed):
         None, description="groups of cells that are bodies; or body to group, groups or regions (all)"
     )
     surfaces: SurfaceGroups | None = Field(
-        None, description="groups of facets that are surfaces; or surface to group or groups (all)"
+        None,
+        description="groups of facets that are surfaces; or surface to group or groups, of CAD files also to "
+        "tables that choose faces (all)",
     )
     size: PositiveFloat | None = Field(
         None, description="largest edge of a cell, for CAD files, which gmsh meshes, [length]"
@@ -78,7 +71,7 @@ class MeshFile(Placed):
         return {name: Shaped(mesh) for name, mesh in self._read(folder / self.file, comm).items()}
 
     def _read(self, path: Path, comm: MPI.Comm) -> Mapping[str, BodyMesh]:
-        kind, groups = path.suffix.lower(), (self.bodies, self.surfaces)
+        kind, groups = path.suffix.lower(), (self.bodies, made_choice(self.surfaces))
         if kind in (*CAD, ".msh", ".xdmf") and (self.labels is not None or self.corners_only):
             raise InvalidInputError(
                 f"labels and corners_only are for other formats than CAD, .msh and .xdmf, got {self.file!r}: "
@@ -86,6 +79,11 @@ class MeshFile(Placed):
             )
         if kind in CAD:
             return mesh_io.read_cad(path, self.size, *groups, comm=comm)
+        if by_place(self.surfaces):
+            raise InvalidInputError(
+                f"faces are chosen by where they lie in CAD files ({', '.join(CAD)}), got {self.file!r}: "
+                "choose groups by their names or numbers"
+            )
         if self.size is not None:
             raise InvalidInputError(
                 f"size is for CAD files ({', '.join(CAD)}), got {self.file!r}: leave it away, or mesh the "
@@ -95,6 +93,4 @@ class MeshFile(Placed):
             return mesh_io.read_msh(path, *groups, comm=comm)
         if kind == ".xdmf":
             return mesh_io.read_xdmf(path, *groups, comm=comm)
-        return mesh_io.read_mesh(
-            path, *groups, labels=self.labels, corners_only=self.corners_only, comm=comm
-        )
+        return mesh_io.read_mesh(path, *groups, labels=self.labels, corners_only=self.corners_only, comm=comm)

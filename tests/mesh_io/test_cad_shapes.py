@@ -229,7 +229,7 @@ def test_a_step_file_keeps_its_shapes(model: Any, tmp_path: Path, capfd: pytest.
     edges = np.linalg.norm(again.points[again.cells[:, 1]] - again.points[again.cells[:, 0]], axis=1)
     assert edges.max() < 1.0
     with pytest.raises(
-        InvalidInputError, match=r"surface 'bore' needs the physical surface 'none', which .* '1'"
+        InvalidInputError, match=r"surface 'bore' must have a face, .* 'none': it has 1 \(plane, area"
     ):
         read_cad(path, 0.5, surfaces={"bore": ["none"]})
 

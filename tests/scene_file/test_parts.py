@@ -98,6 +98,26 @@ def test_bodies_come_from_cad_files_with_their_shapes(tmp_path: Path) -> None:
     found = file_of(mesh=mesh).scene.bodies["a"].mesh
     there = np.array([[3.0, 0.0, 1.0], [0.0, 2.0, 3.0]])
     np.testing.assert_allclose(found.shapes["mantle"].distance(there), [1.0, 0.0], atol=1e-12)
+    by_place = {"mantle": {"faces": "on_cylinder", "radius": 1.0, "axis": [0, 0, 1]}}
+    by_place["ends"] = [{"faces": "on_plane", "point": [0, 0, z], "normal": [0, 0, 1]} for z in (0, 2)]
+    chosen = file_of(mesh={**mesh, "surfaces": by_place}).scene.bodies["a"].mesh
+    np.testing.assert_array_equal(chosen.surfaces["mantle"], found.surfaces["mantle"])
+    assert set(chosen.points[chosen.surfaces["ends"]][..., 2].ravel()) == {0.0, 4.0}
+    for wrong, words in (
+        ({"faces": "on_cylinder", "radius": 3.0}, "'x' must have a face, .* cylinder of radius 3: it has 1 "),
+        ({"faces": "on_cylinder"}, r"surfaces\.x must have 'radius'"),
+        ({"faces": "in_sphere"}, "must .*'in_box', 'on_plane'"),
+        ({"faces": "on_cylinder", "radius": 1.0, "way": 1}, "way"),
+        ([1, 2.5], r"surfaces\.x\.1 must be the name or number of a group or face, a list"),
+        ([], r"surfaces\.x must"),
+    ):
+        with pytest.raises(SceneFileError, match=words):
+            _ = file_of(mesh={**mesh, "surfaces": {"x": wrong}}).scene
+    data = ROOT / "tests" / "data" / "two_boxes_41.msh"
+    with pytest.raises(
+        SceneFileError, match=r"faces are chosen by where they lie in CAD files .*: choose groups"
+    ):
+        _ = file_of(mesh={"file": str(data), "surfaces": by_place}).scene
     coarse = file_of(mesh={**mesh, "size": 0.7}).scene.bodies["a"].mesh
     assert coarse.n_cells < found.n_cells
     with pytest.raises(SceneFileError, match=r"labels and corners_only are for other formats than CAD"):
