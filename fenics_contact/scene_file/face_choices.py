@@ -49,10 +49,9 @@ _LIST = Annotated[
     Field(min_length=1, strict=False),
     said("a list of groups, or a table: surface = group, or surface = [groups]"),
 ]
+_OF_SURFACES = dict[str, Annotated[Any, Read(_either(list, _SEVERAL, _ONE))]]
 #: A list of groups, or surface to group, groups, or tables that choose faces.
-SurfaceGroups: TypeAlias = Annotated[
-    Any, Read(_either(dict, dict[str, _either(list, _SEVERAL, _ONE)], _LIST))
-]
+SurfaceGroups: TypeAlias = Annotated[Any, Read(_either(dict, _OF_SURFACES, _LIST))]
 
 
 def made_choice(given: Any) -> Any:
