@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene_file import suggestion
 
 FIELD_FILES = (".vtu", ".vtm", ".pvd")
+#: Names of the components of a stress, in VTK's order.
+COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 
 def newest_member(path: Path) -> Path:
@@ -37,7 +40,7 @@ def newest_member(path: Path) -> Path:
 
 
 def _blocks(path: Path) -> dict[str, Any]:
-    """Read the meshes of a file by name."""
+    """Read the meshes of a file by name, stresses by components."""
     require_extra("files of fields", "viz", "pyvista")
     import pyvista
 
@@ -45,9 +48,27 @@ def _blocks(path: Path) -> dict[str, Any]:
     if not member.is_file():
         raise InvalidInputError(f"a file of fields must exist, '{member}' does not: write the result again")
     data = pyvista.read(member)
+    blocks = {member.stem: data}
     if isinstance(data, pyvista.MultiBlock):
-        return {str(name): data[name] for name in data.keys()}
-    return {member.stem: data}
+        blocks = {str(name): data[name] for name in data.keys()}
+    for block in blocks.values():
+        _split_stress(block.point_data)
+        _split_stress(block.cell_data)
+    return blocks
+
+
+def _split_stress(data: Any) -> None:
+    """Replace stresses by their components, ``stress_xx`` and so on, principal ones by ``sigma_1`` to 3."""
+    for prefix in ("", "nodal_"):
+        _split(data, f"{prefix}principal_stress", [f"{prefix}sigma_{k}" for k in (1, 2, 3)])
+        _split(data, f"{prefix}stress", [f"{prefix}stress_{ending}" for ending in COMPONENTS])
+
+
+def _split(data: Any, name: str, parts: Sequence[str]) -> None:
+    if name in data:
+        for part, column in zip(parts, np.asarray(data[name]).T, strict=True):
+            data[part] = column
+        del data[name]
 
 
 def fields_in(path: Path) -> dict[str, str]:
@@ -132,8 +153,8 @@ def _plotter(path: Path, look: tuple[str, float], *, off_screen: bool) -> Any:
     return plotter
 
 
-_WORDS = {"von_mises": "von Mises stress"}
-#: The colours end at this quantile.
+_WORDS = {"von_mises": "von Mises stress", "nodal_von_mises": "von Mises stress"}
+#: The colours end at this quantile, and with negative numbers at its counterpart.
 QUANTILE = 0.995
 #: Colour bar on the right, clear of the bodies.
 _BAR = {
@@ -143,10 +164,11 @@ _BAR = {
 
 
 def _range(blocks: dict[str, Any], field: str) -> tuple[float, float]:
-    """Return the range of the colours: all but the largest few values, which would leave one shade."""
+    """Return the range of the colours: all but the few extreme values, which would leave one shade."""
     arrays = [
         np.asarray(block[field], dtype=float) for block in blocks.values() if field in block.array_names
     ]
     sizes = [np.linalg.norm(values, axis=1) if values.ndim == 2 else values for values in arrays]
     values = np.concatenate([size.ravel() for size in sizes])
-    return float(np.nanmin(values)), float(np.nanquantile(values, QUANTILE))
+    low = 0.0 if np.nanmin(values) >= 0.0 else 1 - QUANTILE
+    return float(np.nanquantile(values, low)), float(np.nanquantile(values, QUANTILE))

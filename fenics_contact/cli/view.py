@@ -41,7 +41,10 @@ def view(
     save: Annotated[
         Path | None, typer.Option("--save", help="PNG file to draw to.", show_default=False)
     ] = None,
-    field: Annotated[str, typer.Option("--field", help="Field shown by the colours.")] = "von_mises",
+    field: Annotated[
+        str,
+        typer.Option("--field", help="Field shown by the colours, as in the list."),
+    ] = "von_mises",
     scale: Annotated[float, typer.Option("--scale", help="Factor of the displacement.")] = 1.0,
     window: Annotated[
         bool, typer.Option("--window/--no-window", help="Open a window where there is a display.")

@@ -143,6 +143,12 @@ def principal(tensor: np.ndarray) -> np.ndarray:
     return np.linalg.eigvalsh(tensor)[..., ::-1]
 
 
+def von_mises_of(tensor: np.ndarray) -> np.ndarray:
+    """Return the von Mises stress of symmetric tensors, shape (..., 3, 3)."""
+    deviator = tensor - np.trace(tensor, axis1=-2, axis2=-1)[..., None, None] / 3 * np.eye(3)
+    return np.asarray(np.sqrt(1.5 * (deviator**2).sum(axis=(-2, -1))))
+
+
 def tensors(components: np.ndarray) -> np.ndarray:
     """Return symmetric tensors, shape (..., 3, 3), of their `COMPONENTS`, shape (..., 6)."""
     full = np.empty((*components.shape[:-1], 3, 3))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact.contact.cell_stress import components_of, principal, von_mises_of
 from fenics_contact.contact.result import ContactResult
 from fenics_contact.display import displayed
 from fenics_contact.pairing import NodeNumbers
@@ -17,8 +18,10 @@ class GatheredFields:
     """The fields of one body, replicated on all ranks.
 
     Attributes:
-        points: Fields on nodes by their names: ``displacement``, (n_nodes, dim), [length], and what
-            `contact_fields` returns.
+        points: Fields on nodes by their names: ``displacement``, (n_nodes, dim), [length], what
+            `contact_fields` returns, and ``nodal_stress``, ``nodal_principal_stress`` and
+            ``nodal_von_mises``, averaged around each node within one material, [force / length²]. Where
+            materials meet they are those of the material in which the von Mises stress is largest.
         cells: Fields on cells: ``von_mises``, (n_cells,), ``stress``, the components xx, yy, zz, xy, yz, xz,
             (n_cells, 6), and ``principal_stress``, the largest first, (n_cells, 3), all means over the cell,
             [force / length²]; ``subdomain``, numbered over all bodies, (n_cells,) int.
@@ -60,6 +63,34 @@ def contact_fields(contact: ContactResult, numbers: NodeNumbers, body: str) -> d
         "contact_force": summed(contact.force),
         "contact_slip": summed(contact.slip_in_space),
     }
+
+
+def stress_fields(tensor: np.ndarray, prefix: str = "") -> dict[str, np.ndarray]:
+    """Return components, principal values and von Mises stress of tensors, shape (n, 3, 3), by name.
+
+    Von Mises stress of a mean is below the mean of von Mises stress.
+    """
+    return {
+        f"{prefix}von_mises": von_mises_of(tensor),
+        f"{prefix}stress": components_of(tensor),
+        f"{prefix}principal_stress": principal(tensor),
+    }
+
+
+def most_stressed(by_material: np.ndarray) -> np.ndarray:
+    """Return the stress of each node in the material with the largest von Mises stress there.
+
+    A mean over materials would be the stress of none of them.
+
+    Args:
+        by_material: Shape (n_materials, n_nodes, 3, 3), NaN where a node has no cell of a material.
+
+    Returns:
+        Shape (n_nodes, 3, 3).
+    """
+    size = von_mises_of(by_material)
+    chosen = np.where(np.isnan(size), -1.0, size).argmax(axis=0)
+    return np.asarray(by_material[chosen, np.arange(by_material.shape[1])])
 
 
 def in_space(values: np.ndarray) -> np.ndarray:

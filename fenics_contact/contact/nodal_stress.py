@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import scipy.sparse as sp
 
 from fenics_contact import _dolfinx
 from fenics_contact.accuracy import Sites, find_sites, recovered_gradients
@@ -56,43 +57,42 @@ def _at_sites(
     temperature = temperature_of(torn.scene.loads, name)
     means = CellStress(mesh, body, torn.decomposition.comm, temperature)
     places = body.mesh.points - body.mesh.points.mean(axis=0)
-
-    def of_gradient(gradient: np.ndarray) -> np.ndarray:
-        components = means.components(displacement_function(mesh, places @ gradient.T))
-        return _around_sites(torn, name, sites, components, cells_of_body(mesh, body.mesh.cells))
-
-    at_rest = of_gradient(np.zeros((dim, dim)))
+    # A rotation has no stress: the gradients (i, j) and (j, i) have the same.
+    pairs = [(i, j) for i in range(dim) for j in range(i, dim)]
+    units = np.zeros((1 + len(pairs), dim, dim))
+    units[np.arange(1, len(units)), [i for i, _ in pairs], [j for _, j in pairs]] = 1.0
+    on_cells = [means.components(displacement_function(mesh, places @ unit.T)) for unit in units]
+    around = _around_sites(torn, name, sites, np.hstack(on_cells), cells_of_body(mesh, body.mesh.cells))
+    at_rest, *strained = np.split(around, len(units), axis=1)
     total = at_rest.copy()
-    for i in range(dim):
-        for j in range(i, dim):
-            unit = np.zeros((dim, dim))
-            unit[i, j] = 1.0
-            # A rotation has no stress: the gradients (i, j) and (j, i) have the same.
-            size = gradients[:, i, j] if i == j else gradients[:, i, j] + gradients[:, j, i]
-            total += size[:, None] * (of_gradient(unit) - at_rest)
+    for (i, j), stress in zip(pairs, strained, strict=True):
+        size = gradients[:, i, j] if i == j else gradients[:, i, j] + gradients[:, j, i]
+        total += size[:, None] * (stress - at_rest)
     return total
 
 
 def _around_sites(
     torn: TornSystem, name: str, sites: Sites, values: np.ndarray, number: np.ndarray
 ) -> np.ndarray:
-    """Return the means of values on cells over the cells around each site, shape (n_sites, 6). Collective.
+    """Return the means of values on cells over the cells around each site, shape (n_sites, k). Collective.
 
     Args:
         torn: The torn system.
         name: The body.
         sites: The sites.
-        values: On this rank's cells of the body, shape (n_owned, 6).
+        values: On this rank's cells of the body, shape (n_owned, k).
         number: Number in the body of each of them, shape (n_owned,).
     """
-    of_body = np.zeros((torn.scene.bodies[name].mesh.n_cells, values.shape[1]))
-    of_body[number] = values
-    total = np.zeros((sites.count, values.shape[1] + 1))
+    of_body = np.zeros((torn.scene.bodies[name].mesh.n_cells, values.shape[1] + 1))
+    of_body[number] = np.pad(values, ((0, 0), (0, 1)), constant_values=1.0)
+    total = np.zeros((sites.count, of_body.shape[1]))
     for mesh in torn.decomposition.meshes:
         if mesh.body == name:
             places = sites.of_cells[mesh.number]
-            with_count = np.pad(of_body[mesh.cells], ((0, 0), (0, 1)), constant_values=1.0)
-            np.add.at(total, places.ravel(), np.repeat(with_count, places.shape[1], axis=0))
+            starts = np.arange(len(places) + 1) * places.shape[1]
+            shape = (len(places), sites.count)
+            around = sp.csr_matrix((np.ones(places.size), places.ravel(), starts), shape=shape).T
+            total += around @ of_body[mesh.cells]
     total = sites.sharing.add_up(total)
     return np.asarray(total[:, :-1] / np.maximum(total[:, -1:], 1.0))
 

@@ -12,16 +12,10 @@ import numpy as np
 from fenics_contact._libraries import MPI
 from fenics_contact.checks import GivenVector
 from fenics_contact.contact.balance import Balance, force_balance
-from fenics_contact.contact.cell_stress import (
-    components_of,
-    principal,
-    principal_stress,
-    stress,
-    von_mises,
-)
+from fenics_contact.contact.cell_stress import principal_stress, stress, von_mises
 from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.fields import body_mesh, cell_values, displacement_function, nodal_function
-from fenics_contact.contact.gathered import GatheredFields, contact_fields
+from fenics_contact.contact.gathered import GatheredFields, contact_fields, most_stressed, stress_fields
 from fenics_contact.contact.nodal_forces import NodalForces, nodal_forces
 from fenics_contact.contact.pair_resultants import PairResultants, pair_resultants
 from fenics_contact.contact.reactions import support_reactions
@@ -287,15 +281,11 @@ class State:
         decomposition = self.torn.decomposition
         first = decomposition.tearing.subdomain_offset[decomposition.tearing.body_names.index(body)]
         subdomain = np.asarray(decomposition.partitions[body], dtype=np.int32) + np.int32(first)
-        tensor = self.gather_stress(body)
+        on_cells = stress_fields(self.gather_stress(body))
+        on_nodes = stress_fields(most_stressed(self.gather_nodal_stress(body)), "nodal_")
         return GatheredFields(
-            {"displacement": self.gather_displacement(body), **self._contact_fields(body)},
-            {
-                "von_mises": self.gather_von_mises(body),
-                "stress": components_of(tensor),
-                "principal_stress": principal(tensor),
-                "subdomain": subdomain,
-            },
+            {"displacement": self.gather_displacement(body), **self._contact_fields(body), **on_nodes},
+            {**on_cells, "von_mises": self.gather_von_mises(body), "subdomain": subdomain},
         )
 
     def _contact_fields(self, body: str) -> dict[str, np.ndarray]:
@@ -357,7 +347,8 @@ class State:
 
         Returns:
             A ``pyvista.MultiBlock`` with an ``UnstructuredGrid`` for each body under its name, which holds
-            the fields that `io.write_vtu` writes: on points ``displacement``, ``contact_status``,
+            the fields that `io.write_vtu` writes: on points ``displacement``, ``nodal_stress``,
+            ``nodal_principal_stress``, ``nodal_von_mises``, ``contact_status``,
             ``contact_pressure``, ``contact_force`` and ``contact_slip``, on cells ``von_mises``, ``stress``,
             ``principal_stress`` and ``subdomain``; see `GatheredFields`. Plane bodies lie in the plane z = 0.
 

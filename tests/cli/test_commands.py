@@ -6,12 +6,15 @@ import json
 from pathlib import Path
 
 import jsonschema
+import numpy as np
 import pytest
+import pyvista as pv
 from mpi4py import MPI
 
 from fenics_contact import cli
 from fenics_contact.cli.blas import Blas, loaded_blas, numpy_speed
 from fenics_contact.cli.desk import Desk
+from fenics_contact.cli.field_files import fields_in
 from fenics_contact.cli.shipped import folder_of_demos, shipped
 from fenics_contact.cli.view import show_record
 from tests.conftest import ROOT
@@ -132,6 +135,25 @@ def test_view_shows_numbers_and_fields(result: Path, capsys: pytest.CaptureFixtu
     assert run("view", result / "result.json", "--no-window") == 0
 
 
+def test_view_tells_the_range_of_every_component_of_the_stress(result: Path) -> None:
+    blocks, told = pv.read(result / "state.vtm"), fields_in(result / "state.vtm")
+
+    def range_of(where: str, name: str, column: int) -> str:
+        data = [getattr(blocks[body], where)[name][:, column] for body in blocks.keys()]
+        values = np.concatenate(data)
+        assert np.ptp(values) > 1.0
+        return f"{values.min():.5g} to {values.max():.5g}"
+
+    for name, column in (("stress_xx", 0), ("stress_zz", 2), ("stress_xy", 3), ("stress_xz", 5)):
+        assert told[f"nodal_{name}"] == range_of("point_data", "nodal_stress", column)
+        assert told[name] == range_of("cell_data", "stress", column)
+    for number in (1, 2, 3):
+        assert told[f"nodal_sigma_{number}"] == range_of("point_data", "nodal_principal_stress", number - 1)
+        assert told[f"sigma_{number}"] == range_of("cell_data", "principal_stress", number - 1)
+    assert "stress" not in told
+    assert "displacement" in told
+
+
 def test_view_lists_the_first_and_the_last_evaluations(capsys: pytest.CaptureFixture[str]) -> None:
     count = 50
     history = {
@@ -150,9 +172,12 @@ def test_view_lists_the_first_and_the_last_evaluations(capsys: pytest.CaptureFix
     assert "aggregate" not in str(told)
 
 
-def test_view_draws_to_a_file(result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("field", ["displacement", "nodal_stress_xx", "sigma_3"])
+def test_view_draws_to_a_file(
+    field: str, result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     picture = tmp_path / "there" / "picture.png"
-    assert run("view", result / "state.vtm", "--save", picture, "--field", "displacement") == 0
+    assert run("view", result / "state.vtm", "--save", picture, "--field", field) == 0
     assert f"picture in {picture}\n" in capsys.readouterr().out
     assert picture.stat().st_size > 5000
 

@@ -13,11 +13,24 @@ from fenics_contact.contact import State, solve_scene
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.mesh import quadratic
 from fenics_contact.partition import box_partition
-from fenics_contact.scene import Body, IsotropicElasticity, PlaneStrain, Pressure, Scene, Support, Traction
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    IsotropicElasticity,
+    PlaneStrain,
+    Pressure,
+    RigidSphere,
+    Scene,
+    Support,
+    Surface,
+    Traction,
+)
 
 #: Radii, inner pressure.
 INNER, OUTER, PRESSURE = 1.0, 2.0, 3.0
 POISSON = 0.3
+#: Largest pressure below a cylinder, for contact of half width one.
+PEAK = 5.0
 
 
 def cylinder(cells: int, *, order: int = 1) -> Scene:
@@ -43,6 +56,39 @@ def lame(points: np.ndarray) -> np.ndarray:
     stress[:, :2, :2] = np.einsum("n,ni,nj->nij", scale * (1 - (OUTER / radius) ** 2), along, along)
     stress[:, :2, :2] += np.einsum("n,ni,nj->nij", scale * (1 + (OUTER / radius) ** 2), around, around)
     stress[:, 2, 2] = POISSON * np.trace(stress[:, :2, :2], axis1=1, axis2=2)
+    return stress
+
+
+def punched(cells: int, *, order: int = 1) -> Scene:
+    """Half of a block that a rigid cylinder presses; on its far sides act the tractions of a half plane."""
+    radius = 1.0 / (2 * PEAK) * 1000.0 / (1 - POISSON**2)
+    block = rectangle((0.0, -3.0), (3.0, 0.0), (3 * cells, 3 * cells))
+    mesh = quadratic(block) if order == 2 else block
+    loads = [
+        Traction("block", "x1", lambda x: line_contact(x)[:, :2, 0]),
+        Traction("block", "y0", lambda x: -line_contact(x)[:, :2, 1]),
+    ]
+    cylinder = RigidSphere((0.0, radius), radius)
+    return Scene(
+        {"block": Body(mesh, PlaneStrain(1000.0, POISSON))},
+        [Support("block", "x0", (0.0, None))],
+        loads,
+        [ContactPair(Surface("block", "y1"), cylinder)],
+    )
+
+
+def line_contact(points: np.ndarray) -> np.ndarray:
+    """Return McEwen's stress of a half plane below Hertz's pressure of half width one, shape (n, 3, 3)."""
+    x, z = points[:, 0], -points[:, 1]
+    half = 1 - x**2 + z**2
+    root = np.sqrt(half**2 + 4 * x**2 * z**2)
+    m, n = np.sqrt(0.5 * (root + half)), np.sign(x) * np.sqrt(np.maximum(0.5 * (root - half), 0.0))
+    share = (z**2 + n**2) / np.maximum(root, 1e-300)
+    stress = np.zeros((len(points), 3, 3))
+    stress[:, 0, 0] = -PEAK * (m * (1 + share) - 2 * z)
+    stress[:, 1, 1] = -PEAK * m * (1 - share)
+    stress[:, 0, 1] = stress[:, 1, 0] = PEAK * n * (m**2 - z**2) / np.maximum(root, 1e-300)
+    stress[:, 2, 2] = POISSON * (stress[:, 0, 0] + stress[:, 1, 1])
     return stress
 
 

@@ -21,7 +21,16 @@ from fenics_contact.scene import (
     ThermalStrain,
     Traction,
 )
-from tests.contact.stress_cases import SCENES, composite, cylinder, lame, solved
+from tests.contact.stress_cases import (
+    PEAK,
+    SCENES,
+    composite,
+    cylinder,
+    lame,
+    line_contact,
+    punched,
+    solved,
+)
 
 SCRIPT = Path(__file__).with_name("stress_cases.py")
 COMM = MPI.COMM_SELF
@@ -46,6 +55,24 @@ def test_the_stress_of_a_thick_cylinder_converges_to_lame(order: int, coarsest: 
     assert rates(on_cells)[-1] > 1.8, on_cells
     assert rates(on_nodes)[-1] > rate, on_nodes
     assert at_wall[-1] < 0.02 * np.abs(lame(np.array([[1.0, 0.0]]))).max()
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_stress_below_a_cylinder_converges_to_hertz(order: int) -> None:
+    errors = []
+    for cells in (4, 8, 16):
+        scene = punched(cells // order, order=order)
+        state, points = solved(scene, COMM, 1), scene.bodies["block"].mesh.points
+        (nodal,) = state.gather_nodal_stress("block")
+        below = points[:, 1] < -0.24  # at the ends of the contact the pressure has a vertical slope
+        errors.append(np.abs(nodal - line_contact(points))[below].max() / PEAK)
+    # The largest shear stress lies on the axis, 0.786 half widths below the surface: 0.3 p₀.
+    axis = below & (points[:, 0] == 0.0)
+    shear = 0.5 * (nodal[axis, 0, 0] - nodal[axis, 1, 1])
+    assert shear.max() == pytest.approx(0.3003 * PEAK, rel=0.01)
+    assert points[axis][shear.argmax(), 1] == pytest.approx(-0.786, abs=0.1)
+    assert rates(errors).min() > 1.0, errors
+    assert errors[-1] < 0.01, errors
 
 
 @pytest.mark.parametrize("material", [PlaneStrain(1000.0, 0.3), PlaneStress(1000.0, 0.3), None])

@@ -9,6 +9,7 @@ import meshio
 import numpy as np
 import pytest
 import pyvista as pv
+from mpi4py import MPI
 
 from fenics_contact.accuracy import discretisation_error
 from fenics_contact.contact import State, Status
@@ -16,6 +17,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.io import write_vtu, write_xdmf
 from fenics_contact.io.names import file_of_each
 from tests.contact.gallery import partitions
+from tests.contact.stress_cases import composite, solved
 from tests.io.states import touching_blocks
 from tests.viz.plane_states import plane_block
 
@@ -56,6 +58,40 @@ def test_vtu_files_hold_mesh_displacement_and_stress(cell: str, tmp_path: Path) 
         components = state.gather_stress(name)[:, (0, 1, 2, 0, 1, 0), (0, 1, 2, 1, 2, 2)]
         np.testing.assert_array_equal(read[name].cell_data["stress"], components)
         assert read[name].cell_data["principal_stress"].shape == (body.mesh.n_cells, 3)
+
+
+@pytest.mark.parametrize("make", [touching_blocks, plane_block])
+def test_vtu_files_hold_the_stress_at_nodes_for_pyvista_and_meshio(
+    make: Callable[[], State], tmp_path: Path
+) -> None:
+    state = make()
+    blocks = pv.read(write_vtu(state, tmp_path))
+    files = file_of_each(state.scene.bodies, tmp_path, "state", ".vtu")
+    for name in state.scene.bodies:
+        (tensor,) = state.gather_nodal_stress(name)
+        assert np.abs(tensor[:, 0, 1]).max() > 1e-3 * np.abs(tensor).max() > 0.0
+        deviator = tensor - np.trace(tensor, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
+        for data in (blocks[name].point_data, meshio.read(files[name]).point_data):
+            xx, yy, zz, xy, yz, xz = data["nodal_stress"].T
+            found = np.stack([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
+            np.testing.assert_array_equal(found, tensor)
+            np.testing.assert_allclose(
+                data["nodal_principal_stress"], np.linalg.eigvalsh(tensor)[:, ::-1], rtol=1e-12, atol=1e-9
+            )
+            equivalent = np.sqrt(1.5) * np.linalg.norm(deviator, axis=(1, 2))
+            np.testing.assert_allclose(data["nodal_von_mises"], equivalent, rtol=1e-12)
+
+
+def test_vtu_files_hold_at_a_node_between_materials_the_larger_stress(tmp_path: Path) -> None:
+    state = solved(composite(), MPI.COMM_SELF)
+    data = pv.read(write_vtu(state, tmp_path))["bar"].point_data
+    low, high = state.gather_nodal_stress("bar")
+    between = ~np.isnan(low[:, 0, 0]) & ~np.isnan(high[:, 0, 0])
+    assert between.sum() > 10
+    np.testing.assert_array_equal(data["nodal_stress"][between, 0], high[between, 0, 0])
+    assert data["nodal_stress"][between, 0].min() > 2 * low[between, 0, 0].max()
+    only = np.isnan(high[:, 0, 0])
+    np.testing.assert_array_equal(data["nodal_stress"][only, 0], low[only, 0, 0])
 
 
 def test_vtu_files_number_the_subdomains_of_all_bodies(tmp_path: Path) -> None:
