@@ -9,7 +9,7 @@ from fenics_contact.contact.nodal_forces import NodalForces
 from fenics_contact.contact.resultant import Resultants, point_of, resultant
 from fenics_contact.pairing import NodeNumbers
 from fenics_contact.scene import Scene, Surface
-from fenics_contact.surfaces import nodal_areas, quadrature_areas
+from fenics_contact.surfaces import nodal_areas, surface_moments
 
 
 def support_reactions(
@@ -48,8 +48,6 @@ def support_shares(scene: Scene, numbers: NodeNumbers) -> list[np.ndarray]:
 
 
 def centroid(scene: Scene, surface: Surface) -> np.ndarray:
-    """Return the centroid of a surface, each facet counting at the mean of its nodes, shape (dim,)."""
+    """Return the centroid of a surface, shape (dim,)."""
     mesh = scene.bodies[surface.body].mesh
-    facets = mesh.surfaces[surface.name]
-    areas = quadrature_areas(mesh.points, facets)
-    return np.asarray(areas @ mesh.points[facets].mean(axis=1) / areas.sum())
+    return surface_moments(mesh.points, mesh.surfaces[surface.name]).centroid

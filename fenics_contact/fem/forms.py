@@ -11,6 +11,7 @@ from fenics_contact.errors import together
 from fenics_contact.fem.composition import Composition, integrate, material_sets
 from fenics_contact.fem.load_forms import Symbol, fields_of, load_key, load_name, load_parameters, load_work
 from fenics_contact.fem.model_checks import check_model, unit_cell_stiffness
+from fenics_contact.fem.spread_force import as_tractions
 from fenics_contact.fem.templates import (
     LOADED,
     QUADRATURE_DEGREE,
@@ -21,8 +22,7 @@ from fenics_contact.fem.templates import (
     surface_measure,
     volume_measure,
 )
-from fenics_contact.scene import Load, Material, Scene, ThermalStrain, TotalForce, Traction
-from fenics_contact.surfaces import quadrature_areas
+from fenics_contact.scene import Load, Material, Scene, ThermalStrain
 
 __all__ = [
     "LOADED",
@@ -30,7 +30,6 @@ __all__ = [
     "FormLibrary",
     "Template",
     "Templates",
-    "as_tractions",
     "scalar_constants",
     "surface_measure",
     "volume_measure",
@@ -149,14 +148,3 @@ class FormLibrary:
             return form, (*symbol.constants, *constants), symbol.coefficients
 
         self._templates.get(load_key(load, materials, cell_type), load_name(load, cell_type), write)
-
-
-def as_tractions(scene: Scene) -> tuple[Load, ...]:
-    """Return the scene's loads with every resultant spread over the present area of its surface."""
-    return tuple(_spread(scene, load) if isinstance(load, TotalForce) else load for load in scene.loads)
-
-
-def _spread(scene: Scene, load: TotalForce) -> Traction:
-    mesh = scene.bodies[load.body].mesh
-    area = float(quadrature_areas(mesh.points, mesh.surfaces[load.surface]).sum())
-    return Traction(load.body, load.surface, tuple(component / area for component in load.value))

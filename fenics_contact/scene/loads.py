@@ -11,7 +11,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fenics_contact.checks import GivenVector, checked
+import numpy as np
+
+from fenics_contact.checks import GivenVector, checked, floats
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene.values import ScalarValue, VectorValue, checked_scalar, checked_vector
 
@@ -44,20 +46,37 @@ class Traction:
 @dataclass(frozen=True)
 @checked("value")
 class TotalForce:
-    """Dead surface load given by its resultant, spread evenly over the surface of the undeformed body.
+    """Dead surface load given by its resultant, spread over the surface of the undeformed body.
+
+    Without ``moment`` and ``at`` it is an even traction. With them the traction is a + b × (x − c), c being
+    the centroid of the surface, with a and b such that the resultant is exactly the force at the point and
+    the moment: even from the force, linear across the surface from the moment. The surface may deform.
 
     Attributes:
         body: Name of the body.
         surface: Name of its surface.
         value: Resultant, [force] (in the plane: per unit of thickness).
+        moment: Moment beside that of the force, three numbers in space, in the plane one, positive from x to
+            y, [force·length]; none by default.
+        at: Point at which the force acts, [length]; by default the centroid of the surface.
+
+    Example:
+        >>> torque = TotalForce("shaft", "end", (0.0, 0.0, 0.0), moment=(0.0, 0.0, 2e4))  # N, N mm
+        >>> eccentric = TotalForce("bracket", "plate", (0.0, 0.0, -500.0), at=(40.0, 0.0, 10.0))
     """
 
     body: str
     surface: str
     value: GivenVector
+    moment: GivenVector | float | None = None
+    at: GivenVector | None = None
 
     def __post_init__(self) -> None:
-        """Reject a value that is not a vector of numbers."""
+        """Reject a force, a moment or a point that is not made of finite numbers."""
+        for name in ("moment", "at"):
+            given = getattr(self, name)
+            if given is not None:
+                object.__setattr__(self, name, _numbers(f"TotalForce.{name}", given))
         value = checked_vector("TotalForce.value", self.value)
         if not isinstance(value, tuple):
             raise InvalidInputError(
@@ -65,6 +84,14 @@ class TotalForce:
                 "on position; give a Traction as a function of position"
             )
         object.__setattr__(self, "value", value)
+
+
+def _numbers(name: str, given: GivenVector | float) -> GivenVector | float:
+    """Return finite numbers as plain ones."""
+    numbers = np.asarray(given, dtype=np.float64)
+    if not np.isfinite(numbers).all():
+        raise InvalidInputError(f"{name} must be finite numbers, got {given!r}: correct it")
+    return floats(numbers) if numbers.ndim else float(numbers)
 
 
 @dataclass(frozen=True)

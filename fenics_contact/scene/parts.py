@@ -12,7 +12,7 @@ from fenics_contact.checks import checked
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene.body import Body
-from fenics_contact.scene.loads import Load, SurfaceLoad, ThermalStrain
+from fenics_contact.scene.loads import Load, SurfaceLoad, ThermalStrain, TotalForce
 from fenics_contact.scene.materials import can_expand
 from fenics_contact.scene.obstacles import RigidObstacle
 from fenics_contact.scene.pairs import ContactPair, Surface, Tie
@@ -43,6 +43,8 @@ class SceneParts:
         object.__setattr__(self, "supports", held)
         for part in (*self.supports, *self.loads):
             self._require_components(part)
+            if isinstance(part, TotalForce):
+                self._require_lever(part)
             if isinstance(part, ThermalStrain):
                 self._require_expansion(part)
         pairs: list[ContactPair | Tie] = [*self.contacts, *self.ties]
@@ -77,6 +79,22 @@ class SceneParts:
             raise InvalidInputError(
                 f"{type(part).__name__}.value of body {part.body!r} must hold {needed}, got {part.value!r}: "
                 f"give {dim} of them"
+            )
+
+    def _require_lever(self, load: TotalForce) -> None:
+        """Reject a moment or a point whose dimension is not that of the body."""
+        dim = self.bodies[load.body].mesh.dim
+        where = f"surface {load.surface!r} of body {load.body!r}"
+        if load.moment is not None and np.shape(load.moment) != (() if dim == 2 else (3,)):
+            needed = "one number, as the body is plane" if dim == 2 else "three numbers, about x, y and z"
+            raise InvalidInputError(
+                f"TotalForce.moment on {where} must be {needed}, got {load.moment!r}: in the plane "
+                "a moment is positive from x to y"
+            )
+        if load.at is not None and len(load.at) != dim:
+            raise InvalidInputError(
+                f"TotalForce.at of the force on {where} must have {dim} coordinates, got {load.at!r}: give a "
+                "point, or none for the centroid of the surface"
             )
 
     def _require_dimension(self, obstacle: RigidObstacle) -> None:

@@ -10,7 +10,7 @@ from fenics_contact import scene
 from fenics_contact.scene import Load, Support
 from fenics_contact.scene_file.expression import Expression, VectorExpression
 from fenics_contact.scene_file.part import Part, keys_of
-from fenics_contact.scene_file.values import FREE, Components, Scalar, one_of
+from fenics_contact.scene_file.values import FREE, Components, Scalar, Vector, one_of
 
 
 class _Named(Part):
@@ -47,9 +47,25 @@ class TractionLoad(_Load):
 
 @keys_of(scene.TotalForce)
 class TotalForceLoad(_Load):
-    """A resultant, spread evenly over a surface."""
+    """A resultant, spread over a surface."""
 
     kind: Literal["total_force"]
+
+
+@keys_of(scene.TotalForce, without=("value", "at"))
+class TotalMomentLoad(_Load):
+    """A moment, spread over a surface."""
+
+    changed: ClassVar[str] = "moment"
+    kind: Literal["total_moment"]
+    moment: Vector | float = Field(
+        alias="value", description="three numbers, in the plane one, positive from x to y, [force·length]"
+    )
+
+    def build(self, dim: int, value: Any = None) -> Load:
+        """Return the load, without a force."""
+        moment = self.moment if value is None else value
+        return self.made(value=(0.0,) * dim, moment=moment)
 
 
 @keys_of(scene.Pressure)
@@ -106,5 +122,14 @@ class SupportPart(_Named):
 
 AnyLoad: TypeAlias = Annotated[
     Any,
-    one_of("kind", TractionLoad, TotalForceLoad, PressureLoad, BodyForceLoad, GravityLoad, ThermalLoad),
+    one_of(
+        "kind",
+        TractionLoad,
+        TotalForceLoad,
+        TotalMomentLoad,
+        PressureLoad,
+        BodyForceLoad,
+        GravityLoad,
+        ThermalLoad,
+    ),
 ]

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, cr
 from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails, PydanticCustomError, ValidationError
 
-from fenics_contact.checks import meaning
+from fenics_contact.checks import GivenVector, meaning
 from fenics_contact.scene import ScalarValue, VectorValue
 from fenics_contact.scene_file.values import (
     CountPair,
@@ -27,6 +27,8 @@ _FORMULAS = "; numbers, or formulas in x, y, z in quotes"
 IN_FILES: list[tuple[Any, Any, str]] = [
     (Sequence[float], Vector, ""),
     (tuple[float, ...], Vector, ""),
+    (GivenVector | float | None, Vector | float | None, ""),
+    (GivenVector | None, Vector | None, ""),
     (tuple[float, float], Pair, ""),
     (tuple[float, float] | None, Pair | None, ""),
     (tuple[float, float, float], Triple, ""),

@@ -1,6 +1,11 @@
 """Surfaces of meshes: facets, the true surfaces that they approximate, and projections on them."""
 
-from fenics_contact.surfaces.facet_areas import nodal_areas, quadrature_areas
+from fenics_contact.surfaces.facet_areas import (
+    SurfaceMoments,
+    nodal_areas,
+    quadrature_areas,
+    surface_moments,
+)
 from fenics_contact.surfaces.facets import (
     FacetedSurface,
     Relief,
@@ -19,6 +24,7 @@ __all__ = [
     "Geometry",
     "Projection",
     "Relief",
+    "SurfaceMoments",
     "corner_normals",
     "corner_products",
     "edge_distance",
@@ -34,5 +40,6 @@ __all__ = [
     "quadrature_areas",
     "shape_functions",
     "slopes",
+    "surface_moments",
     "true_surface",
 ]

@@ -24,6 +24,7 @@ from fenics_contact.scene import (
     Surface,
     ThermalStrain,
     Tie,
+    TotalForce,
     Traction,
     gravity,
 )
@@ -77,7 +78,15 @@ def pinched() -> Scene:
     )
 
 
-SCENES = {"dragged": dragged, "tied": tied, "pinched": pinched}
+def turned() -> Scene:
+    """A block that a force beside it bends and turns."""
+    body = Body(block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (6, 3, 3)), SOFT)
+    return Scene({"bar": body}, [Support("bar", "x0")], [TotalForce("bar", "x1", GIVEN, MOMENT, BESIDE)])
+
+
+#: Of the scene "turned".
+GIVEN, MOMENT, BESIDE = (0.3, 0.1, -1.0), (0.5, -0.2, 0.1), (2.5, 3.0, 0.0)
+SCENES = {"dragged": dragged, "tied": tied, "pinched": pinched, "turned": turned}
 
 
 def solved(scene: Scene, comm: MPI.Comm, tolerance: float = 1e-10) -> State:

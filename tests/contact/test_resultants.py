@@ -31,7 +31,7 @@ from fenics_contact.scene import (
     gravity,
 )
 from tests.contact.bedded import FORCE, Bedded, pushed
-from tests.contact.resultant_cases import SCENES, numbers, solved
+from tests.contact.resultant_cases import BESIDE, GIVEN, MOMENT, SCENES, numbers, solved
 from tests.hard.invariants import Whole
 
 SCRIPT = Path(__file__).with_name("resultant_cases.py")
@@ -113,6 +113,15 @@ def test_the_balance_notices_a_force_that_is_forgotten(lost: str) -> None:
     assert state.balance().imbalance > 1e-6
 
 
+def test_a_force_at_a_point_is_held_there() -> None:
+    state = solved(SCENES["turned"](), COMM)
+    loads, (held,) = state.balance(BESIDE).loads, state.reactions(BESIDE)
+    np.testing.assert_allclose([loads.force, loads.moment], [GIVEN, MOMENT], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        [held.force, held.moment], [[-f for f in GIVEN], [-m for m in MOMENT]], atol=1e-9
+    )
+
+
 def test_friction_across_a_gap_is_told_as_its_moment() -> None:
     state = solved(SCENES["dragged"](), COMM)
     balance, (pair, floor) = state.balance(), state.resultants().contacts
@@ -127,7 +136,7 @@ def test_friction_across_a_gap_is_told_as_its_moment() -> None:
     )
 
 
-@pytest.mark.parametrize("name", ["dragged", "tied"])
+@pytest.mark.parametrize("name", ["dragged", "tied", "turned"])
 def test_numbers_are_the_same_on_two_ranks(name: str, mpirun: Callable[..., str]) -> None:
     alone, ranks = numbers(solved(SCENES[name](), COMM)), json.loads(mpirun(SCRIPT, 2, name))
     assert len(ranks) == 2

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.fem.forms import FormLibrary, as_tractions
+from fenics_contact.fem.forms import FormLibrary
+from fenics_contact.fem.spread_force import as_tractions
 from fenics_contact.feti.subdomain import Subdomain, assemble, cut_out
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import Body, Load, Material, Scene

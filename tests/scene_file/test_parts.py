@@ -183,6 +183,8 @@ def test_loads_and_supports_are_those_of_the_package() -> None:
     loads = [
         {"kind": "traction", "body": "a", "surface": "z1", "value": ["x", 0, 1.5]},
         {"kind": "total_force", "body": "a", "surface": "z1", "value": [1, 2, 3]},
+        {"kind": "total_force", "body": "a", "surface": "z1", "value": [1, 2, 3], "at": [5, 0, 0]},
+        {"kind": "total_moment", "body": "a", "surface": "z1", "value": [0, 0, 7]},
         {"kind": "pressure", "body": "a", "surface": "x1", "value": "2 * z"},
         {"kind": "body_force", "body": "a", "value": [0, 0, -1]},
         {"kind": "gravity", "body": "a", "density": 2.0, "acceleration": [0, 0, -10]},
@@ -196,6 +198,8 @@ def test_loads_and_supports_are_those_of_the_package() -> None:
     assert list(found.loads) == [
         scene.Traction("a", "z1", VectorExpression((Expression("x"), 0.0, 1.5))),
         scene.TotalForce("a", "z1", (1.0, 2.0, 3.0)),
+        scene.TotalForce("a", "z1", (1.0, 2.0, 3.0), at=(5.0, 0.0, 0.0)),
+        scene.TotalForce("a", "z1", (0.0, 0.0, 0.0), moment=(0.0, 0.0, 7.0)),
         scene.Pressure("a", "x1", Expression("2 * z")),
         scene.BodyForce("a", (0.0, 0.0, -1.0)),
         scene.gravity("a", 2.0, (0, 0, -10)),
@@ -281,6 +285,14 @@ def test_steps_go_from_value_to_value() -> None:
     assert all(step.supports and step.supports[1].value == (0.0, 0.0, 0.0) for step in found)
     pushed = [step.loads[0].value(np.array([[2.0, 0, 0]])) for step in found if step.loads]  # type: ignore[operator,union-attr]
     np.testing.assert_allclose(np.ravel(pushed), [2, 2, 2, 4, 6])
+
+
+def test_steps_turn_a_moment_up() -> None:
+    moment = {"name": "turn", "kind": "total_moment", "body": "a", "surface": "z1", "value": [0, 0, 1]}
+    steps = [{"loads": {"turn": [0, 4, 3]}, "count": 2}]
+    found = file_of(loads=[moment], steps=steps, supports=[{"body": "a", "surface": "z0"}]).steps
+    moments = [load.moment for step in found for load in step.loads]
+    assert moments == [(0.0, 2.0, 2.0), (0.0, 4.0, 3.0)]
 
 
 def test_steps_must_keep_what_is_free() -> None:

@@ -20,6 +20,7 @@ from fenics_contact.scene import (
     Scene,
     Surface,
     ThermalStrain,
+    TotalForce,
     Tresca,
     Ufl,
 )
@@ -44,6 +45,7 @@ def two_materials() -> Scene:
         {"block": Body(mesh, materials)},
         loads=[
             Pressure("block", "z1", lambda points: 2.0 + 0.2 * points[:, 0]),
+            TotalForce("block", "z1", (0.02, 0.0, -0.1), moment=(0.01, 0.02, 0.05), at=(0.9, 0.6, 1.5)),
             BodyForce("block", Ufl(lambda x: [0.3 * x[2], 0.1, -0.2 * x[0]])),
             ThermalStrain("block", 5.0),
             ThermalStrain("block", Ufl(lambda x: 3.0 * x[2] * x[0])),
