@@ -127,14 +127,14 @@ def _through_steps(desk: Desk, file: SceneFile, resume: bool | None) -> dict[str
         for number, step in enumerate(file.steps):
             state = sequence.advance(step)
             if file.document.output.files:
-                series.add(state, number, step.name)
+                series.add(state, number if step.time is None else step.time, step.name)
             rows.append(step_row(number, step.name, state))
             if number in chosen:
                 drawn[f"{number}: {step.name}"] = state
         sequence.finish()
     desk.show(step_table(rows, file))
     _show(desk, file, state, f"{file.title}: after the last step")
-    write_result(state, file.folder, more={**_origin(file), "steps": _steps(rows)})
+    write_result(state, file.folder, more={**_origin(file), "steps": _steps(rows, file)})
     _done(desk, checkpoint)
     return drawn
 
@@ -154,13 +154,14 @@ def _origin(file: SceneFile) -> dict[str, Any]:
     }
 
 
-def _steps(rows: list[tuple[str, ...]]) -> dict[str, list[Any]]:
+def _steps(rows: list[tuple[str, ...]], file: SceneFile) -> dict[str, list[Any]]:
     names = (
         "number", "name", "iterations", "products", "open", "stick", "slip", "normal_force", "friction_force",
         "peak_pressure",
     )  # fmt: skip
     kinds = (int, str, int, int, int, int, int, float, float, float)
-    return {
+    columns = {
         name: [kind(row[column]) for row in rows]
         for column, (name, kind) in enumerate(zip(names, kinds, strict=True))
     }
+    return {**columns, "time": [step.time for step in file.steps]}

@@ -89,6 +89,7 @@ class FormLibrary:
         space: _dolfinx.fem.FunctionSpace,
         points: np.ndarray,
         facets: tuple[np.ndarray, np.ndarray] | None = None,
+        acted: np.ndarray | None = None,
     ) -> _dolfinx.fem.Form:
         """Return the linear form of ``load`` bound to ``space``.
 
@@ -99,10 +100,11 @@ class FormLibrary:
             space: Displacements on the mesh.
             points: Coordinates by input node of the mesh, shape (n, dim), [length].
             facets: (cells, local facets) on which a surface load acts.
+            acted: Marks of the nodes of its surface by input node, shape (n,).
         """
         template = self._templates[load_key(load, parts.materials, cell_type)]
         cells = parts.cells if isinstance(load, ThermalStrain) else None
-        functions = fields_of(load, space, points)
+        functions = fields_of(load, space, points, acted)
         return template.bind([space], load_parameters(load, parts), functions, facets, cells=cells)
 
     def varies(self, material: Material, cell_type: str) -> bool:

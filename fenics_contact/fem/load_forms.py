@@ -79,7 +79,7 @@ def numbers_of(load: Load) -> tuple[float, ...]:
 
 
 def fields_of(
-    load: Load, space: _dolfinx.fem.FunctionSpace, points: np.ndarray
+    load: Load, space: _dolfinx.fem.FunctionSpace, points: np.ndarray, acted: np.ndarray | None = None
 ) -> tuple[_dolfinx.fem.Function, ...]:
     """Return the Functions for a symbol's coefficients.
 
@@ -87,6 +87,7 @@ def fields_of(
         load: The load.
         space: Space of displacements on the mesh.
         points: Coordinates by input node of that mesh, shape (n, dim), [length].
+        acted: Marks of the nodes on the load's surface, shape (n,); the value is asked for only there.
     """
     if isinstance(load.value, Ufl) or not callable(load.value):
         return ()
@@ -95,10 +96,11 @@ def fields_of(
     dim = points.shape[1]
     shape = () if is_scalar(load) else (dim,)
     name = f"{type(load).__name__} on body {load.body!r}"
+    width = 1 if is_scalar(load) else dim
+    here = np.arange(len(nodes)) if acted is None else np.flatnonzero(acted[nodes])
     field = _dolfinx.fem.Function(space, name="load")
-    field.x.array.reshape(-1, 1 if is_scalar(load) else dim)[dofs] = evaluate(
-        name, load.value, points[nodes], shape
-    ).reshape(len(nodes), -1)
+    given = evaluate(name, load.value, points[nodes[here]], shape)
+    field.x.array.reshape(-1, width)[dofs[here]] = given.reshape(-1, width)
     return (field,)
 
 

@@ -163,8 +163,11 @@ def assemble(
         return earlier
     force = np.zeros(mesh.size)
     for load in acting:
-        facets = mesh.facets_of(body, load.surface) if isinstance(load, SurfaceLoad) else None
-        form = forms.load(load, parts, body.mesh.cell_type, mesh.space, points[order], facets)
+        facets, acted = None, None
+        if isinstance(load, SurfaceLoad):
+            facets = mesh.facets_of(body, load.surface)
+            acted = np.isin(mesh.nodes[order], body.mesh.surfaces[load.surface])
+        form = forms.load(load, parts, body.mesh.cell_type, mesh.space, points[order], facets, acted)
         absolute = isinstance(load.value, Ufl) or _varies(parts, body, forms)
         coordinates = points[order] if absolute else _from_own_origin(points[order])
         _dolfinx.update_coordinates(mesh.space.mesh, coordinates)

@@ -242,7 +242,7 @@ def _joined(
 ) -> TornSystem:
     """Search for contact and build B; the right side is left empty. Collective."""
     points, ties = _meeting_points(scene, decomposition, overlap)
-    has_friction, coefficient, tresca = friction_data(scene.contacts, points)
+    has_friction, coefficient, tresca = friction_data(scene, points)
     frictional = np.flatnonzero(has_friction)
     gluing, tearing, fixed = decomposition.gluing.rows, decomposition.tearing, decomposition.fixed
     tied = tied_relations(ties, scene.ties, fixed)

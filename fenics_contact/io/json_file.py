@@ -14,11 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fenics_contact.display import in_short
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.io.replacing import write_text
 
 if TYPE_CHECKING:
     from mpi4py import MPI
+
+#: Largest number of entries of an array that a description lists.
+SHOWN = 12
 
 
 def write_json(path: str | Path, data: Any, *, comm: MPI.Comm | None = None) -> Path:
@@ -63,7 +67,8 @@ def plain(data: Any, place: str = "data", *, lenient: bool = False) -> Any:
         data: The data.
         place: Its name in error messages.
         lenient: Whether to replace what JSON lacks: dataclasses with their type, functions by their name,
-            other objects by their type, keys by text, and NaN and infinity by None.
+            other objects by their type, keys by text, and NaN and infinity by None; and long arrays by their
+            shape and range.
 
     Raises:
         InvalidInputError: If some part cannot be converted; states which.
@@ -77,6 +82,8 @@ def plain(data: Any, place: str = "data", *, lenient: bool = False) -> Any:
     if is_dataclass(data) and not isinstance(data, type):
         kind = {"type": type(data).__name__} if lenient else {}
         return kind | {part.name: inside(getattr(data, part.name), f".{part.name}") for part in fields(data)}
+    if lenient and isinstance(data, np.ndarray) and data.size > SHOWN:
+        return in_short(data)
     if isinstance(data, np.ndarray | np.generic):
         return inside(data.tolist(), "")
     if isinstance(data, Mapping):

@@ -133,6 +133,15 @@ def _other_reader(path: Path, labels: str | None) -> Callable[..., dict[str, Bod
 
 
 def _read(path: Path, tagged: Callable[..., TaggedMesh], file_format: str | None) -> TaggedMesh:
+    return tagged(with_element_sets(read_with_meshio(path, file_format), path), f"file '{path}'")
+
+
+def read_with_meshio(path: Path, file_format: str | None = None) -> meshio.Mesh:
+    """Read a file as meshio does, by its format or its ending.
+
+    Raises:
+        InvalidInputError: If it is missing, of unknown format, or cannot be read.
+    """
     require_file(path)
     import meshio
 
@@ -143,8 +152,7 @@ def _read(path: Path, tagged: Callable[..., TaggedMesh], file_format: str | None
             f"file '{path}' must end in one of {' '.join(sorted(known))}, which say what is in it: rename "
             "it, or give file_format"
         )
-    mesh = _read_by_meshio(path, file_format)
-    return tagged(with_element_sets(mesh, path), f"file '{path}'")
+    return _read_by_meshio(path, file_format)
 
 
 def _read_by_meshio(path: Path, file_format: str | None) -> meshio.Mesh:

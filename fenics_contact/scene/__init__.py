@@ -42,11 +42,12 @@ from fenics_contact.scene.obstacles import (
 from fenics_contact.scene.pair_geometry import PairGeometry
 from fenics_contact.scene.pairs import ContactPair, Coulomb, Discretisation, Friction, Surface, Tie, Tresca
 from fenics_contact.scene.plan import ConeKind, Plan, SolverKind, choose_solver
+from fenics_contact.scene.sampled import Sampled
 from fenics_contact.scene.scene import Scene
 from fenics_contact.scene.steps import LoadStep
 from fenics_contact.scene.supports import Support
 from fenics_contact.scene.true_surfaces import surface_of
-from fenics_contact.scene.values import ScalarValue, Ufl, VectorValue, evaluate
+from fenics_contact.scene.values import OfPosition, ScalarValue, Ufl, VectorValue, evaluate
 
 __all__ = [
     "RANK_TOLERANCE",
@@ -66,6 +67,7 @@ __all__ = [
     "Load",
     "LoadStep",
     "Material",
+    "OfPosition",
     "OrthotropicElasticity",
     "OrthotropicPlaneStress",
     "PairGeometry",
@@ -77,6 +79,7 @@ __all__ = [
     "RigidObstacle",
     "RigidPlane",
     "RigidSphere",
+    "Sampled",
     "ScalarValue",
     "Scene",
     "SolverKind",

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from fenics_contact.checks import checked
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene.obstacles import RigidObstacle
+from fenics_contact.scene.values import OfPosition, evaluate
 from fenics_contact.surfaces import Geometry
 
 #: Where contact is enforced: at the slave's nodes, or weighted by its shape functions (mortar).
@@ -37,16 +38,18 @@ class Coulomb:
     """Coulomb friction: ‖τ‖ ≤ friction_coefficient · λ_N.
 
     Attributes:
-        friction_coefficient: Friction coefficient μ ≥ 0, dimensionless. Zero is frictionless contact.
+        friction_coefficient: Friction coefficient μ ≥ 0, dimensionless. Zero is frictionless contact. A
+            function receives points of the slave, shape (n, dim), and returns μ there, shape (n,).
     """
 
-    friction_coefficient: float
+    friction_coefficient: float | OfPosition
 
     def __post_init__(self) -> None:
         """Refuse a negative coefficient."""
-        if not (np.isfinite(self.friction_coefficient) and self.friction_coefficient >= 0):
+        given = self.friction_coefficient
+        if not (callable(given) or (np.isfinite(given) and given >= 0)):
             raise InvalidInputError(
-                f"friction_coefficient must be zero or positive, got {self.friction_coefficient!r}: "
+                f"friction_coefficient must be zero or positive, got {given!r}: "
                 "steel on steel has about 0.3; omit friction for a frictionless pair"
             )
 
@@ -60,14 +63,15 @@ class Tresca:
     surfaces are known to touch.
 
     Attributes:
-        traction: Largest tangential traction, ≥ 0, [force / length²].
+        traction: Largest tangential traction, ≥ 0, [force / length²]; a number, or a function of points as
+            for `Coulomb`.
     """
 
-    traction: float
+    traction: float | OfPosition
 
     def __post_init__(self) -> None:
         """Refuse a negative bound."""
-        if not (np.isfinite(self.traction) and self.traction >= 0):
+        if not (callable(self.traction) or (np.isfinite(self.traction) and self.traction >= 0)):
             raise InvalidInputError(
                 f"Tresca.traction must be zero or positive, got {self.traction!r}: give the largest "
                 "tangential force per unit area that the surfaces can carry"
@@ -127,10 +131,37 @@ class ContactPair:
     @property
     def has_friction(self) -> bool:
         """Whether tangential forces can be transmitted at all."""
+        return self.friction_varies or self._friction_value > 0
+
+    @property
+    def friction_varies(self) -> bool:
+        """Whether friction is given as a function of position."""
+        return callable(self._friction_value)
+
+    @property
+    def _friction_value(self) -> Any:
         match self.friction:
             case Coulomb(friction_coefficient=value) | Tresca(traction=value):
-                return value > 0
-        return False
+                return value
+        return 0.0
+
+    def friction_at(self, points: np.ndarray) -> np.ndarray:
+        """Return the friction coefficient, or Tresca's traction, at points of the slave, shape (n,).
+
+        Raises:
+            InvalidInputError: If a function returns something other than numbers of at least zero.
+        """
+        given = self._friction_value
+        if not callable(given):
+            return np.full(len(points), float(given))
+        values = evaluate(f"friction of {self.place}", given, points, ())
+        if (values < 0).any():
+            worst = int(np.argmin(values))
+            raise InvalidInputError(
+                f"friction of {self.place} must be zero or positive everywhere, got {values[worst]:.6g} at "
+                f"({', '.join(f'{x:.6g}' for x in points[worst])}): give a function that is"
+            )
+        return values
 
 
 @dataclass(frozen=True)

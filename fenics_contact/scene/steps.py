@@ -23,11 +23,13 @@ class LoadStep:
         loads: All loads that act at the end of the step, or None.
         supports: All supports with their values at the end of the step, or None; they must hold the same
             components in every step.
+        time: Time at the end of the step in any unit, for records, or None; nothing depends on it.
     """
 
     name: str
     loads: Sequence[Load] | None = None
     supports: Sequence[Support] | None = None
+    time: float | None = None
 
     def applied_to(self, scene: Scene) -> Scene:
         """Return the scene at the end of the step."""

@@ -52,7 +52,7 @@ def checked_vector(name: str, value: Any) -> Any:
     """
     if isinstance(value, Ufl) or callable(value):
         return value
-    array = _floats(value)
+    array = finite_numbers(value)
     if array is None or array.shape not in ((2,), (3,)):
         raise InvalidInputError(
             f"{name} must be three finite numbers (two for a plane body), got {value!r}: give one for x, y "
@@ -69,7 +69,7 @@ def checked_scalar(name: str, value: Any) -> Any:
     """
     if isinstance(value, Ufl) or callable(value):
         return value
-    array = _floats(value)
+    array = finite_numbers(value)
     if array is None or array.shape != ():
         raise InvalidInputError(
             f"{name} must be a finite number, got {value!r}: give a number or a function of the points"
@@ -77,7 +77,8 @@ def checked_scalar(name: str, value: Any) -> Any:
     return float(array)
 
 
-def _floats(value: Any) -> np.ndarray | None:
+def finite_numbers(value: Any) -> np.ndarray | None:
+    """Return a value as an array of floats, None if it is something other than finite numbers."""
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
@@ -99,7 +100,7 @@ def evaluate(name: str, function: OfPosition, points: np.ndarray, shape: tuple[i
         UserCodeError: If it raises.
     """
     with calling(f"the function given as {name}"):
-        values = _floats(function(points.copy()))
+        values = finite_numbers(function(points.copy()))
     wanted = (len(points), *shape)
     if values is None or values.shape != wanted:
         given = "something other than finite numbers" if values is None else f"shape {values.shape}"

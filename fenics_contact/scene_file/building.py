@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.errors import together
 from fenics_contact.scene import Body, Material, Scene
 from fenics_contact.scene_file.document import Document
-from fenics_contact.scene_file.evaluation import check_formulas
+from fenics_contact.scene_file.evaluation import check_formulas, check_friction
+from fenics_contact.scene_file.expression import at_time
+from fenics_contact.scene_file.located import located
 from fenics_contact.scene_file.mistakes import Mistake, SceneFileError
 from fenics_contact.scene_file.names import surface_parts, unknown
 from fenics_contact.scene_file.places import Path, written
@@ -98,13 +100,22 @@ class Builder:
             built[key] = []
             for number, part in enumerate(getattr(document, key)):
                 with self._at(key, number):
-                    one = part.build(dim) if hasattr(part, "build") else part.made()
+                    one = self._made(part, dim)
                     _refuse(empty, {key: (one,)})
                     built[key].append(one)
                     with self._at(key, number, *_FORMULAS.get(key, ())):
                         check_formulas(one, bodies)
+                    if key == "contacts":
+                        with self._at(key, number, "friction"):
+                            check_friction(one, bodies)
         self._check()
         return Scene(bodies, **built)
+
+    def _made(self, part: Any, dim: int) -> Any:
+        """Return a part, as it is before the first load step if there are any."""
+        if not hasattr(part, "build"):
+            return part.made()
+        return part.build(dim, at_time(part.size, 0.0) if self._document.steps else None)
 
     def _check_surfaces(self, bodies: Mapping[str, Body]) -> None:
         for path, part in surface_parts(self._document):
@@ -123,28 +134,6 @@ class Builder:
         with together(self._comm):
             if self._mistakes:
                 raise SceneFileError(self._source.name, self._mistakes)
-
-
-@contextmanager
-def located(source: Source, path: Path, mistakes: list[Mistake] | None = None) -> Iterator[None]:
-    """Make an error of the block a mistake at a key.
-
-    Args:
-        source: Source of the key.
-        path: The key.
-        mistakes: Collects the mistake, which is raised unless given.
-    """
-    try:
-        yield
-    except SceneFileError as error:
-        if mistakes is None:
-            raise
-        mistakes.extend(error.mistakes)
-    except InvalidInputError as error:
-        mistake = source.mistake(path, f"{written(path)}: {error}")
-        if mistakes is None:
-            raise SceneFileError(source.name, [mistake]) from error
-        mistakes.append(mistake)
 
 
 def _refuse(empty: Scene, part: dict[str, Any]) -> None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
+from pydantic import AfterValidator, Field, PositiveFloat
 
 from fenics_contact import scene
 from fenics_contact.scene import ContactPair, Surface, Tie
 from fenics_contact.scene_file.expression import Expression
 from fenics_contact.scene_file.part import Part, keys_of
-from fenics_contact.scene_file.values import Scalar, Triple, one_of
+from fenics_contact.scene_file.values import FrictionField, Scalar, Triple, one_of
 
 
 @keys_of(Surface)
@@ -81,7 +81,7 @@ class CoulombFriction(Part):
     """Coulomb's law: the friction force is at most the coefficient times the normal force."""
 
     law: Literal["coulomb"]
-    friction_coefficient: NonNegativeFloat = Field(alias="coefficient")
+    friction_coefficient: FrictionField = Field(alias="coefficient")
 
 
 @keys_of(scene.Tresca)
@@ -89,7 +89,7 @@ class TrescaFriction(Part):
     """Friction with a bound that does not depend on the pressure."""
 
     law: Literal["tresca"]
-    traction: NonNegativeFloat
+    traction: FrictionField
 
 
 Master: TypeAlias = Annotated[

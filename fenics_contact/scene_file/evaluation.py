@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.scene import Body, DistanceObstacle, Support
-from fenics_contact.scene_file.expression import Expression, VectorExpression
+from fenics_contact.scene import Body, ContactPair, DistanceObstacle, Support, SurfaceLoad
 
 
 def check_formulas(part: Any, bodies: Mapping[str, Body]) -> None:
@@ -22,12 +21,23 @@ def check_formulas(part: Any, bodies: Mapping[str, Body]) -> None:
         InvalidInputError: If one has no finite value at some node, or depends on z in the plane.
     """
     if isinstance(part, Support):
-        if any(isinstance(component, Expression) for component in part.value):
+        if any(map(callable, part.value)):
             part.values(_nodes(bodies[part.body], part.surface))
-    elif isinstance(getattr(part, "master", None), DistanceObstacle):
-        part.master.distance(_nodes(bodies[part.slave.body], part.slave.name))
-    elif isinstance(value := getattr(part, "value", None), Expression | VectorExpression):
-        value(bodies[part.body].mesh.points)
+    elif isinstance(part, ContactPair):
+        if isinstance(part.master, DistanceObstacle):
+            part.master.distance(_nodes(bodies[part.slave.body], part.slave.name))
+    elif callable(value := getattr(part, "value", None)):
+        body = bodies[part.body]
+        value(_nodes(body, part.surface) if isinstance(part, SurfaceLoad) else body.mesh.points)
+
+
+def check_friction(pair: ContactPair, bodies: Mapping[str, Body]) -> None:
+    """Evaluate the friction of a pair at the slave's nodes.
+
+    Raises:
+        InvalidInputError: If it is a function that has no finite value somewhere, or a negative one.
+    """
+    pair.friction_at(_nodes(bodies[pair.slave.body], pair.slave.name))
 
 
 def _nodes(body: Body, surface: str) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Formulas in x, y, z as text, evaluated at points; only arithmetic is accepted, no code is run."""
+"""Formulas in x, y, z and t as text, evaluated at points; only arithmetic is accepted, no code is run."""
 
 from __future__ import annotations
 
@@ -6,17 +6,20 @@ import ast
 import math
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.scene import OfPosition
 from fenics_contact.scene_file.places import shortened
 
 #: Coordinates by name, in the order of the columns of points.
 COORDINATES = ("x", "y", "z")
+#: Time, which only values that load steps change may depend on.
+TIME = "t"
 CONSTANTS = {"pi": np.pi, "e": np.e}
 FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
     **{
@@ -49,8 +52,8 @@ _COMPARED: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
 #: evaluated from left to right, are not nested.
 LONGEST, DEEPEST = 2000, 50
 ALLOWED = (
-    f"numbers, {', '.join(COORDINATES)}, {', '.join(CONSTANTS)}, + - * / **, comparisons with < <= > >=, and "
-    f"{', '.join(sorted(FUNCTIONS))}"
+    f"numbers, {', '.join(COORDINATES)}, {TIME}, {', '.join(CONSTANTS)}, + - * / **, comparisons with < <= > "
+    f">=, and {', '.join(sorted(FUNCTIONS))}"
 )
 
 
@@ -60,6 +63,7 @@ class Expression:
 
     Attributes:
         text: The formula, for instance ``"0.1 * (1 - x**2)"``; where(condition, a, b) chooses.
+        time: Value of t in it, None without one.
 
     Raises:
         InvalidInputError: If the text contains anything but arithmetic.
@@ -70,6 +74,7 @@ class Expression:
     """
 
     text: str
+    time: float | None = None
 
     def __post_init__(self) -> None:
         """Reject text that is not a formula."""
@@ -96,9 +101,14 @@ class Expression:
 
     @property
     def names(self) -> frozenset[str]:
-        """Coordinates that the formula depends on."""
+        """Coordinates that the formula depends on, and t."""
         used = {node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name)}
-        return frozenset(used & set(COORDINATES))
+        return frozenset(used & {*COORDINATES, TIME})
+
+    @property
+    def changes(self) -> bool:
+        """Whether it depends on t."""
+        return TIME in self.names
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """Evaluate at points.
@@ -110,18 +120,25 @@ class Expression:
             One number per point, shape (n,).
 
         Raises:
-            InvalidInputError: If the formula depends on z and the points lie in the plane, or has no finite
-                value somewhere.
+            InvalidInputError: If the formula depends on z and the points lie in the plane, on t and there is
+                no time, or has no finite value somewhere.
         """
         values = {name: points[:, axis] for axis, name in enumerate(COORDINATES[: points.shape[1]])}
-        missing = self.names - set(values)
+        if self.changes and self.time is None:
+            raise InvalidInputError(
+                f"the formula {shortened(self.text)!r} depends on the time t, which only loads and supports "
+                "of a file with [[steps]] have: add steps, or leave t out"
+            )
+        missing = self.names - {*values, TIME}
         if missing:
             raise InvalidInputError(
                 f"the formula {shortened(self.text)!r} depends on {', '.join(sorted(missing))}, but the "
                 "bodies lie in the plane: use x and y"
             )
         with np.errstate(all="ignore"):
-            result = np.asarray(_value(self._tree, {**CONSTANTS, **values}), dtype=np.float64)
+            result = np.asarray(
+                _value(self._tree, {**CONSTANTS, TIME: self.time, **values}), dtype=np.float64
+            )
         result = np.broadcast_to(result, (len(points),)).copy()
         infinite = np.flatnonzero(~np.isfinite(result))
         if infinite.size:
@@ -139,31 +156,57 @@ class VectorExpression:
     """A vector at every point, a number or a formula for each component.
 
     Attributes:
-        components: Numbers and formulas.
+        components: Numbers, formulas and other functions of position.
     """
 
-    components: tuple[float | Expression, ...]
+    components: tuple[float | OfPosition, ...]
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """Evaluate at points, shape (n, dim) -> (n, dim)."""
-        columns = [
-            part(points) if isinstance(part, Expression) else np.full(len(points), part)
-            for part in self.components
-        ]
+        columns = [part(points) if callable(part) else np.full(len(points), part) for part in self.components]
         return np.column_stack(columns)
 
 
-def between(start: float | Expression, end: float | Expression, share: float) -> float | Expression:
-    """Return the value between ``start`` (share 0) and ``end`` (share 1), number or formula."""
+@dataclass(frozen=True)
+class Between:
+    """A value on the way from one to another, each a number or a function of position.
+
+    Attributes:
+        start: The one.
+        end: The other.
+        share: Part of the way.
+    """
+
+    start: float | OfPosition
+    end: float | OfPosition
+    share: float
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Evaluate at points, shape (n, dim) -> (n,), (n, dim) for vectors."""
+        start, end = (part(points) if callable(part) else part for part in (self.start, self.end))
+        return np.asarray((1.0 - self.share) * start + self.share * end)
+
+
+def between(start: float | OfPosition, end: float | OfPosition, share: float) -> float | OfPosition:
+    """Return the value between ``start`` (share 0) and ``end`` (share 1), number or function."""
     if share == 1.0:
         return end
-    if isinstance(start, Expression) or isinstance(end, Expression):
-        return Expression(f"(1 - {share!r}) * ({_text(start)}) + {share!r} * ({_text(end)})")
+    if callable(start) or callable(end):
+        return Between(start, end, share)
     return start + share * (end - start)
 
 
-def _text(value: float | Expression) -> str:
-    return value.text if isinstance(value, Expression) else repr(value)
+def changes(value: Any) -> bool:
+    """Return whether a value, or an entry of it, depends on t."""
+    parts = value if isinstance(value, tuple) else (value,)
+    return any(isinstance(part, Expression) and part.changes for part in parts)
+
+
+def at_time(value: Any, time: float) -> Any:
+    """Return a value, or all entries of one, at a time."""
+    if isinstance(value, tuple):
+        return tuple(at_time(part, time) for part in value)
+    return replace(value, time=time) if isinstance(value, Expression) and value.changes else value
 
 
 def is_finite(value: float) -> bool:
@@ -206,7 +249,7 @@ def _known(node: ast.expr) -> bool:
         case ast.Constant(value=int() | float() as value):
             return is_finite(value)
         case ast.Name(id=name):
-            return name in COORDINATES or name in CONSTANTS
+            return name in {*COORDINATES, TIME, *CONSTANTS}
         case ast.UnaryOp(op=ast.UAdd() | ast.USub()):
             return True
         case ast.BinOp(op=operator):

@@ -8,9 +8,9 @@ from pydantic import Field, PositiveFloat
 
 from fenics_contact import scene
 from fenics_contact.scene import Load, Support
-from fenics_contact.scene_file.expression import Expression, VectorExpression
+from fenics_contact.scene_file.expression import VectorExpression
 from fenics_contact.scene_file.part import Part, keys_of
-from fenics_contact.scene_file.values import FREE, Components, Scalar, Vector, one_of
+from fenics_contact.scene_file.values import FREE, Components, ScalarField, Vector, one_of
 
 
 class _Named(Part):
@@ -33,7 +33,7 @@ class _Load(_Named):
     def build(self, dim: int, value: Any = None) -> Load:
         """Return the load, with the value of a load step if given."""
         value = self.size if value is None else value
-        if isinstance(value, tuple) and any(isinstance(entry, Expression) for entry in value):
+        if isinstance(value, tuple) and any(map(callable, value)):
             value = VectorExpression(value)
         return self.made(**{self.changed: value})
 
@@ -97,7 +97,7 @@ class ThermalLoad(_Load):
 
     changed: ClassVar[str] = "temperature_change"
     kind: Literal["thermal"]
-    temperature_change: Scalar = Field(alias="value")
+    temperature_change: ScalarField = Field(alias="value")
 
 
 @keys_of(Support)
@@ -107,7 +107,7 @@ class SupportPart(_Named):
     value: Components | None = Field(
         None,
         description=f'displacement along x, y and z (x, y of a plane body), [length]: a number, "{FREE}", or '
-        "a formula in x, y, z in quotes; zero in all directions by default",
+        "a formula in x, y, z in quotes, or a field from a file; zero in all directions by default",
     )
 
     def build(self, dim: int, value: tuple[Any, ...] | None = None) -> Support:

@@ -11,7 +11,7 @@ from fenics_contact.scene_file.mistakes import Mistake, listed, suggestion
 from fenics_contact.scene_file.part import Part
 from fenics_contact.scene_file.places import Path, as_toml, branches, written
 from fenics_contact.scene_file.source import Source
-from fenics_contact.scene_file.values import FREE
+from fenics_contact.scene_file.values import FREE, FieldFile
 
 
 def unknown(source: Source, path: Path, given: str, what: str, known: Iterable[str]) -> Mistake:
@@ -95,7 +95,7 @@ def _unlike(source: Source, document: Document) -> Iterator[Mistake]:
         for key in ("supports", "loads"):
             own = {part.name: part.size for part in getattr(document, key) if part.size is not None}
             for name, value in getattr(step, key).items():
-                if name in own and _form(own[name]) != _form(value):
+                if name in own and not _alike(own[name], value):
                     path: Path = ("steps", number, key, name)
                     words = (
                         f"{written(path)} must have the form of {name!r} itself, "
@@ -103,6 +103,11 @@ def _unlike(source: Source, document: Document) -> Iterator[Mistake]:
                         f"{as_toml(_plain(value))}"
                     )
                     yield source.mistake(path, words)
+
+
+def _alike(own: Any, value: Any) -> bool:
+    """Return whether values have the same components; those of a field from a file are not known yet."""
+    return isinstance(own, FieldFile) or isinstance(value, FieldFile) or _form(own) == _form(value)
 
 
 def _form(value: Any) -> Any:

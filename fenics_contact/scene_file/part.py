@@ -16,13 +16,13 @@ from fenics_contact.scene_file.values import (
     CountPair,
     CountTriple,
     Pair,
-    Scalar,
+    ScalarField,
     Triple,
     Vector,
     VectorOrFormulas,
 )
 
-_FORMULAS = "; numbers, or formulas in x, y, z in quotes"
+_FORMULAS = "; numbers, formulas in x, y, z in quotes, or fields from files"
 #: Types in files for declared types of arguments, with their descriptions; others are read as declared.
 IN_FILES: list[tuple[Any, Any, str]] = [
     (Sequence[float], Vector, ""),
@@ -35,7 +35,7 @@ IN_FILES: list[tuple[Any, Any, str]] = [
     (tuple[float, float, float] | None, Triple | None, ""),
     (tuple[int, int], CountPair, ""),
     (tuple[int, int, int], CountTriple, ""),
-    (ScalarValue, Scalar, _FORMULAS),
+    (ScalarValue, ScalarField, _FORMULAS),
     (VectorValue, VectorOrFormulas, _FORMULAS),
 ]
 Table = TypeVar("Table", bound="type[Part]")

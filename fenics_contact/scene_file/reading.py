@@ -16,8 +16,10 @@ from fenics_contact.checks import require_file
 from fenics_contact.contact import ContactProblem, LoadSequence, State
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.scene import LoadStep, Scene
-from fenics_contact.scene_file.building import Builder, located
+from fenics_contact.scene_file.building import Builder
 from fenics_contact.scene_file.document import Document, refused_python
+from fenics_contact.scene_file.field_files import with_fields_read
+from fenics_contact.scene_file.located import located
 from fenics_contact.scene_file.mistakes import SceneFileError
 from fenics_contact.scene_file.names import wrong_names
 from fenics_contact.scene_file.placing import Shaped
@@ -63,8 +65,13 @@ class SceneFile:
         return Path(self.document.output.folder or f"output/{self.name}")
 
     @cached_property
+    def _complete(self) -> Document:
+        """The document with the fields of its files."""
+        return with_fields_read(self.source, self.document, self.comm)
+
+    @cached_property
     def _built(self) -> tuple[Scene, dict[str, Shaped]]:
-        builder = Builder(self.source, self.document, self.comm)
+        builder = Builder(self.source, self._complete, self.comm)
         bodies, shapes = builder.bodies()
         return builder.scene(bodies), shapes
 
@@ -80,7 +87,7 @@ class SceneFile:
     @cached_property
     def steps(self) -> tuple[LoadStep, ...]:
         """All load steps; empty where everything acts at once. Collective on first use."""
-        document, bodies = self.document, self.scene.bodies
+        document, bodies = self._complete, self.scene.bodies
         return load_steps(document.steps, document.supports, document.loads, bodies, self._at)
 
     @cached_property

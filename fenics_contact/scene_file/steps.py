@@ -1,17 +1,18 @@
-"""Load steps, several at once: values change linearly to those at the end."""
+"""Load steps, several at once: values change linearly to those at the end, or as formulas of the time."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from pydantic import Field
+from pydantic import Field, PositiveFloat
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene import Body, LoadStep
 from fenics_contact.scene_file.evaluation import check_formulas
-from fenics_contact.scene_file.expression import between
+from fenics_contact.scene_file.expression import VectorExpression, at_time, between, changes
 from fenics_contact.scene_file.part import Part
 from fenics_contact.scene_file.values import Components, Line, LoadValue
 
@@ -23,10 +24,16 @@ MOST = 100_000
 
 
 class StepPart(Part):
-    """One load step or several: values go linearly from those before to those given here."""
+    """One load step or several: values go linearly from those before to those given here.
+
+    A value given by a formula in t is what the formula says at the end of each load step.
+    """
 
     name: Line = Field("step", description="what it does, for records")
     count: int = Field(1, ge=1, le=MOST, description="number of load steps in which the values are reached")
+    duration: PositiveFloat | None = Field(
+        None, description="time that they take together, for t in formulas; one for each load step by default"
+    )
     supports: dict[str, Components] = Field({}, description="name of a support -> its value at the end")
     loads: dict[str, LoadValue] = Field({}, description="name of a load -> its value at the end")
 
@@ -41,7 +48,8 @@ def load_steps(
     """Return all load steps, in their order.
 
     A support or load that a step does not name keeps its value; a named one changes linearly from the value
-    before, initially its own, to the one given.
+    before, initially its own, to the one given. A formula that depends on t is evaluated at the end of each
+    load step instead, also in later steps and where it is the initial value; t starts at zero.
 
     Args:
         steps: The steps of the file.
@@ -56,28 +64,69 @@ def load_steps(
     with at("steps"):
         _require_few(steps)
     dim = next(iter(bodies.values())).mesh.dim
-    held: dict[str, Any] = {part.name: part.value or (0.0,) * dim for part in supports if part.name}
-    acting: dict[str, Any] = {part.name: part.size for part in loads if part.name}
+    held = _Values([part.name for part in supports], [part.value or (0.0,) * dim for part in supports])
+    acting = _Values([part.name for part in loads], [part.size for part in loads])
     built: list[LoadStep] = []
+    begin = 0.0
     for position, step in enumerate(steps):
+        duration = step.duration or float(step.count)
         with at("steps", position):
             for number in range(1, step.count + 1):
-                share = number / step.count
-                supported = {**held, **_on_the_way(held, step.supports, share)}
-                loaded = {**acting, **_on_the_way(acting, step.loads, share)}
+                way = _Way(begin, begin + number / step.count * duration, number / step.count)
                 name = step.name if step.count == 1 else f"{step.name} {number}/{step.count}"
-                built.append(
-                    LoadStep(
-                        name,
-                        loads=tuple(part.build(dim, loaded.get(part.name or "")) for part in loads),
-                        supports=tuple(part.build(dim, supported.get(part.name or "")) for part in supports),
-                    )
-                )
+                acted = tuple(map(_built(dim), loads, acting.on_the_way(step.loads, way)))
+                held_up = tuple(map(_built(dim), supports, held.on_the_way(step.supports, way)))
+                built.append(LoadStep(name, acted, held_up, way.time))
             for part in (*(built[-1].loads or ()), *(built[-1].supports or ())):
                 check_formulas(part, bodies)
-        held.update(step.supports)
-        acting.update(step.loads)
+        held.reach(step.supports)
+        acting.reach(step.loads)
+        begin += duration
     return tuple(built)
+
+
+def _built(dim: int) -> Callable[[Any, Any], Any]:
+    return lambda part, value: part.build(dim, value)
+
+
+@dataclass(frozen=True)
+class _Way:
+    """A moment of a step: time at its begin, time now, and the share of the step that is over."""
+
+    begin: float
+    time: float
+    share: float
+
+    def value(self, start: Any, end: Any) -> Any:
+        """Return the value between those before the step and at its end, or of a formula in t."""
+        if isinstance(start, tuple) and isinstance(end, tuple):
+            return tuple(map(self.value, start, end))
+        if changes(end):
+            return at_time(end, self.time)
+        if self.share == 1.0 or start is None or end is None:
+            return end
+        return between(_whole(at_time(start, self.begin)), _whole(end), self.share)
+
+
+class _Values:
+    """The values of all supports or loads as they stand in the file; steps change those with names."""
+
+    def __init__(self, names: Sequence[str | None], values: Sequence[Any]) -> None:
+        self._values = dict(enumerate(values))
+        self._place = {name: place for place, name in enumerate(names) if name}
+
+    def on_the_way(self, changed: Mapping[str, Any], way: _Way) -> list[Any]:
+        """Return the values within a step, in the order of the file."""
+        ends = {**self._values, **{self._place[name]: value for name, value in changed.items()}}
+        return [way.value(start, ends[place]) for place, start in self._values.items()]
+
+    def reach(self, changed: Mapping[str, Any]) -> None:
+        """Replace the values that a step has changed."""
+        self._values.update({self._place[name]: value for name, value in changed.items()})
+
+
+def _whole(value: Any) -> Any:
+    return VectorExpression(value) if isinstance(value, tuple) else value
 
 
 def _require_few(steps: Sequence[StepPart]) -> None:
@@ -87,14 +136,3 @@ def _require_few(steps: Sequence[StepPart]) -> None:
             f"a file may have at most {MOST} load steps in all, got {count}: take larger steps, or drive a "
             "longer history from Python with LoadSequence"
         )
-
-
-def _on_the_way(before: Mapping[str, Any], after: Mapping[str, Any], share: float) -> dict[str, Any]:
-    return {name: way(before[name], value, share) for name, value in after.items()}
-
-
-def way(start: Any, end: Any, share: float) -> Any:
-    """Return the value, numbers or formulas, between ``start`` and ``end``."""
-    if isinstance(end, tuple):
-        return tuple(way(one, other, share) for one, other in zip(start, end, strict=True))
-    return None if start is None or end is None else between(start, end, share)

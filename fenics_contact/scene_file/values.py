@@ -9,7 +9,16 @@ from functools import reduce
 from operator import or_
 from typing import Annotated, Any, Literal, TypeAlias, get_args
 
-from pydantic import AfterValidator, Discriminator, Field, GetCoreSchemaHandler, Tag, WrapValidator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    GetCoreSchemaHandler,
+    Tag,
+    WrapValidator,
+)
 from pydantic_core import PydanticCustomError, ValidationError
 
 from fenics_contact.checks import MOST
@@ -120,6 +129,19 @@ def _place_of_file(value: str) -> str:
     return value
 
 
+PlaceOfFile: TypeAlias = Annotated[str, AfterValidator(_place_of_file)]
+
+
+class FieldFile(BaseModel):
+    """A field from a file: values at points, or on the nodes or cells of a mesh."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+    file: PlaceOfFile = Field(description="the file, relative to the folder of the scene file")
+    field: str | list[str] | None = Field(
+        None, description="name of its column or field, several for a vector; needed if it has others"
+    )
+
+
 _COUNT = Annotated[int, Field(ge=1, le=MOST)]
 _AXES = "in brackets, for x, y and z (two for a plane body)"
 _COUNTS = f"integers from 1 to {MOST} in brackets"
@@ -136,16 +158,28 @@ Row: TypeAlias = Annotated[
 ]
 
 Formula: TypeAlias = Annotated[Any, Read(Annotated[str, AfterValidator(_formula)])]
+_FIELD = "or a table {file = ..., field = ...}"
 #: A number or a formula in x, y, z; a formula becomes an `Expression`, a free component None.
 Scalar: TypeAlias = Annotated[float | Formula, said("a finite number, or a formula in x, y and z in quotes")]
+#: A number, a formula or a field from a file.
+ScalarField: TypeAlias = Annotated[
+    float | Formula | FieldFile, said(f"a finite number, a formula in x, y and z in quotes, {_FIELD}")
+]
+#: The same for what cannot be negative.
+FrictionField: TypeAlias = Annotated[
+    Annotated[float, Field(ge=0)] | Formula | FieldFile,
+    said(f"a number of at least 0, a formula in x, y and z in quotes, {_FIELD}"),
+]
 _FREE = Annotated[Literal["free"], AfterValidator(lambda _: None)]
+_OF_LOAD = f"three numbers or formulas {_AXES}, {_FIELD}"
 VectorOrFormulas: TypeAlias = Annotated[
-    Any, _row(float | Formula, 2, 3, f"three numbers or formulas {_AXES}")
+    Any,
+    Read(Annotated[_row(float | Formula | FieldFile, 2, 3, _OF_LOAD).annotation | FieldFile, said(_OF_LOAD)]),
 ]
-Components: TypeAlias = Annotated[
-    Any, _row(float | _FREE | Formula, 2, 3, f"three numbers, formulas or '{FREE}' {_AXES}")
-]
-_LOAD = said("a number or a formula, or two or three of them in brackets, like the load's own value")
-LoadValue: TypeAlias = Annotated[Any, Read(Annotated[float | Formula | VectorOrFormulas, _LOAD])]
+_HELD = f"three numbers, formulas or '{FREE}' {_AXES}, or tables {{file = ..., field = ...}} among them"
+Components: TypeAlias = Annotated[Any, _row(float | _FREE | Formula | FieldFile, 2, 3, _HELD)]
+_LOAD = said(
+    f"a number or a formula, or two or three of them in brackets, {_FIELD}, like the load's own value"
+)
+LoadValue: TypeAlias = Annotated[Any, Read(Annotated[float | Formula | VectorOrFormulas | FieldFile, _LOAD])]
 Line: TypeAlias = Annotated[str, Field(pattern=r"^[^\n\r]*$"), said("one line of text in quotes")]
-PlaceOfFile: TypeAlias = Annotated[str, AfterValidator(_place_of_file)]

@@ -67,8 +67,9 @@ def contact_by_shape(state: State, adjoint: Adjoint, by_bound: np.ndarray) -> np
     by_bound_full[torn.frictional] = by_bound
     for index, pair in enumerate(torn.scene.contacts):
         mine = np.flatnonzero(points.pair == index)
-        # Tresca's nodal bound is a traction times a nodal area, which moves with the nodes.
-        if isinstance(pair.friction, Tresca):
+        # Tresca's nodal bound is a traction times a nodal area, which moves with the nodes. Those of a
+        # function of position do not move.
+        if isinstance(pair.friction, Tresca) and not callable(pair.friction.traction):
             surface = surface_of(torn.scene, pair.slave, "faceted")
             nodes = tearing.global_nodes(pair.slave.body, surface.nodes)
             by_areas = np.zeros(len(nodes))

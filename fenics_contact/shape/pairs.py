@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -30,7 +30,9 @@ def checked_contact(contact: ContactProblem) -> ContactProblem:
 
 
 def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
-    """Reject designs that move surfaces of mortar contact or of ties, or bodies of quadratic cells.
+    """Reject designs that move surfaces without derivatives, or bodies of quadratic cells.
+
+    Mortar contact, ties and friction that varies have none.
 
     Args:
         scene: The scene.
@@ -47,18 +49,21 @@ def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
             )
     for number, pair in enumerate(scene.contacts):
         if pair.discretisation == "mortar" and isinstance(pair.master, Surface):
-            _check(scene, moving, (pair.slave, pair.master), f"mortar contact pair {number}", "node")
+            remedy = "use discretisation='node' for it"
+            _check(scene, moving, (pair.slave, pair.master), f"mortar contact pair {number}", remedy)
+        if pair.friction_varies:
+            remedy = "give its friction as a number, as the derivative of a function is not known"
+            _check(scene, moving, (pair.slave,), f"contact pair {number}, whose friction varies,", remedy)
     for number, tie in enumerate(scene.ties):
-        _check(scene, moving, (tie.slave, tie.master), f"tie {number}", "")
+        _check(scene, moving, (tie.slave, tie.master), f"tie {number}", "move another part of the body")
 
 
 def _check(
-    scene: Scene, moving: Mapping[str, np.ndarray], surfaces: tuple[Surface, Surface], what: str, instead: str
+    scene: Scene, moving: Mapping[str, np.ndarray], surfaces: Sequence[Surface], what: str, remedy: str
 ) -> None:
     for surface in surfaces:
         count = int(np.count_nonzero(moving[surface.body][np.unique(scene.facets(surface))]))
         if count:
-            remedy = f"use discretisation={instead!r} for it" if instead else "move another part of the body"
             raise InvalidInputError(
                 f"a design may move only surfaces whose rows have derivatives by the shape, but {what} lies "
                 f"on {surface.name!r} of body {surface.body!r}, of which {count} nodes move: {remedy}"

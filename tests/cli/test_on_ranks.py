@@ -53,7 +53,7 @@ def test_one_rank_speaks_and_all_end_alike(tmp_path: Path) -> None:
     assert codes == [[code, code] for code in (0, 2, 4, 0, 2, 2, 0, 2, 0)]
     assert [ranks[1][1:] for ranks in told] == [["", ""]] * len(commands), "rank 1 says nothing"
     assert "scene.toml on 2 ranks" in told[0][0][1]
-    assert "coefficient must be a number of at least 0, got -1" in told[1][0][2]
+    assert "coefficient must be a number of at least 0, a formula" in told[1][0][2]
     assert "give --ranks 2" in told[5][0][2]
     assert "2 on 1 node" in told[8][0][1]
     assert (tmp_path / "out" / "state.vtm").exists()

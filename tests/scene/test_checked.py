@@ -27,6 +27,7 @@ from fenics_contact.scene import (
     RigidCylinder,
     RigidPlane,
     RigidSphere,
+    Sampled,
     Scene,
     Support,
     Surface,
@@ -46,7 +47,8 @@ DOWN = (0, 0, -1)
 SAMPLES: dict[type, Any] = {
     type(sample): sample
     for sample in (
-        FLOOR, STEEL, FACE, BODY, Coulomb(0.3), Tresca(1.0), ContactPair(FACE, FLOOR), Tie(FACE, OTHER),
+        FLOOR, STEEL, FACE, BODY, Coulomb(0.3), Tresca(1.0), Sampled(np.eye(3), np.ones(3)),
+        ContactPair(FACE, FLOOR), Tie(FACE, OTHER),
         Support("a", "b"), Traction("a", "b", DOWN), TotalForce("a", "b", DOWN), Pressure("a", "b", 1),
         BodyForce("a", DOWN), ThermalStrain("a", 1.0), Ufl(lambda x: x), LoadStep("a"), Scene({"a": BODY}),
         RigidSphere((0, 0, 0), 1.0), RigidCylinder((0, 0, 0), (0, 0, 1), 1.0),
@@ -98,8 +100,8 @@ WRONG: list[tuple[Any, str]] = [
     (lambda: Tie(FACE, FLOOR), r"Tie.master must be Surface\(body, name\), got RigidPlane.*: surface of"),
     (lambda: Tie(FACE, OTHER, 1), "Tie.sliding must be True or False, got 1: whether the surfaces"),
     (lambda: ContactPair(FACE, FLOOR, None, "Mortar"), "discretisation must be 'node' or 'mortar', got 'Mor"),
-    (lambda: Coulomb(True), "friction_coefficient must be a number, got True: friction coefficient μ ≥ 0"),
-    (lambda: Coulomb("0.3"), "friction_coefficient must be a number, got '0.3': friction coefficient μ ≥ 0"),
+    (lambda: Coulomb(True), "must be a number or a function, got True: friction coefficient μ ≥ 0"),
+    (lambda: Coulomb("0.3"), "must be a number or a function, got '0.3': friction coefficient μ ≥ 0"),
     (lambda: IsotropicElasticity("steel", 0.3), "IsotropicElasticity.young_modulus must be a number, got 's"),
     (lambda: PlaneStrain(1.0, 0.3, "hot"), "PlaneStrain.thermal_expansion must be a number or None"),
     (lambda: Body("cube.msh", STEEL), "Body.mesh must be BodyMesh.*, got 'cube.msh': the mesh"),

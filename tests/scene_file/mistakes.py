@@ -47,10 +47,10 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         "Poisson's ratio ν in (−1, 0.5), dimensionless",
     ),
     "a number is text": (
-        "coefficient = 0.3",
-        'coefficient = "0.3"',
-        'scene.toml, line 40: contacts.0.friction.coefficient must be a number, got "0.3": friction '
-        "coefficient μ ≥ 0, dimensionless",
+        "poisson_ratio = 0.3",
+        'poisson_ratio = "0.3"',
+        'scene.toml, line 17: materials.steel.poisson_ratio must be a number, got "0.3": Poisson\'s ratio ν '
+        "in (−1, 0.5), dimensionless",
     ),
     "a vector is too short": (
         "counts = [2, 2, 1]",
@@ -116,7 +116,7 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
     "a formula is no arithmetic": (
         "value = [10.0, 0.0, -100.0]",
         'value = ["open(x)", 0.0, -100.0]',
-        "scene.toml, line 35: loads.0.value: a formula may hold numbers, x, y, z, pi, e, + - * / **, "
+        "scene.toml, line 35: loads.0.value: a formula may hold numbers, x, y, z, t, pi, e, + - * / **, "
         "comparisons with < <= > >=, and abs, acos, asin, atan, atan2, cos, cosh, exp, log, max, min, sign, "
         "sin, sinh, sqrt, tan, tanh, where, got 'open(x)' in 'open(x)': leave it out, or give the value by a "
         "scene in Python",
@@ -124,7 +124,7 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
     "a sum is fine, brackets are too many": (
         "value = [10.0, 0.0, -100.0]",
         f'value = ["{"abs(" * 60}x{")" * 60}", "{" + ".join(["x"] * 60)}", -100.0]',
-        "scene.toml, line 35: loads.0.value: a formula may hold numbers, x, y, z, pi, e, + - * / **, "
+        "scene.toml, line 35: loads.0.value: a formula may hold numbers, x, y, z, t, pi, e, + - * / **, "
         "comparisons with < <= > >=, and abs, acos, asin, atan, atan2, cos, cosh, exp, log, max, min, "
         "sign, sin, sinh, sqrt, tan, tanh, where, got 'more than 50 nested operations' in "
         "'abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(abs(a...': leave it out, or give the value "
@@ -134,7 +134,7 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         "value = [10.0, 0.0, -100.0]",
         'value = ["1/0", 0.0, -100.0]',
         "scene.toml, line 35: loads.0.value: the formula '1/0' must have a finite value at every node, "
-        "got inf at (0.5, 0.5, 1): choose another one there with where(condition, a, b), each of whose "
+        "got inf at (0.5, 0.5, 2): choose another one there with where(condition, a, b), each of whose "
         "values may be infinite where the other is taken",
     ),
     "a number has four hundred digits": (
@@ -148,9 +148,10 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         "value = [10.0,",
         f"value = [1{'0' * 400},",
         "scene.toml, line 35: loads.0.value must be three numbers or formulas in brackets, for x, y "
-        "and z (two for a plane body), got [10000000000000000000000000000000000000000000000000000000...: "
-        "force per reference area, [force / length²] (in the plane: per unit of thickness); numbers, or "
-        "formulas in x, y, z in quotes",
+        "and z (two for a plane body), or a table {file = ..., field = ...}, got "
+        "[10000000000000000000000000000000000000000000000000000000...: force per reference area, "
+        "[force / length²] (in the plane: per unit of thickness); numbers, formulas in x, y, z in quotes, or "
+        "fields from files",
     ),
     "a count has four hundred digits": (
         "counts = [2, 2, 1]",

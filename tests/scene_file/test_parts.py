@@ -15,6 +15,7 @@ from fenics_contact.mesh_io import read_msh
 from fenics_contact.mesh_io.gmsh_session import gmsh_model
 from fenics_contact.scene_file import Expression, SceneFile, SceneFileError, VectorExpression, read_scene_file
 from tests.conftest import ROOT
+from tests.scene_file.texts import changed
 
 SELF = MPI.COMM_SELF
 BLOCK = {"shape": "block", "lower": [0, 0, 0], "upper": [2, 1, 1], "counts": [4, 2, 2]}
@@ -284,7 +285,63 @@ def test_steps_go_from_value_to_value() -> None:
     ]  # fmt: skip
     assert all(step.supports and step.supports[1].value == (0.0, 0.0, 0.0) for step in found)
     pushed = [step.loads[0].value(np.array([[2.0, 0, 0]])) for step in found if step.loads]  # type: ignore[operator,union-attr]
-    np.testing.assert_allclose(np.ravel(pushed), [2, 2, 2, 4, 6])
+    np.testing.assert_allclose([float(np.squeeze(push)) for push in pushed], [2, 2, 2, 4, 6])
+
+
+def test_steps_follow_formulas_in_time() -> None:
+    loads = [
+        {"name": "push", "kind": "pressure", "body": "a", "surface": "x1", "value": 2.0},
+        {"kind": "traction", "body": "a", "surface": "z1", "value": ["sin(t) * x", 0.0, "t"]},
+    ]
+    steps: list[dict[str, Any]] = [
+        {"count": 2, "duration": 0.5},
+        {"count": 2, "loads": {"push": "10 * t"}},
+        {"count": 2, "duration": 4.0, "loads": {"push": 0.0}},
+    ]
+    found = file_of(loads=loads, steps=steps)
+    times = [0.25, 0.5, 1.5, 2.5, 4.5, 6.5]
+    assert [step.time for step in found.steps] == times
+    at = np.array([[2.0, 0.0, 0.0]])
+    pushed, pulled = zip(*(_values(step.loads, at) for step in found.steps), strict=True)
+    # While t rules, nothing is interpolated; on the way from it, from its value at the begin of the step.
+    pushed = tuple(float(np.squeeze(push)) for push in pushed)
+    assert pushed == pytest.approx((2.0, 2.0, 15.0, 25.0, 12.5, 0.0))
+    np.testing.assert_allclose(np.squeeze(pulled), [[2.0 * np.sin(t), 0.0, t] for t in times])
+    assert _values(found.scene.loads, at)[1] == pytest.approx(np.array([[0.0, 0.0, 0.0]]))
+
+
+def _values(loads: Any, at: np.ndarray) -> list[Any]:
+    return [load.value(at) if callable(load.value) else load.value for load in loads]
+
+
+def test_there_is_no_time_without_steps() -> None:
+    loads = [{"kind": "pressure", "body": "a", "surface": "x1", "value": "t"}]
+    with pytest.raises(SceneFileError, match=r"loads\.0\.value: .* depends on the time t, which only loads"):
+        _ = file_of(loads=loads).scene
+
+
+def test_fields_come_from_files(tmp_path: Path) -> None:
+    (tmp_path / "wind.csv").write_text("x, y, z, p, q\n0, 0, 0, 1, 0.1\n1, 1, 1, 3, 0.3\n")
+    (tmp_path / "scene.toml").write_text(
+        changed(
+            ('kind = "traction"', 'kind = "pressure"'),
+            ("value = [10.0, 0.0, -100.0]", 'value = { file = "wind.csv", field = "p" }'),
+            ("coefficient = 0.3", 'coefficient = { file = "wind.csv", field = "q" }'),
+        )
+    )
+    scene = read_scene_file(tmp_path / "scene.toml", MPI.COMM_SELF).scene
+    ends = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+    assert scene.loads[0].value(ends).tolist() == pytest.approx([1.0, 3.0])  # type: ignore[operator]
+    assert scene.contacts[0].friction_at(ends).tolist() == pytest.approx([0.1, 0.3])
+    (tmp_path / "wind.csv").unlink()
+    with pytest.raises(SceneFileError, match=r"loads\.0\.value: .*wind\.csv"):
+        _ = read_scene_file(tmp_path / "scene.toml", MPI.COMM_SELF).scene
+
+
+def test_a_negative_coefficient_is_found_before_it_is_used(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(changed(("coefficient = 0.3", 'coefficient = "1 - x"')))
+    with pytest.raises(SceneFileError, match=r"contacts\.0\.friction: .* zero or positive everywhere"):
+        _ = read_scene_file(tmp_path / "scene.toml", MPI.COMM_SELF).scene
 
 
 def test_steps_turn_a_moment_up() -> None:
