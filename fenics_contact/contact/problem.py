@@ -15,6 +15,7 @@ from fenics_contact.contact.equilibrium import (
     known_system,
     state_of,
 )
+from fenics_contact.contact.gap_doubts import GapDoubts
 from fenics_contact.contact.state import State
 from fenics_contact.contact.static_admissibility import check_held
 from fenics_contact.contact.stored import Stored, restored_solution, with_stored_slip
@@ -69,6 +70,7 @@ class ContactProblem:
         self.timer = PhaseTimer()
         self.state = None
         self._partitions, self._decomposition = partitions, None
+        self._gap_doubts = GapDoubts()
 
     state: State | None
     _decomposition: Decomposition | None
@@ -170,6 +172,9 @@ class ContactProblem:
         if wanted is None and (self.solver is not None or sensitivity):
             wanted = solver.tolerance
         self.state = dual_state(torn, previous, solver, wanted, self.timer)
+        if not overlap:  # designs differ little from the first one
+            with self.timer.phase("state"):
+                self._gap_doubts.warn(self.state)
         return self.state
 
     @collectively("ContactProblem.restore", lambda self, *_, **__: self.comm)

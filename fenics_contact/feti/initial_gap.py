@@ -6,7 +6,7 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.contact_rows import Relations
-from fenics_contact.pairing import ContactPoints
+from fenics_contact.pairing import HELD, ContactPoints
 from fenics_contact.scene import Scene
 
 #: Supports hold a point along its normal if the free fraction is no larger than this: normals of facets are
@@ -19,18 +19,22 @@ FACETING = 0.1
 def check_no_penetration(scene: Scene, points: ContactPoints) -> None:
     """Reject an initial geometry whose bodies overlap by more than their faceting explains.
 
+    Overlap that the pair declares, see `ContactPair.interference`, is a load like any other.
+
     Raises:
         InvalidInputError: Names the pair, the number of nodes and the depth.
     """
     allowed = -_explained(points)
-    deep = points.gap < allowed
+    deep = (points.gap < allowed) & ~points.given
     if deep.any():
-        worst = int(np.argmin(points.gap))
+        worst = int(np.argmin(np.where(deep, points.gap, np.inf)))
         pair = scene.contacts[int(points.pair[worst])]
         raise InvalidInputError(
             f"bodies must not overlap at the start: {int(deep.sum())} nodes of {pair.slave.body!r} lie up to "
             f"{-points.gap[worst]:.3g} inside the master, more than the faceting of the surfaces explains "
-            f"({-allowed[worst]:.3g}): move the bodies apart"
+            f"({-allowed[worst]:.3g}): move the bodies apart; for a press fit declare the overlap by "
+            "ContactPair(interference='measured'), or give its amount, interference=0.05; adjust= puts "
+            "points in touch without strain"
         )
 
 
@@ -47,12 +51,13 @@ def gap_with_room(normal: Relations, fixed: np.ndarray, prescribed: np.ndarray) 
     """
     points = normal.points
     missing = np.where(normal.freedom(fixed) <= SLIGHT, normal.of_supports(prescribed) - points.gap, 0.0)
-    pressed = missing > _explained(points)
+    # A given interference is meant: it must not vanish where nothing can yield.
+    pressed = missing > np.where(points.given, HELD, 1.0) * _explained(points)
     if pressed.any():
         raise InvalidInputError(
             f"supports must leave room between surfaces that they hold on both sides, but {pressed.sum()} "
             f"contact nodes are pressed up to {missing.max():.3g} into their master: prescribe one of the "
-            "bodies only, or another displacement"
+            "bodies only, another displacement, or less interference there"
         )
     return points.gap + np.maximum(missing, 0.0)
 

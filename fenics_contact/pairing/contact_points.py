@@ -27,7 +27,8 @@ class ContactPoints:
             n_nodes); a row sums to one, and is empty on a rigid obstacle.
         normal: Unit normal from master to slave, shape (n, dim).
         tangents: Unit tangents, shape (n, dim - 1, dim).
-        gap: Distance along the normal, positive when open, shape (n,), [length].
+        gap: Gap before anything moves, positive when open: the distance, or what the pair gives in its place,
+            shape (n,), [length].
         area: Area of the slave surface that belongs to the node, shape (n,), [length^(dim - 1)].
         facet: Facet of the master surface that a node projects on; −1 on a rigid obstacle and where a point
             represents a mean over facets, shape (n,).
@@ -35,6 +36,10 @@ class ContactPoints:
         axes: Coordinate axis nearest to the first tangent, as a unit vector, shape (n, dim).
         symmetric: Components normal to a plane of symmetry that cuts both surfaces there: the mirror images
             move opposite, so that there is no slip across the plane, shape (n, dim).
+        distance: Measured distance of the surfaces along the normal, positive when apart, shape (n,),
+            [length].
+        given: Whether the pair says what the gap is, by a value or by declaring the measured overlap an
+            interference, shape (n,).
     """
 
     pair: np.ndarray
@@ -48,6 +53,8 @@ class ContactPoints:
     local: np.ndarray
     axes: np.ndarray
     symmetric: np.ndarray
+    distance: np.ndarray
+    given: np.ndarray
 
     @property
     def count(self) -> int:
@@ -69,7 +76,7 @@ def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> Conta
         return ContactPoints(
             integer, integer, sp.csr_matrix((0, n_nodes)), np.zeros((0, dim)), np.zeros((0, dim - 1, dim)),
             np.zeros(0), np.zeros(0), integer, np.zeros((0, dim - 1)), np.zeros((0, dim)),
-            np.zeros((0, dim), dtype=bool),
+            np.zeros((0, dim), dtype=bool), np.zeros(0), np.zeros(0, dtype=bool),
         )  # fmt: skip
 
     def strung(name: str) -> np.ndarray:
@@ -78,7 +85,7 @@ def join_points(parts: Sequence[ContactPoints], dim: int, n_nodes: int) -> Conta
     return ContactPoints(
         strung("pair"), strung("slave"), sp.vstack([part.master for part in parts], format="csr"),
         strung("normal"), strung("tangents"), strung("gap"), strung("area"), strung("facet"), strung("local"),
-        strung("axes"), strung("symmetric"),
+        strung("axes"), strung("symmetric"), strung("distance"), strung("given"),
     )  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from fenics_contact.pairing.contact_points import (
     reference_axes,
     tangent_frames,
 )
+from fenics_contact.pairing.given_gaps import with_given_gaps
 from fenics_contact.pairing.node_numbers import NodeNumbers
 from fenics_contact.pairing.surface_doubts import warn_of_surface
 from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie, master_share, surface_of
@@ -96,43 +97,57 @@ def _points_of_pairs(
     comm: MPI.Comm,
     finer: bool = False,
 ) -> ContactPoints:
-    parts, numbers = [], NodeNumbers.of(scene)
+    parts = []
     for index, pair in enumerate(pairs):
-        # The gap between tied surfaces stays as it is and is not used.
-        geometry = pair.geometry if isinstance(pair, ContactPair) else "faceted"
-        slave = _Side.of(scene, pair.slave, geometry, numbers, finer)
-        movable = ~fixed[slave.nodes].all(axis=1)
-        if not finer:
-            warn_of_surface(scene, pair.slave, geometry, slave.surface, comm)
-        if not isinstance(pair.master, Surface):
-            with together(comm):
-                points = _on_obstacle(slave, movable, pair.master)
-            name = f"what ContactPair {index} asks its obstacle, {type(pair.master).__name__}"
-            require_alike(comm, described((points.slave, points.normal, points.gap), name))
-        else:
-            master = _Side.of(scene, pair.master, geometry, numbers, finer)
-            if not finer:
-                warn_of_surface(scene, pair.master, geometry, master.surface, comm)
-            if pair.discretisation == "mortar":
-                points = _by_mortar(slave, movable, master, comm, master_share(scene, pair))
-            else:
-                points = _by_projection(slave, movable, master, comm)
-            points = replace(points, symmetric=_symmetric(points, slave, master))
-        if comm.rank == 0 and not movable.all():
-            tell(
-                _LOG.info,
-                "%d of %d nodes of %s %d are left out as supports hold them in all directions",
-                np.count_nonzero(~movable), len(movable), type(pair).__name__, index,
-            )  # fmt: skip
-        if points.count == 0:
-            raise InvalidInputError(
-                f"{type(pair).__name__} {index} needs slave nodes that face the master, but none of the "
-                f"{np.count_nonzero(movable)} movable nodes of {pair.slave.name!r} meets it: check the "
-                "surfaces' names and where the bodies lie"
-            )
-        gap = without_rounding(points.gap, slave.surface.points)
-        parts.append(in_free_frames(replace(points, pair=np.full(points.count, index), gap=gap), fixed))
+        points = _measured(scene, pair, index, fixed, comm, finer)
+        if isinstance(pair, ContactPair) and pair.given_gap:
+            origin, mesh = scene.origin, scene.bodies[pair.slave.body].mesh.origin
+            first = points if origin is scene else _measured(origin, pair, index, fixed, comm, finer)
+            slave = first.slave - NodeNumbers.of(scene).first_of(pair.slave.body)
+            points = with_given_gaps(points, first, pair, mesh.points[slave], comm)
+        parts.append(in_free_frames(points, fixed))
     return join_points(parts, scene.dim, len(fixed))
+
+
+def _measured(
+    scene: Scene, pair: ContactPair | Tie, index: int, fixed: np.ndarray, comm: MPI.Comm, finer: bool
+) -> ContactPoints:
+    """Return the points of one pair with the gaps between its surfaces. Collective."""
+    numbers = NodeNumbers.of(scene)
+    # The gap between tied surfaces stays as it is and is not used.
+    geometry = pair.geometry if isinstance(pair, ContactPair) else "faceted"
+    slave = _Side.of(scene, pair.slave, geometry, numbers, finer)
+    movable = ~fixed[slave.nodes].all(axis=1)
+    if not finer:
+        warn_of_surface(scene, pair.slave, geometry, slave.surface, comm)
+    if not isinstance(pair.master, Surface):
+        with together(comm):
+            points = _on_obstacle(slave, movable, pair.master)
+        name = f"what ContactPair {index} asks its obstacle, {type(pair.master).__name__}"
+        require_alike(comm, described((points.slave, points.normal, points.gap), name))
+    else:
+        master = _Side.of(scene, pair.master, geometry, numbers, finer)
+        if not finer:
+            warn_of_surface(scene, pair.master, geometry, master.surface, comm)
+        if pair.discretisation == "mortar":
+            points = _by_mortar(slave, movable, master, comm, master_share(scene, pair))
+        else:
+            points = _by_projection(slave, movable, master, comm)
+        points = replace(points, symmetric=_symmetric(points, slave, master))
+    if comm.rank == 0 and not movable.all():
+        tell(
+            _LOG.info,
+            "%d of %d nodes of %s %d are left out as supports hold them in all directions",
+            np.count_nonzero(~movable), len(movable), type(pair).__name__, index,
+        )  # fmt: skip
+    if points.count == 0:
+        raise InvalidInputError(
+            f"{type(pair).__name__} {index} needs slave nodes that face the master, but none of the "
+            f"{np.count_nonzero(movable)} movable nodes of {pair.slave.name!r} meets it: check the "
+            "surfaces' names and where the bodies lie"
+        )
+    gap = without_rounding(points.gap, slave.surface.points)
+    return replace(points, pair=np.full(points.count, index), gap=gap, distance=gap)
 
 
 def _symmetric(points: ContactPoints, slave: _Side, master: _Side) -> np.ndarray:
@@ -245,7 +260,7 @@ def _points(
     return ContactPoints(
         np.zeros(count, dtype=np.int64), slave.nodes[chosen], weight, normal, tangent_frames(normal, axes),
         gap, slave.surface.areas[chosen], np.full(count, -1), np.zeros((count, normal.shape[1] - 1)), axes,
-        np.zeros(normal.shape, dtype=bool),
+        np.zeros(normal.shape, dtype=bool), gap, np.zeros(count, dtype=bool),
     )  # fmt: skip
 
 

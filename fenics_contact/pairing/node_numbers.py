@@ -34,6 +34,10 @@ class NodeNumbers:
         """Number of nodes of all bodies."""
         return int(self.node_offset[-1])
 
+    def first_of(self, body: str) -> int:
+        """Return the number of a body's first node."""
+        return int(self.node_offset[self.body_names.index(body)])
+
     def global_nodes(self, body: str, nodes: np.ndarray) -> np.ndarray:
         """Number nodes of one body among those of all bodies."""
-        return nodes + self.node_offset[self.body_names.index(body)]
+        return nodes + self.first_of(body)

@@ -99,9 +99,17 @@ class ContactPair:
             else smooth surfaces through the nodes; ``"reconstructed"``, always the latter; ``"faceted"``, the
             flat facets, for comparison. Between round bodies the error of facets is often larger than the
             approach of the bodies. For the shapes of meshes see `BodyMesh`.
+        gap: Clearance in place of the measured one, ≥ 0, [length]: a number, or a function of the slave
+            nodes, shape (n, dim), that returns one for each, shape (n,). None: as measured.
+        interference: Overlap in place of the measured gap, ≥ 0, [length], given like ``gap``;
+            ``"measured"`` takes the one that the geometry has, which counts as a mistake otherwise.
+        adjust: Slave points whose measured clearance or overlap is at most this, [length], are put in touch
+            without strain, or get ``gap`` or ``interference`` if these are given; all others keep the
+            measured gap. None: no point is put in touch, and ``gap`` and ``interference`` hold at all points.
 
     Raises:
-        InvalidInputError: If a body is paired with itself, or the discretisation or geometry is unknown.
+        InvalidInputError: If a body is paired with itself, the discretisation or geometry is unknown, or
+            both gap and interference, or negative lengths, are given.
 
     Example:
         >>> pair = ContactPair(Surface("punch", "bottom"), Surface("block", "z1"), Coulomb(0.3), "mortar")
@@ -114,9 +122,20 @@ class ContactPair:
     friction: Friction = None
     discretisation: Discretisation = "node"
     geometry: Geometry = "best"
+    gap: float | OfPosition | None = None
+    interference: float | OfPosition | Literal["measured"] | None = None
+    adjust: float | None = None
 
     def __post_init__(self) -> None:
-        """Reject self-contact."""
+        """Reject self-contact, and gaps that contradict each other or are no lengths."""
+        if self.gap is not None and self.interference is not None:
+            raise InvalidInputError(
+                f"a contact pair has a gap or an interference, got gap={self.gap!r} and interference="
+                f"{self.interference!r}: keep one of them; a function that changes its sign is no gap but "
+                "two pairs"
+            )
+        for name in ("gap", "interference", "adjust"):
+            _check_length(f"ContactPair.{name}", getattr(self, name))
         if isinstance(self.master, Surface) and self.master.body == self.slave.body:
             raise InvalidInputError(
                 f"contact of body {self.slave.body!r} with itself is not supported: "
@@ -127,6 +146,13 @@ class ContactPair:
     def place(self) -> str:
         """Its surfaces: "upper z0 on lower z1", "block z0 on rigid plane"."""
         return _place(self.slave, self.master)
+
+    @property
+    def given_gap(self) -> str:
+        """What the pair gives in place of measured gaps, in words; empty if nothing."""
+        words = {"gap": self.gap, "interference": self.interference, "in touch within": self.adjust}
+        given = [(name, value) for name, value in words.items() if value is not None]
+        return ", ".join(f"{name} {_in_words(value)}" for name, value in given)
 
     @property
     def has_friction(self) -> bool:
@@ -196,6 +222,21 @@ class Tie:
     def place(self) -> str:
         """Its surfaces: "upper z0 on lower z1"."""
         return _place(self.slave, self.master)
+
+
+def _check_length(name: str, value: float | OfPosition | str | None) -> None:
+    number = not (value is None or isinstance(value, str) or callable(value))
+    if number and not (np.isfinite(value) and value >= 0):  # type: ignore[arg-type, operator]
+        raise InvalidInputError(
+            f"{name} must be zero or positive and finite, got {value!r}: clearances are given by gap, "
+            "overlaps by interference, both as positive lengths"
+        )
+
+
+def _in_words(value: float | OfPosition | str) -> str:
+    if callable(value):
+        return "by a function"
+    return value if isinstance(value, str) else f"{value:g}"
 
 
 def _place(slave: Surface, master: Surface | RigidObstacle) -> str:

@@ -175,6 +175,13 @@ class SceneParts:
             self._require(name, None, "reshaped")
         return self._with_meshes({name: self.bodies[name].mesh.reshaped(x) for name, x in points.items()})
 
+    @property
+    def origin(self) -> Self:
+        """The scene before it was `reshaped`; the scene itself if it was not."""
+        meshes = {name: body.mesh.origin for name, body in self.bodies.items()}
+        changed = {name: mesh for name, mesh in meshes.items() if mesh is not self.bodies[name].mesh}
+        return self._with_meshes(changed) if changed else self
+
     def _with_meshes(self, meshes: Mapping[str, BodyMesh]) -> Self:
         changed = {name: replace(self.bodies[name], mesh=mesh) for name, mesh in meshes.items()}
         return replace(self, bodies={**self.bodies, **changed})

@@ -67,7 +67,10 @@ class Scene(SceneParts):
                 f"{type(load).__name__} {load.body} {getattr(load, 'surface', '')}".rstrip()
                 for load in self.loads
             ],
-            "contacts": [f"{pair.place}, {pair.friction or 'without friction'}" for pair in self.contacts],
+            "contacts": [
+                f"{pair.place}, {pair.friction or 'without friction'}, {pair.given_gap}".removesuffix(", ")
+                for pair in self.contacts
+            ],
             "ties": [tie.place for tie in self.ties],
         }
 

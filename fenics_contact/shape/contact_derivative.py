@@ -104,7 +104,7 @@ def _add_projected(
     corners = rows.at(nodes[surface.facets[points.facet[mine]]])
     by = _by_point(points, rows, mine, corners)
     by_slave, by_master = projection_pulled_back(
-        surface, points.facet[mine], points.local[mine], points.gap[mine], by
+        surface, points.facet[mine], points.local[mine], points.distance[mine], by
     )
     result[points.slave[mine]] += by_slave
     result[nodes] += by_master

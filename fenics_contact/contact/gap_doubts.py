@@ -1,0 +1,108 @@
+"""Warnings about gaps whose error is not small beside what moves: by flat facets, or by undeclared overlap."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+
+from fenics_contact.contact.state import State
+from fenics_contact.errors import InvalidInputError, tell
+from fenics_contact.feti import TornSystem
+from fenics_contact.pairing import ContactPoints
+from fenics_contact.scene import ContactPair, Scene, Surface, surface_of
+
+_LOG = logging.getLogger(__name__)
+
+
+class GapDoubts:
+    """What is doubtful about the gaps of a problem; each pair is warned of once."""
+
+    def __init__(self) -> None:
+        """Start without any."""
+        self._points: ContactPoints | None = None
+        self._finer = np.zeros(0)
+        self._told: set[tuple[int, str]] = set()
+
+    def warn(self, state: State, share: float = 0.1) -> None:
+        """Warn of pairs whose measured gaps are not known well enough for a state. Collective.
+
+        The error of flat facets, or of surfaces reconstructed from nodes, is the difference to gaps between
+        surfaces that are known better, see `fenics_contact.surfaces.true_surface`; it is computed once for
+        all loads, by one more search for contact and without another solve, and only where a surface is
+        curved and its shape not known. Gaps that a pair gives are not doubted.
+
+        Args:
+            state: The state.
+            share: Errors up to this share of the largest closing or opening of a pair are small.
+        """
+        torn, contact = state.torn, state.contact
+        if contact.points.count == 0:
+            return
+        if contact.points is not self._points:
+            self._points, self._finer = contact.points, _finer_gap(torn)
+        change = self._finer - contact.points.gap
+        for number, pair in enumerate(torn.scene.contacts):
+            mine = contact.on_pair(number)
+            mine = mine[~contact.points.given[mine]]
+            before, after = contact.points.gap[mine], contact.gap[mine]
+            moved = float(np.abs(after - before).max(initial=0.0))
+            nearest = np.minimum(before, after) + np.minimum(change[mine], 0.0)
+            error = float(np.abs(change[mine][nearest <= moved]).max(initial=0.0))
+            if error > share * moved > 0.0:
+                self._tell(torn, number, "facets", _words_of_facets(pair, error, moved))
+            overlap = -float(before[contact.normal_force[mine] > 0.0].min(initial=0.0))
+            if overlap > share * moved > 0.0:
+                self._tell(torn, number, "overlap", _words_of_overlap(pair, overlap, moved))
+
+    def _tell(self, torn: TornSystem, pair: int, kind: str, words: str) -> None:
+        if (pair, kind) not in self._told and torn.decomposition.comm.rank == 0:
+            tell(_LOG.warning, "%s", words)
+        self._told.add((pair, kind))
+
+
+def _words_of_facets(pair: ContactPair, error: float, moved: float) -> str:
+    what, remedy = "surfaces reconstructed from the nodes miss", ""
+    if pair.geometry == "faceted":
+        what, remedy = "flat facets miss", "take geometry='best', "
+    return (
+        f"gaps of {pair.place} are uncertain: {what} the true surfaces by up to {error:.2g}, where these move "
+        f"by {moved:.2g} against each other: {remedy}give the meshes their shapes (BodyMesh.shapes, or read "
+        "them from CAD), or say what the gap is, by ContactPair(gap=...) or interference=..., or by "
+        "adjust=..., which puts points in touch that lie nearer than that"
+    )
+
+
+def _words_of_overlap(pair: ContactPair, overlap: float, moved: float) -> str:
+    return (
+        f"surfaces of {pair.place} overlap by up to {overlap:.2g} before they are loaded and are pressed apart "
+        f"by that, where they move by {moved:.2g} against each other: if that is a press fit, declare it by "
+        "ContactPair(interference='measured'); if not, adjust=... or gap=0 puts them in touch without strain"
+    )
+
+
+def _finer_gap(torn: TornSystem) -> np.ndarray:
+    """Return gaps between surfaces that are known better, [length]; the same where none are. Collective."""
+    if not any(_is_approximate(torn.scene, pair) for pair in torn.scene.contacts):
+        return torn.points.gap
+    try:
+        return torn.finer_gap()
+    except InvalidInputError as error:
+        if torn.decomposition.comm.rank == 0:
+            tell(_LOG.info, "the error of the facets is not known: %s", error)
+        return torn.points.gap
+
+
+def _is_approximate(scene: Scene, pair: ContactPair) -> bool:
+    """Return whether gaps are measured between curved surfaces that are only known by their nodes."""
+    if not isinstance(pair.master, Surface):
+        return False
+    # Slave nodes lie on their surface; mortar contact also uses what is between them.
+    sides = (pair.master, pair.slave) if pair.discretisation == "mortar" else (pair.master,)
+    return any(_is_curved(scene, side, pair) for side in sides)
+
+
+def _is_curved(scene: Scene, side: Surface, pair: ContactPair) -> bool:
+    shapes = scene.bodies[side.body].mesh.origin.shapes
+    known = pair.geometry == "best" and side.name in shapes
+    return not known and surface_of(scene, side, "reconstructed").relief is not None
