@@ -1,4 +1,4 @@
-"""Warnings about gaps whose error is not small beside what moves: by flat facets, or by undeclared overlap."""
+"""Warnings about gaps that are not known well beside what moves: by flat facets, or undeclared overlap."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class GapDoubts:
             if error > share * moved > 0.0:
                 self._tell(torn, number, "facets", _words_of_facets(pair, error, moved))
             overlap = -float(before[contact.normal_force[mine] > 0.0].min(initial=0.0))
-            if overlap > share * moved > 0.0:
+            if overlap > max(error, share * moved) and moved > 0.0:
                 self._tell(torn, number, "overlap", _words_of_overlap(pair, overlap, moved))
 
     def _tell(self, torn: TornSystem, pair: int, kind: str, words: str) -> None:
@@ -66,18 +66,19 @@ def _words_of_facets(pair: ContactPair, error: float, moved: float) -> str:
     if pair.geometry == "faceted":
         what, remedy = "flat facets miss", "take geometry='best', "
     return (
-        f"gaps of {pair.place} are uncertain: {what} the true surfaces by up to {error:.2g}, where these move "
-        f"by {moved:.2g} against each other: {remedy}give the meshes their shapes (BodyMesh.shapes, or read "
-        "them from CAD), or say what the gap is, by ContactPair(gap=...) or interference=..., or by "
+        f"gaps of {pair.place} are uncertain: {what} the true surfaces by up to {error:.2g}, where these "
+        f"move by {moved:.2g} against each other: {remedy}give the meshes their shapes (BodyMesh.shapes, or "
+        "read them from CAD), or say what the gap is, by ContactPair(gap=...) or interference=..., or by "
         "adjust=..., which puts points in touch that lie nearer than that"
     )
 
 
 def _words_of_overlap(pair: ContactPair, overlap: float, moved: float) -> str:
     return (
-        f"surfaces of {pair.place} overlap by up to {overlap:.2g} before they are loaded and are pressed apart "
-        f"by that, where they move by {moved:.2g} against each other: if that is a press fit, declare it by "
-        "ContactPair(interference='measured'); if not, adjust=... or gap=0 puts them in touch without strain"
+        f"surfaces of {pair.place} overlap by up to {overlap:.2g} before they are loaded and are pressed "
+        f"apart by that, where they move by {moved:.2g} against each other: if that is a press fit, declare "
+        "it by ContactPair(interference='measured'); if not, adjust=... or gap=0 puts them in touch without "
+        "strain"
     )
 
 

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.errors import InvalidDesignError, InvalidInputError, tell, together
+from fenics_contact.errors import InvalidDesignError, tell, together
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.mesh import computed_rounding
 from fenics_contact.pairing.contact_points import ContactPoints
-from fenics_contact.scene import ContactPair, evaluate
+from fenics_contact.scene import ContactPair
 
 _LOG = logging.getLogger(__name__)
 
@@ -48,7 +48,8 @@ def with_given_gaps(
         near = _near(pair, measured, place)
         if comm.rank == 0 and pair.adjust is not None:
             _tell_of_adjusted(pair, near, measured)
-        target = _target(pair, place, measured, near)
+        wanted = pair.gap_at(place)
+        target = np.where(near, 0.0 if wanted is None else wanted, measured)
     require_alike(comm, described(target, f"the gap given between {pair.place}"))
     moved = points.distance[now] - measured
     moved[np.abs(moved) <= computed_rounding(place)] = 0.0
@@ -61,35 +62,8 @@ def with_given_gaps(
 def _near(pair: ContactPair, measured: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Return whose gap is replaced, shape (n,)."""
     if pair.adjust is None:
-        return np.full(len(measured), pair.interference != "measured")
+        return np.full(len(measured), pair.gives_all_gaps)
     return np.abs(measured) <= pair.adjust + computed_rounding(place)
-
-
-def _target(pair: ContactPair, place: np.ndarray, measured: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """Return the gaps in the first geometry, shape (n,), [length]."""
-    if pair.gap is not None:
-        wanted = _values("gap", pair.gap, place)
-    elif pair.interference is not None and pair.interference != "measured":
-        wanted = -_values("interference", pair.interference, place)
-    else:
-        wanted = np.zeros(len(place))
-    return np.where(near, wanted, measured)
-
-
-def _values(name: str, given: object, place: np.ndarray) -> np.ndarray:
-    """Return a length at each point, shape (n,), [length]."""
-    if not callable(given):
-        return np.full(len(place), given, dtype=np.float64)
-    values = evaluate(f"ContactPair.{name}", given, place, ())
-    if np.any(values < 0.0):
-        lowest = int(np.argmin(values))
-        where = ", ".join(f"{x:.6g}" for x in place[lowest])
-        raise InvalidInputError(
-            f"the function given as ContactPair.{name} must return lengths of zero or more, got "
-            f"{values[lowest]:.6g} at ({where}): clearances are given by gap, overlaps by interference; cut "
-            "it off at zero, or make two pairs"
-        )
-    return values
 
 
 def _tell_of_adjusted(pair: ContactPair, near: np.ndarray, measured: np.ndarray) -> None:

@@ -31,16 +31,19 @@ class PairGeometry:
         master: The same of the master; of a rigid obstacle the name of its class.
         height: Largest height of the true surface over the middles of its facets, [length], where the gap
             exceeds the smallest one by no more than the approach; everywhere if that is unknown. Of the
-            master and, with mortar contact, also of the slave; zero on obstacles: nodes lie on true surfaces.
+            master and, with mortar contact, also of the slave; zero on obstacles, as nodes lie on true
+            surfaces, and where the pair gives all gaps.
         approach: Estimate of how far the bodies come closer, [length]: by Hertz's theory under the largest
             resultant of the loads on one body, or by the largest displacement along the normal that a support
             prescribes, if that is larger. None if neither is known.
+        given: What the pair gives in place of measured gaps, in words, see `ContactPair.given_gap`.
     """
 
     slave: str
     master: str
     height: float
     approach: float | None
+    given: str = ""
 
     @property
     def share(self) -> float | None:
@@ -49,7 +52,7 @@ class PairGeometry:
 
     def __str__(self) -> str:
         """Describe it in one line."""
-        words = f"{self.slave} on {self.master}; facets "
+        words = f"{self.slave} on {self.master}; {self.given}; facets ".replace("; ;", ";")
         if self.height == 0.0:
             return words + "miss nothing"
         share = self.share
@@ -82,7 +85,8 @@ def pair_geometry(scene: SceneParts, pair: ContactPair) -> PairGeometry:
     name = _name(scene, pair, pair.slave, slave)
     if not isinstance(pair.master, Surface):
         met = _meeting_obstacle(slave, pair.master)
-        return PairGeometry(name, _shape_name(pair.master), 0.0, _approach(scene, pair, slave, met))
+        approach = _approach(scene, pair, slave, met)
+        return PairGeometry(name, _shape_name(pair.master), 0.0, approach, pair.given_gap)
     master = surface_of(scene, pair.master, geometry)
     met = _meeting(slave, master)
     approach = _approach(scene, pair, slave, met)
@@ -91,7 +95,9 @@ def pair_geometry(scene: SceneParts, pair: ContactPair) -> PairGeometry:
     if pair.discretisation == "mortar":
         touching = np.flatnonzero(np.isin(slave.facets, met.node[near]).any(axis=1))
         height = max(height, _largest_height(slave, touching))
-    return PairGeometry(name, _name(scene, pair, pair.master, master), height, approach)
+    if pair.gives_all_gaps:
+        height = 0.0
+    return PairGeometry(name, _name(scene, pair, pair.master, master), height, approach, pair.given_gap)
 
 
 def _name(scene: SceneParts, pair: ContactPair, surface: Surface, faceted: FacetedSurface) -> str:

@@ -154,6 +154,30 @@ class ContactPair:
         given = [(name, value) for name, value in words.items() if value is not None]
         return ", ".join(f"{name} {_in_words(value)}" for name, value in given)
 
+    def gap_at(self, points: np.ndarray) -> np.ndarray | None:
+        """Return the gap or, as a negative number, the interference that the pair gives; None if none.
+
+        Args:
+            points: Coordinates of slave nodes, shape (n, dim), [length].
+
+        Returns:
+            Shape (n,), [length].
+
+        Raises:
+            InvalidInputError: If a function returns anything but lengths of zero or more.
+        """
+        if self.gap is not None:
+            return _not_negative(f"gap of {self.place}", self.gap, points)
+        if self.interference is None or isinstance(self.interference, str):
+            return None
+        return -_not_negative(f"interference of {self.place}", self.interference, points)
+
+    @property
+    def gives_all_gaps(self) -> bool:
+        """Whether no gap of the pair is measured."""
+        value = self.interference if self.gap is None else self.gap
+        return self.adjust is None and value not in (None, "measured")
+
     @property
     def has_friction(self) -> bool:
         """Whether tangential forces can be transmitted at all."""
@@ -177,17 +201,7 @@ class ContactPair:
         Raises:
             InvalidInputError: If a function returns something other than numbers of at least zero.
         """
-        given = self._friction_value
-        if not callable(given):
-            return np.full(len(points), float(given))
-        values = evaluate(f"friction of {self.place}", given, points, ())
-        if (values < 0).any():
-            worst = int(np.argmin(values))
-            raise InvalidInputError(
-                f"friction of {self.place} must be zero or positive everywhere, got {values[worst]:.6g} at "
-                f"({', '.join(f'{x:.6g}' for x in points[worst])}): give a function that is"
-            )
-        return values
+        return _not_negative(f"friction of {self.place}", self._friction_value, points)
 
 
 @dataclass(frozen=True)
@@ -231,6 +245,20 @@ def _check_length(name: str, value: float | OfPosition | str | None) -> None:
             f"{name} must be zero or positive and finite, got {value!r}: clearances are given by gap, "
             "overlaps by interference, both as positive lengths"
         )
+
+
+def _not_negative(name: str, given: float | OfPosition, points: np.ndarray) -> np.ndarray:
+    """Return a number or the values of a function at points, shape (n,), if none is negative."""
+    if not callable(given):
+        return np.full(len(points), float(given))
+    values = evaluate(name, given, points, ())
+    if (values < 0).any():
+        worst = int(np.argmin(values))
+        raise InvalidInputError(
+            f"{name} must be zero or positive everywhere, got {values[worst]:.6g} at "
+            f"({', '.join(f'{x:.6g}' for x in points[worst])}): give a function that is"
+        )
+    return values
 
 
 def _in_words(value: float | OfPosition | str) -> str:

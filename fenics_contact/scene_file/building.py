@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from fenics_contact.errors import together
 from fenics_contact.scene import Body, Material, Scene
 from fenics_contact.scene_file.document import Document
-from fenics_contact.scene_file.evaluation import check_formulas, check_friction
+from fenics_contact.scene_file.evaluation import check_formulas, check_pair
 from fenics_contact.scene_file.expression import at_time
 from fenics_contact.scene_file.located import located
 from fenics_contact.scene_file.mistakes import Mistake, SceneFileError
@@ -105,9 +105,9 @@ class Builder:
                     built[key].append(one)
                     with self._at(key, number, *_FORMULAS.get(key, ())):
                         check_formulas(one, bodies)
-                    if key == "contacts":
-                        with self._at(key, number, "friction"):
-                            check_friction(one, bodies)
+                    for name in ("friction", "gap", "interference") if key == "contacts" else ():
+                        with self._at(key, number, name):
+                            check_pair(one, name, bodies)
         self._check()
         return Scene(bodies, **built)
 

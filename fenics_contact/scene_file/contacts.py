@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import AfterValidator, Field, PositiveFloat
+from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
 
 from fenics_contact import scene
 from fenics_contact.scene import ContactPair, Surface, Tie
 from fenics_contact.scene_file.expression import Expression
 from fenics_contact.scene_file.part import Part, keys_of
-from fenics_contact.scene_file.values import FrictionField, Scalar, Triple, one_of
+from fenics_contact.scene_file.values import FieldOrMeasured, NotNegativeField, Scalar, Triple, one_of
 
 
 @keys_of(Surface)
@@ -81,7 +81,7 @@ class CoulombFriction(Part):
     """Coulomb's law: the friction force is at most the coefficient times the normal force."""
 
     law: Literal["coulomb"]
-    friction_coefficient: FrictionField = Field(alias="coefficient")
+    friction_coefficient: NotNegativeField = Field(alias="coefficient")
 
 
 @keys_of(scene.Tresca)
@@ -89,7 +89,7 @@ class TrescaFriction(Part):
     """Friction with a bound that does not depend on the pressure."""
 
     law: Literal["tresca"]
-    traction: FrictionField
+    traction: NotNegativeField
 
 
 Master: TypeAlias = Annotated[
@@ -111,6 +111,15 @@ class ContactPart(Part):
     slave: SurfaceOfBody
     master: Master
     friction: AnyFriction | None
+    gap: NotNegativeField | None = Field(
+        description="clearance in place of the measured one, [length]: a number, a formula in x, y, z in "
+        "quotes, or a field from a file"
+    )
+    interference: FieldOrMeasured | None = Field(
+        description="overlap in place of the measured gap, [length], given like gap; 'measured' takes the "
+        "one that the geometry has, which counts as a mistake otherwise"
+    )
+    adjust: NonNegativeFloat | None
 
 
 @keys_of(Tie)

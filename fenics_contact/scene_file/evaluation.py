@@ -31,13 +31,17 @@ def check_formulas(part: Any, bodies: Mapping[str, Body]) -> None:
         value(_nodes(body, part.surface) if isinstance(part, SurfaceLoad) else body.mesh.points)
 
 
-def check_friction(pair: ContactPair, bodies: Mapping[str, Body]) -> None:
-    """Evaluate the friction of a pair at the slave's nodes.
+def check_pair(pair: ContactPair, key: str, bodies: Mapping[str, Body]) -> None:
+    """Evaluate the friction, gap or interference of a pair, whichever the key is, at the slave's nodes.
 
     Raises:
         InvalidInputError: If it is a function that has no finite value somewhere, or a negative one.
     """
-    pair.friction_at(_nodes(bodies[pair.slave.body], pair.slave.name))
+    nodes = _nodes(bodies[pair.slave.body], pair.slave.name)
+    if key == "friction":
+        pair.friction_at(nodes)
+    elif getattr(pair, key) is not None:
+        pair.gap_at(nodes)
 
 
 def _nodes(body: Body, surface: str) -> np.ndarray:

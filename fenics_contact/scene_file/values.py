@@ -166,9 +166,13 @@ ScalarField: TypeAlias = Annotated[
     float | Formula | FieldFile, said(f"a finite number, a formula in x, y and z in quotes, {_FIELD}")
 ]
 #: The same for what cannot be negative.
-FrictionField: TypeAlias = Annotated[
+NotNegativeField: TypeAlias = Annotated[
     Annotated[float, Field(ge=0)] | Formula | FieldFile,
     said(f"a number of at least 0, a formula in x, y and z in quotes, {_FIELD}"),
+]
+FieldOrMeasured: TypeAlias = Annotated[
+    Literal["measured"] | Annotated[float, Field(ge=0)] | Formula | FieldFile,
+    said(f"'measured', a number of at least 0, a formula in x, y and z in quotes, {_FIELD}"),
 ]
 _FREE = Annotated[Literal["free"], AfterValidator(lambda _: None)]
 _OF_LOAD = f"three numbers or formulas {_AXES}, {_FIELD}"
