@@ -34,24 +34,25 @@ class GapDoubts:
 
         Args:
             state: The state.
-            share: Errors up to this share of the largest closing or opening of a pair are small.
+            share: Errors up to this share of what moves are small.
         """
         torn, contact = state.torn, state.contact
         if contact.points.count == 0:
             return
         if contact.points is not self._points:
             self._points, self._finer = contact.points, _finer_gap(torn)
-        change = self._finer - contact.points.gap
+        change, pressed_in = self._finer - contact.points.gap, _indentation(state)
         for number, pair in enumerate(torn.scene.contacts):
             mine = contact.on_pair(number)
             mine = mine[~contact.points.given[mine]]
             before, after = contact.points.gap[mine], contact.gap[mine]
-            moved = float(np.abs(after - before).max(initial=0.0))
+            touching = contact.normal_force[mine] > 0.0
+            moved = _largest_motion(after - before, pressed_in[mine], touching)
             nearest = np.minimum(before, after) + np.minimum(change[mine], 0.0)
             error = float(np.abs(change[mine][nearest <= moved]).max(initial=0.0))
             if error > share * moved > 0.0:
                 self._tell(torn, number, "facets", _words_of_facets(pair, error, moved))
-            overlap = -float(before[contact.normal_force[mine] > 0.0].min(initial=0.0))
+            overlap = -float(before[touching].min(initial=0.0))
             if overlap > max(error, share * moved) and moved > 0.0:
                 self._tell(torn, number, "overlap", _words_of_overlap(pair, overlap, moved))
 
@@ -59,6 +60,22 @@ class GapDoubts:
         if (pair, kind) not in self._told and torn.decomposition.comm.rank == 0:
             tell(_LOG.warning, "%s", words)
         self._told.add((pair, kind))
+
+
+def _indentation(state: State) -> np.ndarray:
+    """Return how far the force of each point presses its own node in, shape (n,), [length]. Collective."""
+    flexibility = state.torn.numbering.gather(state.dual.problem.diagonal, state.torn.normal_rows)
+    return np.asarray(flexibility * state.contact.normal_force)
+
+
+def _largest_motion(closing: np.ndarray, pressed_in: np.ndarray, touching: np.ndarray) -> float:
+    """Return how far surfaces move against each other where they touch, anywhere if they do not, [length].
+
+    Where surfaces touched from the start, that is how far they are pressed in.
+    """
+    if not touching.any():
+        return float(np.abs(closing).max(initial=0.0))
+    return float(max(np.abs(closing[touching]).max(), pressed_in[touching].max()))
 
 
 def _words_of_facets(pair: ContactPair, error: float, moved: float) -> str:

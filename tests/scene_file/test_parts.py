@@ -212,6 +212,57 @@ def test_loads_and_supports_are_those_of_the_package() -> None:
     ]
 
 
+def contact_with(**keys: Any) -> scene.ContactPair:
+    contact = {"slave": {"body": "a", "surface": "z0"}, "master": FLOOR, **keys}
+    (pair,) = file_of(contacts=[contact]).scene.contacts
+    return pair
+
+
+def test_gaps_and_interferences_are_those_of_the_package() -> None:
+    assert contact_with().given_gap == ""
+    pair = contact_with(gap=0.1)
+    assert (pair.gap, pair.interference, pair.adjust) == (0.1, None, None)
+    pair = contact_with(interference="measured", adjust=0.25)
+    assert (pair.gap, pair.interference, pair.adjust) == (None, "measured", 0.25)
+    formula = contact_with(interference="0.1 + 0.05 * x").gap_at(np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]))
+    np.testing.assert_allclose(formula, [-0.1, -0.2])
+
+
+@pytest.mark.parametrize(
+    ("keys", "match"),
+    [
+        (
+            {"gap": -0.1},
+            r"contacts\.0\.gap must be a length of zero or more, or a formula in x, y and z in quotes",
+        ),
+        ({"gap": "measured"}, r"contacts\.0\.gap: a formula may hold"),
+        (
+            {"interference": [0.1]},
+            r"contacts\.0\.interference must be 'measured', a length of zero or more, or a",
+        ),
+        ({"adjust": -1.0}, r"contacts\.0\.adjust must be a number of at least 0, got -1"),
+        (
+            {"gap": "x - 0.5"},
+            r"contacts\.0\.gap: the function given as ContactPair\.gap must return lengths of",
+        ),
+        (
+            {"interference": "1 / x"},
+            r"contacts\.0\.interference: the formula '1 / x' must have a finite value",
+        ),
+        ({"gap": 0.1, "interference": 0.1}, r"contacts\.0: a contact pair has a gap or an interference"),
+    ],
+)
+def test_gaps_that_are_none_are_refused_at_their_key(keys: dict[str, Any], match: str) -> None:
+    with pytest.raises(SceneFileError, match=match):
+        contact_with(**keys)
+
+
+def test_ties_have_no_gaps() -> None:
+    tie = {"slave": {"body": "a", "surface": "z0"}, "master": {"body": "a", "surface": "z1"}, "gap": 0.1}
+    with pytest.raises(SceneFileError, match=r"ties\.0\.gap"):
+        file_of(ties=[tie])
+
+
 def test_obstacles_and_laws_of_friction_are_those_of_the_package() -> None:
     masters = [
         FLOOR,
