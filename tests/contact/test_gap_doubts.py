@@ -51,6 +51,10 @@ def test_nothing_is_told_where_the_gap_is_known(disc: Disc, caplog: pytest.LogCa
         assert told(caplog, clamp(20.0, **unknown)) == []
 
 
+def test_facets_of_surfaces_that_stay_far_apart_are_not_told(caplog: pytest.LogCaptureFixture) -> None:
+    assert told(caplog, clamp(20.0, geometry="faceted", overlap=-1.0)) == []
+
+
 def test_reconstructed_surfaces_are_told_where_little_moves(caplog: pytest.LogCaptureFixture) -> None:
     (words,) = told(caplog, clamp(2.0, shapes=False))
     assert words.startswith(f"{CLAMPED}surfaces reconstructed from the nodes miss the true surfaces by up to")

@@ -7,6 +7,7 @@ from tests.mutants.copy_of_package import Mutation
 CONIC = "tests/contact/test_conic.py::test_energies_and_contact_forces_equal_those_of_a_conic_solver"
 
 PARTS = "tests/accuracy/test_certificate_parts.py"
+GIVEN = "tests/shape/test_given_gap_sensitivity.py"
 
 MUTATIONS = (
     Mutation(
@@ -43,6 +44,27 @@ MUTATIONS = (
         "FACETING = 0.1",
         "FACETING = 10.0",
         ("tests/pairing/test_contact_search.py::test_overlapping_bodies_are_refused",),
+    ),
+    Mutation(
+        "what a design moves is not added to a given gap",
+        "pairing/given_gaps.py",
+        "= target + moved, declared",
+        "= target, declared",
+        (f"{GIVEN}::test_the_gap_is_the_given_one_and_what_the_design_adds",),
+    ),
+    Mutation(
+        "gradients take a given gap for the distance of the surfaces",
+        "shape/contact_derivative.py",
+        "points.distance[mine], by",
+        "points.gap[mine], by",
+        (f"{GIVEN}::test_the_adjoint_agrees_with_central_differences",),
+    ),
+    Mutation(
+        "the error of facets is compared with ten times what moves",
+        "contact/gap_doubts.py",
+        "if error > share * moved > 0.0:",
+        "if error > 10.0 * share * moved > 0.0:",
+        ("tests/contact/test_gap_doubts.py::test_a_roller_is_told_of_by_facets_alone",),
     ),
     Mutation(
         "no body is ever too loose",
