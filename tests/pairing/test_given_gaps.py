@@ -171,9 +171,7 @@ def test_interference_between_surfaces_that_supports_hold_is_refused() -> None:
         return replace(scene, supports=supports)
 
     assert found(held(gap=0.01)).count == 25
-    with pytest.raises(
-        InvalidInputError, match=r"25 contact nodes are pressed up to 0\.001 into"
-    ):
+    with pytest.raises(InvalidInputError, match=r"25 contact nodes are pressed up to 0\.001 into"):
         found(held(interference=0.001))
 
 
@@ -183,11 +181,11 @@ def test_interference_between_surfaces_that_supports_hold_is_refused() -> None:
         (
             lambda x: x[:, 0] - 1.0,
             InvalidInputError,
-            r"gap must return lengths .* got -1 at \(0,",
+            r"gap of upper z0 .* positive everywhere, got -1 at \(0,",
         ),
-        (lambda x: x, InvalidInputError, r"ContactPair\.gap must return finite numbers of shape \(25,\)"),
+        (lambda x: x, InvalidInputError, r"rigid plane must return finite numbers of shape \(25,\)"),
         (lambda x: np.nan * x[:, 0], InvalidInputError, "something other than finite numbers"),
-        (lambda x: x[:, 7], UserCodeError, r"the function given as ContactPair\.gap"),
+        (lambda x: x[:, 7], UserCodeError, r"the function given as gap of upper z0 on rigid plane"),
     ],
 )
 def test_functions_that_return_no_lengths_are_refused(function: Any, error: Any, match: str) -> None:

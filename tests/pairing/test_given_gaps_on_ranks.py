@@ -43,4 +43,4 @@ def test_functions_that_differ_or_fail_on_one_rank_are_refused_on_all() -> None:
     for differ, negative in answer(2)["messages"]:
         assert "all ranks must be given the same" in differ
         assert "the gap given between upper z0 on lower z1" in differ
-        assert "ContactPair.gap must return lengths of zero or more" in negative
+        assert "gap of upper z0 on lower z1 must be zero or positive everywhere, got" in negative

@@ -233,17 +233,14 @@ def test_gaps_and_interferences_are_those_of_the_package() -> None:
     [
         (
             {"gap": -0.1},
-            r"contacts\.0\.gap must be a length of zero or more, or a formula in x, y and z in quotes",
+            r"contacts\.0\.gap must be a number of at least 0, a formula in x, y and z in quotes, or",
         ),
         ({"gap": "measured"}, r"contacts\.0\.gap: a formula may hold"),
-        (
-            {"interference": [0.1]},
-            r"contacts\.0\.interference must be 'measured', a length of zero or more, or a",
-        ),
+        ({"interference": [0.1]}, r"contacts\.0\.interference must be 'measured', a number of at least 0, a"),
         ({"adjust": -1.0}, r"contacts\.0\.adjust must be a number of at least 0, got -1"),
         (
             {"gap": "x - 0.5"},
-            r"contacts\.0\.gap: the function given as ContactPair\.gap must return lengths of",
+            r"contacts\.0\.gap: gap of a z0 on rigid plane must be zero or positive everywhere",
         ),
         (
             {"interference": "1 / x"},
@@ -373,17 +370,19 @@ def test_there_is_no_time_without_steps() -> None:
 
 def test_fields_come_from_files(tmp_path: Path) -> None:
     (tmp_path / "wind.csv").write_text("x, y, z, p, q\n0, 0, 0, 1, 0.1\n1, 1, 1, 3, 0.3\n")
+    interference = 'interference = { file = "wind.csv", field = "q" }'
     (tmp_path / "scene.toml").write_text(
         changed(
             ('kind = "traction"', 'kind = "pressure"'),
             ("value = [10.0, 0.0, -100.0]", 'value = { file = "wind.csv", field = "p" }'),
-            ("coefficient = 0.3", 'coefficient = { file = "wind.csv", field = "q" }'),
+            ("coefficient = 0.3 }", 'coefficient = { file = "wind.csv", field = "q" } }\n' + interference),
         )
     )
     scene = read_scene_file(tmp_path / "scene.toml", MPI.COMM_SELF).scene
     ends = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
     assert scene.loads[0].value(ends).tolist() == pytest.approx([1.0, 3.0])  # type: ignore[operator]
     assert scene.contacts[0].friction_at(ends).tolist() == pytest.approx([0.1, 0.3])
+    assert scene.contacts[0].gap_at(ends) == pytest.approx([-0.1, -0.3])
     (tmp_path / "wind.csv").unlink()
     with pytest.raises(SceneFileError, match=r"loads\.0\.value: .*wind\.csv"):
         _ = read_scene_file(tmp_path / "scene.toml", MPI.COMM_SELF).scene
