@@ -21,7 +21,7 @@ class Balance:
     """Forces and moments on all bodies together, about one point, and what is missing to equilibrium.
 
     Moments are those of the undeformed geometry, as in the linear theory of the state. The imbalance is
-    governed by the equilibrium of the multipliers with the load (`State.solution.coarse_residual`), which
+    governed by the equilibrium of the multipliers with the load (``State.solution.coarse_residual``), which
     every step of a solver keeps to rounding; for one body without multipliers by the rounding of its
     factorisation, which is larger in slender bodies. It says that no force was forgotten, not how accurate
     the forces are. That is governed by the tolerance of the solver, and by the mesh.

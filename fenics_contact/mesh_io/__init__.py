@@ -7,10 +7,9 @@ from fenics_contact.mesh_io.cad_faces import CadFace
 from fenics_contact.mesh_io.cad_files import read_cad
 from fenics_contact.mesh_io.cad_shapes import cad_shapes
 from fenics_contact.mesh_io.dolfinx_import import from_dolfinx, read_xdmf
-from fenics_contact.mesh_io.field_files import read_field
 from fenics_contact.mesh_io.gmsh_import import from_gmsh_model, read_msh
 from fenics_contact.mesh_io.gmsh_session import gmsh_model
-from fenics_contact.mesh_io.meshio_import import from_meshio, read_mesh
+from fenics_contact.mesh_io.meshio_import import from_meshio, read_mesh, read_with_meshio
 
 __all__ = [
     "CadFace",
@@ -23,8 +22,8 @@ __all__ = [
     "from_meshio",
     "gmsh_model",
     "read_cad",
-    "read_field",
     "read_mesh",
     "read_msh",
+    "read_with_meshio",
     "read_xdmf",
 ]

@@ -4,6 +4,7 @@ from fenics_contact.scene.approach import master_share
 from fenics_contact.scene.bodies import bodies_from
 from fenics_contact.scene.body import Body
 from fenics_contact.scene.effects import Effect, EffectName
+from fenics_contact.scene.field_files import read_field
 from fenics_contact.scene.held import RANK_TOLERANCE, resisted_motions
 from fenics_contact.scene.kernels import rigid_body_modes
 from fenics_contact.scene.loads import (
@@ -103,6 +104,7 @@ __all__ = [
     "gravity",
     "master_share",
     "material_axes",
+    "read_field",
     "resisted_motions",
     "rigid_body_modes",
     "strain",

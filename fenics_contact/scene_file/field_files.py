@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydantic import BaseModel
 
-from fenics_contact import mesh_io
 from fenics_contact.errors import together
+from fenics_contact.scene import Sampled, read_field
 from fenics_contact.scene_file.located import located
 from fenics_contact.scene_file.mistakes import Mistake, SceneFileError
 from fenics_contact.scene_file.places import branches
@@ -17,8 +17,6 @@ from fenics_contact.scene_file.values import FieldFile
 
 if TYPE_CHECKING:
     from mpi4py import MPI
-
-    from fenics_contact.scene import Sampled
 
 Document = TypeVar("Document", bound=BaseModel)
 
@@ -36,7 +34,7 @@ def with_fields_read(source: Source, document: Document, comm: MPI.Comm) -> Docu
     for path, part in branches(document):
         if isinstance(part, FieldFile) and _key(part) not in read:
             with located(source, path, mistakes):
-                read[_key(part)] = mesh_io.read_field(source.folder / part.file, part.field, comm=comm)
+                read[_key(part)] = read_field(source.folder / part.file, part.field, comm=comm)
     with together(comm):
         if mistakes:
             raise SceneFileError(source.name, mistakes)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh_io import read_field
+from fenics_contact.scene import read_field
 
 POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 

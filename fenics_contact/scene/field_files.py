@@ -11,8 +11,8 @@ import numpy as np
 
 from fenics_contact.checks import require_file
 from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.mesh_io.meshio_import import read_with_meshio
-from fenics_contact.scene import Sampled
+from fenics_contact.mesh_io import read_with_meshio
+from fenics_contact.scene.sampled import Sampled
 
 if TYPE_CHECKING:
     from mpi4py import MPI
