@@ -27,7 +27,7 @@ from _site import docstrings, signatures
 PACKAGE = fenics_contact.__name__
 #: As a user meets them; rooms that are not named here come last.
 ORDER = (
-    "gallery mesh mesh_io partition surface_shapes scene contact accuracy shape optimize viz io theory "
+    "gallery mesh mesh_io partition surface_shapes scene contact accuracy shape optimize viz io page theory "
     "progress study scene_file cli outer surfaces pairing fem qp feti checkpoint linalg display timing errors"
 ).split()
 #: Names that the reference uses and does not describe: other libraries', and the standard library's.

@@ -3,54 +3,33 @@
 from __future__ import annotations
 
 import os
-import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fenics_contact._requirements import require_extra
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.io import StoredFields, stored_fields
 from fenics_contact.scene_file import suggestion
 
-FIELD_FILES = (".vtu", ".vtm", ".pvd")
 #: Names of the components of a stress, in VTK's order.
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 
-def newest_member(path: Path) -> Path:
-    """Return the last file named in a .pvd file; any other file itself.
+def newest_member(path: Path) -> StoredFields:
+    """Return the first file of the last time that a .pvd file names; any other file itself.
 
     Raises:
         InvalidInputError: If a .pvd file names none or cannot be read.
     """
-    if path.suffix != ".pvd":
-        return path
-    try:
-        entries = ET.parse(path).getroot().iter("DataSet")
-        times = [(float(entry.get("timestep", 0)), entry.get("file", "")) for entry in entries]
-    except (ET.ParseError, ValueError) as error:
-        raise InvalidInputError(f"'{path}' must be a whole .pvd file, got {error}: write it again") from error
-    if not times:
-        raise InvalidInputError(f"'{path}' must name at least one file of fields, it names none")
-    last = max(time for time, _ in times)
-    files = [file for time, file in times if time == last]
-    return path.parent / files[0]
+    members = stored_fields(path)
+    return next(member for member in members if member.value == members[-1].value)
 
 
 def _blocks(path: Path) -> dict[str, Any]:
     """Read the meshes of a file by name, stresses by components."""
-    require_extra("files of fields", "viz", "pyvista")
-    import pyvista
-
-    member = newest_member(path)
-    if not member.is_file():
-        raise InvalidInputError(f"a file of fields must exist, '{member}' does not: write the result again")
-    data = pyvista.read(member)
-    blocks = {member.stem: data}
-    if isinstance(data, pyvista.MultiBlock):
-        blocks = {str(name): data[name] for name in data.keys()}
+    blocks = newest_member(path).read()
     for block in blocks.values():
         _split_stress(block.point_data)
         _split_stress(block.cell_data)

@@ -1,7 +1,8 @@
-"""`fenics-contact view`: numbers and a picture of a result."""
+"""`fenics-contact view`: numbers, a picture and a web page of a result."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,10 +10,10 @@ import typer
 from rich.table import Table
 
 from fenics_contact.cli.desk import Desk, desk_of, facts
-from fenics_contact.cli.field_files import FIELD_FILES, draw, fields_in, newest_member
+from fenics_contact.cli.field_files import draw, fields_in, newest_member
 from fenics_contact.cli.forces import forces_table
 from fenics_contact.errors import InvalidInputError, MissingRequirementError, together
-from fenics_contact.io import read_result
+from fenics_contact.io import FIELD_FILES, fields_of_result, read_result
 
 #: Entries of a result that are shown, in this order; the others are long.
 SHOWN = (
@@ -25,7 +26,7 @@ LONGEST, MOST = 8, 20
 
 def add_to(app: typer.Typer) -> None:
     """Add the command to the program."""
-    app.command("view", short_help="numbers and a picture of a result")(view)
+    app.command("view", short_help="numbers, a picture and a web page of a result")(view)
 
 
 def view(
@@ -41,6 +42,15 @@ def view(
     save: Annotated[
         Path | None, typer.Option("--save", help="PNG file to draw to.", show_default=False)
     ] = None,
+    page: Annotated[
+        str | None,
+        typer.Option(
+            "--page",
+            metavar="[FILE.html]",
+            help="Write a web page to turn, cut and read, page.html beside the result unless named.",
+            show_default=False,
+        ),
+    ] = None,
     field: Annotated[
         str,
         typer.Option("--field", help="Field shown by the colours, as in the list."),
@@ -52,16 +62,41 @@ def view(
 ) -> None:
     """Show a result: its numbers, its fields, and a picture.
 
-    With a display an interactive window opens; --save writes a PNG file instead. Without a display nothing
-    opens.
+    With a display an interactive window opens; --save writes a PNG file instead, --page a web page. Without a
+    display nothing opens.
     """
     desk = desk_of(context)
     with together(desk.comm):
         if desk.comm.rank == 0:
-            _view(desk, result, save, (field, scale), window=window)
+            _view(desk, result, save, (field, scale), window=window if page is None else None)
+            if page is not None:
+                _write_page(desk, result, page)
 
 
-def _view(desk: Desk, result: Path, save: Path | None, look: tuple[str, float], *, window: bool) -> None:
+def with_page_named(arguments: Sequence[str]) -> list[str]:
+    """Give --page of this command an empty value where no file follows it, as the library wants one."""
+    command = next((word for word in arguments if not word.startswith("-")), "")
+    if command != "view":
+        return list(arguments)
+    named = [*arguments[1:], ""]
+    return [
+        f"{word}=" if word == "--page" and not after.endswith(".html") else word
+        for word, after in zip(arguments, named, strict=True)
+    ]
+
+
+def _write_page(desk: Desk, result: Path, name: str) -> None:
+    from fenics_contact.page import result_page
+
+    target = Path(name) if name else (result if result.is_dir() else result.parent) / "page.html"
+    result_page(result, target)
+    desk.say(f"page in {target}, {target.stat().st_size / 1e6:.1f} MB: open it in a browser")
+
+
+def _view(
+    desk: Desk, result: Path, save: Path | None, look: tuple[str, float], *, window: bool | None
+) -> None:
+    """Print a result and draw it; without a file the picture is left out if window is None."""
     try:
         there, reason = result.exists(), "nothing is there"
     except OSError as error:
@@ -76,25 +111,22 @@ def _view(desk: Desk, result: Path, save: Path | None, look: tuple[str, float], 
         record = read_result(result)
         show_record(desk, record)
         folder = result if result.is_dir() else result.parent
-        fields = _fields_of(folder)
+        fields = fields_of_result(folder)
         pictures = sorted(path.name for path in folder.glob("*.png"))
         if pictures:
             desk.say(f"pictures in {folder}/: {', '.join(pictures)}")
     if fields is None:
         desk.say("no .vtm or .pvd file of fields is there to draw")
         return
-    desk.show(facts(fields_in(fields), f"fields of {newest_member(fields).name}"))
+    desk.show(facts(fields_in(fields), f"fields of {newest_member(fields).file.name}"))
+    if save is None and window is None:
+        return
     try:
-        desk.say(draw(fields, save, look, window=window))
+        desk.say(draw(fields, save, look, window=bool(window)))
     except MissingRequirementError as missing:
         if save is not None:
             raise
         desk.say(f"no picture: {missing}")
-
-
-def _fields_of(folder: Path) -> Path | None:
-    files = [*sorted(folder.glob("*.pvd")), *sorted(folder.glob("*.vtm"))]
-    return files[0] if files else None
 
 
 def show_record(desk: Desk, record: dict[str, Any]) -> None:

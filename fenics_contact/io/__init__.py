@@ -3,25 +3,31 @@
 On several ranks rank 0 writes (XDMF: all ranks together), and all raise if one fails.
 """
 
+from fenics_contact.io.field_files import FIELD_FILES, StoredFields, fields_of_result, stored_fields
 from fenics_contact.io.forces_record import forces_record
 from fenics_contact.io.json_file import json_text, write_json
 from fenics_contact.io.one_run import only_run_in
 from fenics_contact.io.provenance import versions
 from fenics_contact.io.reading import read_result
 from fenics_contact.io.replacing import OutputError, write_text
-from fenics_contact.io.result import write_optimisation_result, write_result
+from fenics_contact.io.result import result_record, write_optimisation_result, write_result
 from fenics_contact.io.series import ResultSeries
 from fenics_contact.io.vtu import write_vtu
 from fenics_contact.io.vtx import write_vtx
 from fenics_contact.io.xdmf import write_xdmf
 
 __all__ = [
+    "FIELD_FILES",
     "OutputError",
     "ResultSeries",
+    "StoredFields",
+    "fields_of_result",
     "forces_record",
     "json_text",
     "only_run_in",
     "read_result",
+    "result_record",
+    "stored_fields",
     "versions",
     "write_json",
     "write_optimisation_result",

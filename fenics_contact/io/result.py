@@ -18,6 +18,7 @@ from fenics_contact.io.json_file import write_json
 from fenics_contact.io.names import checked_name
 from fenics_contact.io.provenance import versions
 from fenics_contact.io.reading import FORMAT, FORMAT_VERSION
+from fenics_contact.qp import SolverStep
 from fenics_contact.scene import SolverKind
 
 if TYPE_CHECKING:
@@ -56,6 +57,8 @@ that was read from a checkpoint says so and has no tolerance |
     | ``counts`` | torn unknowns, multipliers, F-products, steps; `State.counts` |
     | ``seconds`` | by phase |
     | ``residuals`` | ``gluing``, ``natural``, ``equilibrium``; recomputed, relative |
+    | ``residual_history`` | ``method``, ``outer``, ``products``, ``natural``, ``gluing``, ``coarse``: lists, \
+one entry per step of the solver; empty for a state that was read from a checkpoint |
     | ``energies`` | ``strain``, ``load``, ``friction``, ``dual``, ``total_potential``, ``primal`` |
     | ``errors`` | ``algebraic``, ``friction``, ``discretisation``, ``by_body``; None if unknown |
     | ``contact`` | one entry per pair: ``points``, ``open``, ``stick``, ``slip``, ``force`` on the slave, \
@@ -86,12 +89,22 @@ surface, ``force``, ``moment`` and the point ``about`` which it is; ``balance`` 
     Example:
         >>> write_result(state, "output", more={"drop_percent": 12.4})  # doctest: +SKIP
     """
+    comm = state.torn.decomposition.comm
+    with together(comm):
+        target = checked_name(folder, name, ".json")
+    return write_json(target, result_record(state, more=more, errors=errors), comm=comm)
+
+
+@collectively("result_record", lambda state, *_, **__: state.torn.decomposition.comm)
+def result_record(
+    state: State, *, more: Mapping[str, Any] | None = None, errors: bool = False
+) -> dict[str, Any]:
+    """Return what `write_result` writes, with its arguments. Collective."""
     comm, unheld, forces = state.torn.decomposition.comm, state.unheld, forces_record(state)
     with together(comm):
         record = {**_head("state", comm), **_state_record(state, unheld), "forces": forces}
-        target = checked_name(folder, name, ".json")
     record["errors"] = _errors(state) if errors or _knows_errors(state) else None
-    return write_json(target, {**record, "more": dict(more or {})}, comm=comm)
+    return {**record, "more": dict(more or {})}
 
 
 @collectively("write_optimisation_result", lambda result, problem, *_, **__: problem.comm)
@@ -200,6 +213,7 @@ def _state_record(state: State, unheld: Sequence[UnheldMotion]) -> dict[str, Any
             "natural": readable(solution.natural_residual),
             "equilibrium": readable(solution.coarse_residual),
         },
+        "residual_history": _residual_history(solution.history),
         "energies": {
             key: getattr(state.energies, key)
             for key in ("strain", "load", "friction", "dual", "total_potential", "primal")
@@ -207,6 +221,15 @@ def _state_record(state: State, unheld: Sequence[UnheldMotion]) -> dict[str, Any
         "contact": [_pair(state, number) for number in range(len(state.scene.contacts))],
         "unheld": [str(motion) for motion in unheld],
     }
+
+
+def _residual_history(history: Sequence[SolverStep]) -> dict[str, list[Any]]:
+    counted = {name: [getattr(step, name) for step in history] for name in ("method", "outer", "products")}
+    measured = {
+        name: [readable(getattr(step.residuals, name)) for step in history]
+        for name in ("natural", "gluing", "coarse")
+    }
+    return counted | measured
 
 
 def _pair(state: State, number: int) -> dict[str, Any]:

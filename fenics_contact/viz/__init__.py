@@ -8,7 +8,18 @@ returns a `Picture`, which Jupyter shows and which is written to a file if a pat
 from fenics_contact.viz._libraries import check_libraries
 from fenics_contact.viz.before_after import plot_before_after
 from fenics_contact.viz.browser import InteractiveScene
-from fenics_contact.viz.colours import BLUE, FAMILIES, GREEN, GREY, INK, ORANGE, SPARE, STRESS_MAP
+from fenics_contact.viz.colours import (
+    BLUE,
+    FAMILIES,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PRESSURE_MAP,
+    SIGNED_MAP,
+    SPARE,
+    STRESS_MAP,
+)
 from fenics_contact.viz.control_net import plot_control_net
 from fenics_contact.viz.convergence import plot_convergence
 from fenics_contact.viz.curves import plot_curves
@@ -31,6 +42,8 @@ __all__ = [
     "GREY",
     "INK",
     "ORANGE",
+    "PRESSURE_MAP",
+    "SIGNED_MAP",
     "SPARE",
     "STRESS_MAP",
     "InteractiveScene",

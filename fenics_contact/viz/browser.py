@@ -36,10 +36,12 @@ class InteractiveScene:
     Attributes:
         html: The page on the rank that drew, None on the others.
         path: The file it was written to, None if it was not.
+        height: Height in a notebook, in units of its screen.
     """
 
     html: str | None = field(repr=False)
     path: Path | None = None
+    height: int = HEIGHT
 
     def __fspath__(self) -> str:
         """Return the path of the file.
@@ -47,7 +49,7 @@ class InteractiveScene:
         Raises:
             InvalidInputError: If the scene was written to no file.
         """
-        return written_path(self.path, "function interactive a path, such as path='stress.html'")
+        return written_path(self.path, "function a path, such as path='stress.html'")
 
     def __str__(self) -> str:
         """Return the path of the file, or a text if there is none."""
@@ -57,7 +59,7 @@ class InteractiveScene:
         if self.html is None:
             return {"text/plain": ""}
         page = html.escape(self.html, quote=True)
-        return {"text/html": _FRAME.format(page=page, height=HEIGHT), "text/plain": str(self)}
+        return {"text/html": _FRAME.format(page=page, height=self.height), "text/plain": str(self)}
 
 
 def exported(plotter: Any) -> str:

@@ -14,10 +14,12 @@ from tests.house.source import PACKAGE, Module, modules, room_of
 
 FLOOR = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
 BESIDE = {"viz", "io", "study", "scene_file"}
-#: On top of everything: the study of accuracy draws and writes, the command line does all that there is.
+#: On top of everything: the study of accuracy and web pages draw and write, the command line does all that
+#: there is.
 ABOVE = {
     "study": {"viz", "io"},
-    "cli": {"viz", "io", "study", "scene_file"},
+    "page": {"viz", "io"},
+    "cli": {"viz", "io", "study", "scene_file", "page"},
     "__main__": {"cli"},
 }
 #: Rooms that are tested with small dense matrices, and what they never meet.

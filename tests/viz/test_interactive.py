@@ -82,7 +82,7 @@ def test_jupyter_shows_the_page_in_a_frame_and_a_file_holds_it(tmp_path: Path) -
     assert shown.startswith("<iframe srcdoc=")
     assert shown.count('"') == 4, "quotes of the page end the frame"
     assert InteractiveScene(None)._repr_mimebundle_() == {"text/plain": ""}
-    with pytest.raises(InvalidInputError, match=r"not written: give the function interactive a path"):
+    with pytest.raises(InvalidInputError, match=r"not written: give the function a path"):
         Path(InteractiveScene("<html>"))
 
 

@@ -1,0 +1,203 @@
+"""The tables of a page, from the record of a result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+from fenics_contact.viz import Units
+
+Record = Mapping[str, Any]
+
+
+def sections(record: Record, units: Units) -> str:
+    """Return the tables of a result as HTML, each under its heading; nothing for what the record lacks.
+
+    Args:
+        record: What `fenics_contact.io.read_result` returns; may be empty.
+        units: Names of the units.
+    """
+    parts = {
+        "Summary": _rows(_summary(record, units)),
+        "Contact": _contact(record, units),
+        "Load steps": _steps(record, units),
+        "Forces and moments": _forces(record, units),
+        "Errors and residuals": _rows(_accuracy(record)),
+        "Computed with": _rows(_origin(record)),
+    }
+    return "".join(f"<section><h2>{name}</h2>{part}</section>\n" for name, part in parts.items() if part)
+
+
+def number(value: Any) -> str:
+    """Return a value for readers: numbers with five digits, a dash for None."""
+    if value is None:
+        return "–"
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return str(value)
+    text = f"{value:,}" if isinstance(value, int) else f"{value:.5g}"
+    return text.replace(",", "\u202f").replace("-", "\u2212")
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[Any]], words: int) -> str:
+    """Return a table of which the first columns are text; one of many columns is a list on narrow screens."""
+    body = "".join(f"<tr>{_line('td', row, words, head or row)}</tr>\n" for row in rows)
+    top = f"<thead><tr>{_line('th', head, words, head)}</tr></thead>" if head else ""
+    kind = ' class="many"' if len(head) > 5 else ""
+    return f'<div class="wide"><table{kind}>{top}<tbody>\n{body}</tbody></table></div>'
+
+
+def _line(tag: str, cells: Sequence[Any], words: int, head: Sequence[Any]) -> str:
+    texts = [escape(number(cell)) for cell in cells]
+    names = [f' class="number" data-name="{escape(str(name))}"' for name in head]
+    return "".join(
+        f"<{tag}{'' if place < words else names[place]}>{text}</{tag}>" for place, text in enumerate(texts)
+    )
+
+
+def _rows(facts: Mapping[str, Any]) -> str:
+    """Return a table of names and what they are."""
+    kept = [(name, value) for name, value in facts.items() if value not in (None, "")]
+    return _table((), kept, words=2) if kept else ""
+
+
+def _summary(record: Record, units: Units) -> dict[str, Any]:
+    scene, counts, solver = (record.get(name) or {} for name in ("scene", "counts", "solver"))
+    energies, work = record.get("energies") or {}, f"{units.force} {units.length}"
+    facts: dict[str, Any] = {
+        f"body {name}": f"{number(body['cells'])} cells ({body['cell_type']}), {number(body['nodes'])} nodes"
+        for name, body in (scene.get("bodies") or {}).items()
+    }
+    facts |= {name.replace("f_", "F-").replace("_", " "): value for name, value in counts.items()}
+    facts |= {
+        f"energy, {name.replace('_', ' ')}": f"{number(value)} {work}" for name, value in energies.items()
+    }
+    facts["solver"] = ", ".join([*solver.get("methods", ()), solver.get("reason") or ""]).strip(", ")
+    facts["tolerance"] = solver.get("tolerance")
+    facts["held by nothing"] = "; ".join(record.get("unheld") or ())
+    objective = (record.get("optimisation") or {}).get("objective") or {}
+    return facts | {f"objective, {name.replace('_', ' ')}": value for name, value in objective.items()}
+
+
+def _accuracy(record: Record) -> dict[str, Any]:
+    errors = record.get("errors") or {}
+    facts = {f"residual, {name}": value for name, value in (record.get("residuals") or {}).items()}
+    facts |= {
+        f"error, {name.replace('_', ' ')}": value
+        for name, value in errors.items()
+        if not isinstance(value, Mapping)
+    }
+    facts |= {f"error of {name}": value for name, value in (errors.get("by_body") or {}).items()}
+    if facts and not errors:
+        facts["errors"] = "not computed"
+    return facts
+
+
+def _contact(record: Record, units: Units) -> str:
+    entries = record.get("contact") or []
+    names = (record.get("scene") or {}).get("contacts") or [{}] * len(entries)
+    rows: list[tuple[str, str]] = []
+    for pair, entry in zip(names, entries, strict=True):
+        rows.append(("contact", f"{_side(pair.get('slave'))} on {_side(pair.get('master'))}"))
+        states = ", ".join(f"{entry[name]} {name}" for name in ("open", "stick", "slip") if name in entry)
+        rows.append(("points", f"{number(entry.get('points'))}: {states}"))
+        rows += [
+            (words, f"{number(entry[name])} {unit}")
+            for name, words, unit in (
+                ("normal_force", "normal force", units.force),
+                ("peak_pressure", "largest pressure", units.stress),
+                ("area", "area in contact", units.length if _plane(record) else f"{units.length}²"),
+                ("smallest_gap", "smallest gap", units.length),
+                ("largest_slip", "largest slip of the last step", units.length),
+            )
+            if entry.get(name) is not None
+        ]
+    return _table((), rows, words=2) if rows else ""
+
+
+def _side(side: Any) -> str:
+    if not isinstance(side, Mapping):
+        return "?"
+    if "surface" in side:
+        return f"{side['body']} {side['surface']}"
+    return str(side.get("type", "obstacle"))
+
+
+def _plane(record: Record) -> bool:
+    return (record.get("scene") or {}).get("dimension") == 2
+
+
+def _steps(record: Record, units: Units) -> str:
+    steps = (record.get("more") or {}).get("steps")
+    if not isinstance(steps, Mapping) or "name" not in steps:
+        return ""
+    named = {
+        "number": "", "name": "step", "iterations": "iterations", "products": "products", "open": "open",
+        "stick": "stick", "slip": "slip", "normal_force": f"normal force ({units.force})",
+        "friction_force": f"friction ({units.force})", "peak_pressure": f"largest pressure ({units.stress})",
+    }  # fmt: skip
+    columns = [name for name in named if name in steps]
+    rows = list(zip(*(steps[name] for name in columns), strict=True))
+    return _table([named[name] for name in columns], rows, words=2)
+
+
+def _forces(record: Record, units: Units) -> str:
+    """Two rows for each force: itself and its moment, so that narrow screens hold them."""
+    forces = record.get("forces") or {}
+    if not forces:
+        return ""
+    balance = dict(forces.get("balance") or {})
+    about, imbalance = balance.pop("about", None), balance.pop("imbalance", None)
+    entries = [
+        (f"{word} {place}{f' {_side(entry)}' if 'surface' in entry else ''}", entry)
+        for kind, word in (("reactions", "reaction"), ("contacts", "contact"), ("ties", "tie"))
+        for place, entry in enumerate(forces.get(kind) or ())
+    ]
+    entries += [(f"sum of {name}", {**entry, "about": about}) for name, entry in balance.items()]
+    scales = _scales(record, [entry for _, entry in entries])
+    rows = [row for name, entry in entries for row in _force_rows(name, entry, scales, units)]
+    words = f"<p>All forces together lack {escape(number(imbalance))} of the largest sum.</p>"
+    axes = ("x", "y", "z")[: 2 if _plane(record) else 3]
+    return _table(("", "", *axes), rows, words=2) + words
+
+
+def _scales(record: Record, entries: Sequence[Record]) -> dict[str, float]:
+    """Return the force and the moment beside which others are zero but for rounding."""
+    boxes = [body["box"] for body in ((record.get("scene") or {}).get("bodies") or {}).values()]
+    size = max((math.dist(*box) for box in boxes), default=1.0)
+    force, moment = (
+        max((abs(part) for entry in entries for part in _several(entry[name])), default=0.0)
+        for name in ("force", "moment")
+    )
+    return {"force": force, "moment": max(moment, force * size)}
+
+
+def _force_rows(
+    name: str, entry: Record, scales: Mapping[str, float], units: Units, rounding: float = 1e-9
+) -> list[tuple[Any, ...]]:
+    """Return a row for a force and one for its moment; none if both are zero."""
+    force, moment = (
+        [0 if abs(part) <= rounding * scales[kind] else part for part in _several(entry[kind])]
+        for kind in ("force", "moment")
+    )
+    if not any([*force, *moment]):
+        return []
+    about = f"about {', '.join(map(number, entry['about']))}" if entry.get("about") else ""
+    # In the plane a moment is one number, about the axis across it.
+    padded = [*[""] * (len(force) - len(moment)), *moment]
+    return [
+        (name, f"force ({units.force})", *force),
+        (about, f"moment ({units.force} {units.length})", *padded),
+    ]
+
+
+def _several(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, Sequence) else [value]
+
+
+def _origin(record: Record) -> dict[str, Any]:
+    facts = {"written": record.get("written"), "ranks": record.get("ranks")}
+    seconds = record.get("seconds") or {}
+    facts["seconds"] = ", ".join(f"{name} {spent:.2f}" for name, spent in seconds.items())
+    return facts | dict(record.get("versions") or {})
