@@ -57,8 +57,8 @@ that was read from a checkpoint says so and has no tolerance |
     | ``counts`` | torn unknowns, multipliers, F-products, steps; `State.counts` |
     | ``seconds`` | by phase |
     | ``residuals`` | ``gluing``, ``natural``, ``equilibrium``; recomputed, relative |
-    | ``residual_history`` | ``method``, ``outer``, ``products``, ``natural``, ``gluing``, ``coarse``: lists, \
-one entry per step of the solver; empty for a state that was read from a checkpoint |
+    | ``residual_history`` | ``method``, ``outer``, ``products``, ``natural``, ``gluing``, ``coarse``: \
+lists, one entry per step of the solver; empty for a state that was read from a checkpoint |
     | ``energies`` | ``strain``, ``load``, ``friction``, ``dual``, ``total_potential``, ``primal`` |
     | ``errors`` | ``algebraic``, ``friction``, ``discretisation``, ``by_body``; None if unknown |
     | ``contact`` | one entry per pair: ``points``, ``open``, ``stick``, ``slip``, ``force`` on the slave, \

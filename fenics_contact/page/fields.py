@@ -34,17 +34,26 @@ def field_entries(steps: Sequence[Grids], units: Units) -> list[dict[str, Any]]:
     """Return the fields of all steps in the order of the menu.
 
     Each entry has ``source``, the name in the files, ``component``, a column, or −1 for the size of a vector,
-    ``label`` and ``unit``, ``place``, "nodes" or "on_cells", ``contact``, whether it lives on slave surfaces,
+    ``label`` and ``unit``, ``place``, "nodes" or "on_cells", ``smooth``, whether means over cells make sense,
+    ``contact``, whether it lives on slave surfaces,
     ``colours``, "size" or "signed" or "status", ``range`` of the colours, and ``extremes``, the smallest and
     largest value of each step.
     """
     found: dict[str, tuple[str, int]] = {}
+    whole: set[str] = set()
     for grid in (grid for grids in steps for grid in grids.values()):
         for place, data in (("on_cells", grid.cell_data), ("nodes", grid.point_data)):
             found |= {name: (place, _columns(values)) for name, values in data.items()}
+            whole |= {name for name, values in data.items() if np.issubdtype(values.dtype, np.integer)}
     ordered = sorted(found, key=lambda name: list(_KNOWN).index(name) if name in _KNOWN else len(_KNOWN))
     return [
-        {**entry, "place": found[name][0], "contact": name.startswith("contact_"), **_range(steps, entry)}
+        {
+            **entry,
+            "place": found[name][0],
+            "smooth": found[name][0] == "on_cells" and name not in whole,
+            "contact": name.startswith("contact_"),
+            **_range(steps, entry),
+        }
         for name in ordered
         for entry in _components(name, found[name][1], units)
     ]

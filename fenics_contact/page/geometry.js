@@ -1,8 +1,14 @@
-"use strict";
-// Surfaces of moved and cut bodies. A plane cuts the undeformed bodies: {axis, place, side}, side = 1 keeps what
-// lies below the place, -1 what lies above.
+// Surfaces of moved and cut bodies. A plane cuts the undeformed bodies: {axis, place, side}; side = 1 keeps
+// what lies below the place, -1 what lies above.
 
-const SIX = [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]];
+const SIX = [
+  [0, 1, 2, 6],
+  [0, 2, 3, 6],
+  [0, 3, 7, 6],
+  [0, 7, 4, 6],
+  [0, 4, 5, 6],
+  [0, 5, 1, 6],
+];
 const ONE = [[0, 1, 2, 3]];
 
 class Surface {
@@ -31,7 +37,8 @@ class Shape {
   // A body at one scale of its displacement, with values on nodes or cells, and its distances from a plane.
   constructor(body, scale, plane, values, cellwise) {
     Object.assign(this, { body, values, cellwise });
-    const points = body.points.values, moves = body.nodes.displacement && body.nodes.displacement.values;
+    const points = body.points.values,
+      moves = body.nodes.displacement && body.nodes.displacement.values;
     this.positions = moves && scale ? points.map((x, n) => x + scale * moves[n]) : points;
     this.distance = null;
     if (plane) {
@@ -66,7 +73,8 @@ class Shape {
 
   // The skin, or its part on one side of the plane; only those triangles of which all nodes are wanted.
   addSkin(surface, wanted) {
-    const nodes = this.body.triangles.values, owner = this.body.owner.values;
+    const nodes = this.body.triangles.values,
+      owner = this.body.owner.values;
     const places = new Int32Array(this.positions.length / 3).fill(-1);
     const whole = (n) => {
       if (places[n] < 0) places[n] = this.vertex(surface, [n, n, 0]);
@@ -111,12 +119,19 @@ class Shape {
       for (const n of corners) below += this.distance[n] <= 0;
       if (below === 0 || below === columns) continue;
       for (const four of columns === 8 ? SIX : ONE) {
-        const inside = [], outside = [];
+        const inside = [],
+          outside = [];
         for (const n of four) (this.distance[corners[n]] <= 0 ? inside : outside).push(corners[n]);
         if (!inside.length || !outside.length) continue;
-        const ring = inside.length === 2
-          ? [[0, 0], [0, 1], [1, 1], [1, 0]].map(([a, b]) => this.crossing(inside[a], outside[b]))
-          : inside.flatMap((a) => outside.map((b) => this.crossing(a, b)));
+        const ring =
+          inside.length === 2
+            ? [
+                [0, 0],
+                [0, 1],
+                [1, 1],
+                [1, 0],
+              ].map(([a, b]) => this.crossing(inside[a], outside[b]))
+            : inside.flatMap((a) => outside.map((b) => this.crossing(a, b)));
         this.addPolygon(surface, ring, cell);
       }
     }
@@ -138,7 +153,8 @@ class Shape {
 // Means over the cells around each node, as pictures show fields on cells.
 function meansAtNodes(body, values) {
   const { values: corners, columns } = body.cells;
-  const sums = new Float64Array(body.points.values.length / 3), counts = new Uint32Array(sums.length);
+  const sums = new Float64Array(body.points.values.length / 3),
+    counts = new Uint32Array(sums.length);
   for (let n = 0; n < corners.length; n++) {
     sums[corners[n]] += values[Math.floor(n / columns)];
     counts[corners[n]] += 1;

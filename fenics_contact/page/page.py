@@ -22,7 +22,7 @@ from fenics_contact.page.fields import field_entries
 from fenics_contact.page.obstacles import obstacle_entries
 from fenics_contact.page.packing import Arrays
 from fenics_contact.page.source import Source, source_of_files, source_of_states
-from fenics_contact.page.tables import sections
+from fenics_contact.page.tables import sections, status_words
 from fenics_contact.viz import InteractiveScene, Units
 
 
@@ -91,8 +91,7 @@ def _filled(source: Source, title: str, units: Units) -> str:
         "data": json.dumps(data, ensure_ascii=False).replace("<", "\\u003c"),
         "arrays": arrays.packed(),
         "library": get_plotlyjs(),
-        "geometry": _file("geometry.js"),
-        "script": _file("page.js"),
+        "script": "".join(map(_file, ("geometry.js", "content.js", "view.js", "curves.js", "controls.js"))),
     }
     whole = [_file("page.html")]
     for name, text in parts.items():  # a text may contain what marks the place of another
@@ -130,6 +129,7 @@ def _data(source: Source, title: str, units: Units, arrays: Arrays) -> dict[str,
         ],
         "scale": 1.0 if obstacles else _visible_scale(everything, points),
         "obstacles": obstacles,
+        "status": status_words((source.record.get("scene") or {}).get("contacts") or ()),
         "colours": colour_scales(),
         "history": _history(source.record),
     }

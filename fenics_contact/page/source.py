@@ -32,17 +32,19 @@ class Source:
     Attributes:
         steps: Name of each step and its bodies.
         record: What `read_result` returns, empty if there is none.
+        name: Title where the record has none.
         comm: Ranks that know it, None if only the calling one does.
     """
 
     steps: list[tuple[str, Mapping[str, pyvista.UnstructuredGrid]]]
     record: Mapping[str, Any]
+    name: str = "Result"
     comm: MPI.Comm | None = None
 
     @property
     def title(self) -> str:
-        """The title that the result's scene file gives, "Result" if there is none."""
-        return str((self.record.get("more") or {}).get("title") or "Result")
+        """The title that the result's scene file gives, the source's name if there is none."""
+        return str((self.record.get("more") or {}).get("title") or self.name)
 
     @property
     def units(self) -> Units:
@@ -52,14 +54,18 @@ class Source:
 
 def source_of_states(states: Mapping[str, State]) -> Source:
     """Return the fields of states by name and the record of the last one. Collective."""
-    if not states:
-        raise InvalidInputError("a page needs at least one state, got none: solve a scene first")
+    strange = [type(state).__name__ for state in states.values() if not isinstance(state, State)]
+    if strange or not states:
+        raise InvalidInputError(
+            f"a page needs a state, states by name, or a file, got {', '.join(strange) or 'none'}: give what "
+            "solve_scene returned, or the folder that write_result wrote to"
+        )
     steps: list[tuple[str, Mapping[str, pyvista.UnstructuredGrid]]] = []
     for name, state in states.items():
         blocks = state.to_pyvista()
         steps.append((name, {body: blocks[body] for body in blocks.keys()}))
     last = list(states.values())[-1]
-    return Source(steps, json.loads(json_text(result_record(last))), last.torn.decomposition.comm)
+    return Source(steps, json.loads(json_text(result_record(last))), comm=last.torn.decomposition.comm)
 
 
 def source_of_files(path: Path) -> Source:
@@ -80,4 +86,8 @@ def source_of_files(path: Path) -> Source:
             'write_vtu, in a scene file with [output] files = ["vtu"]'
         )
     members = stored_fields(fields)
-    return Source([(member.label or f"{member.value:g}", member.read()) for member in members], record)
+    return Source(
+        [(member.label or f"{member.value:g}", member.read()) for member in members],
+        record,
+        folder.resolve().name,
+    )

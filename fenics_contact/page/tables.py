@@ -100,8 +100,9 @@ def _contact(record: Record, units: Units) -> str:
     rows: list[tuple[str, str]] = []
     for pair, entry in zip(names, entries, strict=True):
         rows.append(("contact", f"{_side(pair.get('slave'))} on {_side(pair.get('master'))}"))
-        states = ", ".join(f"{entry[name]} {name}" for name in ("open", "stick", "slip") if name in entry)
-        rows.append(("points", f"{number(entry.get('points'))}: {states}"))
+        named = zip(("open", "stick", "slip"), status_words([pair]), strict=True)
+        states = [f"{entry[name]} {word}" for name, word in named if word and name in entry]
+        rows.append(("points", f"{number(entry.get('points'))}: {', '.join(states)}"))
         rows += [
             (words, f"{number(entry[name])} {unit}")
             for name, words, unit in (
@@ -114,6 +115,18 @@ def _contact(record: Record, units: Units) -> str:
             if entry.get(name) is not None
         ]
     return _table((), rows, words=2) if rows else ""
+
+
+def status_words(pairs: Sequence[Record]) -> tuple[str, str, str]:
+    """Return what open, sticking and slipping points of contact pairs are called, "" what there is none of.
+
+    Without friction closed points count as slipping, which none of them is.
+    """
+    laws = [pair.get("friction") or {} for pair in pairs]
+    rub = [any(value for name, value in law.items() if name != "type") for law in laws]
+    if all(rub):
+        return "open", "stick", "slip"
+    return ("open", "stick", "slip or closed") if any(rub) else ("open", "", "closed")
 
 
 def _side(side: Any) -> str:
@@ -163,27 +176,27 @@ def _forces(record: Record, units: Units) -> str:
 
 
 def _scales(record: Record, entries: Sequence[Record]) -> dict[str, float]:
-    """Return the force and the moment beside which others are zero but for rounding."""
+    """Return the force, the moment and the length beside which others are zero but for rounding."""
     boxes = [body["box"] for body in ((record.get("scene") or {}).get("bodies") or {}).values()]
     size = max((math.dist(*box) for box in boxes), default=1.0)
     force, moment = (
         max((abs(part) for entry in entries for part in _several(entry[name])), default=0.0)
         for name in ("force", "moment")
     )
-    return {"force": force, "moment": max(moment, force * size)}
+    return {"force": force, "moment": max(moment, force * size), "about": size}
 
 
 def _force_rows(
     name: str, entry: Record, scales: Mapping[str, float], units: Units, rounding: float = 1e-9
 ) -> list[tuple[Any, ...]]:
     """Return a row for a force and one for its moment; none if both are zero."""
-    force, moment = (
-        [0 if abs(part) <= rounding * scales[kind] else part for part in _several(entry[kind])]
-        for kind in ("force", "moment")
+    force, moment, place = (
+        [0 if abs(part) <= rounding * scales[kind] else part for part in _several(entry.get(kind) or ())]
+        for kind in ("force", "moment", "about")
     )
     if not any([*force, *moment]):
         return []
-    about = f"about {', '.join(map(number, entry['about']))}" if entry.get("about") else ""
+    about = f"about {', '.join(map(number, place))}" if place else ""
     # In the plane a moment is one number, about the axis across it.
     padded = [*[""] * (len(force) - len(moment)), *moment]
     return [
