@@ -40,10 +40,15 @@ class Browser:
 
     def open(self, page: Path, width: int = 1280, height: int = 900) -> None:
         """Open a page at a width of the screen and wait until it has drawn."""
+        self.go(page, width, height)
+        self.wait("return Number(document.getElementById('view').dataset.drawn || 0) > 0")
+
+    def go(self, page: Path, width: int = 1280, height: int = 900) -> None:
+        """Open a page and forget what was asked for and complained about before."""
+        self.requests(), self.messages()
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
         self._post("goog/cdp/execute", {"cmd": "Emulation.setDeviceMetricsOverride", "params": size})
         self._post("url", {"url": page.as_uri()})
-        self.wait("return Number(document.getElementById('view').dataset.drawn || 0) > 0")
 
     def run(self, script: str, *arguments: Any) -> Any:
         """Return what a script returns."""
