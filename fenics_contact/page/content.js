@@ -39,7 +39,6 @@ function connect(arrays) {
           ),
           nodes: all(body.nodes),
           on_cells: all(body.on_cells),
-          means: {},
         },
     );
   }
@@ -65,12 +64,7 @@ function component({ values, columns }, number) {
 function valuesOf(body) {
   const { source, place, component: number } = field();
   if (!body[place][source]) return [null, false];
-  if (place === "nodes") return [component(body.nodes[source], number), false];
-  const values = component(body.on_cells[source], number);
-  if (!field().smooth || !$("smooth").checked) return [values, true];
-  const key = `${source} ${number}`;
-  body.means[key] = body.means[key] || meansAtNodes(body, values);
-  return [body.means[key], false];
+  return [component(body[place][source], number), place === "on_cells"];
 }
 
 // The corners of the box around all steps at the chosen scale, and around the undeformed bodies.

@@ -25,7 +25,11 @@ function prepare() {
   page.box = box(null);
   page.lift = 1e-3 * Math.max(...page.box[1].map((x, n) => x - page.box[0][n]));
   $("title").textContent = page.title;
-  page.fields.forEach(({ label }, n) => $("field").add(new Option(label, n)));
+  for (const part of new Set(page.fields.map((each) => each.part))) {
+    const group = Object.assign(document.createElement("optgroup"), { label: part });
+    page.fields.forEach((each, n) => each.part === part && group.append(new Option(each.label, n)));
+    $("field").append(group);
+  }
   setRange(field().range);
   choose("field", ({ value }) => {
     shown.field = Number(value);
@@ -47,8 +51,7 @@ function prepare() {
   $("near").parentElement.hidden = !page.steps.some((step) =>
     step.bodies.some((body) => body && status(body) && status(body).some((mark) => mark > 0)),
   );
-  for (const id of ["low", "high", "smooth", "axis", "place", "other", "near", "mesh", "axes"])
-    choose(id, () => {});
+  for (const id of ["low", "high", "axis", "place", "other", "near", "mesh", "axes"]) choose(id, () => {});
   $("whole").addEventListener("click", () => {
     setRange(field().extremes[shown.step] || field().range);
     draw();

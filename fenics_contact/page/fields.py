@@ -17,40 +17,39 @@ if TYPE_CHECKING:
 _AXES = ("x", "y", "z")
 _TENSOR = ("xx", "yy", "zz", "xy", "yz", "xz")
 _PRINCIPAL = ("first (largest)", "second", "third (smallest)")
-#: Fields of the library: words, and the unit's name in `Units`. In the order of the menu.
+#: Fields of the library: part of the menu, words, and the unit's name in `Units`. In the order of the menu.
 _KNOWN = {
-    "von_mises": ("von Mises stress", "stress"),
-    "displacement": ("displacement", "length"),
-    "contact_status": ("contact status", ""),
-    "contact_pressure": ("contact pressure", "stress"),
-    "contact_force": ("contact force at nodes", "force"),
-    "contact_slip": ("slip in the last load step", "length"),
-    "stress": ("stress", "stress"),
-    "principal_stress": ("principal stress", "stress"),
+    "nodal_von_mises": ("at nodes", "von Mises stress", "stress"),
+    "displacement": ("at nodes", "displacement", "length"),
+    "nodal_stress": ("at nodes", "stress", "stress"),
+    "nodal_principal_stress": ("at nodes", "principal stress", "stress"),
+    "contact_status": ("contact", "contact status", ""),
+    "contact_pressure": ("contact", "contact pressure", "stress"),
+    "contact_force": ("contact", "contact force of a node", "force"),
+    "contact_slip": ("contact", "slip in the last load step", "length"),
+    "von_mises": ("means over cells", "von Mises stress of cells", "stress"),
+    "stress": ("means over cells", "stress of cells", "stress"),
+    "principal_stress": ("means over cells", "principal stress of cells", "stress"),
 }
 
 
 def field_entries(steps: Sequence[Grids], units: Units) -> list[dict[str, Any]]:
     """Return the fields of all steps in the order of the menu.
 
-    Each entry has ``source``, the name in the files, ``component``, a column, or −1 for the size of a vector,
-    ``label`` and ``unit``, ``place``, "nodes" or "on_cells", ``smooth``, whether means over cells make sense,
-    ``contact``, whether it lives on slave surfaces,
-    ``colours``, "size" or "signed" or "status", ``range`` of the colours, and ``extremes``, the smallest and
-    largest value of each step.
+    Each entry has ``part`` of the menu, ``source``, the name in the files, ``component``, a column, or −1 for
+    the size of a vector, ``label`` and ``unit``, ``place``, "nodes" or "on_cells", ``contact``, whether it
+    lives on slave surfaces, ``colours``, "size" or "signed" or "status", ``range`` of the colours, and
+    ``extremes``, the smallest and largest value of each step.
     """
     found: dict[str, tuple[str, int]] = {}
-    whole: set[str] = set()
     for grid in (grid for grids in steps for grid in grids.values()):
         for place, data in (("on_cells", grid.cell_data), ("nodes", grid.point_data)):
             found |= {name: (place, _columns(values)) for name, values in data.items()}
-            whole |= {name for name, values in data.items() if np.issubdtype(values.dtype, np.integer)}
     ordered = sorted(found, key=lambda name: list(_KNOWN).index(name) if name in _KNOWN else len(_KNOWN))
     return [
         {
             **entry,
             "place": found[name][0],
-            "smooth": found[name][0] == "on_cells" and name not in whole,
             "contact": name.startswith("contact_"),
             **_range(steps, entry),
         }
@@ -64,20 +63,20 @@ def _columns(values: np.ndarray) -> int:
 
 
 def _components(name: str, columns: int, units: Units) -> list[dict[str, Any]]:
-    words, quantity = _KNOWN.get(name, (name.replace("_", " "), ""))
+    part, words, quantity = _KNOWN.get(name, ("more", name.replace("_", " "), ""))
     unit = getattr(units, quantity) if quantity else ""
     parts = (
         {-1: "magnitude", **dict(enumerate(_AXES))}
         if columns == 3
         else dict(enumerate(range(1, columns + 1)))
     )
-    if name == "stress" or columns == 6:
+    if columns == 6:
         parts = dict(enumerate(_TENSOR))
-    elif name == "principal_stress":
+    elif name.endswith("principal_stress"):
         parts = dict(enumerate(_PRINCIPAL))
-    labels = {0: words} if columns == 1 else {number: f"{words}, {part}" for number, part in parts.items()}
+    labels = {0: words} if columns == 1 else {number: f"{words}, {which}" for number, which in parts.items()}
     return [
-        {"source": name, "component": number, "label": label, "unit": unit}
+        {"part": part, "source": name, "component": number, "label": label, "unit": unit}
         for number, label in labels.items()
     ]
 

@@ -149,15 +149,3 @@ class Shape {
     }
   }
 }
-
-// Means over the cells around each node, as pictures show fields on cells.
-function meansAtNodes(body, values) {
-  const { values: corners, columns } = body.cells;
-  const sums = new Float64Array(body.points.values.length / 3),
-    counts = new Uint32Array(sums.length);
-  for (let n = 0; n < corners.length; n++) {
-    sums[corners[n]] += values[Math.floor(n / columns)];
-    counts[corners[n]] += 1;
-  }
-  return sums.map((sum, n) => (counts[n] ? sum / counts[n] : 0));
-}

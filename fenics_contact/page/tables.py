@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from fenics_contact.linalg import ROUNDING
 from fenics_contact.viz import Units
 
 Record = Mapping[str, Any]
@@ -160,48 +160,38 @@ def _forces(record: Record, units: Units) -> str:
     forces = record.get("forces") or {}
     if not forces:
         return ""
-    balance = dict(forces.get("balance") or {})
-    about, imbalance = balance.pop("about", None), balance.pop("imbalance", None)
+    balance = forces["balance"]
     entries = [
         (f"{word} {place}{f' {_side(entry)}' if 'surface' in entry else ''}", entry)
         for kind, word in (("reactions", "reaction"), ("contacts", "contact"), ("ties", "tie"))
-        for place, entry in enumerate(forces.get(kind) or ())
+        for place, entry in enumerate(forces[kind])
     ]
-    entries += [(f"sum of {name}", {**entry, "about": about}) for name, entry in balance.items()]
-    scales = _scales(record, [entry for _, entry in entries])
-    rows = [row for name, entry in entries for row in _force_rows(name, entry, scales, units)]
-    words = f"<p>All forces together lack {escape(number(imbalance))} of the largest sum.</p>"
+    entries += [
+        (f"sum of {name}", {**entry, "about": balance["about"]})
+        for name, entry in balance.items()
+        if isinstance(entry, Mapping)
+    ]
+    rows = [row for name, entry in entries for row in _force_rows(name, entry, balance, units)]
+    words = f"<p>Imbalance of all forces and moments: {escape(number(balance['imbalance']))}.</p>"
     axes = ("x", "y", "z")[: 2 if _plane(record) else 3]
     return _table(("", "", *axes), rows, words=2) + words
 
 
-def _scales(record: Record, entries: Sequence[Record]) -> dict[str, float]:
-    """Return the force, the moment and the length beside which others are zero but for rounding."""
-    boxes = [body["box"] for body in ((record.get("scene") or {}).get("bodies") or {}).values()]
-    size = max((math.dist(*box) for box in boxes), default=1.0)
-    force, moment = (
-        max((abs(part) for entry in entries for part in _several(entry[name])), default=0.0)
-        for name in ("force", "moment")
-    )
-    return {"force": force, "moment": max(moment, force * size), "about": size}
-
-
-def _force_rows(
-    name: str, entry: Record, scales: Mapping[str, float], units: Units, rounding: float = 1e-9
-) -> list[tuple[Any, ...]]:
+def _force_rows(name: str, entry: Record, balance: Record, units: Units) -> list[tuple[Any, ...]]:
     """Return a row for a force and one for its moment; none if both are zero."""
-    force, moment, place = (
-        [0 if abs(part) <= rounding * scales[kind] else part for part in _several(entry.get(kind) or ())]
-        for kind in ("force", "moment", "about")
+    scales = {kind: balance[f"{kind}_scale"] for kind in ("force", "moment")}
+    scales["about"] = scales["moment"] / scales["force"] if scales["force"] else 0.0
+    force, moment, about = (
+        [0 if abs(part) <= ROUNDING * scale else part for part in _several(entry[kind])]
+        for kind, scale in scales.items()
     )
     if not any([*force, *moment]):
         return []
-    about = f"about {', '.join(map(number, place))}" if place else ""
     # In the plane a moment is one number, about the axis across it.
     padded = [*[""] * (len(force) - len(moment)), *moment]
     return [
         (name, f"force ({units.force})", *force),
-        (about, f"moment ({units.force} {units.length})", *padded),
+        (f"about {', '.join(map(number, about))}", f"moment ({units.force} {units.length})", *padded),
     ]
 
 

@@ -281,12 +281,7 @@ function say() {
   words.push(`displacement × ${written(shown.scale)}`);
   if (at)
     words.push(`section of the undeformed bodies at ${"xyz"[at.axis]} = ${written(at.name)} ${page.length}`);
-  if (field().place === "on_cells")
-    words.push(
-      field().smooth && $("smooth").checked
-        ? "colours are means at the nodes, the range is that of the cells"
-        : "one value per cell",
-    );
+  if (field().place === "on_cells") words.push("one value per cell");
   if (field().contact) words.push("on slave surfaces");
   const missing = page.obstacles.filter(({ lines: each }) => !each.length).map(({ type }) => type);
   if (missing.length) words.push(`not drawn: ${missing.join(", ")}`);
@@ -294,7 +289,6 @@ function say() {
   $("step-name").textContent = `${shown.step + 1} of ${page.steps.length}: ${step.label}`;
   $("scale-name").textContent = written(shown.scale);
   $("colours").hidden = field().colours === "status";
-  $("smooth").parentElement.hidden = !field().smooth;
   $("place").disabled = $("other").disabled = !at;
   $("place-name").textContent = at ? `${written(at.name)} ${page.length}` : "";
 }
