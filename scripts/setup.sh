@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
 # Set up everything on Debian 12 or 13: Debian's FEniCSx and gmsh, and .venv on top of Debian's own Python.
-# What is already there is left alone; an interrupted run is repaired by the next one.
+# What is already there is left alone; an interrupted run is repaired by the next one. Arguments are further Debian
+# packages to install.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)
 cd "$root"
 unset PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE=1 # packages of the user's own would hide Debian's
 
-packages=(python3-dolfinx-real python3-gmsh python3-venv libopenblas0-pthread libegl1 ca-certificates)
+packages=(python3-dolfinx-real python3-gmsh python3-venv libopenblas0-pthread libegl1 ca-certificates "$@")
 python=/usr/bin/python3 # never another python3 that comes first on PATH: only Debian's sees Debian's FEniCSx
 venv=.venv
 stamp=$venv/.fenics_contact-ready

@@ -38,7 +38,7 @@ def result_page(
     The page is one file that works without a server and without a network, and in notebooks. It shows the
     bodies with any of their fields, a section, a magnified deformation, the contact, the load steps, the
     history of residuals, forces and moments, and how it was computed. It holds the meshes and all fields of
-    all steps, numbers with four digits: a megabyte for about 10 000 cells and step, besides 5 MB for the
+    all steps, numbers with four digits: for each step a megabyte for 15 000 cells, besides 5 MB for the
     library plotly, which draws.
 
     Args:

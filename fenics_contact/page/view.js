@@ -282,6 +282,8 @@ function say() {
   if (at)
     words.push(`section of the undeformed bodies at ${"xyz"[at.axis]} = ${written(at.name)} ${page.length}`);
   if (field().place === "on_cells") words.push("one value per cell");
+  if (found && (found[0] < Number($("low").value) || found[1] > Number($("high").value)))
+    words.push("values beyond the bar have the colours of its ends");
   if (field().contact) words.push("on slave surfaces");
   const missing = page.obstacles.filter(({ lines: each }) => !each.length).map(({ type }) => type);
   if (missing.length) words.push(`not drawn: ${missing.join(", ")}`);

@@ -68,6 +68,10 @@ def test_energies_residuals_and_contact_are_the_states(tmp_path: Path) -> None:
     assert found["energies"]["total_potential"] == state.energies.total_potential != 0.0
     assert found["residuals"]["gluing"] == state.solution.gluing_residual > 0.0
     assert found["residuals"]["equilibrium"] == state.solution.coarse_residual
+    history = found["residual_history"]
+    assert history["natural"] == [step.residuals.natural for step in state.solution.history]
+    assert history["products"][-1] == state.solution.history[-1].products > 0
+    assert {len(column) for column in history.values()} == {len(state.solution.history)}
     assert found["solver"]["tolerance"] == 1e-6
     assert found["solver"]["methods"] == ["face Newton"]
     assert sum(found["seconds"].values()) > 0.0

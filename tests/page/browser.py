@@ -15,6 +15,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from fenics_contact.launching import clean_environment
+
 DRIVER = shutil.which("chromedriver")
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 MISSING = "needs Chromium and chromedriver, on Debian: apt-get install chromium chromium-driver"
@@ -128,9 +130,8 @@ def browser(folder: Path) -> Iterator[Browser]:
         "goog:loggingPrefs": {"browser": "ALL", "performance": "ALL"},
     }
     url = f"http://127.0.0.1:{port}"
-    with subprocess.Popen(
-        [DRIVER, f"--port={port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    ) as driver:
+    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen([DRIVER, f"--port={port}"], env=clean_environment(), **silent) as driver:
         try:
             wait_for(url)
             session = answer(f"{url}/session", {"capabilities": {"alwaysMatch": wanted}})
