@@ -71,7 +71,11 @@ BESIDE = [
     Room("io", "files", "beside"),
     Room("scene_file", "TOML → scene", "beside"),
 ]
-TOP = [Room("cli", "the command fenics-contact", "top"), Room("study", "what accuracy costs in time", "top")]
+TOP = [
+    Room("cli", "the command fenics-contact", "top"),
+    Room("study", "what accuracy costs in time", "top"),
+    Room("page", "web pages of results", "top"),
+]
 FLOW = [
     ("1", "Scene", "what there is; nothing numerical"),
     ("2", "TornSystem", "subdomains on every rank: K, f, R, rows of B"),
