@@ -4,7 +4,10 @@ from __future__ import annotations
 
 _DIMENSION = {"triangle": 2, "quadrilateral": 2, "tetrahedron": 3, "hexahedron": 3}
 #: Quadratic cells and the linear ones of the same shape.
-_SHAPE = {"triangle6": "triangle", "quadrilateral9": "quadrilateral", "hexahedron27": "hexahedron"}
+_SHAPE = {
+    "triangle6": "triangle", "quadrilateral9": "quadrilateral",
+    "tetrahedron10": "tetrahedron", "hexahedron27": "hexahedron",
+}  # fmt: skip
 #: The cell types of bodies.
 CELL_TYPES = (*_DIMENSION, *_SHAPE)
 
@@ -17,6 +20,7 @@ NODE_ORDER = {
     "hexahedron": [0, 1, 3, 2, 4, 5, 7, 6],
     "triangle6": [0, 1, 2, 4, 5, 3],
     "quadrilateral9": [0, 1, 3, 2, 4, 7, 5, 6, 8],
+    "tetrahedron10": [0, 1, 2, 3, 9, 8, 5, 7, 6, 4],
     "hexahedron27": [
         *(0, 1, 3, 2, 4, 5, 7, 6),
         *(8, 11, 16, 9, 17, 10, 19, 18, 12, 15, 13, 14),
@@ -43,8 +47,9 @@ def degree(cell_type: str) -> int:
 
 
 def cell_type_named(name: str, order: int) -> str:
-    """Return the type of cells with dolfinx's name and degree."""
-    return name if order == 1 else next(cell for cell, linear in _SHAPE.items() if linear == name)
+    """Return the type of cells with dolfinx's name and degree; the name itself if bodies cannot have them."""
+    higher = [cell for cell, linear in _SHAPE.items() if linear == name and order == 2]
+    return higher[0] if higher else name
 
 
 def facet_vertices(cell_type: str) -> list[list[int]]:

@@ -7,14 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from fenics_contact._dolfinx.cells import NODE_ORDER
+from fenics_contact._dolfinx.cells import NODE_ORDER, cell_type_named, facet_vertices
 from fenics_contact._dolfinx.loading import cpp, dolfinx, old
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import InvalidInputError
 
 __all__ = ["MeshArrays", "TagArrays", "mesh_arrays", "read_mesh", "read_tags", "tag_arrays"]
-
-_VERTICES = {"triangle": 3, "quadrilateral": 4, "tetrahedron": 4, "hexahedron": 8, "prism": 6, "pyramid": 5}
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,12 +20,12 @@ class MeshArrays:
     """A mesh on one rank.
 
     Attributes:
-        cell_type: dolfinx's name of the cells.
+        cell_type: Type of the cells; dolfinx's name if bodies cannot have them.
         dim: Topological dimension of the cells.
         points: Coordinates, (n_nodes, geometric dimension), in the order of dolfinx's input.
-        cells: Node numbers, (n_cells, nodes of a cell), in the order of dolfinx's input; vertices in VTK
-            order where the cells are linear.
-        linear: Whether cells have no nodes except their vertices.
+        cells: Node numbers, (n_cells, nodes of a cell), in the order of dolfinx's input; nodes of cells that
+            bodies can have in VTK order.
+        order: Degree of the map from the reference cell.
         node: Number of every node of dolfinx's geometry among ``points``.
         cell: Number of every cell of dolfinx's topology among ``cells``.
     """
@@ -36,7 +34,7 @@ class MeshArrays:
     dim: int
     points: np.ndarray
     cells: np.ndarray
-    linear: bool
+    order: int
     node: np.ndarray
     cell: np.ndarray
 
@@ -137,12 +135,13 @@ def mesh_arrays(mesh: dolfinx.mesh.Mesh) -> MeshArrays:
     dofmap = np.asarray(getattr(geometry.dofmap, "array", geometry.dofmap)).reshape(n_cells, -1)
     cells: np.ndarray = np.empty(dofmap.shape, dtype=np.int64)
     cells[cell] = node[dofmap]
-    linear = cells.shape[1] == _VERTICES.get(name)
     points = np.empty((node.size, geometry.dim))
     points[node] = geometry.x[:, : geometry.dim]
-    if linear:
-        cells = cells[:, NODE_ORDER.get(name, slice(None))]
-    return MeshArrays(name, topology.dim, points, cells, linear, node, cell)
+    order = int((geometry.cmap if hasattr(geometry.cmap, "degree") else geometry.cmaps[0]).degree)
+    kind = cell_type_named(name, order)
+    if kind in NODE_ORDER:
+        cells = cells[:, np.argsort(NODE_ORDER[kind])]
+    return MeshArrays(kind, topology.dim, points, cells, order, node, cell)
 
 
 def tag_arrays(mesh: dolfinx.mesh.Mesh, arrays: MeshArrays, tags: dolfinx.mesh.MeshTags) -> TagArrays:
@@ -154,4 +153,6 @@ def tag_arrays(mesh: dolfinx.mesh.Mesh, arrays: MeshArrays, tags: dolfinx.mesh.M
     topology.create_connectivity(arrays.dim, tags.dim)
     core = mesh._mesh if old() else mesh._cpp_object
     rows = cpp.mesh.entities_to_geometry(core, tags.dim, np.asarray(tags.indices, dtype=np.int32), False)
-    return TagArrays(arrays.node[np.asarray(rows).reshape(len(tags.indices), -1)], np.asarray(tags.values))
+    facets = arrays.node[np.asarray(rows).reshape(len(tags.indices), -1)]
+    corners = len(facet_vertices(arrays.cell_type)[0])  # before the other nodes of quadratic facets
+    return TagArrays(facets[:, :corners], np.asarray(tags.values))

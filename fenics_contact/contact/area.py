@@ -6,6 +6,7 @@ import numpy as np
 
 from fenics_contact.contact.state import State
 from fenics_contact.scene import Surface, surface_of
+from fenics_contact.surfaces import filled_at_corners
 
 #: Newton steps to the root of a cubic, from above: sufficient in practice for any ratio of its coefficients.
 NEWTON_STEPS = 60
@@ -36,6 +37,8 @@ def contact_area(state: State, pair: int = 0) -> float:
     pressure, spread = np.zeros(len(nodes)), np.zeros(len(nodes))
     pressure[place] = contact.pressure[mine] * (contact.status[mine] > 0)
     spread[place] = _modulus(state, pair) * np.maximum(contact.gap[mine], 0.0)
+    whole = np.searchsorted(surface.nodes, scene.bodies[slave.body].mesh.surfaces[slave.name])
+    pressure, spread = filled_at_corners(whole, pressure), np.maximum(filled_at_corners(whole, spread), 0.0)
     closed = pressure > 0.0
     total = 0.0
     for corners, weight in _simplices(surface.corners):

@@ -10,6 +10,8 @@ from fenics_contact.contact.cell_stress import components_of, principal, von_mis
 from fenics_contact.contact.result import ContactResult
 from fenics_contact.display import displayed
 from fenics_contact.pairing import NodeNumbers
+from fenics_contact.scene import Scene
+from fenics_contact.surfaces import filled_at_corners
 
 
 @displayed
@@ -31,37 +33,45 @@ class GatheredFields:
     cells: dict[str, np.ndarray]
 
 
-def contact_fields(contact: ContactResult, numbers: NodeNumbers, body: str) -> dict[str, np.ndarray]:
+def contact_fields(
+    contact: ContactResult, scene: Scene, numbers: NodeNumbers, body: str
+) -> dict[str, np.ndarray]:
     """Return the contact result of a body's surfaces as fields on all its nodes.
 
     Args:
         contact: Result on all contact surfaces.
+        scene: The scene.
         numbers: Numbers of the nodes of all bodies.
         body: Name of the body.
 
     Returns:
         ``contact_status``, (n_nodes,) int: the value of `Status`, −1 on nodes that are not contact points;
         and, zero on those, ``contact_pressure``, (n_nodes,), [force / length²], ``contact_force`` on the
-        slave and ``contact_slip``, (n_nodes, 3), [force] and [length]. A node that belongs to several pairs
-        has their sum, and the status of the last.
+        slave and ``contact_slip``, (n_nodes, 3), [force] and [length]. At the corners of quadratic triangles
+        pressure and slip are interpolated, see `filled_at_corners`. A node that belongs to several pairs has
+        their sum, and the status of the last.
     """
     start, end = numbers.node_offset[numbers.body_names.index(body) :][:2]
     count = int(end - start)
     nodes = contact.points.slave - start
     mine = np.flatnonzero((nodes >= 0) & (nodes < count))
 
-    def summed(values: np.ndarray) -> np.ndarray:
-        field = np.zeros((count, *values.shape[1:]))
-        np.add.at(field, nodes[mine], values[mine])
-        return field
+    def summed(values: np.ndarray, filled: bool = False) -> np.ndarray:
+        total = np.zeros((count, *values.shape[1:]))
+        for pair in np.unique(contact.points.pair[mine]):
+            field, own = np.zeros_like(total), mine[contact.points.pair[mine] == pair]
+            field[nodes[own]] = values[own]
+            facets = scene.bodies[body].mesh.surfaces[scene.contacts[pair].slave.name]
+            total += filled_at_corners(facets, field) if filled else field
+        return total
 
     status = np.full(count, -1, dtype=np.int32)
     status[nodes[mine]] = contact.status[mine]
     return {
         "contact_status": status,
-        "contact_pressure": summed(contact.pressure),
+        "contact_pressure": np.maximum(summed(contact.pressure, filled=True), 0.0),
         "contact_force": summed(contact.force),
-        "contact_slip": summed(contact.slip_in_space),
+        "contact_slip": summed(contact.slip_in_space, filled=True),
     }
 
 

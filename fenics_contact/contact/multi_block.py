@@ -26,6 +26,7 @@ _VTK_NAMES = {
     "hexahedron27": "TRIQUADRATIC_HEXAHEDRON",
     "quadrilateral9": "BIQUADRATIC_QUAD",
     "triangle6": "QUADRATIC_TRIANGLE",
+    "tetrahedron10": "QUADRATIC_TETRA",
 }
 
 

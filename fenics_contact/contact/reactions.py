@@ -9,7 +9,7 @@ from fenics_contact.contact.nodal_forces import NodalForces
 from fenics_contact.contact.resultant import Resultants, point_of, resultant
 from fenics_contact.pairing import NodeNumbers
 from fenics_contact.scene import Scene, Surface
-from fenics_contact.surfaces import nodal_areas, surface_moments
+from fenics_contact.surfaces import share_areas, surface_moments
 
 
 def support_reactions(
@@ -37,8 +37,7 @@ def support_shares(scene: Scene, numbers: NodeNumbers) -> list[np.ndarray]:
     areas = []
     for support in scene.supports:
         mesh = scene.bodies[support.body].mesh
-        facets = mesh.surfaces[support.surface]
-        own = np.bincount(facets.ravel(), nodal_areas(mesh.points, facets).ravel(), minlength=mesh.n_nodes)
+        own = share_areas(mesh, support.surface)
         area = np.zeros((numbers.n_nodes, scene.dim))
         held = [component is not None for component in support.value]
         area[numbers.global_nodes(support.body, np.arange(mesh.n_nodes))] = own[:, None] * held

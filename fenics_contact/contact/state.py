@@ -289,7 +289,7 @@ class State:
         )
 
     def _contact_fields(self, body: str) -> dict[str, np.ndarray]:
-        return contact_fields(self.contact, self.torn.decomposition.tearing, body)
+        return contact_fields(self.contact, self.scene, self.torn.decomposition.tearing, body)
 
     @collectively("State.reactions", _comm)
     def reactions(self, about: GivenVector | np.ndarray | None = None) -> Resultants:

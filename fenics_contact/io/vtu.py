@@ -25,6 +25,7 @@ _MESHIO_NAMES = {
     "hexahedron27": "hexahedron27",
     "quadrilateral9": "quad9",
     "triangle6": "triangle6",
+    "tetrahedron10": "tetra10",
 }
 
 

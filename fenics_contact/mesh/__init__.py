@@ -6,8 +6,7 @@ from fenics_contact.mesh.body_mesh import BodyMesh
 from fenics_contact.mesh.cell_types import (
     CELL_TYPES,
     FACET_TYPES,
-    QUADRATIC,
-    QUADRATIC_FILE,
+    OF_THE_FILE,
     CellType,
     cell_type_of,
 )
@@ -33,8 +32,7 @@ from fenics_contact.mesh.shape_functions import quadrature, shape_gradients, sha
 __all__ = [
     "CELL_TYPES",
     "FACET_TYPES",
-    "QUADRATIC",
-    "QUADRATIC_FILE",
+    "OF_THE_FILE",
     "BodyMesh",
     "CellType",
     "boundary_faces",

@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 
 from fenics_contact.display import displayed
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import quality
 from fenics_contact.mesh.cell_types import cell_type_of
 from fenics_contact.mesh.coincidence import check_no_coincident_nodes
+from fenics_contact.mesh.quadratic_nodes import check_node_order
 from fenics_contact.mesh.shape_fit import check_shapes
 from fenics_contact.mesh.similarity import similarity
 from fenics_contact.mesh.validation import (
@@ -39,12 +41,12 @@ class BodyMesh:
         points: Coordinates, (n_nodes, 3 | 2) float64, in the scene's unit of length.
         cells: Node numbers, (n_cells, 8) for hexahedra, (n_cells, 4) for tetrahedra; in two dimensions
             (n_cells, 4) for quadrilaterals, (n_cells, 3) for triangles; quadratic hexahedra have 27 nodes,
-            quadratic quadrilaterals 9 and triangles 6 (`quadratic` makes them); int64, nodes in the order of
-            VTK, Jacobian positive (in two dimensions: counter-clockwise).
+            tetrahedra 10, quadrilaterals 9 and triangles 6 (`quadratic` makes them); int64, nodes in the
+            order of VTK, Jacobian positive (in two dimensions: counter-clockwise).
         surfaces: Name to facets, (n_facets, 4 | 3) int64 node numbers in cyclic order, the right-hand
             normal pointing out of the body. In two dimensions (n_facets, 2) edges with the body on their
             left: run through in their direction, the boundary runs counter-clockwise around the body. Facets
-            of quadratic cells have their midpoints after the corners, 9 or 3 nodes in all.
+            of quadratic cells have their midpoints after the corners, 9, 6 or 3 nodes in all.
         grid: Structured index of every cell, (n_cells, 3 | 2) int64, or None. The simplices that a cell was
             split into share its index.
         regions: Name to ascending cell numbers, int64, of parts of the body that differ, for instance in
@@ -88,9 +90,14 @@ class BodyMesh:
             grid=checked_grid(self.grid, cells.shape[0], points.shape[1]),
             regions=checked_regions(self.regions, cells.shape[0]),
         )
-        check_jacobians(
-            points, cells, "list the vertices of the cells in VTK order and check the coordinates"
-        )
+        curved = "refine the mesh along its curved surfaces, or take linear cells"
+        straight = "list the vertices of the cells in VTK order and check the coordinates"
+        try:
+            check_jacobians(points, cells, straight if self.order == 1 else curved)
+        except InvalidInputError:
+            if self.order > 1:
+                check_node_order(points, cells)
+            raise
         if not self.coincident_nodes:
             check_no_coincident_nodes(points)
         self._set(surfaces=checked_surfaces(self.surfaces, cells, *points.shape))
@@ -122,7 +129,7 @@ class BodyMesh:
         """Name of the type of cells.
 
         ``"hexahedron"``, ``"tetrahedron"``, ``"quadrilateral"`` or ``"triangle"``; the quadratic ones are
-        ``"hexahedron27"``, ``"quadrilateral9"`` and ``"triangle6"``.
+        ``"hexahedron27"``, ``"tetrahedron10"``, ``"quadrilateral9"`` and ``"triangle6"``.
         """
         return cell_type_of(self.cells, self.dim).name
 

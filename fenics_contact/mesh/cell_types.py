@@ -91,7 +91,8 @@ def _quadratic(
     for face in linear.faces:
         corners = linear.nodes[face]
         middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
-        more = middles[:1] if len(face) == 2 else [*middles, corners.mean(axis=0)]
+        more = [*middles[:1]] if len(face) == 2 else [*middles, corners.mean(axis=0)]
+        more = more[:3] if len(face) == 3 else more  # triangles have no centre
         faces.append([*face, *(number[tuple(place)] for place in more)])
     return CellType(
         name,
@@ -161,6 +162,17 @@ TRIANGLE6 = _quadratic(
     [[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]],
     [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
 )
+TETRAHEDRON10 = _quadratic(
+    TETRAHEDRON,
+    "tetrahedron10",
+    "quadratic tetrahedra",
+    [[0.5, 0, 0], [0.5, 0.5, 0], [0, 0.5, 0], [0, 0, 0.5], [0.5, 0, 0.5], [0, 0.5, 0.5]],
+    # Four at the corners, and the octahedron between them, which is cut along one diagonal.
+    [
+        *([0, 4, 6, 7], [4, 1, 5, 8], [6, 5, 2, 9], [7, 8, 9, 3]),
+        *([6, 8, 4, 5], [6, 8, 5, 9], [6, 8, 9, 7], [6, 8, 7, 4]),
+    ],
+)
 QUADRILATERAL9 = _quadratic(
     QUADRILATERAL,
     "quadrilateral9",
@@ -200,28 +212,25 @@ HEXAHEDRON27 = _quadratic(
     ],
 )
 
-FACET_TYPES = {(2, 2): EDGE, (3, 2): EDGE3, (3, 3): TRIANGLE, (4, 3): QUADRILATERAL, (9, 3): QUADRILATERAL9}
+FACET_TYPES = {
+    (2, 2): EDGE, (3, 2): EDGE3,
+    (3, 3): TRIANGLE, (4, 3): QUADRILATERAL, (6, 3): TRIANGLE6, (9, 3): QUADRILATERAL9,
+}  # fmt: skip
 """(nodes of a facet, dimension of space) to its type."""
 CELL_TYPES = {
     cell.name: cell
-    for cell in (TRIANGLE, QUADRILATERAL, TETRAHEDRON, HEXAHEDRON, TRIANGLE6, QUADRILATERAL9, HEXAHEDRON27)
+    for cell in (
+        *(TRIANGLE, QUADRILATERAL, TETRAHEDRON, HEXAHEDRON),
+        *(TRIANGLE6, QUADRILATERAL9, TETRAHEDRON10, HEXAHEDRON27),
+    )
 }
 """Name to type, for all types."""
 
 
-QUADRATIC = (
-    "such quadratic cells are not supported: the contact constraints are one for every node and need nodal "
-    "forces that are positive under a uniform pressure, which those of their facets are not; use linear "
-    "cells, which `quadratic` gives 27 nodes (hexahedra), in the plane 9 (quadrilaterals) or 6 (triangles)"
+OF_THE_FILE = (
+    "such cells are not read: write the mesh with linear or quadratic ones (gmsh: Mesh.ElementOrder = 1 or 2)"
 )
-"""Reason and remedy."""
-QUADRATIC_FILE = (
-    "such quadratic cells are not read: write the mesh with linear ones (gmsh: Mesh.ElementOrder = 1), "
-    "which `quadratic` makes quadratic where they are hexahedra or plane cells"
-)
-"""Remedy."""
-
-_QUADRATIC_NODES = (10, 20)
+"""Remedy for cells of higher order."""
 
 
 def cell_type_of(cells: np.ndarray, dim: int) -> CellType:
@@ -237,8 +246,11 @@ def cell_type_of(cells: np.ndarray, dim: int) -> CellType:
     for cell in CELL_TYPES.values():
         if cell.dim == dim and cells.ndim == 2 and cells.shape[1] == cell.nodes.shape[0]:
             return cell
-    if dim == 3 and cells.ndim == 2 and cells.shape[1] in _QUADRATIC_NODES:
-        raise InvalidInputError(f"cells of {cells.shape[1]} nodes in {dim} dimensions: {QUADRATIC}")
+    if dim == 3 and cells.ndim == 2 and cells.shape[1] == 20:
+        raise InvalidInputError(
+            "hexahedra of 20 nodes are not supported, as a uniform pressure pulls at the corners of their "
+            "facets: complete them by centres, points, cells = in_vtk_order(points, cells)"
+        )
     known = " or ".join(
         f"(n_cells, {cell.nodes.shape[0]}) for {cell.plural}"
         for cell in CELL_TYPES.values()

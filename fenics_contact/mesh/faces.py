@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh.cell_types import HEXAHEDRON27, cell_type_of
+from fenics_contact.mesh.cell_types import FACET_TYPES, cell_type_of
 
 
 def cell_faces(cells: np.ndarray, dim: int = 3) -> np.ndarray:
@@ -21,7 +21,7 @@ def cell_faces(cells: np.ndarray, dim: int = 3) -> np.ndarray:
 
     Args:
         cells: Node numbers, (n_cells, 8) for hexahedra, (n_cells, 4) for tetrahedra or (dim=2)
-            quadrilaterals, (n_cells, 3) for triangles; quadratic ones have 27, 9 or 6.
+            quadrilaterals, (n_cells, 3) for triangles; quadratic ones have 27, 10, 9 or 6.
         dim: Dimension of the space, 2 or 3.
 
     Returns:
@@ -32,20 +32,20 @@ def cell_faces(cells: np.ndarray, dim: int = 3) -> np.ndarray:
 
 def corners_of(faces: np.ndarray, dim: int) -> np.ndarray:
     """Return the corners of faces, linear or quadratic, in cyclic order, (n, 4 | 3 | 2)."""
-    return faces[:, : min(faces.shape[1], 4 if dim == 3 else 2)]
+    return faces[:, : len(FACET_TYPES[faces.shape[1], dim].edges)]
 
 
 def face_keys(faces: np.ndarray) -> np.ndarray:
     """Reduce faces to two integers each that do not depend on the order of the nodes.
 
     Args:
-        faces: Node numbers, (n, 4 | 3 | 2) or of quadratic cells (n, 9 | 3), all below 2**31.
+        faces: Node numbers, (n, 4 | 3 | 2) or of quadratic cells (n, 9 | 6 | 3), all below 2**31.
 
     Returns:
         (n, 2) int64; equal rows belong to faces with equal nodes.
     """
     nodes = np.zeros((faces.shape[0], 4), dtype=np.int64)
-    corners = faces[:, :4]
+    corners = faces[:, : 3 if faces.shape[1] == 6 else 4]
     nodes[:, : corners.shape[1]] = np.sort(corners, axis=1)
     return (nodes[:, [0, 2]] << 31) + nodes[:, [1, 3]]
 
@@ -183,19 +183,20 @@ def vector_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
 
     The vector area of a bilinear facet is half the cross product of its diagonals, exactly. In two dimensions
     it is the chord rotated clockwise by a right angle, also for curved edges. Quadratic facets in space are
-    treated as four bilinear ones. Over a closed surface the vector areas add up to zero.
+    treated as four linear ones. Over a closed surface the vector areas add up to zero.
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2).
-        facets: Node numbers in cyclic order, (n, 4 | 3) or quadratic (n, 9), or edges with the body on their
-            left, (n, 2 | 3).
+        facets: Node numbers in cyclic order, (n, 4 | 3) or quadratic (n, 9 | 6), or edges with the body on
+            their left, (n, 2 | 3).
 
     Returns:
         (n, 3 | 2) vectors: normal times area (for a warped facet: of its projection along the mean normal) or
         length.
     """
-    if facets.shape[1] == 9:
-        return np.asarray(sum(vector_areas(points, facets[:, piece]) for piece in HEXAHEDRON27.face_pieces))
+    pieces = FACET_TYPES[facets.shape[1], points.shape[1]].pieces
+    if points.shape[1] == 3 and len(pieces) > 1:
+        return np.asarray(sum(vector_areas(points, facets[:, piece]) for piece in pieces))
     corners = points[facets]
     if points.shape[1] == 2:
         along = corners[:, 1] - corners[:, 0]

@@ -6,13 +6,20 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.body_mesh import BodyMesh
-from fenics_contact.mesh.cell_types import HEXAHEDRON27, QUADRILATERAL9, TRIANGLE6, CellType, cell_type_of
+from fenics_contact.mesh.cell_types import (
+    HEXAHEDRON27,
+    QUADRILATERAL9,
+    TETRAHEDRON10,
+    TRIANGLE6,
+    CellType,
+    cell_type_of,
+)
 from fenics_contact.mesh.faces import boundary_faces, corners_of, match_faces
 from fenics_contact.mesh.shape_functions import shape_values
 from fenics_contact.mesh.validation import check_jacobians
 from fenics_contact.surface_shapes import closest_points
 
-_QUADRATIC = {cell.vertices.shape: cell for cell in (TRIANGLE6, QUADRILATERAL9, HEXAHEDRON27)}
+_QUADRATIC = {cell.vertices.shape: cell for cell in (TRIANGLE6, QUADRILATERAL9, TETRAHEDRON10, HEXAHEDRON27)}
 
 
 def quadratic(mesh: BodyMesh) -> BodyMesh:
@@ -23,12 +30,11 @@ def quadratic(mesh: BodyMesh) -> BodyMesh:
     the old nodes, cells and facets are unchanged.
 
     Args:
-        mesh: Hexahedra, quadrilaterals or triangles. Quadratic tetrahedra are rejected: under a uniform
-            pressure the nodal forces of their facets vanish at the corners.
+        mesh: Linear cells of any type.
 
     Raises:
-        InvalidInputError: If the cells have no quadratic counterpart or are quadratic already, or nodes are
-            moved so far onto a shape that a cell is inverted.
+        InvalidInputError: If the cells are quadratic already, or nodes are moved so far onto a shape that a
+            cell is inverted.
 
     Example:
         >>> from fenics_contact.gallery import half_disc
@@ -38,12 +44,9 @@ def quadratic(mesh: BodyMesh) -> BodyMesh:
         'quadrilateral9'
     """
     linear = cell_type_of(mesh.cells, mesh.dim)
-    kind = _QUADRATIC.get(linear.vertices.shape)
-    if linear.order == 2 or kind is None:
-        raise InvalidInputError(
-            f"quadratic needs linear hexahedra, quadrilaterals or triangles, got {linear.plural}: mesh the "
-            "body with hexahedra; facets of quadratic tetrahedra bear no force at their corners"
-        )
+    if linear.order == 2:
+        raise InvalidInputError(f"quadratic needs linear cells, got {linear.plural}: use the mesh as it is")
+    kind = _QUADRATIC[linear.vertices.shape]
     points, cells = _with_more_nodes(mesh.points, mesh.cells, linear, kind)
     boundary, _ = boundary_faces(cells, mesh.dim)
     surfaces = {
@@ -86,7 +89,7 @@ def _follow(points: np.ndarray, cells: np.ndarray, kind: CellType, placed: np.nd
     A centre is placed by serendipity functions: ½ Σ midpoints − ¼ Σ corners of a face, ¼ Σ midpoints − ¼ Σ
     corners of a hexahedron.
     """
-    if kind is TRIANGLE6:
+    if kind.is_simplex:
         return
     if kind is HEXAHEDRON27:
         for face in kind.faces:

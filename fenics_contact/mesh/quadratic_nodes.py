@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh.cell_types import (
     HEXAHEDRON,
     HEXAHEDRON27,
     QUADRILATERAL,
     QUADRILATERAL9,
+    TETRAHEDRON,
+    TETRAHEDRON10,
     TRIANGLE,
     TRIANGLE6,
     CellType,
@@ -21,10 +24,16 @@ from fenics_contact.mesh.cell_types import (
 from fenics_contact.mesh.faces import number_faces
 from fenics_contact.mesh.shape_functions import shape_values
 
-QUADRATIC = {6: TRIANGLE6, 8: QUADRILATERAL9, 9: QUADRILATERAL9, 20: HEXAHEDRON27, 27: HEXAHEDRON27}
+QUADRATIC = {
+    6: TRIANGLE6, 8: QUADRILATERAL9, 9: QUADRILATERAL9,
+    10: TETRAHEDRON10, 20: HEXAHEDRON27, 27: HEXAHEDRON27,
+}  # fmt: skip
 """Number of nodes of a quadratic cell in a file to the resulting type."""
 
-_LINEAR = {TRIANGLE6.name: TRIANGLE, QUADRILATERAL9.name: QUADRILATERAL, HEXAHEDRON27.name: HEXAHEDRON}
+_LINEAR = {
+    TRIANGLE6.name: TRIANGLE, QUADRILATERAL9.name: QUADRILATERAL,
+    TETRAHEDRON10.name: TETRAHEDRON, HEXAHEDRON27.name: HEXAHEDRON,
+}  # fmt: skip
 _ENOUGH = 1000
 """Number of cells from which the order of nodes is determined."""
 
@@ -34,10 +43,10 @@ def in_vtk_order(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.
 
     Args:
         points: Coordinates, (n_nodes, 3 | 2) [length].
-        cells: Node numbers, corners first, (n_cells, 6 | 8 | 9 | 20 | 27).
+        cells: Node numbers, corners first, (n_cells, 6 | 8 | 9 | 10 | 20 | 27).
 
     Returns:
-        Coordinates, new nodes at the end, and cells, (n_cells, 6 | 9 | 27).
+        Coordinates, new nodes at the end, and cells, (n_cells, 6 | 9 | 10 | 27).
     """
     kind = QUADRATIC[cells.shape[1]]
     cells = _ordered(points, cells, kind)
@@ -51,6 +60,31 @@ def in_vtk_order(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.
     centres = share * middles - 0.25 * points[cells[:, :corners]].sum(axis=1)
     numbers = np.arange(count, count + len(cells))
     return np.concatenate([points, centres]), np.column_stack([cells, numbers])
+
+
+def check_node_order(points: np.ndarray, cells: np.ndarray) -> None:
+    """Reject quadratic cells whose nodes are in another order than that of VTK.
+
+    Args:
+        points: Coordinates, (n_nodes, 3 | 2) [length].
+        cells: Node numbers, corners first, (n_cells, 6 | 9 | 10 | 27).
+
+    Raises:
+        InvalidInputError: States the order.
+    """
+    kind = QUADRATIC[cells.shape[1]]
+    ordered = _ordered(points, cells, kind)
+    if (ordered == cells).all():
+        return
+    corners = len(kind.edges)
+    around = shape_values(_LINEAR[kind.name], kind.nodes[corners:]) > 0.1
+    expected = ", ".join("-".join(map(str, np.flatnonzero(row))) for row in around)
+    places = [int(np.flatnonzero(ordered[0] == node)[0]) for node in cells[0]]
+    raise InvalidInputError(
+        f"the nodes of {kind.plural} must be in the order of VTK, the {corners} corners and then those "
+        f"between the corners {expected}, but by their coordinates they are in the order {places} of these: give "
+        "points, cells = in_vtk_order(points, cells), or check the coordinates"
+    )
 
 
 def _ordered(points: np.ndarray, cells: np.ndarray, kind: CellType) -> np.ndarray:

@@ -31,6 +31,7 @@ def read_cad(
     bodies: Bodies | None = None,
     surfaces: FaceChoice | None = None,
     *,
+    order: int = 1,
     comm: MPI.Comm | None = None,
 ) -> dict[str, BodyMesh]:
     """Read a CAD file, mesh it with gmsh, and return its bodies with the true shapes of their surfaces.
@@ -46,6 +47,7 @@ def read_cad(
         surfaces: The wanted surfaces: names or numbers of faces, or name of the surface to what chooses its
             faces: a name, a number, `InBox`, `OnPlane`, `OnCylinder`, a function that says of a `CadFace`
             whether it is one, or several of these. Every face unless given.
+        order: 1 for linear cells, 2 for quadratic ones, curved like the surfaces.
         comm: If given, rank 0 reads the file and all ranks receive the bodies.
 
     Returns:
@@ -66,16 +68,17 @@ def read_cad(
         surface "hole", whose shape is a `Cylinder`.
     """
     if comm is None:
-        return _read(Path(path), size, bodies, surfaces)
+        return _read(Path(path), size, order, bodies, surfaces)
     made = None
     with together(comm):
-        made = _read(Path(path), size, bodies, surfaces) if comm.rank == 0 else None
+        made = _read(Path(path), size, order, bodies, surfaces) if comm.rank == 0 else None
     return comm.bcast(made, root=0)
 
 
 def _read(
     path: Path,
     size: float | None,
+    order: int,
     bodies: Bodies | None,
     surfaces: FaceChoice | None,
 ) -> dict[str, BodyMesh]:
@@ -89,7 +92,12 @@ def _read(
         check_numbers(size=size)
         if size <= 0:
             raise InvalidInputError(f"size must be above zero, got {size}: give the largest edge of a cell")
-    options = {} if size is None else {"Mesh.MeshSizeMax": size}
+    if order not in (1, 2):
+        raise InvalidInputError(f"order must be 1 or 2, got {order}: linear or quadratic cells")
+    options = {"Mesh.ElementOrder": order, "Mesh.SecondOrderIncomplete": 0, "Mesh.SecondOrderLinear": 0}
+    options["Mesh.HighOrderOptimize"] = 1  # only where curved cells would be inverted
+    if size is not None:
+        options["Mesh.MeshSizeMax"] = size
     with gmsh_model("fenics_contact CAD", **options) as gmsh:
         with _reasons(path):
             gmsh.merge(str(path))

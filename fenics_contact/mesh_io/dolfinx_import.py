@@ -14,7 +14,7 @@ import numpy as np
 
 from fenics_contact._libraries import start
 from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.mesh import CELL_TYPES, QUADRATIC_FILE, BodyMesh, flattened, turned_right_handed
+from fenics_contact.mesh import CELL_TYPES, OF_THE_FILE, BodyMesh, flattened, turned_right_handed
 from fenics_contact.mesh_io.bodies import bodies_of
 from fenics_contact.mesh_io.tagged_mesh import Label, TaggedMesh
 from fenics_contact.mesh_io.xdmf_grids import Grid, chosen_grid, grids_of
@@ -69,8 +69,8 @@ def read_xdmf(
         Name to body.
 
     Raises:
-        InvalidInputError: If a file, a grid or a tag is missing, a cell has no tag, cells are not linear, are
-            prisms or pyramids or of several types, or the bodies or surfaces cannot be made of them, see
+        InvalidInputError: If a file, a grid or a tag is missing, a cell has no tag, cells are of higher order,
+            are prisms or pyramids or of several types, or the bodies or surfaces cannot be made of them, see
             `read_msh`.
 
     Note:
@@ -124,7 +124,7 @@ def _read(path: Path, facet_path: Path, names: tuple[str | None, str | None, str
     others = grids if facet_path == path else grids_of(facet_path)
     place = chosen_grid(grids, names[0], "mesh", lambda grid: grid.is_mesh, path)
     assert place is not None
-    cells = chosen_grid(grids, names[1], "cell_tags", lambda grid: grid.tags(place.topology), path, True)
+    cells = chosen_grid(grids, names[1], "cell_tags", lambda grid: grid.tags_cells(place), path, True)
     facets = chosen_grid(
         others, names[2], "facet_tags", lambda grid: grid.tags_facets(place), facet_path, True
     )
@@ -154,9 +154,9 @@ def _tagged_mesh(
     from fenics_contact import _dolfinx
 
     arrays = _dolfinx.mesh_arrays(mesh)
-    if not arrays.linear:
+    if arrays.order > 2:
         raise InvalidInputError(
-            f"{source} has cells of type '{arrays.cell_type}' with more nodes: {QUADRATIC_FILE}"
+            f"{source} has cells of type '{arrays.cell_type}' of order {arrays.order}: {OF_THE_FILE}"
         )
     if arrays.cell_type not in CELL_TYPES:
         raise InvalidInputError(

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh import CELL_TYPES, QUADRATIC_FILE, flattened, in_vtk_order, turned_counter_clockwise
+from fenics_contact.mesh import CELL_TYPES, OF_THE_FILE, flattened, in_vtk_order, turned_counter_clockwise
 from fenics_contact.mesh_io.tagged_mesh import Label, TaggedMesh
 
 _TYPES = {
     2: "triangle", 3: "quadrilateral", 4: "tetrahedron", 5: "hexahedron",
-    9: "triangle6", 10: "quadrilateral9", 12: "hexahedron27",
+    9: "triangle6", 10: "quadrilateral9", 11: "tetrahedron10", 12: "hexahedron27",
 }  # fmt: skip
 """gmsh's numbers of the supported cell types."""
 _INCOMPLETE = (16, 17)
@@ -31,9 +31,8 @@ def tagged_mesh_of(gmsh: ModuleType, source: str) -> TaggedMesh:
         Nodes in the order of their tags, cells in the order of entities, labels by name.
 
     Raises:
-        InvalidInputError: If there are no cells, one has no physical group, or they are not linear triangles,
-            quadrilaterals, tetrahedra or hexahedra, or complete quadratic ones other than tetrahedra, plane
-            ones in a plane.
+        InvalidInputError: If there are no cells, one has no physical group, or they are not linear or
+            complete quadratic triangles, quadrilaterals, tetrahedra or hexahedra, plane ones in a plane.
     """
     elements = {dim: _elements(gmsh, dim, source) for dim in (3, 2)}
     dim = 3 if elements[3] else 2
@@ -82,7 +81,7 @@ def _elements(gmsh: ModuleType, dim: int, source: str) -> dict[int, dict[str, np
         for number, tags in zip(types, nodes, strict=True):
             name, _, order, nodes_each, *_ = gmsh.model.mesh.getElementProperties(number)
             if order > 1 and number not in _TYPES:
-                remedy = "set Mesh.SecondOrderIncomplete = 0" if number in _INCOMPLETE else QUADRATIC_FILE
+                remedy = "set Mesh.SecondOrderIncomplete = 0" if number in _INCOMPLETE else OF_THE_FILE
                 raise InvalidInputError(f"{source} has cells of type '{name}': {remedy}")
             if number not in _TYPES:
                 raise InvalidInputError(

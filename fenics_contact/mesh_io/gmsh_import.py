@@ -40,7 +40,7 @@ def read_msh(
     """Read bodies from a .msh file of any version.
 
     Every body has its own nodes; those that bodies share in the file are duplicated. The constant z
-    coordinate of plane meshes is dropped. Quadratic hexahedra and plane cells stay quadratic.
+    coordinate of plane meshes is dropped. Quadratic cells stay quadratic.
 
     Example:
         ``read_msh("press.msh")`` makes a body of every physical volume. ``read_msh("press.msh",
@@ -61,7 +61,7 @@ def read_msh(
 
     Raises:
         InvalidInputError: If the file is missing or cannot be read, a group does not exist, a volume has no
-            group, cells are quadratic tetrahedra, prisms or pyramids, of several types in one body, flipped,
+            group, cells are prisms or pyramids, of higher order, of several types in one body, flipped,
             or disconnected, a cell is in two bodies, or a surface lies inside a body.
         MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh import QUADRATIC, cell_type_of, flattened, in_vtk_order, turned_right_handed
+from fenics_contact.mesh import cell_type_of, flattened, in_vtk_order, turned_right_handed
 
 if TYPE_CHECKING:
     import meshio
@@ -87,11 +87,6 @@ def cells_of(
 
 def _nodes(block: meshio.CellBlock, mesh: meshio.Mesh, source: str, corners_only: bool) -> np.ndarray:
     name = block.type
-    if name == "tetra10" and not corners_only:
-        raise InvalidInputError(
-            f"{source} has cells of type 'tetra10', {QUADRATIC}; read it with corners_only=True to keep the "
-            "corners of the tetrahedra"
-        )
     linear = _SERENDIPITY_OR_LAGRANGE.get(name, name)
     if linear not in _CORNERS:
         raise InvalidInputError(

@@ -47,8 +47,9 @@ def read_mesh(
     Nodes without a cell are dropped, cells with negative volume reversed. Coordinates stay in the file's unit
     of length; ``mesh.moved(1e3 * mesh.points)`` converts metres to millimetres.
 
-    Quadratic cells stay quadratic where supported: hexahedra of 20 or 27 nodes, in the plane quadrilaterals
-    of 8 or 9 and triangles of 6. Missing nodes of 27 or 9 are added without changing the geometry.
+    Quadratic cells stay quadratic: tetrahedra of 10 nodes, hexahedra of 20 or 27, in the plane
+    quadrilaterals of 8 or 9 and triangles of 6; whatever order a format lists midpoints in. Missing nodes of
+    27 or 9 are added without changing the geometry.
 
     Example:
         ``read_mesh("press.inp")`` makes a body of every element set. ``read_mesh("press.vtu",
@@ -64,7 +65,7 @@ def read_mesh(
         labels: What groups the cells: ``"sets"``, ``"blocks"``, ``"pieces"``, or the name of cell data with
             integers. Unless given: cell sets where there are any, else the only integer cell data, else the
             whole mesh is one body "mesh".
-        corners_only: Drop all nodes but the corners of quadratic cells; needed for quadratic tetrahedra.
+        corners_only: Drop all nodes but the corners of quadratic cells.
         file_format: Name of meshio's format, if the file's suffix does not determine it.
         comm: If given, rank 0 reads the file and all ranks receive the bodies.
 
@@ -73,7 +74,7 @@ def read_mesh(
 
     Raises:
         InvalidInputError: If the file is missing or cannot be read, a label does not exist, a cell has none
-            or several, cells are prisms, pyramids, quadratic tetrahedra, or of several types in one body, are
+            or several, cells are prisms, pyramids, or of several types in one body, are
             degenerate or disconnected, or a surface lies inside a body.
 
     Note:

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 from fenics_contact.checks import require_file
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh import QUADRATIC_FILE
+from fenics_contact.mesh import OF_THE_FILE
 
 _FACETS = {
     "tetrahedron": ("triangle",),
@@ -17,7 +17,9 @@ _FACETS = {
     "triangle": ("polyline", "edge"),
     "quadrilateral": ("polyline", "edge"),
 }
-"""XDMF's names of the facets of each cell type."""
+"""XDMF's names of the facets of each shape of cells."""
+_QUADRATIC = {"tetrahedron_10", "hexahedron_27", "triangle_6", "quadrilateral_9", "edge_3"}
+"""XDMF's names of quadratic cells and facets."""
 
 
 @dataclass(frozen=True)
@@ -39,25 +41,30 @@ class Grid:
     inline: bool
 
     @property
+    def shape(self) -> str:
+        """XDMF's name of linear cells of the same shape."""
+        return self.topology.partition("_")[0]
+
+    @property
     def is_mesh(self) -> bool:
         """Whether it is a mesh of solids or plane bodies."""
-        return self.has_points and self.topology in _FACETS
+        return self.has_points and self.shape in _FACETS
 
-    def tags(self, topology: str) -> bool:
-        """Whether its values are tags of such cells."""
-        return self.has_values and self.topology == topology
+    def tags_cells(self, mesh: Grid) -> bool:
+        """Whether its values are tags of the cells of a mesh."""
+        return self.has_values and self.shape == mesh.shape
 
     def tags_facets(self, mesh: Grid) -> bool:
         """Whether its values are tags of the facets of a mesh."""
-        return self.has_values and self.topology in _FACETS[mesh.topology]
+        return self.has_values and self.shape in _FACETS[mesh.shape]
 
 
 def grids_of(path: Path) -> list[Grid]:
     """List the grids of an XDMF file.
 
     Raises:
-        InvalidInputError: If the file is missing, is not an XDMF file, or its cells are not linear ones of
-            one type.
+        InvalidInputError: If the file is missing, is not an XDMF file, or its cells are not linear or
+            complete quadratic ones of one type.
     """
     require_file(path)
     try:
@@ -96,9 +103,9 @@ def _check_topology(grid: Grid, path: Path) -> None:
             f"cells and "
             "facets to files of their own (facet_file=...), and cells of one type only"
         )
-    if "_" in grid.topology:  # Tetrahedron_10, Hexahedron_27
+    if "_" in grid.topology and grid.topology not in _QUADRATIC:  # Hexahedron_20, Hexahedron_64
         raise InvalidInputError(
-            f"grid '{grid.name}' of file '{path}' is of type '{grid.topology}': {QUADRATIC_FILE}"
+            f"grid '{grid.name}' of file '{path}' is of type '{grid.topology}': {OF_THE_FILE}"
         )
     if grid.topology in ("wedge", "pyramid"):
         raise InvalidInputError(

@@ -25,7 +25,16 @@ from fenics_contact.pairing.node_numbers import NodeNumbers
 from fenics_contact.pairing.surface_doubts import warn_of_surface
 from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie, master_share, surface_of
 from fenics_contact.surface_shapes import asked
-from fenics_contact.surfaces import FacetedSurface, Geometry, Projection, join, project, shape_functions
+from fenics_contact.surfaces import (
+    FacetedSurface,
+    Geometry,
+    Projection,
+    bears_on_midpoints,
+    join,
+    project,
+    shape_functions,
+    shape_weights,
+)
 
 _LOG = logging.getLogger(__name__)
 
@@ -74,11 +83,13 @@ class _Side:
     Attributes:
         surface: The surface.
         nodes: Its nodes among those of all bodies, shape (n,).
+        whole: Its facets before they were cut into linear ones, as nodes among those of all bodies.
         n_nodes: Number of nodes of all bodies.
     """
 
     surface: FacetedSurface
     nodes: np.ndarray
+    whole: np.ndarray
     n_nodes: int
 
     @classmethod
@@ -87,7 +98,18 @@ class _Side:
     ) -> _Side:
         """Return a named surface as a side."""
         own = surface_of(scene, surface, geometry, finer=finer)
-        return cls(own, numbers.global_nodes(surface.body, own.nodes), numbers.n_nodes)
+        whole = scene.bodies[surface.body].mesh.surfaces[surface.name]
+        nodes = numbers.global_nodes(surface.body, own.nodes)
+        return cls(own, nodes, numbers.global_nodes(surface.body, whole), numbers.n_nodes)
+
+    def weights(self, hit: Projection) -> sp.csr_matrix:
+        """Return the weights of the nodes of all bodies at projections on this side, (n, n_nodes)."""
+        values, _ = shape_functions(hit.local, self.surface.corners)
+        nodes = self.nodes[self.surface.facets[hit.facet]]
+        if bears_on_midpoints(self.whole):
+            nodes, values = shape_weights(self.whole, hit.facet, values)
+        row = np.repeat(np.arange(len(nodes)), nodes.shape[1])
+        return sp.csr_matrix((values.ravel(), (row, nodes.ravel())), shape=(len(nodes), self.n_nodes))
 
 
 def _points_of_pairs(
@@ -118,11 +140,12 @@ def _measured(
     geometry = pair.geometry if isinstance(pair, ContactPair) else "faceted"
     slave = _Side.of(scene, pair.slave, geometry, numbers, finer)
     movable = ~fixed[slave.nodes].all(axis=1)
+    bearing = movable & (slave.surface.areas > 0.0) if isinstance(pair, ContactPair) else movable
     if not finer:
         warn_of_surface(scene, pair.slave, geometry, slave.surface, comm)
     if not isinstance(pair.master, Surface):
         with together(comm):
-            points = _on_obstacle(slave, movable, pair.master)
+            points = _on_obstacle(slave, bearing, pair.master)
         name = f"what ContactPair {index} asks its obstacle, {type(pair.master).__name__}"
         require_alike(comm, described((points.slave, points.normal, points.gap), name))
     else:
@@ -130,9 +153,9 @@ def _measured(
         if not finer:
             warn_of_surface(scene, pair.master, geometry, master.surface, comm)
         if pair.discretisation == "mortar":
-            points = _by_mortar(slave, movable, master, comm, master_share(scene, pair))
+            points = _by_mortar(slave, bearing, master, comm, master_share(scene, pair))
         else:
-            points = _by_projection(slave, movable, master, comm)
+            points = _by_projection(slave, bearing, master, comm)
         points = replace(points, symmetric=_symmetric(points, slave, master))
     if comm.rank == 0 and not movable.all():
         tell(
@@ -170,13 +193,8 @@ def _by_projection(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.C
     hit = _shared_projection(slave.surface, candidates, master.surface, comm)
     if len(hit.lost) and comm.rank == 0:
         _tell_of_lost(slave.surface.points[candidates[hit.lost]], len(candidates))
-    values, _ = shape_functions(hit.local, master.surface.corners)
-    corners = master.nodes[master.surface.facets[hit.facet]]
-    row = np.repeat(np.arange(len(hit.point)), master.surface.corners)
-    shape = (len(hit.point), slave.n_nodes)
-    weight = sp.csr_matrix((values.ravel(), (row, corners.ravel())), shape=shape)
-    chosen = candidates[hit.point]
-    return replace(_points(slave, chosen, hit.normal, hit.gap, weight), facet=hit.facet, local=hit.local)
+    points = _points(slave, candidates[hit.point], hit.normal, hit.gap, master.weights(hit))
+    return replace(points, facet=hit.facet, local=hit.local)
 
 
 def _tell_of_lost(places: np.ndarray, count: int) -> None:

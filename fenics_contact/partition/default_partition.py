@@ -28,6 +28,7 @@ _NODES_PER_CELL = {
     "hexahedron27": 8.0,
     "quadrilateral9": 4.0,
     "triangle6": 2.0,
+    "tetrahedron10": 8.0 / 5.5,
 }
 """Nodes per cell in a large mesh; for tetrahedra those of mesh generators (6 in a split hexahedron)."""
 

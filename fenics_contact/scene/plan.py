@@ -15,6 +15,7 @@ from fenics_contact.scene.effects import Effect, EffectName, effects_of
 from fenics_contact.scene.held import held_by_supports
 from fenics_contact.scene.pair_geometry import PairGeometry, pair_geometry
 from fenics_contact.scene.pairs import Surface
+from fenics_contact.surfaces import bears_on_midpoints
 
 if TYPE_CHECKING:
     from fenics_contact.scene.parts import SceneParts
@@ -151,7 +152,7 @@ def _cone(names: set[EffectName]) -> ConeKind:
 def _multipliers(scene: SceneParts, unknowns: int) -> dict[str, int]:
     nodes = sum(body.mesh.n_nodes for body in scene.bodies.values())
     fixed = sum(int(np.count_nonzero(scene.fixed(name))) for name in scene.body_names)
-    slaves = [_slave_nodes(scene, pair.slave) for pair in scene.contacts]
+    slaves = [_bearing_nodes(scene, pair.slave) for pair in scene.contacts]
     rubbing = [count for pair, count in zip(scene.contacts, slaves, strict=True) if pair.has_friction]
     tied = [(1 if tie.sliding else scene.dim) * _slave_nodes(scene, tie.slave) for tie in scene.ties]
     return {
@@ -161,6 +162,11 @@ def _multipliers(scene: SceneParts, unknowns: int) -> dict[str, int]:
         "normal": sum(slaves),
         "tangential": (scene.dim - 1) * sum(rubbing),
     }
+
+
+def _bearing_nodes(scene: SceneParts, surface: Surface) -> int:
+    facets = scene.bodies[surface.body].mesh.surfaces[surface.name]
+    return len(np.unique(facets[:, 3:])) if bears_on_midpoints(facets) else _slave_nodes(scene, surface)
 
 
 def _slave_nodes(scene: SceneParts, surface: Surface) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field, PositiveFloat
 
@@ -53,6 +53,7 @@ class MeshFile(Placed):
     size: PositiveFloat | None = Field(
         None, description="largest edge of a cell, for CAD files, which gmsh meshes, [length]"
     )
+    order: Literal[1, 2] = Field(1, description="order of the cells that CAD files are meshed with")
     labels: str | None = Field(
         None,
         description="not for CAD, .msh and .xdmf: sets, blocks, pieces, or cell data that say which cells "
@@ -78,15 +79,15 @@ class MeshFile(Placed):
                 "choose groups with bodies and surfaces"
             )
         if kind in CAD:
-            return mesh_io.read_cad(path, self.size, *groups, comm=comm)
+            return mesh_io.read_cad(path, self.size, *groups, order=self.order, comm=comm)
         if by_place(self.surfaces):
             raise InvalidInputError(
                 f"faces are chosen by where they lie in CAD files ({', '.join(CAD)}), got {self.file!r}: "
                 "choose groups by their names or numbers"
             )
-        if self.size is not None:
+        if self.size is not None or self.order > 1:
             raise InvalidInputError(
-                f"size is for CAD files ({', '.join(CAD)}), got {self.file!r}: leave it away, or mesh the "
+                f"size and order are for CAD files ({', '.join(CAD)}), got {self.file!r}: leave it away, or mesh the "
                 "body anew"
             )
         if kind == ".msh":

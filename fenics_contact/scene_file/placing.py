@@ -45,7 +45,7 @@ class Shaped:
 class Placed(Part):
     """Keys that every mesh may have."""
 
-    quadratic: bool = Field(False, description="cells of second order (not for tetrahedra)")
+    quadratic: bool = Field(False, description="cells of second order")
     scale: PositiveFloat = Field(
         1.0, description="factor on all coordinates, about the origin, applied first"
     )
@@ -71,7 +71,7 @@ class Placed(Part):
         """Return a shape placed by the keys.
 
         Raises:
-            InvalidInputError: If its cells have no quadratic counterpart, or a vector does not fit.
+            InvalidInputError: If its cells are quadratic already, or a vector does not fit.
         """
         if self.quadratic:
             shape = replace(shape, mesh=quadratic(shape.mesh))

@@ -15,6 +15,12 @@ from fenics_contact.surfaces.facets import (
     faceted_surface,
     shape_functions,
 )
+from fenics_contact.surfaces.midpoints import (
+    bears_on_midpoints,
+    filled_at_corners,
+    shape_weights,
+    share_areas,
+)
 from fenics_contact.surfaces.projection import Projection, interpolated_normal, join, newton_matrix, project
 from fenics_contact.surfaces.relief import corner_normals, edges_at_corners, heights, slopes
 from fenics_contact.surfaces.true_surface import Geometry, true_surface
@@ -25,12 +31,14 @@ __all__ = [
     "Projection",
     "Relief",
     "SurfaceMoments",
+    "bears_on_midpoints",
     "corner_normals",
     "corner_products",
     "edge_distance",
     "edges_at_corners",
     "facet_shape_values",
     "faceted_surface",
+    "filled_at_corners",
     "heights",
     "interpolated_normal",
     "join",
@@ -39,6 +47,8 @@ __all__ = [
     "project",
     "quadrature_areas",
     "shape_functions",
+    "shape_weights",
+    "share_areas",
     "slopes",
     "surface_moments",
     "true_surface",

@@ -126,7 +126,8 @@ class FacetedSurface:
             quadrilaterals counterclockwise seen from outside, in the plane edges with the body on their left.
         points: Coordinates of the nodes, shape (n, dim), [length].
         averaged: Outward unit normals at the nodes, averaged over the facets around each, shape (n, dim).
-        areas: Area, in the plane length, that belongs to each node, shape (n,), [length²] or [length].
+        areas: Area, in the plane length, that belongs to each node, shape (n,), [length²] or [length]; zero
+            at the corners of quadratic triangles, on which a pressure does not bear.
         mirrored: Components that the normals lack on planes of symmetry, shape (n, dim).
         relief: The true surface relative to the facets; None if it is unknown or coincides with them.
     """

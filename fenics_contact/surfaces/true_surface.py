@@ -12,8 +12,8 @@ import numpy as np
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import BodyMesh, computed_rounding
 from fenics_contact.surface_shapes import Joined, SurfaceShape, asked
-from fenics_contact.surfaces.facet_areas import nodal_areas
 from fenics_contact.surfaces.facets import FacetedSurface, Relief, facet_shape_values, faceted_surface
+from fenics_contact.surfaces.midpoints import bearing_areas
 from fenics_contact.surfaces.projection import interpolated_normal
 from fenics_contact.surfaces.reconstruction import reconstructed
 from fenics_contact.surfaces.relief import edges_at_corners, heights, slopes
@@ -69,11 +69,11 @@ def true_surface(
 
 
 def _with_areas(surface: FacetedSurface, mesh: BodyMesh, name: str) -> FacetedSurface:
-    """Distribute the area of quadratic facets like the nodal forces of a unit pressure."""
+    """Distribute the area of quadratic facets over the nodes on which a uniform pressure bears."""
     if mesh.order == 1:
         return surface
     facets = mesh.surfaces[name]
-    areas = np.bincount(facets.ravel(), nodal_areas(mesh.points, facets).ravel(), minlength=mesh.n_nodes)
+    areas = np.bincount(facets.ravel(), bearing_areas(mesh.points, facets).ravel(), minlength=mesh.n_nodes)
     return replace(surface, areas=areas[surface.nodes])
 
 

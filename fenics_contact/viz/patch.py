@@ -8,6 +8,7 @@ import numpy as np
 
 from fenics_contact.contact import State, Status
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.surfaces import filled_at_corners
 from fenics_contact.viz.view import Frame, View, face_on
 
 
@@ -20,7 +21,7 @@ class ContactPatch:
         name: Body and surface.
         places: All nodes of the surface in the picture, (n, 2).
         facets: Rows of positions in ``places``.
-        pressure: On all nodes of the surface, zero where there is no contact point, (n,).
+        pressure: On all nodes of the surface, interpolated at the corners of quadratic triangles, (n,).
         points: Positions of the contact points in ``places``.
         status: Of the contact points.
         slip: Of the contact points in the picture, (n_points, 2).
@@ -81,8 +82,9 @@ def contact_patch(state: State, pair: int, reach: float | None) -> ContactPatch:
     numbers = state.torn.decomposition.tearing.global_nodes(slave.body, nodes)
     chosen = chosen[np.isin(contact.points.slave[chosen], numbers)]
     points = np.searchsorted(numbers, contact.points.slave[chosen])
-    pressure = np.zeros(len(nodes))
-    pressure[points] = contact.pressure[chosen]
+    pressure = np.zeros(mesh.n_nodes)
+    pressure[nodes[points]] = contact.pressure[chosen]
+    pressure = np.maximum(filled_at_corners(mesh.surfaces[slave.name], pressure)[nodes], 0.0)
     places = view.project(mesh.points[nodes])
     frame = _frame(places, points, pressure[points], contact.points.area[chosen], reach)
     return ContactPatch(

@@ -42,9 +42,9 @@ def test_the_estimate_is_close_to_the_error_and_falls_at_its_rate(cell: str) -> 
     assert np.log2(found[0] / found[1]) == pytest.approx(1.0, abs=0.1)
 
 
-@pytest.mark.parametrize("cell", ["triangle6", "quadrilateral9", "hexahedron27"])
+@pytest.mark.parametrize("cell", ["triangle6", "quadrilateral9", "tetrahedron10", "hexahedron27"])
 def test_the_estimate_of_quadratic_cells_falls_at_the_rate_of_their_error(cell: str) -> None:
-    sizes = (4, 6) if cell == "hexahedron27" else (6, 12)
+    sizes = (4, 6) if cell in ("tetrahedron10", "hexahedron27") else (6, 12)
     error, found = series(cell, sizes, 0.15)
     np.testing.assert_allclose(found / error, 1.0, atol=0.15)
     assert np.log(error[0] / error[1]) / np.log(sizes[1] / sizes[0]) == pytest.approx(2.0, abs=0.15)

@@ -35,11 +35,13 @@ from fenics_contact.viz import plot_contact_pressure, plot_decomposition, plot_s
 from tests.contact import hertz
 
 SOLVER = FaceNewton(tolerance=1e-10)
+CELLS = ["hexahedron27", "tetrahedron10", "quadrilateral9", "triangle6"]
 
 
 def meshes(n: int) -> dict[str, BodyMesh]:
     return {
         "hexahedron27": quadratic(block((0, 0, 0), (2, 1, 1), (2 * n, n, n))),
+        "tetrahedron10": quadratic(block((0, 0, 0), (2, 1, 1), (2 * n, n, n), cell="tetrahedron")),
         "quadrilateral9": quadratic(rectangle((0, 0), (2, 1), (2 * n, n))),
         "triangle6": quadratic(rectangle((0, 0), (2, 1), (2 * n, n), cell="triangle")),
     }
@@ -54,7 +56,7 @@ def solved(scene: Scene, parts: int) -> State:
     return solve_scene(scene, MPI.COMM_SELF, partitions=cut, solver=SOLVER)
 
 
-@pytest.mark.parametrize("cell", ["hexahedron27", "quadrilateral9", "triangle6"])
+@pytest.mark.parametrize("cell", CELLS)
 def test_a_quadratic_displacement_is_found_exactly(cell: str) -> None:
     """u = (x², x y, …) on the boundary, and the body force that makes it an equilibrium."""
     mesh = meshes(2)[cell]
@@ -77,7 +79,7 @@ def test_a_quadratic_displacement_is_found_exactly(cell: str) -> None:
     np.testing.assert_allclose(state.gather_displacement("body"), exact(mesh.points), atol=1e-11)
 
 
-@pytest.mark.parametrize("cell", ["hexahedron27", "quadrilateral9", "triangle6"])
+@pytest.mark.parametrize("cell", CELLS)
 def test_a_uniform_pressure_is_uniform_on_quadratic_facets(cell: str) -> None:
     """The pressure is the nodal force by the nodal area, and forces of a pressure are not even."""
     mesh = meshes(2)[cell]

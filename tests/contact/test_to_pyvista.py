@@ -21,6 +21,7 @@ STATES = {
     "quadrilateral": lambda: plane_block("quadrilateral"),
     "triangle": lambda: plane_block("triangle"),
     "hexahedron27": lambda: pulled("hexahedron27"),
+    "tetrahedron10": lambda: pulled("tetrahedron10"),
     "quadrilateral9": lambda: pulled("quadrilateral9"),
     "triangle6": lambda: pulled("triangle6"),
 }

@@ -16,6 +16,7 @@ from fenics_contact.mesh import (
     BodyMesh,
     boundary_faces,
     corners_of,
+    in_vtk_order,
     quadratic,
     shape_gradients,
     shape_values,
@@ -23,13 +24,13 @@ from fenics_contact.mesh import (
 )
 from fenics_contact.surface_shapes import Sphere
 
-QUADRATIC = ["triangle6", "quadrilateral9", "hexahedron27"]
-VTK_CELL = {"triangle6": 22, "quadrilateral9": 28, "hexahedron27": 29}
+QUADRATIC = ["triangle6", "quadrilateral9", "tetrahedron10", "hexahedron27"]
+VTK_CELL = {"triangle6": 22, "quadrilateral9": 28, "tetrahedron10": 24, "hexahedron27": 29}
 
 
 def linear_mesh(cell: str) -> BodyMesh:
-    if cell == "hexahedron27":
-        return block((0, 0, 0), (2, 1, 1), (3, 2, 2))
+    if CELL_TYPES[cell].dim == 3:
+        return block((0, 0, 0), (2, 1, 1), (3, 2, 2), cell=shape(cell))
     return rectangle((0, 0), (2, 1), (3, 2), cell=shape(cell))
 
 
@@ -74,7 +75,7 @@ def test_a_quadratic_mesh_has_the_surfaces_and_the_volume_of_the_linear_one(cell
     assert len(lattice) == mesh.n_nodes == np.prod([7, 5, 5][: mesh.dim])
     for name, facets in linear.surfaces.items():
         there = mesh.surfaces[name]
-        assert there.shape == (len(facets), {2: 3, 3: 9}[mesh.dim])
+        assert there.shape == (len(facets), CELL_TYPES[cell].faces.shape[1])
         np.testing.assert_array_equal(
             np.sort(corners_of(there, mesh.dim)[np.lexsort(np.sort(corners_of(there, mesh.dim)).T)]),
             np.sort(facets[np.lexsort(np.sort(facets).T)]),
@@ -131,14 +132,27 @@ def test_midpoints_that_turn_a_cell_inside_out_are_refused() -> None:
         quadratic(under_an_arc(1.8, hollow=True))
 
 
-def test_only_cells_whose_facets_bear_force_at_their_corners_become_quadratic() -> None:
-    tetrahedra = block((0, 0, 0), (1, 1, 1), (1, 1, 1), cell="tetrahedron")
-    for mesh, plural in (
-        (tetrahedra, "tetrahedra"),
-        (quadratic(rectangle((0, 0), (1, 1), (1, 1))), "quadratic"),
-    ):
-        with pytest.raises(InvalidInputError, match=f"needs linear hexahedra, .* got {plural}"):
-            quadratic(mesh)
+def test_quadratic_cells_do_not_become_quadratic_again() -> None:
+    with pytest.raises(InvalidInputError, match="needs linear cells, got quadratic quadrilaterals"):
+        quadratic(quadratic(rectangle((0, 0), (1, 1), (1, 1))))
+
+
+@pytest.mark.parametrize("cell", QUADRATIC)
+def test_another_order_of_nodes_is_told_which_is_expected(cell: str) -> None:
+    mesh, corners = quadratic(linear_mesh(cell)), len(CELL_TYPES[cell].edges)
+    other = mesh.cells.copy()
+    other[:, corners : corners + 2] = other[:, [corners + 1, corners]]
+    words = rf"must be in the order of VTK, the {corners} corners and then .* corners 0-1, 1-2, .* order \[0, 1, 2.*"
+    with pytest.raises(InvalidInputError, match=words + rf" {corners + 1}, {corners}"):
+        BodyMesh(mesh.points, other)
+    points, cells = in_vtk_order(mesh.points, other)
+    np.testing.assert_array_equal(BodyMesh(points, cells).cells, mesh.cells)
+
+
+def test_faces_of_quadratic_tetrahedra_are_known_by_their_corners() -> None:
+    """Whichever corner they begin with: two cells list a face between them from different corners."""
+    mesh = quadratic(linear_mesh("tetrahedron10"))
+    assert len(boundary_faces(mesh.cells)[0]) == len(boundary_faces(linear_mesh("tetrahedron10").cells)[0])
 
 
 def test_facets_with_other_midpoints_than_the_cells_are_refused() -> None:

@@ -10,7 +10,7 @@ from types import ModuleType
 
 CUBE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
 TRIANGLE, QUADRILATERAL, TETRAHEDRON, HEXAHEDRON, PRISM, PYRAMID = 2, 3, 4, 5, 6, 7
-TETRAHEDRON_10, QUADRILATERAL_8 = 11, 16
+TRIANGLE_10, QUADRILATERAL_8 = 21, 16
 """gmsh's numbers of types of elements."""
 
 

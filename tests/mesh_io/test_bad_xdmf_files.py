@@ -11,7 +11,7 @@ import pytest
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh_io import from_dolfinx, read_xdmf
 from tests.mesh_io.msh_files import CUBE
-from tests.mesh_io.xdmf_files import bar, cell_tags, facet_tags, meshio, second_order_triangle, write
+from tests.mesh_io.xdmf_files import bar, cell_tags, facet_tags, meshio, third_order_triangle, write
 
 import dolfinx.mesh  # isort: skip
 
@@ -88,8 +88,8 @@ def test_a_tagged_facet_inside_a_body_is_refused() -> None:
     [
         ({"wedge": [[0, 1, 2, 4, 5, 6]]}, "of type 'wedge': mesh it without prisms and pyramids"),
         (
-            {"triangle6": [[0, 2, 7, 1, 3, 4]]},
-            "'(triangle_6|tri_6)': such quadratic cells are not read",
+            {"hexahedron20": [[*range(8), *range(8), *range(4)]]},
+            "'(hexahedron_20|hex_20)': such cells are not read: .* linear or quadratic ones",
         ),
         ({"quad": [[0, 1, 2, 3]], "triangle": [[4, 5, 6]]}, r"is mixed: write .* \(facet_file=\.\.\.\)"),
         ({"line": [[0, 1]]}, r"must have a mesh of tetrahedra, .* it has 'Grid' \(polyline\)"),
@@ -136,8 +136,7 @@ def test_a_cell_flipped_over_its_neighbour_is_refused(meshio: ModuleType, tmp_pa
         read_xdmf(written(meshio, tmp_path / "f.xdmf", CUBE[:4], cells))
 
 
-def test_a_second_order_mesh_of_dolfinx_is_refused() -> None:
-    points = np.array([(0, 0), (2, 0), (0, 2), (1, 1), (0, 1), (1, 0)], dtype=float)
-    mesh = second_order_triangle(points)
-    with pytest.raises(InvalidInputError, match="'triangle' with more nodes: such quadratic cells"):
+def test_a_mesh_of_dolfinx_of_third_order_is_refused() -> None:
+    mesh = third_order_triangle()
+    with pytest.raises(InvalidInputError, match="'triangle' of order 3: such cells are not read"):
         from_dolfinx(mesh)

@@ -9,11 +9,12 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from fenics_contact import _dolfinx
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import rectangle
-from fenics_contact.mesh import BodyMesh, vector_areas
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.mesh import BodyMesh, boundary_faces, quadratic, vector_areas
 from fenics_contact.mesh_io import from_dolfinx, read_xdmf
-from tests.mesh_io.xdmf_files import CELLS, bar, cell_tags, facet_tags, meshio, write
+from tests.mesh_io.xdmf_files import CELLS, bar, cell_tags, everywhere, facet_tags, meshio, write
 
 __all__ = ["meshio"]
 
@@ -39,6 +40,30 @@ def test_a_file_of_dolfinx_gives_every_cell_tag_as_a_body(cell: str, tmp_path: P
 def test_a_mesh_in_memory_gives_the_same_bodies(cell: str) -> None:
     mesh = bar(cell)
     check_bar(from_dolfinx(mesh, cell_tags(mesh), facet_tags(mesh)), cell)
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_quadratic_meshes_stay_so_in_memory_and_in_files(cell: str, tmp_path: Path) -> None:
+    plane = cell in ("triangle", "quadrilateral")
+    flat = (
+        rectangle((0, 0), (2, 1), (4, 2), cell)
+        if plane
+        else block((0, 0, 0), (2, 1, 1), (4, 2, 2), cell=cell)
+    )
+    known = quadratic(flat)
+    known = known.moved(known.points + 0.02 * np.sin(3 * known.points[:, ::-1]))
+    mesh = _dolfinx.local_mesh(known.points, known.cells, known.cell_type)
+    (body,) = from_dolfinx(mesh).values()
+    np.testing.assert_array_equal(body.cells, known.cells)
+    np.testing.assert_array_equal(body.points, known.points)
+    tags = everywhere(mesh)
+    (written,) = read_xdmf(write(tmp_path / "bar.xdmf", mesh, *tags), {"bar": 1}).values()
+    assert (written.cell_type, written.volume) == (known.cell_type, pytest.approx(known.volume, rel=1e-12))
+    (tagged,) = from_dolfinx(mesh, *tags).values()
+    for found in (tagged, written):
+        assert len(found.surfaces["3"]) == len(boundary_faces(known.cells, known.dim)[0])
+        total = vector_areas(found.points, found.surfaces["3"]).sum(axis=0)
+        np.testing.assert_allclose(total, 0.0, atol=1e-12)
 
 
 def test_tags_get_names_and_become_regions(tmp_path: Path) -> None:

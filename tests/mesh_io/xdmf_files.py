@@ -52,6 +52,23 @@ def facet_tags(mesh: Any, name: str = "facet_tags") -> Any:
     return tags
 
 
+def everywhere(mesh: Any) -> tuple[Any, Any]:
+    """Tag 1 on all cells, tag 3 on all facets of the boundary."""
+    dim = mesh.topology.dim
+    mesh.topology.create_connectivity(dim - 1, dim)
+    cells = np.arange(mesh.topology.index_map(dim).size_local, dtype=np.int32)
+    facets = dolfinx.mesh.locate_entities_boundary(mesh, dim - 1, lambda x: np.full(x.shape[1], True))
+    found = []
+    for name, d, entities, value in (
+        ("cell_tags", dim, cells, 1),
+        ("facet_tags", dim - 1, np.sort(facets), 3),
+    ):
+        tags = dolfinx.mesh.meshtags(mesh, d, entities, np.full(len(entities), value, dtype=np.int32))
+        tags.name = name
+        found.append(tags)
+    return found[0], found[1]
+
+
 def write(path: Path, mesh: Any, *tags: Any) -> Path:
     """Write a mesh and its tags as dolfinx does."""
     with dolfinx.io.XDMFFile(MPI.COMM_SELF, str(path), "w") as file:
@@ -61,17 +78,17 @@ def write(path: Path, mesh: Any, *tags: Any) -> Path:
     return path
 
 
-def second_order_triangle(points: np.ndarray) -> Any:
-    """A mesh of one triangle with its edge midpoints, in dolfinx's order."""
-    cells = np.arange(6, dtype=np.int64)[None]
+def third_order_triangle() -> Any:
+    """A mesh of one triangle with ten nodes."""
+    cells, points = np.arange(10, dtype=np.int64)[None], np.random.default_rng(0).random((10, 2))
     if _dolfinx.version() < (0, 7):
         import ufl
 
-        domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.triangle, 2))
+        domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.triangle, 3))
         return dolfinx.mesh.create_mesh(MPI.COMM_SELF, cells, points, domain)
     import basix.ufl
 
-    element = basix.ufl.element("Lagrange", "triangle", 2, shape=(2,))
+    element = basix.ufl.element("Lagrange", "triangle", 3, shape=(2,))
     return dolfinx.mesh.create_mesh(MPI.COMM_SELF, cells=cells, x=points, e=element)
 
 

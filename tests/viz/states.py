@@ -46,8 +46,9 @@ def contains(image: np.ndarray, colour: str, tolerance: float = 0.02) -> bool:
 
 def pulled(cell: str) -> State:
     """A bar of quadratic cells pulled along x."""
-    if cell == "hexahedron27":
-        mesh = quadratic(block((0, 0, 0), (2, 1, 1), (2, 1, 1)))
+    if cell in ("hexahedron27", "tetrahedron10"):
+        solid = "hexahedron" if cell == "hexahedron27" else "tetrahedron"
+        mesh = quadratic(block((0, 0, 0), (2, 1, 1), (2, 1, 1), cell=solid))
         material, load = IsotropicElasticity(100.0, 0.3), (1.0, 0.0, 0.0)
     else:
         plane = "triangle" if cell == "triangle6" else "quadrilateral"

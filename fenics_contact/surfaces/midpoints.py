@@ -1,0 +1,94 @@
+"""Facets of six nodes: a pressure bears on the midpoints of their edges, hardly on their corners.
+
+The shape functions of the corners of a quadratic triangle have the mean zero, those of the midpoints a third:
+a uniform pressure makes forces at the midpoints alone. With the midpoints as points of contact, each with a
+third of the facet, forces are those of a quadrature rule that is exact for quadratic displacements, and a
+uniform pressure is found exactly.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.mesh import FACET_TYPES, BodyMesh, shape_values
+from fenics_contact.surfaces.facet_areas import nodal_areas
+
+#: Nodes of a quadratic triangle, and its corners.
+_NODES, _CORNERS = 6, 3
+
+
+def bears_on_midpoints(facets: np.ndarray) -> bool:
+    """Return whether facets are quadratic triangles, (n, 6)."""
+    return facets.shape[1] == _NODES
+
+
+def bearing_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
+    """Return the area of each facet that bears on each of its nodes.
+
+    It is the nodal force of a unit pressure, but that of the corners of quadratic triangles, which vanishes
+    on flat ones, is shared by their midpoints.
+
+    Returns:
+        Shape (n_facets, nodes of a facet), [length²] or [length].
+    """
+    areas = nodal_areas(points, facets)
+    if bears_on_midpoints(facets):
+        areas[:, _CORNERS:] += areas[:, :_CORNERS].sum(axis=1, keepdims=True) / _CORNERS
+        areas[:, :_CORNERS] = 0.0
+    return areas
+
+
+def share_areas(mesh: BodyMesh, name: str) -> np.ndarray:
+    """Return areas by which the nodes of a surface share what is on it, (n_nodes of the mesh,), all positive.
+
+    The nodal forces of a unit pressure; on quadratic triangles those on the linear facets between the nodes.
+    """
+    facets = mesh.surfaces[name]
+    if bears_on_midpoints(facets):
+        facets = mesh.linear.surfaces[name]
+    return np.bincount(facets.ravel(), nodal_areas(mesh.points, facets).ravel(), minlength=mesh.n_nodes)
+
+
+def filled_at_corners(facets: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Fill in values at the corners of quadratic triangles from those at the midpoints.
+
+    At each corner the mean over the facets around it of ¾ (a + b) − ½ c, where a and b are the values at the
+    midpoints beside it and c is that opposite: between the mean beside it and the linear function through all
+    three, so that quadratic fields on regular meshes are exact.
+
+    Args:
+        facets: Node numbers, (n, nodes of a facet); values stay as they are unless there are six.
+        values: Values at nodes, (n_nodes,) or (n_nodes, k).
+
+    Returns:
+        The same with values at the corners.
+    """
+    if not bears_on_midpoints(facets):
+        return values
+    result, corners = values.copy(), facets[:, :_CORNERS]
+    after = values[facets[:, _CORNERS:]]
+    before, opposite = np.roll(after, 1, axis=1), np.roll(after, -1, axis=1)
+    total, count = np.zeros_like(values), np.bincount(corners.ravel(), minlength=len(values))
+    np.add.at(total, corners, 0.75 * (after + before) - 0.5 * opposite)
+    mine = np.flatnonzero(count)
+    result[mine] = (total[mine].T / count[mine]).T
+    return result
+
+
+def shape_weights(
+    facets: np.ndarray, facet: np.ndarray, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes of quadratic triangles and their weights at points of their linear pieces.
+
+    Args:
+        facets: Node numbers of the quadratic triangles, (n, 6).
+        facet: Numbers of linear pieces, four consecutive ones a triangle, (m,).
+        weights: Linear shape functions of the pieces at the points, (m, 3).
+
+    Returns:
+        Node numbers and quadratic shape functions, (m, 6) each.
+    """
+    kind = FACET_TYPES[_NODES, 3]
+    count = len(kind.pieces)
+    places = np.einsum("mk,mkd->md", weights, kind.nodes[kind.pieces[facet % count]])
+    return facets[facet // count], shape_values(kind, places)
