@@ -82,8 +82,8 @@ def check_node_order(points: np.ndarray, cells: np.ndarray) -> None:
     places = [int(np.flatnonzero(ordered[0] == node)[0]) for node in cells[0]]
     raise InvalidInputError(
         f"the nodes of {kind.plural} must be in the order of VTK, the {corners} corners and then those "
-        f"between the corners {expected}, but by their coordinates they are in the order {places} of these: give "
-        "points, cells = in_vtk_order(points, cells), or check the coordinates"
+        f"between the corners {expected}, but by their coordinates they are in the order {places} of these: "
+        "give points, cells = in_vtk_order(points, cells), or check the coordinates"
     )
 
 

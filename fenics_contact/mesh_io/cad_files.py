@@ -94,7 +94,11 @@ def _read(
             raise InvalidInputError(f"size must be above zero, got {size}: give the largest edge of a cell")
     if order not in (1, 2):
         raise InvalidInputError(f"order must be 1 or 2, got {order}: linear or quadratic cells")
-    options = {"Mesh.ElementOrder": order, "Mesh.SecondOrderIncomplete": 0, "Mesh.SecondOrderLinear": 0}
+    options: dict[str, float] = {
+        "Mesh.ElementOrder": order,
+        "Mesh.SecondOrderIncomplete": 0,
+        "Mesh.SecondOrderLinear": 0,
+    }
     options["Mesh.HighOrderOptimize"] = 1  # only where curved cells would be inverted
     if size is not None:
         options["Mesh.MeshSizeMax"] = size

@@ -69,9 +69,9 @@ def read_xdmf(
         Name to body.
 
     Raises:
-        InvalidInputError: If a file, a grid or a tag is missing, a cell has no tag, cells are of higher order,
-            are prisms or pyramids or of several types, or the bodies or surfaces cannot be made of them, see
-            `read_msh`.
+        InvalidInputError: If a file, a grid or a tag is missing, a cell has no tag, cells are of third
+            order, prisms or pyramids, or of several types, or the bodies or surfaces cannot be made of them,
+            see `read_msh`.
 
     Note:
         Collective on ``comm`` if given.

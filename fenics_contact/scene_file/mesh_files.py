@@ -87,8 +87,8 @@ class MeshFile(Placed):
             )
         if self.size is not None or self.order > 1:
             raise InvalidInputError(
-                f"size and order are for CAD files ({', '.join(CAD)}), got {self.file!r}: leave it away, or mesh the "
-                "body anew"
+                f"size and order are for CAD files ({', '.join(CAD)}), got {self.file!r}: leave it away, or "
+                "mesh the body anew"
             )
         if kind == ".msh":
             return mesh_io.read_msh(path, *groups, comm=comm)

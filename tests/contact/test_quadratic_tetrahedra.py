@@ -1,4 +1,4 @@
-"""Quadratic tetrahedra, whose facets bear on the midpoints of their edges, find what quadratic hexahedra find."""
+"""Quadratic tetrahedra, whose facets bear on the midpoints of edges, find what quadratic hexahedra find."""
 
 from __future__ import annotations
 

@@ -142,7 +142,7 @@ def test_another_order_of_nodes_is_told_which_is_expected(cell: str) -> None:
     mesh, corners = quadratic(linear_mesh(cell)), len(CELL_TYPES[cell].edges)
     other = mesh.cells.copy()
     other[:, corners : corners + 2] = other[:, [corners + 1, corners]]
-    words = rf"must be in the order of VTK, the {corners} corners and then .* corners 0-1, 1-2, .* order \[0, 1, 2.*"
+    words = rf"in the order of VTK, the {corners} corners and then .* corners 0-1, 1-2, .* order \[0, 1, 2.*"
     with pytest.raises(InvalidInputError, match=words + rf" {corners + 1}, {corners}"):
         BodyMesh(mesh.points, other)
     points, cells = in_vtk_order(mesh.points, other)

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.mesh import BodyMesh
-from fenics_contact.mesh_io import cad_shapes, from_gmsh_model, read_cad
+from fenics_contact.mesh_io import OnCylinder, cad_shapes, from_gmsh_model, read_cad
 from fenics_contact.mesh_io.gmsh_session import gmsh_model
 from fenics_contact.surface_shapes import (
     Cylinder,
@@ -232,6 +232,24 @@ def test_a_step_file_keeps_its_shapes(model: Any, tmp_path: Path, capfd: pytest.
         InvalidInputError, match=r"surface 'bore' must have a face, .* 'none': it has 1 \(plane, area"
     ):
         read_cad(path, 0.5, surfaces={"bore": ["none"]})
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_quadratic_cells_are_curved_like_the_model(model: Any, tmp_path: Path, order: int) -> None:
+    occ = model.model.occ
+    occ.cut([(3, occ.addBox(-3, -3, 0, 6, 6, 2))], [(3, occ.addCylinder(0, 0, -1, 0, 0, 4, 1))])
+    occ.synchronize()
+    path = tmp_path / "plate.brep"
+    model.write(str(path))
+    (mesh,) = read_cad(path, 1.5, surfaces={"bore": OnCylinder(1.0)}, order=order).values()
+    assert mesh.order == order
+    require_on_nodes(mesh)
+    error = abs(mesh.volume / (72 - 2 * np.pi) - 1)
+    assert error < 2e-4 if order == 2 else error > 2e-3
+    if order == 2:
+        assert mesh.surfaces["bore"].shape[1] == 6
+        with pytest.raises(InvalidInputError, match="order must be 1 or 2, got 3: linear or quadratic cells"):
+            read_cad(path, 1.5, order=3)
 
 
 GEO = """

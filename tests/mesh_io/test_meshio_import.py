@@ -133,6 +133,43 @@ def test_plane_cells_lose_their_constant_z_coordinate(tmp_path: Path) -> None:
     assert [area(body, "7") for body in found.values()] == [[0.0, -1.0], [0.0, -1.0]]
 
 
+@pytest.mark.parametrize("ending", [".vtu", ".msh", ".inp"])
+def test_quadratic_tetrahedra_stay_so_whatever_the_order_of_their_nodes(ending: str, tmp_path: Path) -> None:
+    """Abaqus and CalculiX call them C3D10; gmsh exchanges the last two midpoints."""
+    bent = quadratic(block((0, 0, 0), (2, 1, 1), (2, 2, 2), cell="tetrahedron"))
+    bent = bent.moved(bent.points + 0.05 * np.sin(bent.points[:, [1, 2, 0]]))
+    tags, path = [np.full(bent.n_cells, 1)], tmp_path / f"bent{ending}"
+    data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+    sets = {"bar": [np.arange(bent.n_cells)]} if ending == ".inp" else {}
+    written = meshio.Mesh(
+        bent.points, [("tetra10", bent.cells)], cell_data={} if sets else data, cell_sets=sets,
+        point_sets={"low": np.unique(bent.surfaces["z0"])} if sets else {},
+    )  # fmt: skip
+    written.write(path, **({"file_format": "gmsh22"} if ending == ".msh" else {}))
+    (found,) = read_mesh(path).values()
+    assert (found.cell_type, found.volume) == ("tetrahedron10", pytest.approx(bent.volume, rel=1e-12))
+    np.testing.assert_allclose(found.points[found.cells], bent.points[bent.cells], atol=1e-12)
+    if sets:
+        assert "C3D10" in path.read_text()
+        assert found.surfaces["low"].shape == bent.surfaces["z0"].shape
+    (linear,) = read_mesh(path, corners_only=True, file_format="gmsh" if ending == ".msh" else None).values()
+    assert linear.cell_type == "tetrahedron"
+
+
+def test_midpoints_in_another_order_are_put_right_or_refused(tmp_path: Path) -> None:
+    """In the whole file by their places; of a single cell they make it an inverted one."""
+    straight = quadratic(block((0, 0, 0), (2, 1, 1), (2, 1, 1), cell="tetrahedron"))
+    cells = straight.cells[:, [0, 1, 2, 3, 9, 8, 7, 6, 5, 4]]
+    found = from_meshio(meshio.Mesh(straight.points, [("tetra10", cells)]))["mesh"]
+    np.testing.assert_array_equal(found.cells, straight.cells)
+    cells = straight.cells.copy()
+    cells[0] = cells[0, [0, 1, 2, 3, 5, 4, 6, 7, 8, 9]]
+    with pytest.raises(
+        InvalidInputError, match=r"'mesh' of .* is no sound mesh: every cell .* 1 of 12 are inv"
+    ):
+        from_meshio(meshio.Mesh(straight.points, [("tetra10", cells)]))
+
+
 @pytest.mark.parametrize("ending", [".vtu", ".msh"])
 def test_quadratic_hexahedra_stay_so_whatever_the_order_of_their_nodes(ending: str, tmp_path: Path) -> None:
     bent = quadratic(block((0, 0, 0), (2, 1, 1), (2, 2, 2)))

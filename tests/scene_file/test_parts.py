@@ -86,7 +86,9 @@ def test_bodies_come_from_mesh_files() -> None:
         _ = file_of(mesh={"file": str(data)}, body={"part": "nothing"}).scene
     with pytest.raises(SceneFileError, match="labels and corners_only are for other formats than"):
         _ = file_of(mesh={"file": str(data), "labels": "sets"}).scene
-    with pytest.raises(SceneFileError, match=r"size is for CAD files \(.step, .*: leave it away, or mesh"):
+    with pytest.raises(
+        SceneFileError, match=r"size and order are for CAD files \(.step, .*: leave it away, or mesh"
+    ):
         _ = file_of(mesh={"file": str(data), "size": 1.0}).scene
 
 
@@ -119,6 +121,8 @@ def test_bodies_come_from_cad_files_with_their_shapes(tmp_path: Path) -> None:
         SceneFileError, match=r"faces are chosen by where they lie in CAD files .*: choose groups"
     ):
         _ = file_of(mesh={"file": str(data), "surfaces": by_place}).scene
+    curved = file_of(mesh={**mesh, "order": 2}).scene.bodies["a"].mesh
+    assert (curved.cell_type, found.cell_type) == ("tetrahedron10", "tetrahedron")
     coarse = file_of(mesh={**mesh, "size": 0.7}).scene.bodies["a"].mesh
     assert coarse.n_cells < found.n_cells
     with pytest.raises(SceneFileError, match=r"labels and corners_only are for other formats than CAD"):
