@@ -32,6 +32,23 @@ def scalar_space(mesh: dolfinx.mesh.Mesh, degree: int) -> dolfinx.fem.FunctionSp
     return _space(mesh, scalar_element(cell_type) if degree == 1 else cellwise_element(cell_type))
 
 
+def nodal_space_on(mesh: dolfinx.mesh.Mesh, size: int) -> dolfinx.fem.FunctionSpace:
+    """Return the space of nodal fields with a number of components on ``mesh``, of the cells' degree."""
+    cell_type = cell_type_of_mesh(mesh)
+    if size == 1:
+        return _space(mesh, scalar_element(cell_type))
+    return _space(mesh, vector_element(cell_type, size))
+
+
+def lagrange_degree(space: dolfinx.fem.FunctionSpace) -> int | None:
+    """Return the degree of a space of Lagrange elements, continuous or not; None for others."""
+    element = space.ufl_element()
+    if old():
+        known = ("Lagrange", "Q", "Discontinuous Lagrange", "DQ")
+        return int(element.degree()) if element.family() in known else None
+    return int(element.degree) if getattr(element, "family_name", "") in ("P", "Q") else None
+
+
 def cell_field(mesh: dolfinx.mesh.Mesh, name: str, values: np.ndarray) -> dolfinx.fem.Function:
     """Return a field on ``mesh`` that is constant on each cell, by the values on this rank's own cells.
 
@@ -70,6 +87,11 @@ def cell_nodes(mesh: dolfinx.mesh.Mesh) -> np.ndarray:
     """Return the input nodes of this rank's cells, tensor-product order, shape (n_cells, nodes of a cell)."""
     dofmap = table(mesh.geometry.dofmap, cell_count(mesh))
     return _input_nodes(mesh)[dofmap]
+
+
+def cell_geometry(mesh: dolfinx.mesh.Mesh) -> np.ndarray:
+    """Return the nodes in dolfinx's geometry of this rank's cells, shape (n_cells, nodes of a cell)."""
+    return table(mesh.geometry.dofmap, cell_count(mesh))
 
 
 def cell_dofs(space: dolfinx.fem.FunctionSpace) -> np.ndarray:

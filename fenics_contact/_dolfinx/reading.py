@@ -9,6 +9,7 @@ import numpy as np
 
 from fenics_contact._dolfinx.cells import NODE_ORDER, cell_type_named, facet_vertices
 from fenics_contact._dolfinx.loading import cpp, dolfinx, old
+from fenics_contact._dolfinx.numbering import cell_count, table
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import InvalidInputError
 
@@ -17,22 +18,24 @@ __all__ = ["MeshArrays", "TagArrays", "mesh_arrays", "read_mesh", "read_tags", "
 
 @dataclass(frozen=True, eq=False)
 class MeshArrays:
-    """A mesh on one rank.
+    """A mesh, the same on all ranks of its communicator but for what is on this rank.
 
     Attributes:
         cell_type: Type of the cells; dolfinx's name if bodies cannot have them.
         dim: Topological dimension of the cells.
         points: Coordinates, (n_nodes, geometric dimension), in the order of dolfinx's input.
+        inputs: dolfinx's number of each of them in its input, ascending, (n_nodes,).
         cells: Node numbers, (n_cells, nodes of a cell), in the order of dolfinx's input; nodes of cells that
             bodies can have in VTK order.
         order: Degree of the map from the reference cell.
-        node: Number of every node of dolfinx's geometry among ``points``.
-        cell: Number of every cell of dolfinx's topology among ``cells``.
+        node: Number of every node of this rank's geometry among ``points``.
+        cell: Number of every cell that this rank owns among ``cells``.
     """
 
     cell_type: str
     dim: int
     points: np.ndarray
+    inputs: np.ndarray
     cells: np.ndarray
     order: int
     node: np.ndarray
@@ -126,33 +129,48 @@ def _opened(path: Path, inline: bool) -> dolfinx.io.XDMFFile:
 
 
 def mesh_arrays(mesh: dolfinx.mesh.Mesh) -> MeshArrays:
-    """Extract the arrays of a mesh on one rank."""
+    """Extract the arrays of a mesh, of a distributed one on all its ranks. Collective on its communicator."""
     topology, geometry = mesh.topology, mesh.geometry
-    n_cells = topology.index_map(topology.dim).size_local
-    name = topology.cell_name()
-    node = np.argsort(np.argsort(geometry.input_global_indices))
-    cell = np.argsort(np.argsort(topology.original_cell_index[:n_cells]))
-    dofmap = np.asarray(getattr(geometry.dofmap, "array", geometry.dofmap)).reshape(n_cells, -1)
-    cells: np.ndarray = np.empty(dofmap.shape, dtype=np.int64)
-    cells[cell] = node[dofmap]
-    points = np.empty((node.size, geometry.dim))
-    points[node] = geometry.x[:, : geometry.dim]
+    owned, name = topology.index_map(topology.dim).size_local, topology.cell_name()
+    given = np.asarray(geometry.input_global_indices, dtype=np.int64)
+    inputs, first = np.unique(_from_all(mesh, given), return_index=True)
+    points = _from_all(mesh, np.asarray(geometry.x)[:, : geometry.dim])[first]
+    node = np.searchsorted(inputs, given)
+    original = np.asarray(topology.original_cell_index[:owned], dtype=np.int64)
+    every, place = np.unique(_from_all(mesh, original), return_index=True)
     order = int((geometry.cmap if hasattr(geometry.cmap, "degree") else geometry.cmaps[0]).degree)
     kind = cell_type_named(name, order)
+    nodes = table(geometry.dofmap, cell_count(mesh))[:owned]
+    cells = _from_all(mesh, node[nodes])[place]
     if kind in NODE_ORDER:
         cells = cells[:, np.argsort(NODE_ORDER[kind])]
-    return MeshArrays(kind, topology.dim, points, cells, order, node, cell)
+    cell = np.searchsorted(every, original)
+    return MeshArrays(kind, topology.dim, points, inputs, cells, order, node, cell)
+
+
+def _from_all(mesh: dolfinx.mesh.Mesh, rows: np.ndarray) -> np.ndarray:
+    """Return the rows of all ranks one after another; a rank without rows takes part. Collective."""
+    if mesh.comm.size == 1:
+        return rows
+    parts = [part for part in mesh.comm.allgather(rows) if len(part)]
+    return np.concatenate(parts) if parts else rows
 
 
 def tag_arrays(mesh: dolfinx.mesh.Mesh, arrays: MeshArrays, tags: dolfinx.mesh.MeshTags) -> TagArrays:
-    """Extract the arrays of tags on the cells or facets of a mesh on one rank."""
+    """Extract the arrays of tags on the cells or facets of a mesh. Collective on its communicator."""
+    indices, values = np.asarray(tags.indices, dtype=np.int32), np.asarray(tags.values)
     if tags.dim == arrays.dim:
-        return TagArrays(arrays.cell[tags.indices], np.asarray(tags.values))
+        mine = indices < len(arrays.cell)
+        return TagArrays(_from_all(mesh, arrays.cell[indices[mine]]), _from_all(mesh, values[mine]))
     topology = mesh.topology
     topology.create_connectivity(tags.dim, arrays.dim)
     topology.create_connectivity(arrays.dim, tags.dim)
     core = mesh._mesh if old() else mesh._cpp_object
-    rows = cpp.mesh.entities_to_geometry(core, tags.dim, np.asarray(tags.indices, dtype=np.int32), False)
-    facets = arrays.node[np.asarray(rows).reshape(len(tags.indices), -1)]
     corners = len(facet_vertices(arrays.cell_type)[0])  # before the other nodes of quadratic facets
-    return TagArrays(facets[:, :corners], np.asarray(tags.values))
+    rows = np.asarray(cpp.mesh.entities_to_geometry(core, tags.dim, indices, False))
+    facets = arrays.node[rows.reshape(len(indices), rows.size // max(len(indices), 1))][:, :corners]
+    facets, values = _from_all(mesh, facets.reshape(-1, corners)), _from_all(mesh, values)
+    if mesh.comm.size > 1:  # a facet between two ranks may have its tag on both
+        _, first = np.unique(np.column_stack([np.sort(facets, axis=1), values]), axis=0, return_index=True)
+        facets, values = facets[first], values[first]
+    return TagArrays(facets, values)

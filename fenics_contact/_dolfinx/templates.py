@@ -19,12 +19,17 @@ def _element(cell_type: str, shape: tuple[int, ...]) -> ufl.finiteelement.Abstra
     # The variant is spelt out because ffcx 0.5 rewrites coordinate elements to it while compiling: without
     # it the signature of the next process differs and misses the compilation cache.
     cell, family = ufl.Cell(shape_of(cell_type)), ufl.VectorElement if shape else ufl.FiniteElement
-    return family("Lagrange", cell, degree(cell_type), variant="equispaced")
+    return family("Lagrange", cell, degree(cell_type), *shape, variant="equispaced")
 
 
-def vector_element(cell_type: str) -> ufl.finiteelement.AbstractFiniteElement:
-    """Return the element of coordinates and displacements, of the cells' degree, one value per direction."""
-    return _element(cell_type, (dimension(cell_type),))
+def vector_element(cell_type: str, size: int = 0) -> ufl.finiteelement.AbstractFiniteElement:
+    """Return the element of coordinates and displacements, of the cells' degree, one value per direction.
+
+    Args:
+        cell_type: Type of the cells.
+        size: Another number of values.
+    """
+    return _element(cell_type, (size or dimension(cell_type),))
 
 
 def scalar_element(cell_type: str) -> ufl.finiteelement.AbstractFiniteElement:

@@ -6,6 +6,7 @@ from fenics_contact.mesh_io.cad_choice import InBox, OnCylinder, OnPlane
 from fenics_contact.mesh_io.cad_faces import CadFace
 from fenics_contact.mesh_io.cad_files import read_cad
 from fenics_contact.mesh_io.cad_shapes import cad_shapes
+from fenics_contact.mesh_io.dolfinx_bodies import DolfinxBodies
 from fenics_contact.mesh_io.dolfinx_import import from_dolfinx, read_xdmf
 from fenics_contact.mesh_io.gmsh_import import from_gmsh_model, read_msh
 from fenics_contact.mesh_io.gmsh_session import gmsh_model
@@ -13,6 +14,7 @@ from fenics_contact.mesh_io.meshio_import import from_meshio, read_mesh, read_wi
 
 __all__ = [
     "CadFace",
+    "DolfinxBodies",
     "InBox",
     "OnCylinder",
     "OnPlane",

@@ -59,6 +59,11 @@ def bodies_of(mesh: TaggedMesh, bodies: Any = None, surfaces: Any = None) -> dic
     return result
 
 
+def cells_of_bodies(mesh: TaggedMesh, bodies: Any = None) -> dict[str, np.ndarray]:
+    """Return the ascending numbers of each body's cells; arguments as in `bodies_of`."""
+    return {name: _cells_of(mesh, name, parts)[1] for name, parts in chosen_bodies(mesh, bodies).items()}
+
+
 def _cells_of(mesh: TaggedMesh, name: str, parts: BodyParts) -> tuple[str, np.ndarray, np.ndarray]:
     """Return the cell type of a body, its ascending cells, and the group of each."""
     chosen = [

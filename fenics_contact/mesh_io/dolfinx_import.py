@@ -15,7 +15,8 @@ import numpy as np
 from fenics_contact._libraries import start
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.mesh import CELL_TYPES, OF_THE_FILE, BodyMesh, flattened, turned_right_handed
-from fenics_contact.mesh_io.bodies import bodies_of
+from fenics_contact.mesh_io.bodies import bodies_of, cells_of_bodies
+from fenics_contact.mesh_io.dolfinx_bodies import DolfinxBodies
 from fenics_contact.mesh_io.tagged_mesh import Label, TaggedMesh
 from fenics_contact.mesh_io.xdmf_grids import Grid, chosen_grid, grids_of
 
@@ -93,28 +94,34 @@ def from_dolfinx(
     facet_tags: dolfinx.mesh.MeshTags | None = None,
     bodies: Bodies | None = None,
     surfaces: Surfaces | None = None,
-) -> dict[str, BodyMesh]:
-    """Build bodies from a dolfinx mesh on one rank.
+) -> DolfinxBodies:
+    """Build bodies from a dolfinx mesh, on one rank or distributed over several.
 
     Args:
-        mesh: A mesh on a communicator of one rank.
+        mesh: The mesh. One that is distributed is gathered: the bodies are the same on all its ranks.
         cell_tags: Its tags of cells, if any.
         facet_tags: Its tags of facets, if any.
         bodies: As in `read_xdmf`.
         surfaces: As in `read_xdmf`.
 
     Returns:
-        Name to body; nodes and cells in the order in which the mesh was created from them.
+        Name to body; nodes and cells in the order in which the mesh was created from them. Its method
+        `DolfinxBodies.function_on` brings values of the bodies back to the mesh.
 
     Raises:
-        InvalidInputError: As `read_xdmf`, or if the mesh is distributed.
+        InvalidInputError: As `read_xdmf`.
+
+    Note:
+        Collective on the mesh's communicator.
     """
-    if mesh.comm.size > 1:
-        raise InvalidInputError(
-            f"from_dolfinx needs a mesh on one rank, this one is on {mesh.comm.size}: create it on "
-            "MPI.COMM_SELF on every rank, or write it to a file for `read_xdmf`"
-        )
-    return bodies_of(_tagged_mesh(mesh, cell_tags, facet_tags, "mesh of dolfinx"), bodies, surfaces)
+    from fenics_contact import _dolfinx
+
+    arrays = _dolfinx.mesh_arrays(mesh)
+    tagged = _tagged_mesh(mesh, arrays, cell_tags, facet_tags, "mesh of dolfinx")
+    made, cells = bodies_of(tagged, bodies, surfaces), cells_of_bodies(tagged, bodies)
+    return DolfinxBodies(
+        made, cells, {name: np.unique(arrays.cells[rows]) for name, rows in cells.items()}, arrays
+    )
 
 
 def _read(path: Path, facet_path: Path, names: tuple[str | None, str | None, str | None]) -> TaggedMesh:
@@ -136,7 +143,8 @@ def _read(path: Path, facet_path: Path, names: tuple[str | None, str | None, str
 
     try:
         mesh = _dolfinx.read_mesh(path, place.name, place.inline)
-        return _tagged_mesh(mesh, tags(path, cells), tags(facet_path, facets), f"file '{path}'")
+        arrays, source = _dolfinx.mesh_arrays(mesh), f"file '{path}'"
+        return _tagged_mesh(mesh, arrays, tags(path, cells), tags(facet_path, facets), source)
     except RuntimeError as reason:  # dolfinx raises no other class
         raise InvalidInputError(
             f"file '{path}' must be an XDMF file that dolfinx can read, with its HDF5 file beside it, "
@@ -147,13 +155,13 @@ def _read(path: Path, facet_path: Path, names: tuple[str | None, str | None, str
 
 def _tagged_mesh(
     mesh: dolfinx.mesh.Mesh,
+    arrays: MeshArrays,
     cell_tags: dolfinx.mesh.MeshTags | None,
     facet_tags: dolfinx.mesh.MeshTags | None,
     source: str,
 ) -> TaggedMesh:
     from fenics_contact import _dolfinx
 
-    arrays = _dolfinx.mesh_arrays(mesh)
     if arrays.order > 2:
         raise InvalidInputError(
             f"{source} has cells of type '{arrays.cell_type}' of order {arrays.order}: {OF_THE_FILE}"

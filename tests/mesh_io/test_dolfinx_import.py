@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -144,17 +145,104 @@ def test_all_ranks_receive_the_bodies_that_rank_0_reads(mpirun: Callable[..., st
     assert mpirun(script, 2).strip() == str(2 * [[("bar", 2.0, "end")]])
 
 
-def test_a_distributed_mesh_is_refused(mpirun: Callable[..., str]) -> None:
-    script = """
-        from mpi4py import MPI
-        from fenics_contact import _dolfinx
-        import dolfinx.mesh
-        from fenics_contact.mesh_io import from_dolfinx
-        try:
-            from_dolfinx(dolfinx.mesh.create_unit_square(MPI.COMM_WORLD, 4, 4))
-        except ValueError as error:
-            message = str(error)
-        if MPI.COMM_WORLD.rank == 0:
-            print(message)
-    """
-    assert "needs a mesh on one rank, this one is on 2: create it on" in mpirun(script, 2)
+DISTRIBUTED = """
+    import hashlib
+    import numpy as np
+    from mpi4py import MPI
+    from fenics_contact import _dolfinx
+    import dolfinx.fem, dolfinx.mesh
+    from fenics_contact.contact import solve_scene
+    from fenics_contact.mesh_io import from_dolfinx
+    from fenics_contact.scene import *
+
+    comm = MPI.COMM_WORLD
+    kind = dolfinx.mesh.CellType.{cell}
+    mesh = dolfinx.mesh.create_box(comm, [[0.0, 0.0, 0.0], [2.0, 1.0, 1.0]], [4, 2, 2], kind)
+    owned = mesh.topology.index_map(3).size_local
+    left = dolfinx.mesh.locate_entities(mesh, 3, lambda x: x[0] < 1.0 + 1e-9)
+    values = np.full(owned + mesh.topology.index_map(3).num_ghosts, 2, dtype=np.int32)
+    values[left] = 1
+    cells = dolfinx.mesh.meshtags(mesh, 3, np.arange(len(values), dtype=np.int32), values)
+    boundary = dolfinx.mesh.locate_entities_boundary
+    sides = [boundary(mesh, 2, lambda x, at=at: np.isclose(x[0], at)) for at in (0, 2)]
+    facets, tags = np.concatenate(sides), np.repeat([3, 4], list(map(len, sides))).astype(np.int32)
+    order = np.argsort(facets)
+    facets = dolfinx.mesh.meshtags(mesh, 2, facets[order], tags[order])
+    bodies = from_dolfinx(mesh, cells, facets, {{"bar": {{"soft": 1, "hard": 2}}}})
+    bar = bodies["bar"]
+    ends = [np.sort(bar.surfaces[name], axis=None) for name in "34"]
+    arrays = [bar.points, bar.cells, bar.regions["hard"], *ends]
+    same = hashlib.sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in arrays)).hexdigest()
+    assert len(set(comm.allgather(same))) == 1
+    body = Body(bar, {{"soft": IsotropicElasticity(10.0, 0.3), "hard": IsotropicElasticity(100.0, 0.3)}})
+    state = solve_scene(Scene({{"bar": body}}, [Support("bar", "3", (0.0,) * 3)],
+                              [Traction("bar", "4", (1.0, 0.2, 0.0))]), comm, tolerance=1e-10)
+    u = state.gather_displacement("bar")
+    make = getattr(dolfinx.fem, "functionspace", None)
+    vectors = dolfinx.fem.VectorFunctionSpace if make is None else lambda m, e: make(m, (*e, (3,)))
+    first, second = (vectors(mesh, ("Lagrange", degree)) for degree in (1, 2))
+    found = bodies.function_on(first, {{"bar": u}}, "u")
+    places = first.tabulate_dof_coordinates()
+    number = [int(np.argmin(np.abs(bar.points - x).sum(axis=1))) for x in places]
+    assert np.abs(found.x.array.reshape(-1, 3) - u[number]).max() == 0.0 and found.name == "u"
+    finer = bodies.function_on(second, {{"bar": u}})
+    again = dolfinx.fem.Function(first)
+    again.interpolate(finer)
+    assert np.abs(again.x.array - found.x.array).max() < 1e-12
+    constant = (dolfinx.fem.FunctionSpace if make is None else make)(mesh, ("DG", 0))
+    stiff = np.zeros(bar.n_cells)
+    stiff[bar.regions["hard"]] = 1.0
+    marks = bodies.function_on(constant, {{"bar": stiff}})
+    assert np.array_equal(marks.x.array == 1.0, values == 2)
+    if comm.rank == 0:
+        print(same, float(np.round(np.abs(u).max(), 9)))
+"""
+
+
+@pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])
+def test_a_distributed_mesh_gives_the_same_bodies_and_gets_its_fields_back(
+    cell: str, mpirun: Callable[..., str]
+) -> None:
+    said = [mpirun(DISTRIBUTED.format(cell=cell), ranks).strip() for ranks in (1, 2, 4)]
+    assert said[0] == said[1] == said[2]
+    assert float(said[0].split()[1]) > 0.01
+
+
+def vector_space(mesh: Any, degree: int) -> Any:
+    if _dolfinx.version() < (0, 7):
+        return _dolfinx.fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
+    return _dolfinx.fem.functionspace(mesh, ("Lagrange", degree, (mesh.geometry.dim,)))
+
+
+def test_values_of_quadratic_meshes_come_back_too() -> None:
+    known = quadratic(block((0, 0, 0), (2, 1, 1), (2, 1, 1), cell="tetrahedron"))
+    mesh = _dolfinx.local_mesh(known.points, known.cells, known.cell_type)
+    bodies, space = from_dolfinx(mesh), vector_space(mesh, 2)
+    values = known.points**2
+    found = bodies.function_on(space, {"mesh": values})
+    expected = _dolfinx.fem.Function(space)
+    expected.interpolate(lambda x: x**2)
+    np.testing.assert_allclose(found.x.array, expected.x.array, atol=1e-14)
+    with pytest.raises(
+        InvalidInputError, match="Lagrange elements, of degree 2 or higher like the mesh, or of"
+    ):
+        bodies.function_on(vector_space(mesh, 1), {"mesh": values})
+
+
+def test_what_does_not_fit_the_space_is_refused() -> None:
+    mesh = bar("tetrahedron")
+    bodies, space = from_dolfinx(mesh, cell_tags(mesh)), vector_space(mesh, 1)
+    alike = {name: body.points for name, body in bodies.items()}
+    np.testing.assert_allclose(
+        bodies.function_on(space, alike).x.array.reshape(-1, 3), space.tabulate_dof_coordinates(), atol=1e-14
+    )
+    assert "48 tetrahedra" in repr(bodies)
+    for values, words in (
+        ({"3": alike["1"]}, r"knows the bodies \['1', '2'\], got '3'"),
+        ({"1": alike["1"][1:]}, r"body '1' must have shape \(27, 3\), its nodes and .* got \(26, 3\)"),
+        ({"1": alike["1"], "2": alike["2"] + 1.0}, r"share nodes .* differ by up to 1: bring them back one"),
+    ):
+        with pytest.raises(InvalidInputError, match=words):
+            bodies.function_on(space, values)
+    with pytest.raises(InvalidInputError, match="needs a space on the mesh that the bodies were made of"):
+        bodies.function_on(vector_space(bar("hexahedron"), 1), alike)
