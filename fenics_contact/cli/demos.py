@@ -53,7 +53,7 @@ def demo(
         if context.args:
             raise InvalidInputError(
                 f"a scene takes no options here, got {context.args}: copy it with `fenics-contact demo "
-                f"{name} --copy` and use `fenics-contact run {name}`"
+                f"{name} --copy` and use `fenics-contact {_command(chosen)} {name}`"
             )
         (optimize if optimises(chosen.path) else run)(context, chosen.path)
     else:
@@ -81,8 +81,13 @@ def _copy(desk: Desk, chosen: Shipped) -> None:
             schema = chosen.path.parent / "scene_file.schema.json"
             if chosen.is_scene and schema.exists() and not (target.parent / schema.name).exists():
                 shutil.copyfile(schema, target.parent / schema.name)
-    how = f"fenics-contact run {target.name}" if chosen.is_scene else f"python {target.name}"
-    desk.say(f"copied to {target.name}; run it with `{how}`")
+    program = f"fenics-contact {_command(chosen)}" if chosen.is_scene else "python"
+    desk.say(f"copied to {target.name}; run it with `{program} {target.name}`")
+
+
+def _command(scene: Shipped) -> str:
+    """Return the command that an example scene is for."""
+    return "optimize" if optimises(scene.path) else "run"
 
 
 def _run(desk: Desk, chosen: Shipped, arguments: list[str]) -> None:

@@ -64,7 +64,7 @@ def optimize(
             result = _minimised(desk, file, task, resume)
             desk.show(facts(_facts(file, task, result)))
             gallery = Gallery()
-            if pictures and can_draw(desk):
+            if pictures and can_draw(desk, file, gallery):
                 _draw(desk, file, task, result, gallery)
     names = ", ".join(["result.json", *_films(file), *(path.name for path in gallery.drawn)])
     desk.say(f"results in {file.folder}/: {names}")

@@ -16,32 +16,6 @@ if TYPE_CHECKING:
     from fenics_contact.viz import Units
 
 
-def can_draw(desk: Desk) -> bool:
-    """Return whether pictures can be drawn; report what is missing if not. Collective."""
-    error: Exception | None = None
-    try:
-        from fenics_contact.viz import check_renderer
-
-        if desk.comm.rank == 0:
-            check_renderer()
-    except MissingRequirementError as missing:
-        error = missing
-    try:
-        agree(desk.comm, error)
-    except MissingRequirementError as missing:
-        desk.say(f"no pictures: {missing}")
-        return False
-    return True
-
-
-def units_of(file: SceneFile) -> Units:
-    """Return the names of units for pictures."""
-    from fenics_contact.viz import Units
-
-    names = file.document.units
-    return Units(length=names.length, force=names.force, stress=names.stress)
-
-
 @dataclass
 class Gallery:
     """The pictures of a run: those that were drawn, and those that could not be.
@@ -66,6 +40,40 @@ class Gallery:
                 "not be drawn, everything else is written: take it out of [output] pictures, or run with "
                 "--no-pictures"
             )
+
+
+def can_draw(desk: Desk, file: SceneFile, gallery: Gallery) -> bool:
+    """Return whether pictures can be drawn; if not, say what is missing for them. Collective.
+
+    Args:
+        desk: Output for the message.
+        file: The scene file.
+        gallery: Receives the names of the pictures, if the file requests any itself.
+    """
+    error: Exception | None = None
+    try:
+        from fenics_contact.viz import check_renderer
+
+        if desk.comm.rank == 0:
+            check_renderer()
+    except MissingRequirementError as missing:
+        error = missing
+    try:
+        agree(desk.comm, error)
+    except MissingRequirementError as missing:
+        desk.say(f"no pictures: {missing}")
+        if "pictures" in file.document.output.model_fields_set:
+            gallery.missing += [f"{kind}.png" for kind in file.document.output.pictures]
+        return False
+    return True
+
+
+def units_of(file: SceneFile) -> Units:
+    """Return the names of units for pictures."""
+    from fenics_contact.viz import Units
+
+    names = file.document.units
+    return Units(length=names.length, force=names.force, stress=names.stress)
 
 
 def draw_state(

@@ -72,7 +72,7 @@ def run(
         with only_run_in(file.folder, desk.comm):
             states = _through_steps(desk, file, resume) if file.steps else _at_once(desk, file)
             gallery = Gallery()
-            if pictures and _wanted(file) and can_draw(desk):
+            if pictures and _wanted(file) and can_draw(desk, file, gallery):
                 draw_state(desk, file, states, gallery)
     names = ", ".join(["result.json", *_files(file), *(path.name for path in gallery.drawn)])
     desk.say(f"results in {file.folder}/: {names}")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
+from fenics_contact.display import displayed
 from fenics_contact.scene.approach import displacement_along, force_along, hertz_approach, modulus_of
 from fenics_contact.scene.pairs import ContactPair, Surface
 from fenics_contact.scene.true_surfaces import surface_of
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 MOST = 2000
 
 
+@displayed
 @dataclass(frozen=True)
 class PairGeometry:
     """Between which surfaces the gaps of a contact pair are measured, and the error of flat facets.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fenics_contact.display import displayed
 from fenics_contact.linalg import expected_bytes
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene.effects import Effect, EffectName, effects_of
@@ -41,6 +42,7 @@ class ConeKind(StrEnum):
     COULOMB = "friction cones"
 
 
+@displayed
 @dataclass(frozen=True)
 class Plan:
     """What the solution of a scene needs; nothing else is built.
@@ -74,10 +76,13 @@ class Plan:
 
     def __str__(self) -> str:
         """Return one line for each decision."""
+        return "\n".join(f"{name:15s} {value}" for name, value in self._facts().items())
+
+    def _facts(self) -> dict[str, str]:
         kinds = ", ".join(f"{count} {kind}" for kind, count in self.multipliers.items() if count)
         coarse = f"{self.coarse_motions} rigid motions" if self.coarse_motions else "none"
         bounds = "follow the normal forces" if self.fixed_point else "given"
-        lines = {
+        return {
             "effects": "; ".join(f"{effect.name} ({effect.reason})" for effect in self.effects),
             "unknowns": f"{self.unknowns} in {self.subdomains} subdomains",
             "multipliers": kinds or "none",
@@ -89,7 +94,6 @@ class Plan:
             "memory": f"{self.memory / 1e6:.0f} MB",
             **{f"pair {number}": str(pair) for number, pair in enumerate(self.contacts)},
         }
-        return "\n".join(f"{name:15s} {value}" for name, value in lines.items())
 
 
 def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensitivity: bool = False) -> Plan:

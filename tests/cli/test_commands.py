@@ -120,6 +120,17 @@ def test_an_example_scene_is_copied_with_its_schema_and_run(
     assert "a scene takes no options here" in capsys.readouterr().err
 
 
+def test_a_copied_scene_that_optimises_is_run_by_its_own_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run("demo", "chain_links.toml", "--copy") == 0
+    assert "run it with `fenics-contact optimize chain_links.toml`" in capsys.readouterr().out
+    assert run("optimize", "chain_links.toml", "--dry-run") == 0
+    assert run("demo", "chain_links.toml", "--set", "title=x") == 2
+    assert "--copy` and use `fenics-contact optimize chain_links.toml`" in capsys.readouterr().err
+
+
 def test_view_shows_numbers_and_fields(result: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("view", result, "--no-window") == 0
     printed = capsys.readouterr().out

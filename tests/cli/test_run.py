@@ -233,6 +233,25 @@ def test_a_picture_that_cannot_be_drawn_is_named_once_all_else_is_written(
     assert run("run", path, "-o", tmp_path, "--no-pictures") == 0
 
 
+def test_without_the_libraries_for_pictures_requested_ones_are_missed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def missing() -> None:
+        raise MissingRequirementError("pyvista is not installed", name="pyvista")
+
+    monkeypatch.setattr("fenics_contact.viz.check_renderer", missing)
+    path = scene(tmp_path, changed(("[solver]", '[output]\npictures = ["stress", "pressure"]\n[solver]')))
+    assert run("run", path, "-o", tmp_path) == cli.Ending.WRONG_INPUT
+    told = capsys.readouterr()
+    assert "no pictures: pyvista is not installed\n" in told.out
+    assert f"results in {tmp_path}/: result.json, state.vtm\n" in told.out
+    assert "must be possible, stress.png, pressure.png could not be drawn, everything else is" in told.err
+    assert run("run", path, "-o", tmp_path, "--no-pictures") == 0
+    path = scene(tmp_path, GOOD)
+    assert run("run", path, "-o", tmp_path) == 0, "no picture is asked for"
+    assert "no pictures: pyvista is not installed\n" in capsys.readouterr().out
+
+
 @pytest.mark.slow
 def test_an_optimisation_writes_its_designs_and_says_when_it_stopped_early(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
