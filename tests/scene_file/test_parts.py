@@ -11,10 +11,7 @@ from mpi4py import MPI
 
 from fenics_contact import scene
 from fenics_contact.gallery import LinkShape, block, chain, half_disc, hemisphere, rectangle
-from fenics_contact.mesh_io import read_msh
-from fenics_contact.mesh_io.gmsh_session import gmsh_model
 from fenics_contact.scene_file import Expression, SceneFile, SceneFileError, VectorExpression, read_scene_file
-from tests.conftest import ROOT
 from tests.scene_file.texts import changed
 
 SELF = MPI.COMM_SELF
@@ -74,59 +71,6 @@ def test_the_parts_of_a_chain_are_its_links() -> None:
     np.testing.assert_array_equal(file.scene.bodies["a"].mesh.points, links[1].mesh.points)
     with pytest.raises(SceneFileError, match=r"bodies.a must have 'part', one of \['1', '2', '3'\]"):
         _ = file_of(mesh=mesh).scene
-
-
-def test_bodies_come_from_mesh_files() -> None:
-    data = ROOT / "tests" / "data" / "two_boxes_41.msh"
-    known = read_msh(data)
-    name = sorted(known)[0]
-    found = file_of(mesh={"file": str(data)}, body={"part": name}).scene.bodies["a"].mesh
-    np.testing.assert_array_equal(found.points, known[name].points)
-    with pytest.raises(SceneFileError, match="must be a body of the mesh 'm', one of"):
-        _ = file_of(mesh={"file": str(data)}, body={"part": "nothing"}).scene
-    with pytest.raises(SceneFileError, match="labels and corners_only are for other formats than"):
-        _ = file_of(mesh={"file": str(data), "labels": "sets"}).scene
-    with pytest.raises(
-        SceneFileError, match=r"size and order are for CAD files \(.step, .*: leave it away, or mesh"
-    ):
-        _ = file_of(mesh={"file": str(data), "size": 1.0}).scene
-
-
-def test_bodies_come_from_cad_files_with_their_shapes(tmp_path: Path) -> None:
-    with gmsh_model("pin") as gmsh:
-        gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 2, 1)
-        gmsh.model.occ.synchronize()
-        gmsh.write(str(tmp_path / "pin.brep"))
-    mesh = {"file": str(tmp_path / "pin.brep"), "size": 0.2, "surfaces": {"mantle": 1}, "scale": 2.0}
-    found = file_of(mesh=mesh).scene.bodies["a"].mesh
-    there = np.array([[3.0, 0.0, 1.0], [0.0, 2.0, 3.0]])
-    np.testing.assert_allclose(found.shapes["mantle"].distance(there), [1.0, 0.0], atol=1e-12)
-    by_place = {"mantle": {"faces": "on_cylinder", "radius": 1.0, "axis": [0, 0, 1]}}
-    by_place["ends"] = [{"faces": "on_plane", "point": [0, 0, z], "normal": [0, 0, 1]} for z in (0, 2)]
-    chosen = file_of(mesh={**mesh, "surfaces": by_place}).scene.bodies["a"].mesh
-    np.testing.assert_array_equal(chosen.surfaces["mantle"], found.surfaces["mantle"])
-    assert set(chosen.points[chosen.surfaces["ends"]][..., 2].ravel()) == {0.0, 4.0}
-    for wrong, words in (
-        ({"faces": "on_cylinder", "radius": 3.0}, "'x' must have a face, .* cylinder of radius 3: it has 1 "),
-        ({"faces": "on_cylinder"}, r"surfaces\.x must have 'radius'"),
-        ({"faces": "in_sphere"}, "must .*'in_box', 'on_plane'"),
-        ({"faces": "on_cylinder", "radius": 1.0, "way": 1}, "way"),
-        ([1, 2.5], r"surfaces\.x\.1 must be the name or number of a group or face, a list"),
-        ([], r"surfaces\.x must"),
-    ):
-        with pytest.raises(SceneFileError, match=words):
-            _ = file_of(mesh={**mesh, "surfaces": {"x": wrong}}).scene
-    data = ROOT / "tests" / "data" / "two_boxes_41.msh"
-    with pytest.raises(
-        SceneFileError, match=r"faces are chosen by where they lie in CAD files .*: choose groups"
-    ):
-        _ = file_of(mesh={"file": str(data), "surfaces": by_place}).scene
-    curved = file_of(mesh={**mesh, "order": 2}).scene.bodies["a"].mesh
-    assert (curved.cell_type, found.cell_type) == ("tetrahedron10", "tetrahedron")
-    coarse = file_of(mesh={**mesh, "size": 0.7}).scene.bodies["a"].mesh
-    assert coarse.n_cells < found.n_cells
-    with pytest.raises(SceneFileError, match=r"labels and corners_only are for other formats than CAD"):
-        _ = file_of(mesh={**mesh, "labels": "sets"}).scene
 
 
 @pytest.mark.parametrize(
