@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fenics_contact.io.replacing import replacing
@@ -125,7 +125,6 @@ COLUMNS = {
     "same": "same",
     "status": "open / stick / slip",
     "fallbacks": "fallbacks",
-    "outcome": "outcome",
 }
 
 
@@ -199,9 +198,18 @@ def page(rows: Sequence[Row]) -> str:
         own = [row for row in rows if row.group == key]
         if own:
             parts.append(
-                "\n".join([f"## {heading}", "", *([advice, ""] if advice else []), *_table(own)]) + "\n"
+                "\n".join([f"## {heading}", "", *([advice, ""] if advice else []), *_section(own)]) + "\n"
             )
     return "\n".join(parts)
+
+
+def _section(rows: Sequence[Row]) -> list[str]:
+    """Return the lines of a group: a table of the cases with figures, and what is to say of single cases."""
+    tolerances = {row.tolerance for row in rows}
+    one = [f"Tolerance {_cell(tolerances.pop())} in all cases.", ""] if len(tolerances) == 1 else []
+    measured = [replace(row, tolerance=None) if one else row for row in rows if row.scene or row.products]
+    told = [f"- {_cell(row.case)}: *{_cell(row.outcome)}*" for row in rows if row.outcome != "solved"]
+    return [*one, *(_table(measured) if measured else []), *([""] if measured and told else []), *told]
 
 
 def _table(rows: Sequence[Row]) -> list[str]:
