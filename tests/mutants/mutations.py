@@ -27,8 +27,8 @@ MUTATIONS = (
     Mutation(
         "Tresca's bound is too large by a percent",
         "pairing/friction.py",
-        "traction[points.pair] * points.area",
-        "1.01 * traction[points.pair] * points.area",
+        "bound[mine] = pair.friction_at(",
+        "bound[mine] = 1.01 * pair.friction_at(",
         (CONIC,),
     ),
     Mutation(
