@@ -153,6 +153,11 @@ def test_sliders_move_bodies_and_steps(chromium: Browser, pages: dict[str, Path]
     moved = drawn(chromium)["skin"][0]
     most = max(np.abs(state.gather_displacement(name)).max() for name in state.scene.bodies)
     assert np.abs(moved - still).max() == pytest.approx(told * most, rel=1e-3)
+    chromium.choose("scale", "6")
+    low, high = drawn(chromium)["x"]
+    x = drawn(chromium)["skin"][0][:, 0]
+    assert low < x.min()
+    assert still[:, 0].max() + 0.02 < x.max() < high, "bodies that leave the view are cut off"
     assert "step 2 of 2, second" in drawn(chromium)["caption"]
     chromium.choose("step", "0")
     assert "step 1 of 2, first" in drawn(chromium)["caption"]
@@ -192,3 +197,19 @@ def test_a_page_that_was_cut_says_so(chromium: Browser, pages: dict[str, Path], 
     chromium.go(tmp_path / "cut.html")
     with pytest.raises(AssertionError, match="Something is not shown"):
         chromium.wait("return false", seconds=20)
+
+
+def test_a_notebook_shows_the_page_in_its_frame(chromium: Browser, tmp_path: Path) -> None:
+    shown = result_page(plane_block())._repr_mimebundle_()["text/html"]
+    (tmp_path / "notebook.html").write_text(f'<!DOCTYPE html><meta charset="utf-8"><body>{shown}</body>')
+    chromium.go(tmp_path / "notebook.html", 800)
+    chromium.wait(
+        "const view = document.querySelector('iframe').contentDocument.getElementById('view');"
+        "return view && Number(view.dataset.drawn) > 0"
+    )
+    wide, told = chromium.run(
+        "const {contentDocument, clientWidth} = document.querySelector('iframe');"
+        "return [contentDocument.documentElement.scrollWidth <= clientWidth,"
+        " contentDocument.getElementById('trouble').textContent]"
+    )
+    assert (wide, told) == (True, "")
