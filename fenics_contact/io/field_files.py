@@ -13,6 +13,7 @@ from fenics_contact.errors import InvalidInputError
 if TYPE_CHECKING:
     import pyvista
 
+#: Suffixes of the files of fields that are read back.
 FIELD_FILES = (".vtu", ".vtm", ".pvd")
 
 

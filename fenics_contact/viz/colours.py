@@ -27,12 +27,12 @@ FAMILIES = (
 #: Any other area.
 SPARE = "#dddddd"
 
-#: Maps with monotonic lightness, readable in grey as well. The first ends before black, on which no line
-#: would be visible; the last has zero in its middle.
+#: Stresses, from pale to dark, but not to black, on which no line would be visible. As the maps below it has
+#: monotonic lightness, so that it is readable in grey as well.
 STRESS_MAP = ListedColormap(colormaps["magma_r"](np.linspace(0.04, 0.82, 256)), "stress")
 ERROR_MAP = colormaps["viridis_r"]
-PRESSURE_MAP = colormaps["YlGnBu"]
-SIGNED_MAP = colormaps["PuOr"]
+PRESSURE_MAP = colormaps["YlGnBu"]  #: Sizes other than stresses.
+SIGNED_MAP = colormaps["PuOr"]  #: Values of both signs, with zero in its middle.
 
 
 def neighbours(cells: np.ndarray, partition: np.ndarray) -> np.ndarray:
