@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from fenics_contact.linalg import ROUNDING
 from fenics_contact.viz import Units
 
 Record = Mapping[str, Any]
@@ -44,7 +43,7 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[Any]], words: int) -> st
     """Return a table of which the first columns are text; one of many columns is a list on narrow screens."""
     body = "".join(f"<tr>{_line('td', row, words, head or row)}</tr>\n" for row in rows)
     top = f"<thead><tr>{_line('th', head, words, head)}</tr></thead>" if head else ""
-    kind = ' class="many"' if len(head) > 5 else ""
+    kind = ' class="many"' if len(head) > 4 else ""
     return f'<div class="wide"><table{kind}>{top}<tbody>\n{body}</tbody></table></div>'
 
 
@@ -177,12 +176,14 @@ def _forces(record: Record, units: Units) -> str:
     return _table(("", "", *axes), rows, words=2) + words
 
 
-def _force_rows(name: str, entry: Record, balance: Record, units: Units) -> list[tuple[Any, ...]]:
-    """Return a row for a force and one for its moment; none if both are zero."""
+def _force_rows(
+    name: str, entry: Record, balance: Record, units: Units, rounding: float = 1e-8
+) -> list[tuple[Any, ...]]:
+    """Return a row for a force and one for its moment; none if both are zero but for rounding."""
     scales = {kind: balance[f"{kind}_scale"] for kind in ("force", "moment")}
     scales["about"] = scales["moment"] / scales["force"] if scales["force"] else 0.0
     force, moment, about = (
-        [0 if abs(part) <= ROUNDING * scale else part for part in _several(entry[kind])]
+        [0 if abs(part) <= rounding * scale else part for part in _several(entry[kind])]
         for kind, scale in scales.items()
     )
     if not any([*force, *moment]):

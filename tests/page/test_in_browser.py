@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from fenics_contact.contact import Status
+from fenics_contact.io import ResultSeries, write_result
 from fenics_contact.page import result_page
 from tests.page.browser import CHROMIUM, DRIVER, MISSING, Browser, browser
 from tests.viz.plane_states import plane_block
@@ -37,9 +39,24 @@ def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """A page in space with two steps, and one in the plane."""
+    """A page in space of a folder with two steps, and one in the plane."""
     folder, state = tmp_path_factory.mktemp("pages"), touching_blocks()
-    result_page({"first": state, "second": state}, folder / "space.html", title="Two blocks")
+    series = ResultSeries(folder, "history", MPI.COMM_SELF)
+    for value, label in enumerate(("first", "second")):
+        series.add(state, value, label)
+    numbers = (
+        "iterations",
+        "products",
+        "open",
+        "stick",
+        "slip",
+        "normal_force",
+        "friction_force",
+        "peak_pressure",
+    )
+    steps = {"number": [0, 1], "name": ["first", "second"], **{name: [123.456, 65.4321] for name in numbers}}
+    write_result(state, folder, more={"title": "Two blocks", "steps": steps})
+    result_page(folder, folder / "space.html")
     result_page(plane_block(), folder / "plane.html")
     return {name: folder / f"{name}.html" for name in ("space", "plane")}
 

@@ -124,12 +124,15 @@ def test_the_mesh_of_all_load_steps_is_kept_once() -> None:
 def test_files_give_the_page_of_their_state(tmp_path: Path) -> None:
     state = touching_blocks()
     write_vtu(state, tmp_path)
-    write_result(state, tmp_path, more={"title": "Blocks <of> steel", "unit_names": {"stress": "psi"}})
+    steps = {"number": [0], "name": ["pressed"], "stick": [11], "normal_force": [1234.5678]}
+    more = {"title": "Blocks <of> steel", "unit_names": {"stress": "psi"}, "steps": steps}
+    write_result(state, tmp_path, more=more)
     page = result_page(tmp_path).html
     assert page is not None
     data, arrays = content(page)
     same, others = content(result_page(state, title="Blocks <of> steel", units=Units(stress="psi")).html)
     assert data["title"] == "Blocks <of> steel"
+    assert "Load steps step stick normal force (N) 0 pressed 11 1234.6" in text_of(page)
     assert "<title>Blocks &lt;of&gt; steel</title>" in page
     assert "<of>" not in page.replace("\\u003c", "")
     for ours, theirs in zip(data["steps"][0]["bodies"], same["steps"][0]["bodies"], strict=True):
