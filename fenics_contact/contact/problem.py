@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fenics_contact._libraries import MPI, check_not_forked
+from fenics_contact.contact.contact_doubts import ContactDoubts
 from fenics_contact.contact.equilibrium import (
     default_solver,
     direct_state,
@@ -15,7 +16,6 @@ from fenics_contact.contact.equilibrium import (
     known_system,
     state_of,
 )
-from fenics_contact.contact.gap_doubts import GapDoubts
 from fenics_contact.contact.state import State
 from fenics_contact.contact.static_admissibility import check_held
 from fenics_contact.contact.stored import Stored, restored_solution, with_stored_slip
@@ -70,7 +70,7 @@ class ContactProblem:
         self.timer = PhaseTimer()
         self.state = None
         self._partitions, self._decomposition = partitions, None
-        self._gap_doubts = GapDoubts()
+        self._contact_doubts = ContactDoubts()
 
     state: State | None
     _decomposition: Decomposition | None
@@ -174,7 +174,7 @@ class ContactProblem:
         self.state = dual_state(torn, previous, solver, wanted, self.timer)
         if not overlap:  # designs differ little from the first one
             with self.timer.phase("state"):
-                self._gap_doubts.warn(self.state)
+                self._contact_doubts.warn(self.state)
         return self.state
 
     @collectively("ContactProblem.restore", lambda self, *_, **__: self.comm)

@@ -61,10 +61,10 @@ MUTATIONS = (
     ),
     Mutation(
         "the error of facets is compared with ten times what moves",
-        "contact/gap_doubts.py",
+        "contact/contact_doubts.py",
         "if error > share * moved > 0.0:",
         "if error > 10.0 * share * moved > 0.0:",
-        ("tests/contact/test_gap_doubts.py::test_a_roller_is_told_of_by_facets_alone",),
+        ("tests/contact/test_contact_doubts.py::test_a_roller_is_told_of_by_facets_alone",),
     ),
     Mutation(
         "no body is ever too loose",

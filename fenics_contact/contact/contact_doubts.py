@@ -1,4 +1,4 @@
-"""Warnings about gaps that are not known well beside what moves: by flat facets, or undeclared overlap."""
+"""Warnings about states that rest on doubtful gaps, or in which surfaces slide away from each other."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from fenics_contact.scene import ContactPair, Scene, Surface, surface_of
 _LOG = logging.getLogger(__name__)
 
 
-class GapDoubts:
-    """What is doubtful about the gaps of a problem; each pair is warned of once."""
+class ContactDoubts:
+    """What is doubtful about the contact of a problem; each pair is warned of once."""
 
     def __init__(self) -> None:
         """Start without any."""
@@ -25,7 +25,7 @@ class GapDoubts:
         self._told: set[tuple[int, str]] = set()
 
     def warn(self, state: State, share: float = 0.1) -> None:
-        """Warn of pairs whose measured gaps are not known well enough for a state. Collective.
+        """Warn of pairs that slide far, or whose measured gaps are not known well enough. Collective.
 
         The error of flat facets, or of surfaces reconstructed from nodes, is the difference to gaps between
         surfaces that are known better, see `fenics_contact.surfaces.true_surface`; it is computed once for
@@ -44,6 +44,9 @@ class GapDoubts:
         change, pressed_in = self._finer - contact.points.gap, _indentation(state)
         for number, pair in enumerate(torn.scene.contacts):
             mine = contact.on_pair(number)
+            slid, reach = _sliding(torn.scene, pair, contact.total_slip[mine])
+            if slid > reach:
+                self._tell(torn, number, "sliding", _words_of_sliding(pair, slid, reach))
             mine = mine[~contact.points.given[mine]]
             before, after = contact.points.gap[mine], contact.gap[mine]
             touching = contact.normal_force[mine] > 0.0
@@ -60,6 +63,24 @@ class GapDoubts:
         if (pair, kind) not in self._told and torn.decomposition.comm.rank == 0:
             tell(_LOG.warning, "%s", words)
         self._told.add((pair, kind))
+
+
+def _sliding(scene: Scene, pair: ContactPair, slip: np.ndarray) -> tuple[float, float]:
+    """Return how far points slide, and how far they may: across the slave's surface, [length]."""
+    if not isinstance(pair.master, Surface):
+        return 0.0, np.inf
+    mesh = scene.bodies[pair.slave.body].mesh
+    places = mesh.points[np.unique(mesh.surfaces[pair.slave.name])]
+    slid = np.linalg.norm(slip, axis=1).max(initial=0.0)
+    return float(slid), float(np.linalg.norm(np.ptp(places, axis=0)))
+
+
+def _words_of_sliding(pair: ContactPair, slid: float, reach: float) -> str:
+    return (
+        f"surfaces of {pair.place} slide by up to {slid:.3g} along each other, farther than the slave "
+        f"reaches ({reach:.3g}), but contact points keep the place that they meet at the start: hold by a "
+        "support what only the facets keep from turning or shifting, or move it in the mesh"
+    )
 
 
 def _indentation(state: State) -> np.ndarray:

@@ -12,7 +12,16 @@ from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, solve_scene
 from fenics_contact.gallery import half_disc, rectangle
-from fenics_contact.scene import Body, ContactPair, PlaneStrain, Pressure, Scene, Support, Surface, TotalForce
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    PlaneStrain,
+    Pressure,
+    Scene,
+    Support,
+    Surface,
+    TotalForce,
+)
 from tests.contact.gallery import block_on_plane, two_blocks
 from tests.contact.press_fits import Disc, press_fit
 
@@ -105,3 +114,19 @@ def test_a_pair_is_told_of_once(caplog: pytest.LogCaptureFixture) -> None:
             problem.solve(replace(scene, loads=[Pressure("hub", "outer", pressure)]))
             counts.append(len(caplog.records))
     assert counts == [0, 1, 1]
+
+
+def test_a_shaft_that_turns_away_is_told(caplog: pytest.LogCaptureFixture) -> None:
+    scene = press_fit(24, 8, interference=0.05, discretisation="mortar")
+    hub = scene.bodies["hub"]
+    turn = 0.4 * 2 * np.pi / 24
+    way = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    turned = replace(hub, mesh=hub.mesh.placed(way, np.zeros(2)))
+    free = replace(scene, bodies={**scene.bodies, "hub": turned})
+    # Weighted means over facets that are turned against each other do not face their nodes exactly, and
+    # nothing else keeps the shaft from turning.
+    (words,) = told(caplog, free)
+    assert words.startswith("surfaces of hub inner on shaft outer slide by up to ")
+    assert words.endswith("what only the facets keep from turning or shifting, or move it in the mesh")
+    (pair,) = free.contacts
+    assert told(caplog, replace(free, contacts=[replace(pair, discretisation="node")])) == []
