@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def state_facts(state: State, units: UnitNames) -> dict[str, str]:
-    """Return a summary of a state as text. Collective if it is balanced."""
+    """Return a summary of a state as text. Collective."""
     counts, energy = state.counts, f"{units.force} {units.length}"
     rows = {
         "unknowns": f"{counts['torn_unknowns']} in {counts['subdomains']} subdomains",
@@ -30,6 +30,8 @@ def state_facts(state: State, units: UnitNames) -> dict[str, str]:
     }
     for number, words in enumerate(pairs_in_words(state.scene, state.contact, units.force, units.stress)):
         rows[f"contact {number}"] = words
+    for number, motion in enumerate(state.rigid_motions()):
+        rows[f"rigid surface {number}"] = str(motion).replace("[length]", units.length)
     if state.unheld:
         rows["held by nothing"] = " and ".join(map(str, state.unheld)) + ": stays where it is"
     if state.known_errors is not None:

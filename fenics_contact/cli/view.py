@@ -18,7 +18,7 @@ from fenics_contact.io import FIELD_FILES, fields_of_result, read_result
 #: Entries of a result that are shown, in this order; the others are long.
 SHOWN = (
     "kind", "written", "ranks", "solver", "counts", "residuals", "energies", "errors", "seconds", "contact",
-    "optimisation", "more",
+    "rigid_motions", "optimisation", "more",
 )  # fmt: skip
 #: Longest list that is printed in full, and largest number of evaluations.
 LONGEST, MOST = 8, 20

@@ -12,6 +12,7 @@ from fenics_contact.contact.pair_resultants import PairResultants
 from fenics_contact.contact.problem import ContactProblem, solve_scene
 from fenics_contact.contact.result import ContactResult, Status
 from fenics_contact.contact.resultant import Resultant, Resultants
+from fenics_contact.contact.rigid_motion import RigidMotion
 from fenics_contact.contact.slip_bounds import Damping
 from fenics_contact.contact.state import State
 from fenics_contact.contact.state_in_words import pairs_in_words
@@ -33,6 +34,7 @@ __all__ = [
     "PairResultants",
     "Resultant",
     "Resultants",
+    "RigidMotion",
     "State",
     "Status",
     "Tolerance",

@@ -8,11 +8,12 @@ import numpy as np
 
 from fenics_contact.checks import GivenVector
 from fenics_contact.contact.nodal_forces import NodalForces, by_node
+from fenics_contact.contact.reactions import point_load
 from fenics_contact.contact.resultant import Resultant, point_of, resultant, table
 from fenics_contact.display import displayed
 from fenics_contact.feti import TornSystem
 from fenics_contact.linalg import ROUNDING
-from fenics_contact.scene import Surface
+from fenics_contact.scene import RigidSurface, Surface
 
 
 @displayed
@@ -80,6 +81,10 @@ def force_balance(torn: TornSystem, forces: NodalForces, about: GivenVector | np
     point = _middle(forces.places) if about is None else point_of(about, torn.dim)
     parts = _parts(torn, forces)
     resultants = {name: resultant(force, forces.places, point) for name, force in parts.items()}
+    for support in torn.scene.supports:
+        if isinstance(support, RigidSurface):  # the load at its point comes in through its nodes
+            resultants["loads"] += point_load(support, point)
+            resultants["reactions"] -= point_load(support, point)
     arms = forces.places - point
     sizes = [np.linalg.norm(force, axis=1) for force in parts.values()]
     reach = np.linalg.norm(arms, axis=1)

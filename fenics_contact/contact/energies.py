@@ -66,6 +66,6 @@ def compute_energies(
     torn = system.torn
     internal = torn.load - system.force(multiplier)  # = K u
     strained = 0.5 * internal @ (displacement - rigid)
-    mine = np.array([strained, torn.load @ displacement, multiplier @ torn.right])
-    strain, load, prescribed = (float(total) for total in torn.numbering.comm.allreduce(mine))
-    return Energies(strain, load, friction, -strain - prescribed)
+    mine = np.array([strained, multiplier @ torn.right])
+    strain, prescribed = (float(total) for total in torn.numbering.comm.allreduce(mine))
+    return Energies(strain, torn.load_work(displacement), friction, -strain - prescribed)

@@ -31,7 +31,7 @@ from fenics_contact.feti import (
     decompose,
 )
 from fenics_contact.qp import DualSolver
-from fenics_contact.scene import Scene, SolverKind, choose_solver
+from fenics_contact.scene import Load, RigidSurface, Scene, SolverKind, choose_solver
 from fenics_contact.timing import PhaseTimer
 
 
@@ -162,7 +162,7 @@ class ContactProblem:
                 earlier, moved = slip_from.torn, slip_from.torn_displacement
                 torn = torn.with_slip_from(earlier.relative(moved), earlier.sliding(moved))
             same = previous is not None and torn.points is previous.torn.points
-            if previous is None or not same or torn.scene.loads != previous.scene.loads:
+            if previous is None or not same or _loads_of(torn.scene) != _loads_of(previous.scene):
                 check_held(torn)
         if self.solver is None and kind is SolverKind.DIRECT:
             self.state = direct_state(torn, previous, self.timer)
@@ -246,3 +246,8 @@ def solve_scene(
         >>> state = solve_scene(scene, MPI.COMM_SELF, partitions=parts)  # doctest: +SKIP
     """
     return ContactProblem(scene, comm, partitions=partitions, solver=solver, tolerance=tolerance).solve()
+
+
+def _loads_of(scene: Scene) -> tuple[list[Load], list[RigidSurface]]:
+    """Return the loads of a scene, and the rigid surfaces, at whose points loads act."""
+    return list(scene.loads), [each for each in scene.supports if isinstance(each, RigidSurface)]

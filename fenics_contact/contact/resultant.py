@@ -43,6 +43,14 @@ class Resultant:
         """
         return self.moment + moment_of(self.force, self.about - point_of(point, len(self.force)))
 
+    def __add__(self, other: Resultant) -> Resultant:
+        """Return the sum with another one about the same point."""
+        return Resultant(self.force + other.force, self.moment + other.moment, self.about, self.surface)
+
+    def __sub__(self, other: Resultant) -> Resultant:
+        """Return the difference to another one about the same point."""
+        return Resultant(self.force - other.force, self.moment - other.moment, self.about, self.surface)
+
     def torque(self, point: GivenVector | np.ndarray, direction: GivenVector) -> float:
         """Return the moment about an axis in space, [force·length].
 

@@ -21,6 +21,7 @@ from fenics_contact.contact.pair_resultants import PairResultants, pair_resultan
 from fenics_contact.contact.reactions import support_reactions
 from fenics_contact.contact.result import ContactResult
 from fenics_contact.contact.resultant import Resultants
+from fenics_contact.contact.rigid_motion import RigidMotion, rigid_motion
 from fenics_contact.contact.state_in_words import answer_in_words, errors_in_words, first_pairs
 from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.contact.unheld import UnheldMotion, unheld_motions
@@ -30,7 +31,7 @@ from fenics_contact.fem import temperature_of
 from fenics_contact.feti import DirectSolution, DirectSystem, DualSystem, TornSystem, nodal_mean
 from fenics_contact.progress import Task
 from fenics_contact.qp import DualSolution
-from fenics_contact.scene import Scene
+from fenics_contact.scene import RigidSurface, Scene
 
 if TYPE_CHECKING:
     import dolfinx
@@ -309,6 +310,15 @@ class State:
             >>> state.reactions()[0].torque((0, 0, 0), (0, 0, 1))  # doctest: +SKIP
         """
         return support_reactions(self.scene, self._nodal_forces, about)
+
+    @collectively("State.rigid_motions", _comm)
+    def rigid_motions(self) -> tuple[RigidMotion, ...]:
+        """Return displacement and rotation of the points of all rigid surfaces, in the scene's order.
+
+        Collective.
+        """
+        rigid = [support for support in self.scene.supports if isinstance(support, RigidSurface)]
+        return tuple(rigid_motion(self.scene, each, self.gather_displacement(each.body)) for each in rigid)
 
     @collectively("State.resultants", _comm)
     def resultants(self, about: GivenVector | np.ndarray | None = None) -> PairResultants:

@@ -12,7 +12,14 @@ from fenics_contact.errors import ConvergenceError, InfeasibleError, together
 from fenics_contact.feti import TornSystem, common_kernel
 from fenics_contact.linalg import ROUNDING
 from fenics_contact.pairing import ContactPoints
-from fenics_contact.scene import RANK_TOLERANCE, Body, resisted_motions, rigid_body_modes
+from fenics_contact.scene import (
+    RANK_TOLERANCE,
+    Body,
+    held_components,
+    point_loads,
+    resisted_motions,
+    rigid_body_modes,
+)
 
 #: A load that needs all but this fraction of the friction is at the limit: how far the body slides would be
 #: decided by rounding.
@@ -76,7 +83,7 @@ class _RigidBody:
         self._nodes = slice(int(tearing.node_offset[index]), int(tearing.node_offset[index + 1]))
         body = torn.scene.bodies[self.name]
         self._modes = rigid_body_modes(body.mesh.points)
-        supports = resisted_motions(self._modes, torn.decomposition.fixed[self._nodes])
+        supports = resisted_motions(held_components(torn.scene, self.name, self._modes))
         #: Wrenches that supports and material can exert in both directions, shape (n_modes, n).
         self.support = _both(supports, _resisted_by_material(body, self._modes))
 
@@ -108,6 +115,8 @@ class _RigidBody:
         for subdomain in torn.subdomains:
             if subdomain.mesh.body == self.name:
                 wrench += subdomain.load @ self._modes[subdomain.mesh.nodes].reshape(-1, count)
+        if torn.decomposition.comm.rank == 0:
+            wrench += point_loads(torn.scene, self.name, self._modes)
         return wrench
 
     def _arms(self, points: ContactPoints) -> np.ndarray:

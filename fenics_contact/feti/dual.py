@@ -42,6 +42,8 @@ class DualSystem:
     problem: DualProblem
     kernel: sp.csr_matrix
     unheld: sp.csr_matrix
+    _points: sp.csr_matrix
+    _unheld_points: np.ndarray
     _bent: np.ndarray
     _B_interface: sp.csr_matrix
     _Bt_interface: sp.csr_matrix
@@ -82,13 +84,16 @@ class DualSystem:
 
     def _is_that_of(self, previous: DualSystem) -> bool:
         """Return whether F and G are those of an earlier system. Collective."""
+        mine, other = self.torn.free.columns, previous.torn.free.columns
         differs = self.torn.B is not previous.torn.B or self.inverse.factored > 0
+        differs = differs or mine.shape != other.shape or bool(abs(mine - other).sum() > 0.0)
         return not self.torn.numbering.comm.allreduce(int(differs))
 
     def _take_over(self, previous: DualSystem, timer: PhaseTimer) -> None:
         """Use the operators of an earlier system with the present load. Collective."""
         self._B_interface, self._Bt_interface = previous._B_interface, previous._Bt_interface
         self.kernel, self.unheld = previous.kernel, previous.unheld
+        self._points, self._unheld_points = previous._points, previous._unheld_points
         self._require_unloaded()
         with timer.phase("coarse space"):
             coarse = previous.problem.coarse.with_load(self._resultants(self.torn.numbering.comm))
@@ -191,6 +196,8 @@ class DualSystem:
             Shape (n_interface,), [length].
         """
         nothing = sp.csr_matrix((len(residual), 0))
+        if self.torn.free.count:  # rigid surfaces move as the nodes on them do on average
+            residual = residual + self.torn.free.columns @ self.torn.free_motion(residual)
         return self.preconditioner.lifting(nothing).jump(residual)
 
     def conforming(self, displacement: np.ndarray) -> np.ndarray:
@@ -223,7 +230,12 @@ class DualSystem:
         offset = np.concatenate([[0], np.cumsum(comm.allreduce(counts))])
         mine = offset[[subdomain.mesh.number for subdomain in self.torn.subdomains]]
         own = kernel_matrix(self.torn.subdomains, int(offset[-1]), mine)
-        return (own @ whole_motions(self.torn, offset)).tocsr()
+        motions, count = (own @ whole_motions(self.torn, offset)).tocsr(), self.torn.free.count
+        self._points = sp.csr_matrix((count, motions.shape[1]))
+        if count:  # the motions of points move nothing but the right sides of rows
+            self._points = sp.hstack([self._points, sp.identity(count)], format="csr")
+            motions = sp.hstack([motions, sp.csr_matrix((motions.shape[0], count))], format="csr")
+        return motions
 
     def _without_unheld(self, coarse: CoarseSpace) -> CoarseSpace:
         """Remove the motions in the kernel of B from R, and their rows from G. Collective.
@@ -240,11 +252,12 @@ class DualSystem:
         unfelt = unfelt @ np.linalg.inv(unfelt[order[:k]])
         unfelt[np.abs(unfelt) <= ROUNDING * np.abs(unfelt).max(initial=0.0)] = 0.0
         self.unheld = (self.kernel @ sp.csr_matrix(unfelt)).tocsr()
+        self._unheld_points = self._points @ unfelt
         if k == 0:
             return coarse
         self._require_unloaded()
         remaining = np.sort(order[k:])
-        self.kernel = self.kernel[:, remaining]
+        self.kernel, self._points = self.kernel[:, remaining], self._points[:, remaining]
         return CoarseSpace(coarse.comm, coarse.matrix[remaining], coarse.load[remaining])
 
     def _require_unloaded(self) -> None:
@@ -252,7 +265,8 @@ class DualSystem:
         if self.unheld.shape[1] == 0:
             return
         work = np.append(self.unheld.T @ self.torn.load, np.abs(self.torn.load).sum())
-        *driven, loads = self.torn.numbering.comm.allreduce(work)
+        work = self.torn.numbering.comm.allreduce(work)
+        driven, loads = work[:-1] + self._unheld_points.T @ self.torn.free.load, self._size(work[-1])
         if np.abs(driven).max() > UNBALANCED * loads:
             raise InfeasibleError(
                 "every loaded body must be held by supports, ties or contact, but the load works "
@@ -262,12 +276,20 @@ class DualSystem:
     def _resultants(self, comm: MPI.Comm) -> np.ndarray:
         """Return e = Rᵀ f, replicated; rounding of balanced loads is set to zero."""
         resultants = np.asarray(comm.allreduce(self.kernel.T @ self.torn.load))
-        resultants[np.abs(resultants) <= ROUNDING * comm.allreduce(np.abs(self.torn.load).sum())] = 0.0
+        resultants += self._points.T @ self.torn.free.load
+        size = self._size(comm.allreduce(np.abs(self.torn.load).sum()))
+        resultants[np.abs(resultants) <= ROUNDING * size] = 0.0
         return resultants
+
+    def _size(self, on_nodes: float) -> float:
+        """Return the sum of the sizes of nodal forces and of loads at points."""
+        return on_nodes + float(np.abs(self.torn.free.load).sum())
 
     def _coarse_columns(self) -> sp.csr_matrix:
         """Return this rank's owned columns of G = Rᵀ Bᵀ, shape (n_modes, n_owned)."""
         columns = self.torn.numbering.sum_rows(self._B @ self.kernel).T.tocsr()
+        if self.torn.free.count:
+            columns = (columns - self._points.T @ self.torn.free.columns.T).tocsr()
         columns.data[np.abs(columns.data) <= ROUNDING * np.abs(columns.data).max(initial=0.0)] = 0.0
         columns.eliminate_zeros()
         return columns

@@ -9,6 +9,7 @@ import numpy as np
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.copies import Tearing
 from fenics_contact.feti.rows import Rows
+from fenics_contact.linalg import LAST_PLACES
 from fenics_contact.scene import Scene, Surface
 
 
@@ -26,7 +27,8 @@ def prescribed_displacements(scene: Scene, tearing: Tearing) -> np.ndarray:
         own = np.unique(scene.facets(Surface(support.body, support.surface)))
         nodes = tearing.global_nodes(support.body, own)
         given, known = support.values(scene.bodies[support.body].mesh.points[own]), prescribed[nodes]
-        clash = ~np.isnan(known) & ~np.isnan(given) & (known != given)
+        near = LAST_PLACES * np.nanmax(np.abs(given))
+        clash = ~np.isnan(known) & ~np.isnan(given) & (np.abs(known - given) > near)
         if clash.any():
             node, component = np.argwhere(clash)[0]
             raise InvalidInputError(

@@ -51,7 +51,7 @@ def _values(scene: Scene) -> dict[str, str]:
                 numbers = np.asarray(material.parameters, dtype=np.float64)
             descriptions.update(described(numbers.tolist(), f"parameters of {kind} in body {name!r}"))
     for number, support in enumerate(scene.supports):
-        if any(callable(component) for component in support.value):
+        if isinstance(support, Support) and any(callable(component) for component in support.value):
             values = support.values(_nodes(scene, support))
             descriptions.update(described(values, f"scene.supports[{number}] at some nodes"))
     for number, load in enumerate(scene.loads):

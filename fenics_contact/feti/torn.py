@@ -18,6 +18,7 @@ from fenics_contact.feti.contact_rows import (
     tied_relations,
 )
 from fenics_contact.feti.decomposition import Decomposition
+from fenics_contact.feti.free_motions import NO_MOTIONS, FreeMotions, free_motions
 from fenics_contact.feti.gluing import prescribed_displacements
 from fenics_contact.feti.initial_gap import check_no_penetration, gap_with_room
 from fenics_contact.feti.nodal_mean import nodal_mean_at
@@ -63,6 +64,7 @@ class TornSystem:
         right: c of the owned rows less the contribution of supports, shape (n_owned,), [length].
         slid: Tangential displacement of the points without friction, which have no such rows, at the origin
             of slip, replicated, shape (n_contact − n_friction, dim − 1), [length].
+        free: The free motions of rigid surfaces, which add Q q to c.
     """
 
     scene: Scene
@@ -80,6 +82,7 @@ class TornSystem:
     supported: np.ndarray
     right: np.ndarray
     slid: np.ndarray
+    free: FreeMotions
 
     def jump(self, displacement: np.ndarray) -> np.ndarray:
         """Return B u for a torn displacement of this rank, owned, [length]. Collective."""
@@ -87,7 +90,30 @@ class TornSystem:
 
     def relative(self, displacement: np.ndarray) -> np.ndarray:
         """Return B u with the contribution of supports, owned, [length]. Collective."""
-        return self.jump(displacement) + self.supported
+        jump = self.jump(displacement)
+        return jump + self.supported - self.free.columns @ self.free_motion(self.right - jump)
+
+    def free_motion(self, lacking: np.ndarray) -> np.ndarray:
+        """Return q of rigid surfaces, the motion that fits best to what rows lack, replicated. Collective.
+
+        Args:
+            lacking: c − B u, owned, shape (n_owned,), [length].
+        """
+        if self.free.count == 0:
+            return np.zeros(0)
+        columns = self.free.columns[self.numbering.owned < self.n_gluing]
+        sums = np.column_stack(
+            [(columns.T @ columns).toarray(), -columns.T @ lacking[self.numbering.owned < self.n_gluing]]
+        )
+        sums = self.decomposition.comm.allreduce(sums)
+        return np.asarray(np.linalg.solve(sums[:, :-1], sums[:, -1]))
+
+    def load_work(self, displacement: np.ndarray) -> float:
+        """Return the work of all loads, those at points of rigid surfaces included. Collective."""
+        work = float(self.decomposition.comm.allreduce(self.load @ displacement))
+        if self.free.count == 0:
+            return work
+        return work + float(self.free.load @ self.free_motion(self.right - self.jump(displacement)))
 
     def with_slip_from(self, relative: np.ndarray, slid: np.ndarray) -> TornSystem:
         """Return the system in which slip is measured from an earlier displacement.
@@ -209,6 +235,7 @@ def build_torn_system(
     with together(comm):
         prescribed = prescribed_displacements(scene, decomposition.tearing)
         right = decomposition.gluing.right_side(prescribed)
+        free = free_motions(scene, decomposition.tearing)
     if previous is not None and _meets_alike(scene, previous.scene) and previous.driven_as(prescribed):
         # Only loads and prescribed values changed: B stays the same object, which marks F as unchanged, too.
         system = replace(previous, scene=scene, subdomains=subdomains)
@@ -222,7 +249,13 @@ def build_torn_system(
     owned = system.numbering.owned
     right = np.concatenate([right, tied, gap, slip]) - supported
     slid = np.zeros((len(system.frictionless), system.dim - 1))
-    return replace(system, supported=supported[owned], right=right[owned], slid=slid)
+    if free.count:
+        with together(comm):
+            free.require_felt(system.relations, decomposition.fixed)
+        free = replace(free, columns=free.of_rows(decomposition.gluing.dof, system.relations)[owned])
+    else:
+        free = replace(free, columns=sp.csr_matrix((len(owned), 0)))
+    return replace(system, supported=supported[owned], right=right[owned], slid=slid, free=free)
 
 
 def _meets_alike(scene: Scene, other: Scene) -> bool:
@@ -254,7 +287,7 @@ def _joined(
     return TornSystem(
         scene, decomposition, subdomains, points, ties, gluing.count + tied.count, frictional,
         coefficient[frictional], tresca[frictional], numbering, relations, B, np.zeros(0), np.zeros(0),
-        np.zeros((0, scene.dim - 1)),
+        np.zeros((0, scene.dim - 1)), NO_MOTIONS,
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Forces and moments of a state as they stand in a result file."""
+"""Forces and moments of a state, and motions of rigid surfaces, as they stand in a result file."""
 
 from __future__ import annotations
 
@@ -22,6 +22,20 @@ def forces_record(state: State) -> dict[str, Any]:
             "moment_scale": balance.moment_scale,
         },
     }
+
+
+def motions_record(state: State) -> list[dict[str, Any]]:
+    """Return the motions of rigid surfaces. Collective."""
+    return [
+        {
+            "body": each.surface.body,
+            "surface": each.surface.name,
+            "about": each.about,
+            "displacement": each.displacement,
+            "rotation": each.rotation,
+        }
+        for each in state.rigid_motions()
+    ]
 
 
 def _on_surface(each: Resultant) -> dict[str, Any]:

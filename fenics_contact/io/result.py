@@ -13,7 +13,7 @@ from fenics_contact.contact import State, Status, UnheldMotion, contact_area
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.feti import DirectSystem
 from fenics_contact.io.described_scene import described_scene, readable
-from fenics_contact.io.forces_record import forces_record
+from fenics_contact.io.forces_record import forces_record, motions_record
 from fenics_contact.io.json_file import write_json
 from fenics_contact.io.names import checked_name
 from fenics_contact.io.provenance import versions
@@ -68,6 +68,8 @@ friction closed points count as ``slip`` |
     | ``forces`` | ``reactions`` of the supports, ``contacts`` and ``ties`` (on the slave): each with body, \
 surface, ``force``, ``moment`` and the point ``about`` which it is; ``balance`` of all with the loads, its \
 ``imbalance`` and the scales to which that is relative |
+    | ``rigid_motions`` | of each rigid surface body, surface, ``displacement`` and ``rotation`` of the \
+point ``about`` |
     | ``more`` | further results of the caller |
 
     Entries may be added without a new version; changing or removing one requires a new version.
@@ -100,9 +102,9 @@ def result_record(
     state: State, *, more: Mapping[str, Any] | None = None, errors: bool = False
 ) -> dict[str, Any]:
     """Return what `write_result` writes, with its arguments. Collective."""
-    comm, unheld, forces = state.torn.decomposition.comm, state.unheld, forces_record(state)
+    comm, unheld, read_off = state.torn.decomposition.comm, state.unheld, _read_off(state)
     with together(comm):
-        record = {**_head("state", comm), **_state_record(state, unheld), "forces": forces}
+        record = {**_head("state", comm), **_state_record(state, unheld), **read_off}
     record["errors"] = _errors(state) if errors or _knows_errors(state) else None
     return {**record, "more": dict(more or {})}
 
@@ -144,7 +146,7 @@ an evaluation; None where a trial point was rejected as invalid |
     """
     first, best, comm = problem.first, problem.best, problem.comm
     unheld = () if best is None else best.state.unheld
-    forces = {} if best is None else forces_record(best.state)
+    read_off = {} if best is None else _read_off(best.state)
     with together(comm):
         target = checked_name(folder, name, ".json")
         if first is None or best is None:
@@ -152,7 +154,7 @@ an evaluation; None where a trial point was rejected as invalid |
                 "an optimisation's result needs designs that were evaluated, the problem has none: give the "
                 "problem that was handed to minimize"
             )
-        record = {**_head("optimisation", comm), **_state_record(best.state, unheld), "forces": forces}
+        record = {**_head("optimisation", comm), **_state_record(best.state, unheld), **read_off}
         record["counts"]["f_products"] = problem.products
         record["seconds"] = dict(problem.seconds)
         record["optimisation"] = {
@@ -230,6 +232,11 @@ def _residual_history(history: Sequence[SolverStep]) -> dict[str, list[Any]]:
         for name in ("natural", "gluing", "coarse")
     }
     return counted | measured
+
+
+def _read_off(state: State) -> dict[str, Any]:
+    """Return forces and motions of rigid surfaces. Collective."""
+    return {"forces": forces_record(state), "rigid_motions": motions_record(state)}
 
 
 def _pair(state: State, number: int) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from fenics_contact.scene.bodies import bodies_from
 from fenics_contact.scene.body import Body
 from fenics_contact.scene.effects import Effect, EffectName
 from fenics_contact.scene.field_files import read_field
-from fenics_contact.scene.held import RANK_TOLERANCE, resisted_motions
+from fenics_contact.scene.held import RANK_TOLERANCE, held_components, point_loads, resisted_motions
 from fenics_contact.scene.kernels import rigid_body_modes
 from fenics_contact.scene.loads import (
     BodyForce,
@@ -43,6 +43,7 @@ from fenics_contact.scene.obstacles import (
 from fenics_contact.scene.pair_geometry import PairGeometry
 from fenics_contact.scene.pairs import ContactPair, Coulomb, Discretisation, Friction, Surface, Tie, Tresca
 from fenics_contact.scene.plan import ConeKind, Plan, SolverKind, choose_solver
+from fenics_contact.scene.rigid_surfaces import AnySupport, RigidSurface
 from fenics_contact.scene.sampled import Sampled
 from fenics_contact.scene.scene import Scene
 from fenics_contact.scene.steps import LoadStep
@@ -52,6 +53,7 @@ from fenics_contact.scene.values import OfPosition, ScalarValue, Ufl, VectorValu
 
 __all__ = [
     "RANK_TOLERANCE",
+    "AnySupport",
     "Body",
     "BodyForce",
     "ConeKind",
@@ -80,6 +82,7 @@ __all__ = [
     "RigidObstacle",
     "RigidPlane",
     "RigidSphere",
+    "RigidSurface",
     "Sampled",
     "ScalarValue",
     "Scene",
@@ -102,8 +105,10 @@ __all__ = [
     "choose_solver",
     "evaluate",
     "gravity",
+    "held_components",
     "master_share",
     "material_axes",
+    "point_loads",
     "read_field",
     "resisted_motions",
     "rigid_body_modes",

@@ -10,6 +10,7 @@ from fenics_contact.mesh import vector_areas
 from fenics_contact.scene.loads import BodyForce, Load, Pressure, ThermalStrain, TotalForce
 from fenics_contact.scene.materials import PlaneStress
 from fenics_contact.scene.pairs import ContactPair, Surface, Tie
+from fenics_contact.scene.rigid_surfaces import RigidSurface
 from fenics_contact.surface_shapes import tangent_bases
 from fenics_contact.surfaces import quadrature_areas
 from fenics_contact.theory import contact_modulus, hertz_line, hertz_point
@@ -30,7 +31,8 @@ def displacement_along(scene: SceneParts, normal: np.ndarray) -> float:
     """Return the largest displacement along a direction that a support prescribes as a number, [length]."""
     sizes = [0.0]
     for support in scene.supports:
-        value = [0.0 if given is None or callable(given) else given for given in support.value]
+        given = support.motion[: scene.dim] if isinstance(support, RigidSurface) else support.value
+        value = [0.0 if number is None or callable(number) else number for number in given]
         sizes.append(abs(float(np.array(value) @ normal)))
     return max(sizes)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from fenics_contact.scene.loads import BodyForce, ThermalStrain
 from fenics_contact.scene.pairs import Coulomb, Tresca
+from fenics_contact.scene.rigid_surfaces import RigidSurface
 
 if TYPE_CHECKING:
     from fenics_contact.scene.parts import SceneParts
@@ -19,6 +20,7 @@ class EffectName(StrEnum):
 
     ELASTICITY = "elasticity"
     PRESCRIBED_DISPLACEMENT = "prescribed displacement"
+    RIGID_SURFACE = "rigid surface"
     BODY_FORCE = "body force"
     SURFACE_LOAD = "surface load"
     THERMAL_STRAIN = "thermal strain"
@@ -49,8 +51,13 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
 def _effects_in(scene: SceneParts) -> Iterator[Effect]:
     names = EffectName
     yield Effect(names.ELASTICITY, _count(len(scene.bodies), "elastic body", "elastic bodies"))
-    if scene.supports:
-        yield Effect(names.PRESCRIBED_DISPLACEMENT, _count(len(scene.supports), "support", "supports"))
+    rigid = sum(isinstance(support, RigidSurface) for support in scene.supports)
+    if len(scene.supports) > rigid:
+        yield Effect(
+            names.PRESCRIBED_DISPLACEMENT, _count(len(scene.supports) - rigid, "support", "supports")
+        )
+    if rigid:
+        yield Effect(names.RIGID_SURFACE, _count(rigid, "surface stays rigid", "surfaces stay rigid"))
     volume = [load for load in scene.loads if isinstance(load, BodyForce)]
     thermal = [load for load in scene.loads if isinstance(load, ThermalStrain)]
     surface = len(scene.loads) - len(volume) - len(thermal)

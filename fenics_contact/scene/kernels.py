@@ -17,8 +17,14 @@ def rigid_body_modes(points: np.ndarray) -> np.ndarray:
     Returns:
         Modes, dimensionless: shape (n, 3, 6) in space, (n, 2, 3) in the plane.
     """
-    arm = points - points.mean(axis=0)
-    arm = arm / max(float(np.abs(arm).max()), np.finfo(float).tiny)
+    centre = points.mean(axis=0)
+    size = max(float(np.abs(points - centre).max()), np.finfo(float).tiny)
+    return motions_about((points - centre) / size, np.zeros(points.shape[1]))
+
+
+def motions_about(points: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Return the unit translations and the unit rotations about a point, (dim,); shapes as above."""
+    arm = points - centre
     n, dim = arm.shape
     modes = np.zeros((n, dim, 3 * (dim - 1)))
     modes[:, range(dim), range(dim)] = 1.0

@@ -50,7 +50,8 @@ class TotalForce:
 
     Without ``moment`` and ``at`` it is an even traction. With them the traction is a + b × (x − c), c being
     the centroid of the surface, with a and b such that the resultant is exactly the force at the point and
-    the moment: even from the force, linear across the surface from the moment. The surface may deform.
+    the moment: even from the force, linear across the surface from the moment. The surface may deform;
+    for one that moves as a rigid piece see `RigidSurface`.
 
     Attributes:
         body: Name of the body.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact.mesh import vector_areas
+from fenics_contact.scene.rigid_surfaces import RigidSurface
 
 if TYPE_CHECKING:
     from fenics_contact.scene.parts import SceneParts
@@ -23,6 +24,8 @@ def mirrored(scene: SceneParts, body: str) -> np.ndarray:
     mesh = scene.bodies[body].mesh
     marks = np.zeros(mesh.points.shape, dtype=bool)
     for support in scene.supports:
+        if isinstance(support, RigidSurface):
+            continue
         given = [axis for axis, value in enumerate(support.value) if value is not None]
         if support.body != body or len(given) != 1 or callable(support.value[given[0]]):
             continue

@@ -16,6 +16,7 @@ from fenics_contact.scene.loads import Load, SurfaceLoad, ThermalStrain, TotalFo
 from fenics_contact.scene.materials import can_expand
 from fenics_contact.scene.obstacles import RigidObstacle
 from fenics_contact.scene.pairs import ContactPair, Surface, Tie
+from fenics_contact.scene.rigid_surfaces import AnySupport, RigidSurface
 from fenics_contact.scene.supports import Support
 
 
@@ -25,7 +26,7 @@ class SceneParts:
     """The parts of a `Scene`; its attributes are documented there."""
 
     bodies: Mapping[str, Body]
-    supports: Sequence[Support] = field(default=())
+    supports: Sequence[AnySupport] = field(default=())
     loads: Sequence[Load] = field(default=())
     contacts: Sequence[ContactPair] = field(default=())
     ties: Sequence[Tie] = field(default=())
@@ -37,12 +38,12 @@ class SceneParts:
                 "a scene needs at least one body, got none: pass bodies={'name': Body(...)}"
             )
         for part in (*self.supports, *self.loads):
-            surface = part.surface if isinstance(part, SurfaceLoad | Support) else None
+            surface = part.surface if isinstance(part, SurfaceLoad | AnySupport) else None
             self._require(part.body, surface, type(part).__name__)
-        held = tuple(support.held_in(self.bodies[support.body].mesh.dim) for support in self.supports)
-        object.__setattr__(self, "supports", held)
+        object.__setattr__(self, "supports", tuple(map(self._in_space, self.supports)))
         for part in (*self.supports, *self.loads):
-            self._require_components(part)
+            if not isinstance(part, RigidSurface):
+                self._require_components(part)
             if isinstance(part, TotalForce):
                 self._require_lever(part)
             if isinstance(part, ThermalStrain):
@@ -70,6 +71,18 @@ class SceneParts:
                 f"{user} names surface {surface!r} of body {body!r}, which has {sorted(surfaces)}: "
                 "use one of them"
             )
+
+    def _in_space(self, support: AnySupport) -> AnySupport:
+        """Return a support with as many components as its body has; reject a point in another space."""
+        dim = self.bodies[support.body].mesh.dim
+        if isinstance(support, Support):
+            return support.held_in(dim)
+        if support.dim != dim:
+            raise InvalidInputError(
+                f"RigidSurface.at on surface {support.surface!r} of body {support.body!r} must have {dim} "
+                f"coordinates, got {support.at!r}: give {dim} of them, and as many displacements"
+            )
+        return support
 
     def _require_components(self, part: Load | Support) -> None:
         """Reject a vector whose dimension is not that of its body."""
@@ -130,11 +143,16 @@ class SceneParts:
         """Dimension of space, 2 or 3."""
         return int(next(iter(self.bodies.values())).mesh.points.shape[1])
 
-    def fixed(self, body: str) -> np.ndarray:
-        """Return which components of a body's nodes supports prescribe, shape (n_nodes, dim)."""
+    def fixed(self, body: str, supports: Sequence[AnySupport] | None = None) -> np.ndarray:
+        """Return which components of a body's nodes supports prescribe, shape (n_nodes, dim).
+
+        Args:
+            body: Name of the body.
+            supports: Those that count, all by default.
+        """
         mesh = self.bodies[body].mesh
         marks = np.zeros(mesh.points.shape, dtype=bool)
-        for support in self.supports:
+        for support in self.supports if supports is None else supports:
             if support.body == body:
                 nodes = np.unique(mesh.surfaces[support.surface])
                 marks[nodes] |= ~np.isnan(support.values(mesh.points[nodes]))

@@ -16,6 +16,7 @@ from fenics_contact.scene.effects import Effect, EffectName, effects_of
 from fenics_contact.scene.held import held_by_supports
 from fenics_contact.scene.pair_geometry import PairGeometry, pair_geometry
 from fenics_contact.scene.pairs import Surface
+from fenics_contact.scene.rigid_surfaces import RigidSurface
 from fenics_contact.surfaces import bears_on_midpoints
 
 if TYPE_CHECKING:
@@ -140,7 +141,8 @@ def choose_solver(scene: SceneParts, subdomains: int, *, sensitivity: bool = Fal
     if EffectName.CONTACT in {effect.name for effect in effects_of(scene)}:
         return SolverKind.FACE_NEWTON
     # A body that its supports alone do not hold has a singular stiffness.
-    if subdomains == 1 and not sensitivity and held_by_supports(scene, scene.body_names[0]):
+    loose = any(isinstance(support, RigidSurface) and support.free.any() for support in scene.supports)
+    if subdomains == 1 and not (sensitivity or loose) and held_by_supports(scene, scene.body_names[0]):
         return SolverKind.DIRECT
     return SolverKind.PROJECTED_CG
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from fenics_contact.checks import checked
 from fenics_contact.display import displayed
 from fenics_contact.scene.loads import Load
+from fenics_contact.scene.rigid_surfaces import AnySupport
 from fenics_contact.scene.scene import Scene
-from fenics_contact.scene.supports import Support
 
 
 @displayed
@@ -28,7 +28,7 @@ class LoadStep:
 
     name: str
     loads: Sequence[Load] | None = None
-    supports: Sequence[Support] | None = None
+    supports: Sequence[AnySupport] | None = None
     time: float | None = None
 
     def applied_to(self, scene: Scene) -> Scene:

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from fenics_contact.scene_file.contacts import ContactPart, TiePart
 from fenics_contact.scene_file.design import DesignPart
-from fenics_contact.scene_file.loads import AnyLoad, SupportPart
+from fenics_contact.scene_file.loads import AnyLoad, AnySupportPart
 from fenics_contact.scene_file.materials import AnyMaterial
 from fenics_contact.scene_file.meshes import Mesh
 from fenics_contact.scene_file.mistakes import Mistake
@@ -75,7 +75,7 @@ class Document(Part):
     meshes: dict[str, Mesh] = Field(min_length=1, description="meshes by name: shapes, or files")
     materials: dict[str, AnyMaterial] = Field(min_length=1, description="materials by name")
     bodies: dict[str, BodyPart] = Field(min_length=1, description="bodies by name")
-    supports: list[SupportPart] = Field([], description="prescribed displacements")
+    supports: list[AnySupportPart] = Field([], description="prescribed displacements")
     loads: list[AnyLoad] = Field([], description="forces and changes of temperature")
     contacts: list[ContactPart] = Field([], description="pairs that may touch")
     ties: list[TiePart] = Field([], description="pairs that stay together")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
+import numpy as np
 from pydantic import Field, PositiveFloat
 
 from fenics_contact import scene
-from fenics_contact.scene import Load, Support
-from fenics_contact.scene_file.expression import VectorExpression
+from fenics_contact.scene import Load, RigidSurface, Support
+from fenics_contact.scene_file.expression import Expression, VectorExpression
 from fenics_contact.scene_file.part import Part, keys_of
-from fenics_contact.scene_file.values import FREE, Components, ScalarField, Vector, one_of
+from fenics_contact.scene_file.values import FREE, Components, Motion, ScalarField, Vector, one_of
 
 
 class _Named(Part):
@@ -120,6 +121,42 @@ class SupportPart(_Named):
         return self.made(value=value or self.value or (0.0,) * dim)
 
 
+@keys_of(RigidSurface, without=("displacement", "rotation"))
+class RigidPart(_Named):
+    """A surface that moves as one rigid piece, driven or loaded at a point."""
+
+    kind: Literal["rigid"]
+    value: Motion | None = Field(
+        None,
+        description="displacement of the point along x, y and z, [length], then its rotation about them, in "
+        "radians (in the plane along x and y, then one rotation): a number, a formula in t in quotes, or "
+        f'"{FREE}"; all free by default',
+    )
+
+    @property
+    def size(self) -> Any:
+        """The motion, with its free components."""
+        count = len(self.at)  # type: ignore[attr-defined]
+        return self.value or (None,) * (3 * count - 3)
+
+    def build(self, dim: int, value: tuple[Any, ...] | None = None) -> RigidSurface:
+        """Return the rigid surface, with the motion of a load step if given."""
+        motion = tuple(map(self._number, value or self.size))
+        turned = motion[dim:]
+        return self.made(
+            displacement=motion[:dim], rotation=turned[0] if dim == 2 and len(turned) == 1 else turned
+        )
+
+    def _number(self, component: Any) -> float | None:
+        """Return a component as a number; a formula has its value at the point."""
+        if not isinstance(component, Expression):
+            return component
+        return float(component(np.array([self.at]))[0])  # type: ignore[attr-defined]
+
+
+AnySupportPart: TypeAlias = Annotated[
+    Any, one_of("kind", RigidPart, other=SupportPart, when=lambda part: "kind" not in part)
+]
 AnyLoad: TypeAlias = Annotated[
     Any,
     one_of(

@@ -14,10 +14,10 @@ from fenics_contact.scene import Body, LoadStep
 from fenics_contact.scene_file.evaluation import check_formulas
 from fenics_contact.scene_file.expression import VectorExpression, at_time, between, changes
 from fenics_contact.scene_file.part import Part
-from fenics_contact.scene_file.values import Components, Line, LoadValue
+from fenics_contact.scene_file.values import Line, LoadValue, StepComponents
 
 if TYPE_CHECKING:
-    from fenics_contact.scene_file.loads import AnyLoad, SupportPart
+    from fenics_contact.scene_file.loads import AnyLoad, AnySupportPart
 
 #: Largest total number of load steps of a file; longer histories are driven from Python.
 MOST = 100_000
@@ -34,13 +34,13 @@ class StepPart(Part):
     duration: PositiveFloat | None = Field(
         None, description="time that they take together, for t in formulas; one for each load step by default"
     )
-    supports: dict[str, Components] = Field({}, description="name of a support -> its value at the end")
+    supports: dict[str, StepComponents] = Field({}, description="name of a support -> its value at the end")
     loads: dict[str, LoadValue] = Field({}, description="name of a load -> its value at the end")
 
 
 def load_steps(
     steps: Sequence[StepPart],
-    supports: Sequence[SupportPart],
+    supports: Sequence[AnySupportPart],
     loads: Sequence[AnyLoad],
     bodies: Mapping[str, Body],
     at: Callable[..., AbstractContextManager[None]],
@@ -64,7 +64,7 @@ def load_steps(
     with at("steps"):
         _require_few(steps)
     dim = next(iter(bodies.values())).mesh.dim
-    held = _Values([part.name for part in supports], [part.value or (0.0,) * dim for part in supports])
+    held = _Values([part.name for part in supports], [part.size or (0.0,) * dim for part in supports])
     acting = _Values([part.name for part in loads], [part.size for part in loads])
     built: list[LoadStep] = []
     begin = 0.0

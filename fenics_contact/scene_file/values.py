@@ -182,6 +182,21 @@ VectorOrFormulas: TypeAlias = Annotated[
 ]
 _HELD = f"three numbers, formulas or '{FREE}' {_AXES}, or tables {{file = ..., field = ...}} among them"
 Components: TypeAlias = Annotated[Any, _row(float | _FREE | Formula | FieldFile, 2, 3, _HELD)]
+StepComponents: TypeAlias = Annotated[
+    Any,
+    _row(
+        float | _FREE | Formula | FieldFile, 2, 6,
+        f"numbers, formulas or '{FREE}' in brackets, as many as the support's own value has",
+    ),
+]  # fmt: skip
+Motion: TypeAlias = Annotated[
+    Any,
+    _row(
+        float | _FREE | Formula, 3, 6,
+        f"six numbers, formulas in t or '{FREE}' in brackets: displacement along x, y and z, rotation about "
+        "them (in the plane three: along x and y, rotation)",
+    ),
+]  # fmt: skip
 _LOAD = said(
     f"a number or a formula, or two or three of them in brackets, {_FIELD}, like the load's own value"
 )

@@ -167,7 +167,7 @@ def _balance(whole: Whole, body: str, applied: np.ndarray, on_nodes: np.ndarray)
     if ties.count and np.any(ties.jump[:, own].nnz):
         return 0.0  # tie forces are no part of the answer
     modes = rigid_body_modes(whole.torn.scene.bodies[body].mesh.points)
-    resisted = resisted_motions(modes, whole.fixed[own])
+    resisted = resisted_motions(modes[whole.fixed[own]])
     wrench = np.einsum("ndm,nd->m", modes, applied[own])
     forces = np.abs(whole.load[own]) + np.abs(on_nodes[own])
     parts = np.abs(modes).transpose(2, 0, 1).reshape(modes.shape[2], -1) @ forces.ravel()

@@ -34,6 +34,7 @@ from fenics_contact.scene import (
     Ufl,
 )
 from fenics_contact.shape import ShapeProblem
+from tests.contact.rigid_cases import POINT, SCENES, solved
 from tests.io.states import touching_blocks
 from tests.shape.resumed_cases import minimised, posed
 
@@ -81,6 +82,15 @@ def test_energies_residuals_and_contact_are_the_states(tmp_path: Path) -> None:
     np.testing.assert_allclose(pair["force"], state.contact.force.sum(axis=0))
     assert pair["force"][2] == pytest.approx(pair["normal_force"])
     assert pair["largest_slip"] > 0.0
+
+
+def test_motions_of_rigid_surfaces_are_the_states(tmp_path: Path) -> None:
+    state = solved(SCENES["loaded"](), MPI.COMM_SELF)
+    ((motion,), (found,)) = read_result(write_result(state, tmp_path))["rigid_motions"], state.rigid_motions()
+    assert (motion["body"], motion["surface"], motion["about"]) == ("bar", "x1", list(POINT))
+    np.testing.assert_array_equal(motion["displacement"], found.displacement)
+    np.testing.assert_array_equal(motion["rotation"], found.rotation)
+    assert np.abs(motion["rotation"]).max() > 0.01
 
 
 def test_forces_and_moments_are_the_states_and_in_balance(tmp_path: Path) -> None:

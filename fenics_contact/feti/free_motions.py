@@ -1,0 +1,141 @@
+"""The free motions of rigid surfaces: unknowns beside the displacements, without stiffness."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact.display import displayed
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.feti.contact_rows import Relations
+from fenics_contact.feti.copies import Tearing
+from fenics_contact.linalg import LAST_PLACES
+from fenics_contact.scene import AnySupport, ContactPair, RigidSurface, Scene, Tie
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class FreeMotions:
+    """Unknowns q of rigid surfaces in B u − Q q = c, and the work g·q of the loads at their points.
+
+    Nodes of a rigid surface are prescribed, their values depend on q. The rows of multipliers in equilibrium
+    with the points, −Qᵀλ = g, are part of the coarse problem, as if every point were a body of its own whose
+    stiffness is zero. Motions are scaled to be orthonormal over the nodes of a surface.
+
+    Attributes:
+        columns: Q; on nodes a row for each component of each node, shape (n_nodes · dim, n), replicated; of
+            a system the owned rows, shape (n_owned, n).
+        load: g, shape (n,), replicated.
+    """
+
+    columns: sp.csr_matrix
+    load: np.ndarray
+
+    @property
+    def count(self) -> int:
+        """Number of unknowns."""
+        return len(self.load)
+
+    def of_rows(self, dof: np.ndarray, relations: Sequence[Relations]) -> sp.csr_matrix:
+        """Return Q of all rows, shape (n_rows, n), of those on nodes.
+
+        Args:
+            dof: Node and component of each gluing and Dirichlet row, as node · dim + component.
+            relations: The rows of ties and contacts.
+        """
+        parts = [self.columns[dof]]
+        for relation in relations:
+            dim = relation.directions.shape[1]
+            modes = [column.toarray().reshape(-1, dim) for column in self.columns.T]
+            moved = [-relation.of_supports(mode) for mode in modes] if relation.count else []
+            parts.append(sp.csr_matrix(np.array(moved).reshape(self.count, relation.count).T))
+        return sp.vstack(parts, format="csr")
+
+    def require_felt(self, relations: Sequence[Relations], fixed: np.ndarray) -> None:
+        """Reject rows of ties and contacts in which nothing but rigid surfaces moves.
+
+        Args:
+            relations: The rows of ties and contacts.
+            fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+
+        Raises:
+            InvalidInputError: Says how many.
+        """
+        moving = _moving(self.columns, fixed.shape)
+        for relation in relations:
+            held = relation.which[relation.held(fixed)]
+            touched = int(np.count_nonzero(abs(relation.points.jump[held]) @ moving))
+            if touched:
+                raise InvalidInputError(
+                    f"contact needs bodies that deform, but in {touched} of its rows supports hold the slave "
+                    "and the master is a rigid surface with free components: prescribe these, or leave the "
+                    "slave free"
+                )
+
+
+def _moving(columns: sp.csr_matrix, shape: tuple[int, ...]) -> np.ndarray:
+    """Return which nodes rigid surfaces move, shape (n_nodes,)."""
+    return np.asarray(np.asarray(abs(columns).sum(axis=1)).reshape(shape).any(axis=1))
+
+
+#: Of a scene without rigid surfaces that are free to move.
+NO_MOTIONS = FreeMotions(sp.csr_matrix((0, 0)), np.zeros(0))
+
+
+def free_motions(scene: Scene, tearing: Tearing) -> FreeMotions:
+    """Return the free motions of all rigid surfaces on the nodes of their bodies.
+
+    Raises:
+        InvalidInputError: If a support holds nodes of a rigid surface that are free to move, or the slave of
+            a contact or tie has some.
+    """
+    columns, loads, size = [], [], tearing.n_nodes * scene.dim
+    for number, surface in enumerate(scene.supports):
+        if not isinstance(surface, RigidSurface) or not surface.free.any():
+            continue
+        mesh = scene.bodies[surface.body].mesh
+        own = np.unique(mesh.surfaces[surface.surface])
+        modes = surface.modes(mesh.points[own])[:, :, surface.free]
+        others = [support for place, support in enumerate(scene.supports) if place != number]
+        _require_room(surface, modes, scene.fixed(surface.body, others)[own], mesh.points[own])
+        basis, scale = np.linalg.qr(modes.reshape(-1, modes.shape[2]))
+        node, component = np.indices(modes.shape[:2]).reshape(2, -1)
+        row = tearing.global_nodes(surface.body, own)[node] * scene.dim + component
+        place = np.broadcast_to(np.arange(basis.shape[1]), basis.shape)
+        entries = (basis.ravel(), (np.repeat(row, basis.shape[1]), place.ravel()))
+        columns.append(sp.csr_matrix(entries, shape=(size, basis.shape[1])))
+        loads.append(np.linalg.solve(scale.T, surface.load[surface.free]))
+    if not columns:
+        return FreeMotions(sp.csr_matrix((size, 0)), np.zeros(0))
+    joined = sp.hstack(columns, format="csr")
+    _require_flexible_slaves(scene, tearing, _moving(joined, (tearing.n_nodes, scene.dim)))
+    return FreeMotions(joined, np.concatenate(loads))
+
+
+def _require_flexible_slaves(scene: Scene, tearing: Tearing, moving: np.ndarray) -> None:
+    """Reject slaves with nodes that rigid surfaces move: prescribed nodes have no multipliers."""
+    pairs: list[ContactPair | Tie] = [*scene.contacts, *scene.ties]
+    for pair in pairs:
+        nodes = tearing.global_nodes(pair.slave.body, np.unique(scene.facets(pair.slave)))
+        if moving[nodes].any():
+            raise InvalidInputError(
+                f"slaves must be flexible, but {np.count_nonzero(moving[nodes])} nodes of surface "
+                f"{pair.slave.name!r} of body {pair.slave.body!r} lie on a rigid surface with free "
+                "components: exchange slave and master, or let the rigid surface end before the slave begins"
+            )
+
+
+def _require_room(surface: AnySupport, modes: np.ndarray, held: np.ndarray, points: np.ndarray) -> None:
+    """Reject free motions of nodes, (n, dim, k), along components that other supports hold, (n, dim)."""
+    against = np.abs(modes[held]).max(axis=0, initial=0.0)
+    size = 1.0 + np.abs(points - points.mean(axis=0)).max()
+    if np.any(against > LAST_PLACES * size):
+        raise InvalidInputError(
+            f"the rigid surface {surface.surface!r} of body {surface.body!r} meets another support at "
+            f"{int(held.any(axis=1).sum())} nodes, which holds what the surface is free to move: prescribe "
+            "displacement and rotation as the support does; at a plane of symmetry the displacement across "
+            "it and the rotations about both axes within it are zero"
+        )
