@@ -41,19 +41,23 @@ def shape_gradients(cell: CellType, positions: np.ndarray) -> np.ndarray:
 
 
 @cache
-def quadrature(cell: CellType) -> tuple[np.ndarray, np.ndarray]:
+def quadrature(cell: CellType, degree: int | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Return a rule that integrates squares of shape functions, and the Jacobian of curved cells, exactly.
 
     Two Gauss points per direction on linear and three on quadratic edges, quadrilaterals and hexahedra; rules
     of degree two on linear and of degree five on quadratic simplices.
+
+    Args:
+        cell: The type of cells, or of facets.
+        degree: Degree of polynomials that another rule integrates exactly.
 
     Returns:
         Reference coordinates, (m, dim), and weights that add up to the reference volume, (m,).
     """
     import basix
 
-    degree = 2 if cell.is_simplex and cell.order == 1 else 2 * cell.order + 1
-    positions, weights = basix.make_quadrature(_shape(cell), degree)
+    own = 2 if cell.is_simplex and cell.order == 1 else 2 * cell.order + 1
+    positions, weights = basix.make_quadrature(_shape(cell), degree or own)
     return np.asarray(positions), np.asarray(weights)
 
 

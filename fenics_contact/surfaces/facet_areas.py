@@ -69,7 +69,7 @@ def surface_moments(points: np.ndarray, facets: np.ndarray) -> SurfaceMoments:
 def _at_gauss_points(points: np.ndarray, facets: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Return for each Gauss point the area of it in every facet, (n_facets,), and the shape functions."""
     kind = FACET_TYPES[facets.shape[1], points.shape[1]]
-    positions, weights = quadrature(kind)
+    positions, weights = quadrature(kind, 2 * kind.order)  # as in load forms: resultants are exact
     values, gradients = shape_values(kind, positions), shape_gradients(kind, positions)
     corners = points[facets]
     for weight, value, gradient in zip(weights, values, gradients, strict=True):

@@ -14,14 +14,18 @@ from fenics_contact.scene import Body, Scene, Support, TotalForce, Traction
 from tests.models.bodies import bent, box, steel
 from tests.models.elements import CELLS, load_by_node, whole
 
+#: Quadratic cells and the linear ones of their shapes.
+QUADRATIC = {
+    "quadrilateral9": "quadrilateral",
+    "triangle6": "triangle",
+    "hexahedron27": "hexahedron",
+    "tetrahedron10": "tetrahedron",
+}
+
 
 def curved(cell: str) -> BodyMesh:
     """A bent body of linear cells, or of quadratic ones whose edges are curved."""
-    if cell not in ("quadrilateral9", "triangle6", "hexahedron27"):
-        return bent(box(cell))
-    return bent(
-        quadratic(box({"quadrilateral9": "quadrilateral", "triangle6": "triangle"}.get(cell, "hexahedron")))
-    )
+    return bent(box(cell) if cell in CELLS else quadratic(box(QUADRATIC[cell])))
 
 
 def nodal(mesh: BodyMesh, load: TotalForce | Traction) -> np.ndarray:
@@ -35,7 +39,7 @@ def moment(forces: np.ndarray, arms: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("far", [0.0, 1e4])
-@pytest.mark.parametrize("cell", [*CELLS, "quadrilateral9", "triangle6", "hexahedron27"])
+@pytest.mark.parametrize("cell", [*CELLS, *QUADRATIC])
 def test_force_and_moment_are_what_was_given(cell: str, far: float) -> None:
     mesh = curved(cell)
     mesh = mesh.moved(mesh.points + far)

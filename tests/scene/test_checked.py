@@ -27,6 +27,7 @@ from fenics_contact.scene import (
     RigidCylinder,
     RigidPlane,
     RigidSphere,
+    RigidSurface,
     Sampled,
     Scene,
     Support,
@@ -48,7 +49,7 @@ SAMPLES: dict[type, Any] = {
     type(sample): sample
     for sample in (
         FLOOR, STEEL, FACE, BODY, Coulomb(0.3), Tresca(1.0), Sampled(np.eye(3), np.ones(3)),
-        ContactPair(FACE, FLOOR), Tie(FACE, OTHER),
+        ContactPair(FACE, FLOOR), Tie(FACE, OTHER), RigidSurface("a", "b", (0, 0, 0)),
         Support("a", "b"), Traction("a", "b", DOWN), TotalForce("a", "b", DOWN), Pressure("a", "b", 1),
         BodyForce("a", DOWN), ThermalStrain("a", 1.0), Ufl(lambda x: x), LoadStep("a"), Scene({"a": BODY}),
         RigidSphere((0, 0, 0), 1.0), RigidCylinder((0, 0, 0), (0, 0, 1), 1.0),
