@@ -170,18 +170,24 @@ def _forces(record: Record, units: Units) -> str:
         for name, entry in balance.items()
         if isinstance(entry, Mapping)
     ]
-    rows = [row for name, entry in entries for row in _force_rows(name, entry, balance, units)]
+    # Entries are added to results without a new version: earlier ones lack the scales.
+    scales = {
+        kind: balance.get(
+            f"{kind}_scale", max(abs(part) for _, each in entries for part in _several(each[kind]))
+        )
+        for kind in ("force", "moment")
+    }
+    rows = [row for name, entry in entries for row in _force_rows(name, entry, scales, units)]
     words = f"<p>Imbalance of all forces and moments: {escape(number(balance['imbalance']))}.</p>"
     axes = ("x", "y", "z")[: 2 if _plane(record) else 3]
     return _table(("", "", *axes), rows, words=2) + words
 
 
 def _force_rows(
-    name: str, entry: Record, balance: Record, units: Units, rounding: float = 1e-8
+    name: str, entry: Record, given: Mapping[str, float], units: Units, rounding: float = 1e-8
 ) -> list[tuple[Any, ...]]:
     """Return a row for a force and one for its moment; none if both are zero but for rounding."""
-    scales = {kind: balance[f"{kind}_scale"] for kind in ("force", "moment")}
-    scales["about"] = scales["moment"] / scales["force"] if scales["force"] else 0.0
+    scales = {**given, "about": given["moment"] / given["force"] if given["force"] else 0.0}
     force, moment, about = (
         [0 if abs(part) <= rounding * scale else part for part in _several(entry[kind])]
         for kind, scale in scales.items()

@@ -173,6 +173,22 @@ def test_tables_tell_the_numbers_of_the_result() -> None:
     assert "errors not computed" in told
 
 
+def test_results_of_before_some_entries_were_added_are_told(tmp_path: Path) -> None:
+    state = plane_block()
+    write_vtu(state, tmp_path)
+    record = json.loads(write_result(state, tmp_path).read_text())
+    whole = text_of(result_page(tmp_path).html)
+    for name in ("force_scale", "moment_scale"):
+        del record["forces"]["balance"][name]
+    (tmp_path / "result.json").write_text(json.dumps(record))
+    assert text_of(result_page(tmp_path).html) == whole
+    kept = {name: record[name] for name in ("format", "format_version", "kind", "scene", "contact")}
+    (tmp_path / "result.json").write_text(json.dumps(kept))
+    page = result_page(tmp_path).html
+    assert "Forces" not in text_of(page)
+    assert content(page)[0]["history"]["residuals"] == {}
+
+
 def test_moments_in_the_plane_are_one_number_and_rounding_is_zero() -> None:
     state = plane_block()
     told = text_of(result_page(state).html)
