@@ -34,8 +34,9 @@ class ContactPoints:
             represents a mean over facets, shape (n,).
         local: Local coordinates on it, shape (n, dim - 1).
         axes: Coordinate axis nearest to the first tangent, as a unit vector, shape (n, dim).
-        symmetric: Components normal to a plane of symmetry that cuts both surfaces there: the mirror images
-            move opposite, so that there is no slip across the plane, shape (n, dim).
+        symmetric: Components normal to a plane of symmetry that cuts both surfaces there, or the one on an
+            obstacle: the mirror images move opposite, so that there is no slip across the plane, shape (n,
+            dim).
         distance: Measured distance of the surfaces along the normal, positive when apart, shape (n,),
             [length].
         given: Whether the pair says what the gap is, by a value or by declaring the measured overlap an

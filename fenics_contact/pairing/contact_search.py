@@ -267,7 +267,8 @@ def _on_obstacle(slave: _Side, movable: np.ndarray, obstacle: RigidObstacle) -> 
     facing = np.einsum("nd,nd->n", slave.surface.normals[candidates], normals) < 0
     chosen = candidates[facing]
     gap = asked(obstacle, "distance", slave.surface.points[chosen])
-    return _points(slave, chosen, normals[facing], gap, sp.csr_matrix((len(chosen), slave.n_nodes)))
+    points = _points(slave, chosen, normals[facing], gap, sp.csr_matrix((len(chosen), slave.n_nodes)))
+    return replace(points, symmetric=slave.surface.mirrored[chosen])
 
 
 def _points(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
@@ -15,7 +15,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.shape import DesignPoint
 from fenics_contact.viz.colours import BLUE, GREY, ORANGE
 from fenics_contact.viz.patch import checked_pair, contact_patch
-from fenics_contact.viz.patch_axes import label_axes, label_axis, pressure_bar
+from fenics_contact.viz.patch_axes import label_axes, pressure_bar
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.pressure import draw_pressure
 from fenics_contact.viz.profile import Profile, profiles
@@ -124,7 +124,7 @@ def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> N
     )
     frame = Frame(np.minimum(one.low, other.low), np.maximum(one.high, other.high))
     shown = look.clim or (0.0, peak or 1.0)
-    outlines = profiles(first, best, look.reach)
+    outlines = profiles(first, best, look.reach, look.units.length)
     # Sections have equal heights and together the width of the picture, but a limited height.
     wide = [profile.frame.proportion for profile in outlines]
     tall = [0.4 / frame.proportion + 0.08, min(0.8 / sum(wide), 0.45) + 0.13]
@@ -135,7 +135,8 @@ def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> N
         for axes, patch, word in zip(panels, patches, ("before", "after"), strict=True):
             draw_pressure(axes, patch, shown)
             axes.set_title(f"{word}: pressure on {patch.name}")
-            label_axes(axes, replace(patch, frame=frame), look.units)
+            frame.fit(axes)
+            label_axes(axes, patch.view, look.units)
         pressure_bar(panels[1], shown, "max" if peak > shown[1] else "neither", look.units)
         sections = lower.subplots(1, len(outlines), width_ratios=wide)
         for axes, profile in zip(sections, outlines, strict=True):
@@ -145,7 +146,7 @@ def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> N
 
 def _draw_in_plane(first: State, best: State, paper: BinaryIO, look: _Look) -> None:
     traces = [contact_trace(state, look.pair) for state in (first, best)]
-    (profile,) = profiles(first, best, look.reach)
+    (profile,) = profiles(first, best, look.reach, look.units.length)
     with sheet(paper, (look.width, round(0.5 * look.width)), look.headline) as figure:
         left, right = figure.subplots(1, 2)
         for trace, word, colour, line in zip(
@@ -180,7 +181,6 @@ def _draw_profile(axes: Axes, profile: Profile, factor: float, units: Units) -> 
         if place is not None:
             axes.text(*place, name, color=BLUE, ha="center", va="center")
     profile.frame.fit(axes)
-    for axis, label, word in zip((axes.xaxis, axes.yaxis), profile.axes, ("right", "up"), strict=True):
-        label_axis(axis, label, word, units)
+    label_axes(axes, profile.view, units)
     largest = f"{written(profile.largest, 2)} {units.length}"
     axes.set_title(f"{profile.title}\nmoved by up to {largest}")

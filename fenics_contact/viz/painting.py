@@ -13,16 +13,17 @@ from matplotlib.axes import Axes
 
 from fenics_contact.contact import State
 from fenics_contact.scene import Scene
+from fenics_contact.viz.axes_sign import axes_sign, empty_corner, far_corner
 from fenics_contact.viz.colours import INK
 from fenics_contact.viz.fields import Bodies, cells_of, contact_places, moved, points_of
 from fenics_contact.viz.obstacles import obstacle_layers, shade_obstacles
 from fenics_contact.viz.paints import Paints
 from fenics_contact.viz.picture import Picture, draw_picture
 from fenics_contact.viz.plane import draw_cell_edges, draw_field, draw_outline
-from fenics_contact.viz.section import Spot, section_frame, section_layers, section_views, strongest_contact
+from fenics_contact.viz.section import Spot, section_frame, section_layers, sections_of, strongest_contact
 from fenics_contact.viz.sheet import scale_bar, sheet, show_image
 from fenics_contact.viz.stage import Layer, render
-from fenics_contact.viz.view import IN_PLANE, Frame, View, axis_label, frame_around, oblique_view
+from fenics_contact.viz.view import IN_PLANE, Frame, View, frame_around, oblique_view
 
 #: Half size of the detail of a plane picture, relative to half the length of the closed contact.
 REACH = 2.5
@@ -129,21 +130,26 @@ def _in_space(scene: Scene, bodies: Bodies, spot: Spot | None, paints: Paints) -
     if spot is None:
         return parts
     true = moved(bodies, 1.0)
-    for section in section_views(spot, view):
-        across = axis_label(section.towards).strip("−")
-        frame = section_frame(section, spot, points_of(true), paints.reach)
-        layers = section_layers(true, section, spot.centre, paints.of_surfaces)
-        title = f"section across {across}" if across else "section"
-        parts.append(_image(layers, section, frame, paints, f"{title}; displacement × 1"))
+    for section in sections_of(spot, view):
+        frame = section_frame(section.view, spot, points_of(true), paints.reach)
+        layers = section_layers(true, section, paints.of_surfaces)
+        title = f"{section.title(frame, paints.units.length)}; displacement × 1"
+        corner = far_corner(frame, section.view.project(spot.centre[None])[0])
+        parts.append(_image(layers, section.view, frame, paints, (title, corner)))
     return parts
 
 
-def _image(layers: Sequence[Layer], view: View, frame: Frame, paints: Paints, title: str = "") -> _Part:
-    image = render(layers, view, frame, round(paints.width * (0.45 if title else WIDE)))
+def _image(
+    layers: Sequence[Layer], view: View, frame: Frame, paints: Paints, detail: tuple[str, str] | None = None
+) -> _Part:
+    """Render an image with a sign of its axes; ``detail`` is the title of a section and the sign's corner."""
+    image = render(layers, view, frame, round(paints.width * (0.45 if detail else WIDE)))
 
     def draw(axes: Axes) -> None:
+        title, corner = detail or ("", empty_corner(image))
         show_image(axes, image, frame, title)
-        if title:
+        axes_sign(axes, view, corner)
+        if detail:
             scale_bar(axes, frame, paints.units.length)
 
     return _Part(frame, draw)

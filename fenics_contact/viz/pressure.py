@@ -94,7 +94,8 @@ def _draw(
         slip = f"largest slip {longest}" if patch.largest_slip > 0 else "no slip"
         right.set_title(f"status, {slip if patch.rubs else 'no friction'}")
         for axes in (left, right):
-            label_axes(axes, patch, units)
+            patch.frame.fit(axes)
+            label_axes(axes, patch.view, units)
         right.set_ylabel("")
         handles, labels = right.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower right", ncols=3, handletextpad=0.2)

@@ -12,8 +12,8 @@ from scipy.spatial import cKDTree
 from fenics_contact.contact import State, body_grid, in_space
 from fenics_contact.viz.fields import points_of
 from fenics_contact.viz.painting import REACH as PLANE_REACH
-from fenics_contact.viz.section import cut, section_frame, section_views, strongest_contact
-from fenics_contact.viz.view import IN_PLANE, Frame, View, axis_label, frame_around, oblique_view
+from fenics_contact.viz.section import cut, section_frame, sections_of, strongest_contact
+from fenics_contact.viz.view import IN_PLANE, Frame, View, frame_around, oblique_view
 from fenics_contact.viz.words import nice_number
 
 #: Apparent size of the largest movement relative to the picture.
@@ -28,7 +28,7 @@ class Profile:
 
     Attributes:
         title: Title of the picture.
-        axes: Names of the two axes, such as "x"; "" where they run along none.
+        view: Direction of view.
         before: Body name -> lines before.
         moves: Body name -> displacement of the ends of these lines.
         inside: Body name -> points within it, (n, 2).
@@ -36,7 +36,7 @@ class Profile:
     """
 
     title: str
-    axes: tuple[str, str]
+    view: View
     before: dict[str, np.ndarray]
     moves: dict[str, np.ndarray]
     inside: dict[str, np.ndarray]
@@ -68,13 +68,14 @@ class Profile:
         return np.asarray(places[np.argmax(np.minimum(room, border))])
 
 
-def profiles(first: State, best: State, reach: float | None) -> list[Profile]:
+def profiles(first: State, best: State, reach: float | None, unit: str) -> list[Profile]:
     """Return the outlines around the strongest contact before: in the plane one, in space two sections.
 
     Args:
         first: State before, with some contact force.
         best: State after, on the same meshes with other coordinates.
         reach: Extent from the contact's centre, [length], or None.
+        unit: Name of the unit of length.
     """
     bodies = {}
     for name, body in first.scene.bodies.items():
@@ -87,11 +88,10 @@ def profiles(first: State, best: State, reach: float | None) -> list[Profile]:
         frame = Frame(np.maximum(spot.centre - half, whole.low), np.minimum(spot.centre + half, whole.high))
         return [_profile("outlines", bodies, IN_PLANE, frame)]
     outlines = []
-    for view in section_views(spot, oblique_view(points)):
-        faces = {name: cut(body, view, spot.centre) for name, body in bodies.items()}
-        across = axis_label(view.towards).strip("−")
-        title = f"section across {across}" if across else "section"
-        outlines.append(_profile(title, faces, view, section_frame(view, spot, points, reach)))
+    for section in sections_of(spot, oblique_view(points)):
+        frame = section_frame(section.view, spot, points, reach)
+        title = section.title(frame, unit)
+        outlines.append(_profile(title, cut(bodies, section), section.view, frame))
     return outlines
 
 
@@ -104,5 +104,4 @@ def _profile(title: str, faces: Mapping[str, pv.DataSet], view: View, frame: Fra
         before[name] = view.project(np.asarray(edge.points))[ends]
         moves[name] = view.project(np.asarray(edge["moves"]))[ends] if len(ends) else before[name]
         inside[name] = view.project(np.asarray(face.cell_centers().points))
-    axes = axis_label(view.right), axis_label(view.up)
-    return Profile(title, axes, before, moves, inside, frame)
+    return Profile(title, view, before, moves, inside, frame)

@@ -13,7 +13,7 @@ from fenics_contact.contact import ContactResult
 from fenics_contact.viz.colours import INK
 from fenics_contact.viz.fields import Bodies
 from fenics_contact.viz.stage import Layer
-from fenics_contact.viz.view import Frame, View, frame_around, looking_along
+from fenics_contact.viz.view import Frame, View, axis_label, frame_around, looking_along
 
 #: Half height of a section, relative to the size of the contact.
 REACH = 5.0
@@ -31,19 +31,48 @@ class Spot:
     """Location and size of the contact of a pair.
 
     Attributes:
-        centre: Force-weighted middle, (dim,).
-        normal: Mean unit normal, from master to slave, (dim,).
+        centre: Force-weighted middle, (dim,); in space on the planes of symmetry that cut the contact.
+        normal: Mean unit normal, from master to slave, (dim,); in space within these planes.
         radius: Radius of a disc, or half length of a line, of the size of the closed part of the surface,
             [length].
+        inside: From planes of symmetry into the modelled part of the contact, 0 along other axes, (dim,).
     """
 
     centre: np.ndarray
     normal: np.ndarray
     radius: float
+    inside: np.ndarray
+
+
+@dataclass(frozen=True)
+class Section:
+    """A plane through bodies.
+
+    Attributes:
+        view: View onto it, along its normal.
+        origin: A point of it, (3,).
+        inside: Side to which it is shifted slightly, (3,).
+    """
+
+    view: View
+    origin: np.ndarray
+    inside: np.ndarray
+
+    def title(self, frame: Frame, unit: str) -> str:
+        """Return where it lies, to a thousandth of what is seen: "section at y = 0 mm"."""
+        axis = axis_label(self.view.towards).strip("−")
+        if not axis:
+            return "section"
+        place, step = float(self.origin["xyz".index(axis)]), 1e-3 * float(np.max(frame.size))
+        # Adding zero makes a positive zero of a negative one.
+        place = round(place, -int(np.floor(np.log10(step)))) + 0.0
+        return f"section at {axis} = {place:g} {unit}".replace("-", "−")
 
 
 def strongest_contact(contact: ContactResult, places: np.ndarray) -> Spot:
     """Return the contact of the pair with the largest normal force.
+
+    In space planes of symmetry count: half a contact's middle lies on the plane that halves it.
 
     Args:
         contact: Result on the contact points; some force must act.
@@ -52,17 +81,29 @@ def strongest_contact(contact: ContactResult, places: np.ndarray) -> Spot:
     force, points = contact.normal_force, contact.points
     pair = int(np.argmax(np.bincount(points.pair, weights=force)))
     weight = np.where(points.pair == pair, force, 0.0)
-    normal = weight @ points.normal
-    # Around a pin the normals cancel: there the point of largest force is used.
+    middle = weight @ places / weight.sum()
+    centre, mirrors = _on_mirrors(middle, places, points.symmetric & (weight > 0)[:, None])
+    normal = np.where(mirrors, 0.0, weight @ points.normal)
+    # Around a pin the normals cancel: there the point of largest force is used, best one on a mirror.
     if np.linalg.norm(normal) < 1e-3 * weight.sum():
-        normal = points.normal[int(np.argmax(weight))]
+        held = points.symmetric.sum(axis=1)
+        normal = points.normal[int(np.argmax(np.where(held == held[weight > 0].max(), weight, 0.0)))]
     area = float(points.area[weight > 0].sum())
     radius = float(np.sqrt(area / np.pi)) if places.shape[1] == 3 else area / 2
-    return Spot(weight @ places / weight.sum(), normal / np.linalg.norm(normal), radius)
+    inside = np.where(mirrors, np.sign(middle - centre), 0.0)
+    return Spot(centre, normal / np.linalg.norm(normal), radius, inside)
 
 
-def section_views(spot: Spot, main: View) -> list[View]:
-    """Return the views onto two planes that hold the contact normal, perpendicular to each other.
+def _on_mirrors(middle: np.ndarray, places: np.ndarray, marks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Move a contact's middle to the nearest planes of symmetry; return it and the axes normal to them."""
+    mirrors = marks.any(axis=0) & (len(middle) == 3)
+    distance = np.where(marks, np.abs(places - middle), np.inf)
+    nearest = places[np.argmin(distance, axis=0), np.arange(len(middle))] if len(places) else middle
+    return np.where(mirrors, nearest, middle), mirrors
+
+
+def sections_of(spot: Spot, main: View) -> list[Section]:
+    """Return two planes that hold the middle and the normal of a contact, perpendicular to each other.
 
     Both are seen from the side of the main view, and horizontal directions stay horizontal where possible.
     """
@@ -75,7 +116,10 @@ def section_views(spot: Spot, main: View) -> list[View]:
         inside = (spot.normal, np.cross(spot.normal, towards))
         horizontal = max(inside, key=lambda direction: abs(float(direction @ main.right)))
         views.append(looking_along(towards, np.sign(horizontal @ main.right) * horizontal))
-    return sorted(views, key=lambda view: -float(view.towards @ main.towards))
+    return [
+        Section(view, spot.centre, spot.inside if abs(spot.inside @ view.towards) > 0.5 else view.towards)
+        for view in sorted(views, key=lambda view: -float(view.towards @ main.towards))
+    ]
 
 
 def section_frame(view: View, spot: Spot, points: np.ndarray, reach: float | None = None) -> Frame:
@@ -96,27 +140,32 @@ def section_frame(view: View, spot: Spot, points: np.ndarray, reach: float | Non
     )
 
 
-def cut(body: pv.DataSet, view: View, origin: np.ndarray) -> pv.PolyData:
-    """Cut a body, or its surface, by the plane through a point normal to a view.
+def cut(bodies: Mapping[str, pv.DataSet], section: Section) -> dict[str, pv.PolyData]:
+    """Cut bodies, or their surfaces, by a plane.
 
-    Slightly offset: where it runs along faces of cells, both neighbours would be cut or none.
+    It is shifted slightly: where it ran along faces of cells, both neighbours would be cut or none. Where it
+    misses all bodies it is shifted to the other side.
     """
-    beside = origin + 1e-6 * float(np.ptp(body.points)) * view.towards
-    return body.slice(normal=view.towards, origin=beside)
+    faces = {}
+    for side in (section.inside, -section.inside):
+        for name, body in bodies.items():
+            beside = section.origin + 1e-6 * float(np.ptp(body.points)) * side
+            faces[name] = body.slice(normal=section.view.towards, origin=beside)
+        if any(face.n_points for face in faces.values()):
+            break
+    return faces
 
 
-def section_layers(bodies: Bodies, view: View, origin: np.ndarray, look: Mapping[str, Any]) -> list[Layer]:
-    """Cut all bodies by a plane through ``origin``, normal to the view, and draw the cut in colours.
+def section_layers(bodies: Bodies, section: Section, look: Mapping[str, Any]) -> list[Layer]:
+    """Cut all bodies and draw the cut in colours.
 
     Args:
         bodies: The bodies, deformed, by name.
-        view: Its direction is the plane's normal.
-        origin: A point of the plane, (3,).
+        section: The plane.
         look: Keywords of ``add_mesh`` that turn values into colours.
     """
     layers = []
-    for body in bodies.values():
-        face = cut(body, view, origin)
+    for face in cut(bodies, section).values():
         if face.n_points:
             layers.append(Layer(face, {"lighting": False, **look}))
             edge = face.extract_feature_edges(boundary_edges=True, feature_edges=False, manifold_edges=False)

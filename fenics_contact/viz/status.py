@@ -86,7 +86,8 @@ def _draw(patches: Mapping[str, ContactPatch], paper: BinaryIO, title: str, unit
         for axes, (name, patch) in zip(panels, patches.items(), strict=False):
             draw_status(axes, patch, counted=False)
             axes.set_title(f"{name}\n{_words(patch, units)}")
-            label_axes(axes, patch, units, from_slave=True)
+            patch.frame.fit(axes)
+            label_axes(axes, patch.view, units, mirror=True)
         for axes in panels[len(patches) :]:
             axes.set_axis_off()
         handles, labels = panels[0].get_legend_handles_labels()

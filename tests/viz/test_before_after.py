@@ -17,7 +17,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz import before_after, plot_before_after
 from fenics_contact.viz.colours import GREY, ORANGE
 from fenics_contact.viz.profile import profiles
-from fenics_contact.viz.view import Frame
+from fenics_contact.viz.view import Frame, axis_label
 from tests.contact.gallery import partitions
 from tests.viz.plane_states import plane_block
 from tests.viz.states import contains, painted, pixels, pulled, touching_blocks
@@ -57,7 +57,7 @@ def test_pressures_and_outlines_of_both_are_drawn(dim: int, tmp_path: Path) -> N
 @pytest.mark.parametrize("dim", [2, 3])
 def test_outlines_move_as_the_design_does(dim: int) -> None:
     first = touching_blocks() if dim == 3 else plane_block()
-    found = profiles(first, raised(dim), None)
+    found = profiles(first, raised(dim), None, "mm")
     assert len(found) == dim - 1
     largest = 0.0
     for profile in found:
@@ -67,22 +67,22 @@ def test_outlines_move_as_the_design_does(dim: int) -> None:
         size = float(np.max(profile.frame.size))
         assert profile.factor * profile.largest < 0.1 * size
     assert largest > 0.3 * RISE, "hardly anything moved: nothing was tested"
-    still = profiles(first, first, None)
+    still = profiles(first, first, None, "mm")
     assert all(profile.largest == 0 and profile.factor == 1 for profile in still)
 
 
 def test_a_section_cuts_the_outline_where_it_is() -> None:
-    for profile in profiles(touching_blocks(), raised(3), None):
+    for profile in profiles(touching_blocks(), raised(3), None, "mm"):
         ends = profile.before["lower"].reshape(-1, 2)
         points = touching_blocks().scene.bodies["lower"].mesh.points
-        assert profile.axes[1] == "z"
+        assert axis_label(profile.view.up) == "z"
         assert ends[:, 1].min() == pytest.approx(points[:, 2].min())
         assert ends[:, 1].max() == pytest.approx(points[:, 2].max(), abs=0.01)
 
 
 def test_names_stand_in_their_bodies() -> None:
     scene = touching_blocks().scene
-    for profile in profiles(touching_blocks(), raised(3), None):
+    for profile in profiles(touching_blocks(), raised(3), None, "mm"):
         for name, body in scene.bodies.items():
             place, z = profile.place_in(name), body.mesh.points[:, 2]
             assert place is not None

@@ -63,10 +63,25 @@ def test_bodies_on_obstacles_are_drawn_in_true_scale(tmp_path: Path) -> None:
 def test_where_normals_cancel_the_strongest_point_gives_the_direction() -> None:
     angle = 2 * np.pi * np.arange(12) / 12
     normal = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(12)])
-    points = SimpleNamespace(pair=np.zeros(12, dtype=int), normal=normal, area=np.ones(12))
+    mirrors = np.zeros((12, 3), dtype=bool)
+    points = SimpleNamespace(pair=np.zeros(12, dtype=int), normal=normal, area=np.ones(12), symmetric=mirrors)
     force = np.where(np.arange(12) == 3, 1.0 + 1e-6, 1.0)
     spot = strongest_contact(SimpleNamespace(normal_force=force, points=points), normal)
     np.testing.assert_allclose(spot.normal, normal[3])
+
+
+def test_of_a_quarter_of_a_bore_the_sections_are_those_of_the_whole() -> None:
+    angle = np.pi / 2 * np.linspace(0, 1, 5)
+    normal = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(5)])
+    mirrors = np.abs(normal) < 1e-12
+    mirrors[:, 2] = False
+    points = SimpleNamespace(pair=np.zeros(5, dtype=int), normal=normal, area=np.ones(5), symmetric=mirrors)
+    force = np.array([1.0, 2.0, 3.0, 2.0, 1.5])
+    places = normal + np.array([0, 0, 7])
+    spot = strongest_contact(SimpleNamespace(normal_force=force, points=points), places)
+    np.testing.assert_allclose(spot.centre, [0, 0, 7], atol=1e-12)
+    np.testing.assert_allclose(spot.normal, [0, 1, 0], atol=1e-12)
+    np.testing.assert_array_equal(spot.inside, [1, 1, 0])
 
 
 def test_status_maps_show_stick_and_slip_of_each_state(tmp_path: Path) -> None:

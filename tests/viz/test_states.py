@@ -14,9 +14,7 @@ from fenics_contact.viz import Units, plot_contact_pressure, plot_stress
 from fenics_contact.viz.fields import contact_places, drawn_bodies
 from fenics_contact.viz.patch import contact_patch
 from fenics_contact.viz.plane import refined
-from fenics_contact.viz.section import section_frame, section_views, strongest_contact
 from fenics_contact.viz.stress import chosen_scale, stress_range
-from fenics_contact.viz.view import oblique_view
 from tests.viz.states import contains, painted, pixels, touching_blocks
 
 SMALL = 320
@@ -75,26 +73,6 @@ def test_stress_refuses_options_that_cannot_be_drawn(
     with pytest.raises(InvalidInputError, match=message):
         plot_stress(touching_blocks(), tmp_path / "stress.png", **options)
     assert not list(tmp_path.iterdir())
-
-
-def test_sections_cut_through_the_middle_of_the_contact_along_its_normal() -> None:
-    state = touching_blocks()
-    points = {name: body.mesh.points for name, body in state.scene.bodies.items()}
-    spot = strongest_contact(state.contact, contact_places(state, drawn_bodies(state)))
-    np.testing.assert_allclose(spot.normal, [0, 0, 1], atol=0.1)
-    assert 0.1 < spot.centre[0] < 1.9
-    assert abs(spot.centre[2]) < 0.05
-    everything = np.concatenate(list(points.values()))
-    views = section_views(spot, oblique_view(everything))
-    assert abs(views[0].towards @ views[1].towards) < 1e-12
-    for view in views:
-        assert abs(view.towards @ spot.normal) < 1e-12
-        assert view.up[2] > 0.9
-        frame = section_frame(view, spot, everything)
-        inside = view.project(spot.centre[None])[0]
-        assert np.all(inside > frame.low)
-        assert np.all(inside < frame.high)
-        np.testing.assert_allclose(section_frame(view, spot, everything, 0.1).size, [0.28, 0.2])
 
 
 def test_pressure_and_status_are_drawn(tmp_path: Path) -> None:

@@ -1,0 +1,148 @@
+"""Sections run through the middle of the contact, say where they are, and show how the axes run."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.contact import State, solve_scene
+from fenics_contact.gallery import block
+from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, RigidPlane, Scene, Support, Surface
+from fenics_contact.viz import painting, plot_stress
+from fenics_contact.viz.axes_sign import arrows_of, empty_corner, far_corner
+from fenics_contact.viz.fields import contact_places, drawn_bodies, moved, points_of
+from fenics_contact.viz.section import Section, Spot, cut, section_frame, sections_of, strongest_contact
+from fenics_contact.viz.view import Frame, face_on, oblique_view
+from tests.viz.states import touching_blocks
+
+SOFT = IsotropicElasticity(100.0, 0.3)
+
+
+@lru_cache(maxsize=4)
+def cut_model(cuts: str, floor: bool = False) -> State:
+    """A block pressed on another, or on a floor, cut at planes of symmetry: ``cuts`` is "y1" or "x0 y1"."""
+    bodies = {"upper": Body(block((0, 0, 1), (1, 1, 2), (2, 2, 2)), SOFT)}
+    if not floor:
+        bodies["lower"] = Body(block((0, 0, 0), (1, 1, 1), (3, 3, 2)), SOFT)
+    rollers = [
+        Support(name, side, tuple(0.0 if axis == side[0] else None for axis in "xyz"))
+        for name in bodies
+        for side in cuts.split()
+    ]
+    held = [] if floor else [Support("lower", "z0")]
+    master = RigidPlane((0.0, 0.0, 1.0), (0.0, 0.0, 1.0)) if floor else Surface("lower", "z1")
+    push = Support("upper", "z1", (0.0, 0.0, -0.01))
+    scene = Scene(bodies, [*rollers, *held, push], contacts=[ContactPair(Surface("upper", "z0"), master)])
+    return solve_scene(scene, MPI.COMM_SELF, tolerance=1e-6)
+
+
+def spot_of(state: State) -> Spot:
+    return strongest_contact(state.contact, contact_places(state, moved(drawn_bodies(state), 1.0)))
+
+
+def test_sections_cut_through_the_middle_of_the_contact_along_its_normal() -> None:
+    state = touching_blocks()
+    everything = np.concatenate([body.mesh.points for body in state.scene.bodies.values()])
+    spot = spot_of(state)
+    np.testing.assert_allclose(spot.normal, [0, 0, 1], atol=0.1)
+    assert 0.1 < spot.centre[0] < 1.9
+    assert abs(spot.centre[2]) < 0.05
+    sections = sections_of(spot, oblique_view(everything))
+    assert abs(sections[0].view.towards @ sections[1].view.towards) < 1e-12
+    for section in sections:
+        view = section.view
+        assert abs(view.towards @ spot.normal) < 1e-12
+        assert view.up[2] > 0.9
+        np.testing.assert_array_equal(section.origin, spot.centre)
+        frame = section_frame(view, spot, everything)
+        assert frame.holds(view.project(spot.centre[None]))[0]
+        np.testing.assert_allclose(section_frame(view, spot, everything, 0.1).size, [0.28, 0.2])
+
+
+@pytest.mark.parametrize(("cuts", "floor"), [("y1", False), ("x0 y1", False), ("x0 y1", True)])
+def test_sections_of_parts_of_a_model_lie_in_its_planes_of_symmetry(cuts: str, floor: bool) -> None:
+    state = cut_model(cuts, floor)
+    bodies = moved(drawn_bodies(state), 1.0)
+    spot = spot_of(state)
+    assert spot.centre[1] == pytest.approx(1.0, abs=1e-12)
+    assert spot.inside[1] == -1.0
+    if "x0" in cuts:
+        assert spot.centre[0] == pytest.approx(0.0, abs=1e-12)
+    else:
+        assert 0.2 < spot.centre[0] < 0.8
+        assert spot.inside[0] == 0.0
+    sections = sections_of(spot, oblique_view(points_of(bodies)))
+    titles = {section.title(Frame(np.zeros(2), np.ones(2)), "mm"): section for section in sections}
+    across = titles["section at y = 1 mm"]
+    if "x0" in cuts:
+        assert "section at x = 0 mm" in titles
+    for face in cut(bodies, across).values():
+        assert face.n_points > 3, "shifted out of the bodies"
+        assert np.abs(face.points[:, 1] - 1.0).max() < 1e-4
+
+
+def test_a_section_that_misses_all_bodies_is_shifted_to_the_other_side() -> None:
+    bodies = drawn_bodies(touching_blocks())
+    edge = max(float(body.points[:, 1].max()) for body in bodies.values())
+    section = Section(face_on(np.array([0.0, 1.0, 0.0])), np.array([0, edge, 0]), np.array([0.0, 1.0, 0.0]))
+    assert any(face.n_points for face in cut(bodies, section).values())
+
+
+@pytest.mark.parametrize(
+    ("normal", "place", "words"),
+    [
+        ((0, -1, 0), -1e-9, "section at y = 0 mm"),
+        ((1, 0, 0), -12.34567, "section at x = −12.346 mm"),
+        ((1, 1, 0), 3.0, "section"),
+    ],
+)
+def test_a_section_says_where_it_is(normal: tuple[float, ...], place: float, words: str) -> None:
+    axis = np.array(normal, dtype=float)
+    section = Section(face_on(axis), np.full(3, place), axis)
+    assert section.title(Frame(np.zeros(2), np.full(2, 5.0)), "mm") == words
+
+
+def test_a_sign_has_the_axes_as_they_run() -> None:
+    front = arrows_of(face_on(np.array([1.0, 0.0, 0.0])))
+    assert set(front) == {"y", "z"}
+    np.testing.assert_allclose([front["y"], front["z"]], np.eye(2), atol=1e-12)
+    behind = arrows_of(face_on(np.array([-1.0, 0.0, 0.0])))
+    assert set(behind) == {"y", "z"}
+    np.testing.assert_allclose(behind["y"], [-1, 0], atol=1e-12)
+    oblique = arrows_of(oblique_view(np.diag([3.0, 1.0, 1.0])))
+    assert set(oblique) == {"x", "y", "z"}
+    assert oblique["x"][0] > 0.9
+    assert oblique["z"][1] > 0.7
+
+
+def test_a_sign_keeps_off_the_contact_and_off_the_bodies() -> None:
+    frame = Frame(np.array([1.0, 2.0]), np.array([3.0, 4.0]))
+    assert far_corner(frame, np.array([1.1, 3.0])) == "lower right"
+    assert far_corner(frame, np.array([2.9, 3.0])) == "upper left"
+    assert far_corner(frame, np.array([2.9, 2.1])) == "upper left"
+    assert far_corner(frame, np.array([1.5, 2.1])) == "upper right"
+    image = np.zeros((100, 200, 3), dtype=np.uint8)
+    image[80:, :30] = 255
+    assert empty_corner(image) == "lower left"
+
+
+def test_pictures_in_space_have_a_sign_in_every_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[tuple[set[str], str]] = []
+    sign = painting.axes_sign  # type: ignore[attr-defined]
+
+    def noted(axes: Any, view: Any, corner: str) -> None:
+        drawn.append((set(arrows_of(view)), axes.get_title()))
+        sign(axes, view, corner)
+
+    monkeypatch.setattr(painting, "axes_sign", noted)
+    plot_stress(cut_model("x0 y1"), tmp_path / "stress.png", width=320)
+    assert drawn == [
+        ({"x", "y", "z"}, ""),
+        ({"x", "z"}, "section at y = 1 mm; displacement × 1"),
+        ({"y", "z"}, "section at x = 0 mm; displacement × 1"),
+    ]
