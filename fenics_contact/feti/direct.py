@@ -47,7 +47,7 @@ class DirectSystem:
     """
 
     products = 0
-    _factor: Factor
+    _factor: Factor | None  # None where supports prescribe everything
 
     def __init__(
         self, torn: TornSystem, timer: PhaseTimer | None = None, *, previous: DirectSystem | None = None
@@ -67,7 +67,8 @@ class DirectSystem:
             self._factor = previous._factor
             return
         with (timer or PhaseTimer()).phase("factor"):
-            self._factor = Factor(body.stiffness[self._free][:, self._free].tocsr())
+            free = body.stiffness[self._free][:, self._free].tocsr()
+            self._factor = Factor(free) if len(self._free) else None
 
     def solve(self) -> DirectSolution:
         """Return the displacement under the present load, refined once.
@@ -81,9 +82,7 @@ class DirectSystem:
         displacement[self._fixed] = self.torn.right
         moved = stiffness @ displacement
         for _ in range(2):  # the second pass removes the rounding of the first
-            correction = np.empty(len(free))
-            self._factor.solve((load - stiffness @ displacement)[free], correction)
-            displacement[free] += correction
+            displacement[free] += self._moved_by((load - stiffness @ displacement)[free])
         missing = load - stiffness @ displacement
         scale = max(np.linalg.norm(load), np.linalg.norm(moved), np.finfo(float).tiny)
         error, norm = self.energy_of_residual(displacement), float(displacement @ (stiffness @ displacement))
@@ -101,9 +100,14 @@ class DirectSystem:
         """Return rᵀK⁻¹r of the free components, r = f − K u: the energy norm of the error, squared."""
         (body,) = self.torn.subdomains
         missing = (self.torn.load - body.stiffness @ displacement)[self._free]
-        correction = np.empty(len(self._free))
-        self._factor.solve(missing, correction)
-        return float(missing @ correction)
+        return float(missing @ self._moved_by(missing))
+
+    def _moved_by(self, force: np.ndarray) -> np.ndarray:
+        """Return K⁻¹ times forces on the free components."""
+        displacement = np.empty(len(self._free))
+        if self._factor is not None:
+            self._factor.solve(force, displacement)
+        return displacement
 
     def conforming(self, displacement: np.ndarray) -> np.ndarray:
         """Return the displacement itself: no node has copies."""

@@ -9,8 +9,8 @@ from mpi4py import MPI
 from fenics_contact.contact import solve_scene
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti import DirectSystem
-from fenics_contact.gallery import block
-from fenics_contact.scene import Body, IsotropicElasticity, Scene, Support, Traction
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.scene import Body, IsotropicElasticity, PlaneStrain, Scene, Support, Traction
 
 
 def cantilever(length: float, cells: int) -> Scene:
@@ -51,3 +51,15 @@ def test_a_damaged_factor_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(DirectSystem, "__init__", damaged)
     with pytest.raises(ConvergenceError, match="needs an error below"):
         solve_scene(cantilever(3.0, 5), MPI.COMM_SELF)
+
+
+def test_a_body_of_which_every_node_is_prescribed_has_reactions() -> None:
+    plate = Body(rectangle((0.0, 0.0), (1.0, 1.0), (1, 1)), PlaneStrain(1000.0, 0.0))
+    stretched = (lambda x: 0.01 * x[:, 0], 0.0)
+    scene = Scene({"plate": plate}, [Support("plate", side, stretched) for side in ("y0", "y1")])
+    state = solve_scene(scene, MPI.COMM_SELF)
+    assert isinstance(state.system, DirectSystem)
+    assert state.energies.strain == pytest.approx(0.5 * 1000.0 * 0.01**2)
+    np.testing.assert_allclose(state.gather_stress("plate")[:, 0, 0], 10.0)
+    assert state.errors.algebraic == 0.0
+    assert state.balance().imbalance < 1e-12

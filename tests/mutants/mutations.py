@@ -8,6 +8,7 @@ CONIC = "tests/contact/test_conic.py::test_energies_and_contact_forces_equal_tho
 
 PARTS = "tests/accuracy/test_certificate_parts.py"
 GIVEN = "tests/shape/test_given_gap_sensitivity.py"
+RIGID = "tests/contact/test_rigid_surfaces.py"
 
 MUTATIONS = (
     Mutation(
@@ -100,6 +101,44 @@ MUTATIONS = (
         "connecting - joined",
         "connecting",
         ("tests/contact/test_resultants.py::test_all_forces_balance",),
+    ),
+    Mutation(
+        "nodes between materials show the smaller stress",
+        "contact/gathered.py",
+        "np.where(np.isnan(size), -1.0, size).argmax(axis=0)",
+        "np.where(np.isnan(size), np.inf, size).argmin(axis=0)",
+        (
+            "tests/io/test_fields_in_files.py::"
+            "test_vtu_files_hold_at_a_node_between_materials_the_larger_stress",
+        ),
+    ),
+    Mutation(
+        "the moment of a force beside its surface is forgotten",
+        "fem/spread_force.py",
+        "moment = lever + (",
+        "moment = 0.0 * lever + (",
+        ("tests/contact/test_resultants.py::test_a_force_at_a_point_is_held_there",),
+    ),
+    Mutation(
+        "loads at points of rigid surfaces are forgotten",
+        "feti/dual.py",
+        "resultants += self._points.T @ self.torn.free.load",
+        "resultants += 0.0 * (self._points.T @ self.torn.free.load)",
+        (f"{RIGID}::test_a_force_at_a_point_is_that_of_a_spread_force",),
+    ),
+    Mutation(
+        "contact does not see rigid surfaces move",
+        "feti/free_motions.py",
+        "moved = [-relation.of_supports(mode)",
+        "moved = [0.0 * relation.of_supports(mode)",
+        (f"{RIGID}::test_a_rigid_surface_is_a_support_that_moves_by_itself",),
+    ),
+    Mutation(
+        "reactions of rigid surfaces contain the loads at their points",
+        "contact/reactions.py",
+        "entries.append(total - point_load(support, point) if",
+        "entries.append(total if",
+        (f"{RIGID}::test_a_rigid_surface_is_a_support_that_moves_by_itself",),
     ),
     Mutation(
         "supports that meet have equal parts of the reaction",
