@@ -22,6 +22,7 @@ def sections(record: Record, units: Units) -> str:
         "Summary": _rows(_summary(record, units)),
         "Contact": _contact(record, units),
         "Load steps": _steps(record, units),
+        "Rigid surfaces": _rows(_motions(record, units)),
         "Forces and moments": _forces(record, units),
         "Errors and residuals": _rows(_accuracy(record)),
         "Computed with": _rows(_origin(record)),
@@ -152,6 +153,18 @@ def _steps(record: Record, units: Units) -> str:
     columns = [name for name in named if name in steps]
     rows = list(zip(*(steps[name] for name in columns), strict=True))
     return _table([named[name] for name in columns], rows, words=2)
+
+
+def _motions(record: Record, units: Units) -> dict[str, str]:
+    """Return displacement and rotation of the points of rigid surfaces."""
+    facts: dict[str, str] = {}
+    for place, entry in enumerate(record.get("rigid_motions") or ()):
+        move, turn, about = (
+            ", ".join(map(number, _several(entry[name]))) for name in ("displacement", "rotation", "about")
+        )
+        name = f"{place} {_side(entry)}, point {about}"
+        facts |= {name: f"displacement {move} {units.length}; rotation {turn} rad"}
+    return facts
 
 
 def _forces(record: Record, units: Units) -> str:

@@ -23,7 +23,7 @@ from fenics_contact.io import ResultSeries, result_record, write_result, write_v
 from fenics_contact.page import result_page
 from fenics_contact.page.fields import rounded_up
 from fenics_contact.page.packing import rounded
-from fenics_contact.page.tables import status_words
+from fenics_contact.page.tables import sections, status_words
 from fenics_contact.viz import Units
 from tests.viz.plane_states import plane_block
 from tests.viz.states import pulled, touching_blocks
@@ -199,6 +199,19 @@ def test_moments_in_the_plane_are_one_number_and_rounding_is_zero() -> None:
     assert f"moment (N mm) {moment}" in told
     forces = told.partition("Forces and moments")[2].partition("Imbalance")[0]
     assert "e−1" not in forces, "rounding is told"
+
+
+def test_motions_of_rigid_surfaces_are_told() -> None:
+    plane = {
+        "body": "arm",
+        "surface": "end",
+        "about": [1.0, 2.0],
+        "displacement": [0.5, -0.25],
+        "rotation": 0.01,
+    }
+    told = sections({"rigid_motions": [plane]}, Units("m"))
+    assert "0 arm end, point 1, 2" in told
+    assert "displacement 0.5, −0.25 m; rotation 0.01 rad" in told
 
 
 @pytest.mark.parametrize(
