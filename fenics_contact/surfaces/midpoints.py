@@ -13,13 +13,13 @@ import numpy as np
 from fenics_contact.mesh import FACET_TYPES, BodyMesh, shape_values
 from fenics_contact.surfaces.facet_areas import nodal_areas
 
-#: Nodes of a quadratic triangle, and its corners.
-_NODES, _CORNERS = 6, 3
+#: The nodes of a quadratic triangle.
+_CORNERS, _MIDPOINTS = slice(0, 3), slice(3, 6)
 
 
 def bears_on_midpoints(facets: np.ndarray) -> bool:
     """Return whether facets are quadratic triangles, (n, 6)."""
-    return facets.shape[1] == _NODES
+    return facets.shape[1] == _MIDPOINTS.stop
 
 
 def bearing_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
@@ -33,8 +33,8 @@ def bearing_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
     """
     areas = nodal_areas(points, facets)
     if bears_on_midpoints(facets):
-        areas[:, _CORNERS:] += areas[:, :_CORNERS].sum(axis=1, keepdims=True) / _CORNERS
-        areas[:, :_CORNERS] = 0.0
+        areas[:, _MIDPOINTS] += areas[:, _CORNERS].mean(axis=1, keepdims=True)
+        areas[:, _CORNERS] = 0.0
     return areas
 
 
@@ -65,8 +65,8 @@ def filled_at_corners(facets: np.ndarray, values: np.ndarray) -> np.ndarray:
     """
     if not bears_on_midpoints(facets):
         return values
-    result, corners = values.copy(), facets[:, :_CORNERS]
-    after = values[facets[:, _CORNERS:]]
+    result, corners = values.copy(), facets[:, _CORNERS]
+    after = values[facets[:, _MIDPOINTS]]
     before, opposite = np.roll(after, 1, axis=1), np.roll(after, -1, axis=1)
     total, count = np.zeros_like(values), np.bincount(corners.ravel(), minlength=len(values))
     np.add.at(total, corners, 0.75 * (after + before) - 0.5 * opposite)
@@ -88,7 +88,7 @@ def shape_weights(
     Returns:
         Node numbers and quadratic shape functions, (m, 6) each.
     """
-    kind = FACET_TYPES[_NODES, 3]
+    kind = FACET_TYPES[_MIDPOINTS.stop, 3]
     count = len(kind.pieces)
     places = np.einsum("mk,mkd->md", weights, kind.nodes[kind.pieces[facet % count]])
     return facets[facet // count], shape_values(kind, places)
