@@ -103,19 +103,21 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
         *(_square(x[equality]) for x in (residual, product - problem.rhs, problem.rhs)),
         _square(multiplier),
         _square(problem.rhs),
+        _square(product[layout.normal]),
         *(_square(x[rows]) for x in (error, needed) for rows in (free, ~free)),
         problem.coarse.local(multiplier),
     )
     normal, normal_mapped, force, force_mapped = np.sqrt(sums[:4])
-    jump, cancelled, load, everything, rhs = np.sqrt(sums[4:9])
-    distance, distance_held, closing, closing_held = np.sqrt(sums[9:13])
-    unbalanced = problem.coarse.norm(sums[13:] - problem.coarse.load)
+    jump, cancelled, load, everything, rhs, pressed = np.sqrt(sums[4:10])
+    distance, distance_held, closing, closing_held = np.sqrt(sums[10:14])
+    unbalanced = problem.coarse.norm(sums[14:] - problem.coarse.load)
     force_scale = max(normal, normal_mapped)
     if force_scale <= FORCE_FLOOR * max(force, force_mapped):
         force_scale = max(force, force_mapped)
     force_scale = max(force_scale, FORCE_FLOOR * max(everything, closing))
     gluing_scale = max(cancelled, load) or rhs
-    # Errors below the last places of all forces, and jumps of what the loads alone would open, are none.
+    # Errors below the last places of all forces, and jumps of what the loads alone would open, or of what
+    # contact forces displace, are none: an interference alone may displace nothing at supports.
     rounding = LAST_PLACES * max(everything, closing)
     distance = np.hypot(
         distance if distance > rounding else 0.0,
@@ -124,7 +126,7 @@ def measure(problem: DualProblem, multiplier: Vector, product: Vector, residual:
     violation = global_max(problem.comm, feasible.violation(multiplier))
     return Residuals(
         natural=_ratio(distance, force_scale),
-        gluing=_ratio(jump if jump > LAST_PLACES * load else 0.0, gluing_scale),
+        gluing=_ratio(jump if jump > LAST_PLACES * max(load, pressed) else 0.0, gluing_scale),
         coarse=_ratio(unbalanced, max(everything, problem.coarse.norm(problem.coarse.load))),
         violation=_ratio(violation if violation > rounding else 0.0, force_scale),
         force_scale=force_scale,

@@ -110,3 +110,14 @@ def lame(interference: float = INTERFERENCE) -> float:
     hub = ((RIM**2 + SEAT**2) / (RIM**2 - SEAT**2) + nu) / young
     shaft = ((SEAT**2 + BORE**2) / (SEAT**2 - BORE**2) - nu) / young
     return interference / SEAT / (hub + shaft)
+
+
+def clamped_pressure() -> float:
+    """The pressure where bore and rim are held: u = A r + B / r vanishes there in both bodies."""
+
+    def compliance(held: float) -> float:
+        # σ_r = E / ((1 + ν)(1 - 2ν)) (A - (1 - 2ν) B / r²), and B = -A held².
+        stress = YOUNG / ((1 + NU) * (1 - 2 * NU)) * (1 + (1 - 2 * NU) * (held / SEAT) ** 2)
+        return abs((SEAT - held**2 / SEAT) / stress)
+
+    return INTERFERENCE / (compliance(BORE) + compliance(RIM))

@@ -13,11 +13,12 @@ from mpi4py import MPI
 from fenics_contact.contact import ContactProblem, State, solve_scene, solve_steps
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import quadratic
-from fenics_contact.scene import Body, LoadStep, Pressure, Scene
+from fenics_contact.scene import Body, Coulomb, LoadStep, Pressure, Scene, Support
 from tests.contact.press_fits import (
     INTERFERENCE,
     SEAT,
     Disc,
+    clamped_pressure,
     lame,
     mean_pressure,
     press_fit,
@@ -133,3 +134,33 @@ def test_overlap_without_a_word_is_refused_or_told(around: int, caplog: pytest.L
     assert "surfaces of hub inner on shaft outer overlap by up to 0.05 before they are loaded" in told
     declared = solved(press_fit(around, 8, overlap=INTERFERENCE, interference="measured"))
     np.testing.assert_array_equal(silent.contact.normal_force, declared.contact.normal_force)
+
+
+@pytest.mark.parametrize("friction", [None, Coulomb(0.2)])
+@pytest.mark.parametrize("disc", DISCS)
+def test_an_interference_alone_loads_bodies_that_are_held(disc: Disc, friction: Coulomb | None) -> None:
+    scene = press_fit(96, 16, discretisation=disc, interference=INTERFERENCE, friction=friction)
+    held = [Support("shaft", "inner", (0.0, 0.0)), Support("hub", "outer", (0.0, 0.0))]
+    for tolerance in (1e-6, 1e-10):
+        state = solve_scene(replace(scene, supports=held), MPI.COMM_SELF, tolerance=tolerance)
+        assert state.counts["f_products"] < 100
+        assert mean_pressure(state) == pytest.approx(clamped_pressure(), rel=0.002)
+
+
+@pytest.mark.parametrize("disc", DISCS)
+def test_friction_holds_the_torque_of_the_pressure(disc: Disc) -> None:
+    scene = press_fit(48, 12, discretisation=disc, interference=INTERFERENCE, friction=Coulomb(0.2))
+
+    def turned(angle: float) -> list[Support]:
+        way = (lambda x: -angle * x[:, 1], lambda x: angle * x[:, 0])
+        return [Support("shaft", "inner", way), Support("hub", "outer", (0.0, 0.0))]
+
+    steps = [LoadStep(f"{angle:g}", supports=turned(angle)) for angle in (0.0, 0.01, 0.02)]
+    states = solve_steps(ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-8), steps)
+    limits = [0.2 * state.contact.normal_force.sum() * SEAT for state in states]
+    torques = [abs(float(state.resultants((0.0, 0.0)).contacts[0].moment)) for state in states]
+    assert mean_pressure(states[0]) == pytest.approx(clamped_pressure(), rel=0.005)
+    assert torques[0] < 1e-6 * limits[0]
+    for torque, limit in zip(torques[1:], limits[1:], strict=True):
+        assert torque == pytest.approx(limit, rel=0.005)
+    assert limits[1] == pytest.approx(limits[0], rel=0.01)
