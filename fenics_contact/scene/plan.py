@@ -57,7 +57,8 @@ class Plan:
         solver: How the equilibrium is computed.
         cone: Which inequalities the multipliers obey.
         fixed_point: Whether slip bounds follow the normal forces (Coulomb's law).
-        coarse_motions: Rigid motions of the subdomains, the size of the coarse problem; 0 without one.
+        coarse_motions: Rigid motions of the subdomains and free ones of rigid surfaces, the size of the
+            coarse problem; 0 without one.
         adjoint: Whether sensitivities are requested, which need one adjoint solve per design.
         memory: Expected memory of all ranks together without their libraries, [bytes].
         contacts: Between which surfaces the gaps of each contact pair are measured.
@@ -112,7 +113,8 @@ def make_plan(scene: SceneParts, partitions: Mapping[str, np.ndarray], *, sensit
     subdomains, unknowns = len(nodes), scene.dim * int(nodes.sum())
     solver = choose_solver(scene, subdomains, sensitivity=sensitivity)
     direct = solver is SolverKind.DIRECT
-    motions = 0 if direct else subdomains * scene.dim * (scene.dim + 1) // 2
+    loose = sum(int(s.free.sum()) for s in scene.supports if isinstance(s, RigidSurface))
+    motions = 0 if direct else subdomains * scene.dim * (scene.dim + 1) // 2 + loose
     sizes = zip(scene.dim * nodes, scene.dim * shared, strict=True)
     factors = sum(expected_bytes(int(size), int(interface)) for size, interface in sizes)
     return Plan(

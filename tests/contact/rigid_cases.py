@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
@@ -78,7 +79,15 @@ def punched() -> Scene:
     return Scene({"pad": pad, "punch": punch}, [Support("pad", "z0"), face], contacts=[pair])
 
 
-SCENES = {"loaded": loaded, "pressed": pressed, "tied": tied, "punched": punched}
+def bridged() -> Scene:
+    """The same by mortar, without friction."""
+    scene = punched()
+    pair = ContactPair(Surface("pad", "z1"), Surface("punch", "z0"), None, "mortar")
+    face = RigidSurface("punch", "z0", (1.4, 1.0, 1.6), (0.0, 0.0, None), None, (0.0, 0.0, -20.0))
+    return replace(scene, supports=[scene.supports[0], face], contacts=[pair])
+
+
+SCENES = {"loaded": loaded, "pressed": pressed, "tied": tied, "punched": punched, "bridged": bridged}
 
 
 def solved(scene: Scene, comm: MPI.Comm, tolerance: float | None = 1e-10, parts: int = 4) -> State:

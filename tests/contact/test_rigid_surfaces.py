@@ -78,6 +78,11 @@ def test_a_rigid_surface_is_a_support_that_moves_by_itself(name: str) -> None:
         u, other = (each.gather_displacement(body) for each in (state, same))
         assert np.abs(u).max() > 1e-3
         np.testing.assert_allclose(u, other, rtol=0, atol=1e-9 * np.abs(u).max())
+    parts = {
+        body: box_partition(scene.bodies[body].mesh, (4, *[1] * (scene.dim - 1))) for body in scene.bodies
+    }
+    assert scene.plan(parts).coarse_motions == state.dual.problem.coarse.m + len(state.unheld)
+    assert len(state.unheld) == (name == "bridged")  # the punch may spin
     # What the support needs beside the reaction is the load at the point.
     rigid = next(each for each in scene.supports if isinstance(each, RigidSurface))
     place = scene.supports.index(rigid)
