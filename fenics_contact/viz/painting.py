@@ -71,25 +71,28 @@ def paint(state: State, bodies: Bodies, paints: Paints, path: Path | None, *, se
 
 
 def _draw(parts: Sequence[_Part], paper: BinaryIO, paints: Paints, *, below: bool) -> None:
-    """Place details below or beside the main part, together as wide as the picture and not too high."""
-    main, *details = parts
-    wide = [part.frame.proportion for part in details]
-    if below:
-        high = [min(WIDE / main.frame.proportion, 0.5), min(WIDE / sum(wide), 0.4) if wide else 0.0]
-        height = sum(high) + (0.14 if wide else 0.07)
-    else:
-        height = WIDE / (main.frame.proportion + sum(wide)) + 0.12
-    size = paints.width, round(float(np.clip(height, 0.3, 1.1)) * paints.width)
+    """Place details below or beside the main part, lines as wide as the picture and not too high."""
+    lines = _lines(parts) if below else [parts]
+    wide = [[part.frame.proportion for part in line] for line in lines]
+    most = [0.5] + [0.4] * (len(lines) - 1) if below else [np.inf]
+    high = [min(WIDE / sum(line), limit) for line, limit in zip(wide, most, strict=True)]
+    height = sum(high) + (0.07 * len(lines) if below else 0.12)
+    size = paints.width, round(float(np.clip(height, 0.3, 1.3)) * paints.width)
     with sheet(paper, size, paints.headline) as figure:
-        if below and wide:
-            grid = figure.add_gridspec(2, len(wide), height_ratios=high, width_ratios=wide)
-            places = [grid[0, :], *(grid[1, column] for column in range(len(wide)))]
-        else:
-            places = list(figure.add_gridspec(1, len(parts), width_ratios=[main.frame.proportion, *wide]))
-        panels = [figure.add_subplot(place) for place in places]
+        rows = figure.add_gridspec(len(lines), height_ratios=high)
+        grids = [rows[k].subgridspec(1, len(line), width_ratios=line) for k, line in enumerate(wide)]
+        panels = [figure.add_subplot(place) for grid in grids for place in grid]
         for axes, part in zip(panels, parts, strict=True):
             part.draw(axes)
         paints.add_bar(figure, panels)
+
+
+def _lines(parts: Sequence[_Part]) -> list[Sequence[_Part]]:
+    """Return the main part and its details in lines: details in one, unless one would be tiny there."""
+    main, *details = parts
+    wide = [part.frame.proportion for part in details]
+    apart = len(wide) > 1 and max(wide) > 3.0 * min(wide)
+    return [[main], *([part] for part in details)] if apart else [[main], *([details] if details else [])]
 
 
 def _in_plane(scene: Scene, bodies: Bodies, spot: Spot | None, paints: Paints) -> list[_Part]:

@@ -84,10 +84,12 @@ def strongest_contact(contact: ContactResult, places: np.ndarray) -> Spot:
     middle = weight @ places / weight.sum()
     centre, mirrors = _on_mirrors(middle, places, points.symmetric & (weight > 0)[:, None])
     normal = np.where(mirrors, 0.0, weight @ points.normal)
-    # Around a pin the normals cancel: there the point of largest force is used, best one on a mirror.
+    # Around a pin the normals cancel: there the point of largest force is used, best one on a mirror, and the
+    # axis that is nearest to its normal.
     if np.linalg.norm(normal) < 1e-3 * weight.sum():
         held = points.symmetric.sum(axis=1)
         normal = points.normal[int(np.argmax(np.where(held == held[weight > 0].max(), weight, 0.0)))]
+        normal = np.eye(len(normal))[int(np.argmax(np.round(np.abs(normal), 6)))]
     area = float(points.area[weight > 0].sum())
     radius = float(np.sqrt(area / np.pi)) if places.shape[1] == 3 else area / 2
     inside = np.where(mirrors, np.sign(middle - centre), 0.0)
