@@ -11,7 +11,9 @@ import importlib
 import importlib.util
 import logging
 import re
+import signal
 import sys
+import threading
 from dataclasses import dataclass
 from importlib import metadata
 from types import ModuleType
@@ -128,8 +130,16 @@ def load_petsc(world: MPI.Comm | None = None) -> ModuleType:
     if world is not None:
         _load(_PETSC4PY, "petsc4py").init(comm=world)
     petsc = _load(_PETSC4PY, "petsc4py.PETSc")
+    _hear_of_closed_pipes()
     _check_petsc(_PETSC4PY, petsc)
     return petsc
+
+
+def _hear_of_closed_pipes() -> None:
+    """Let a write to a closed pipe be an error of Python again; PETSc's handler would end all ranks."""
+    handler = signal.getsignal(signal.SIGPIPE)
+    if handler is not None and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGPIPE, handler)
 
 
 def require_extra(use: str, extra: str, *modules: str) -> None:

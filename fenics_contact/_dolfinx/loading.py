@@ -17,20 +17,33 @@ from fenics_contact._requirements import DOLFINX, load_petsc
 __all__ = ["cpp", "dolfinx", "fem", "mesh", "old", "release", "side_effects_undone", "version"]
 
 
+class _NoCommand(logging.Filter):
+    """Drops what the root logger itself is told of commands."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Return whether a record is a warning or worse."""
+        return record.levelno >= logging.WARNING
+
+
 @contextmanager
 def side_effects_undone() -> Iterator[None]:
-    """Undo the side effects of importing and compiling with old releases.
+    """Undo the side effects of importing and compiling.
 
     dolfinx 0.5 switches `sys.setdlopenflags` to RTLD_GLOBAL for good, after which VTK's own
-    libraries clash with the system's; ffcx 0.5 configures the root logger and captures warnings.
+    libraries clash with the system's; ffcx 0.5 configures the root logger and captures warnings. setuptools
+    lowers the root logger's level and has it log every command of the compiler; what the compiler itself says
+    reaches the terminal.
     """
     root = logging.getLogger()
     handlers, level, setdlopenflags = list(root.handlers), root.level, sys.setdlopenflags
     showwarning = warnings.showwarning
     sys.setdlopenflags = lambda flags: None
+    no_command = _NoCommand()  # one of its own, as these blocks are nested
+    root.addFilter(no_command)
     try:
         yield
     finally:
+        root.removeFilter(no_command)
         sys.setdlopenflags = setdlopenflags
         root.handlers[:] = handlers
         root.setLevel(level)

@@ -6,14 +6,15 @@ import numpy as np
 import ufl
 
 from fenics_contact._dolfinx.cells import cell_type_named, facet_vertices
-from fenics_contact._dolfinx.loading import cpp, dolfinx, old
+from fenics_contact._dolfinx.loading import cpp, dolfinx, old, side_effects_undone
 from fenics_contact._dolfinx.templates import cellwise_element, scalar_element, vector_element
 
 
 def _space(
     mesh: dolfinx.mesh.Mesh, element: ufl.finiteelement.AbstractFiniteElement
 ) -> dolfinx.fem.FunctionSpace:
-    return dolfinx.fem.FunctionSpace(mesh, element) if old() else dolfinx.fem.functionspace(mesh, element)
+    with side_effects_undone():  # the element is compiled
+        return dolfinx.fem.FunctionSpace(mesh, element) if old() else dolfinx.fem.functionspace(mesh, element)
 
 
 def cell_type_of_mesh(mesh: dolfinx.mesh.Mesh) -> str:

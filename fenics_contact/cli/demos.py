@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import runpy
 import shutil
 import sys
@@ -15,6 +16,7 @@ from fenics_contact.cli.desk import Desk, desk_of
 from fenics_contact.cli.optimize import optimize
 from fenics_contact.cli.run import run
 from fenics_contact.cli.shipped import Shipped, optimises, shipped, takes
+from fenics_contact.cli.streams import Unread
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.scene_file import suggestion
 
@@ -94,7 +96,9 @@ def _run(desk: Desk, chosen: Shipped, arguments: list[str]) -> None:
     before = sys.argv
     sys.argv = [str(chosen.path), *arguments]
     try:
-        runpy.run_path(str(chosen.path), run_name="__main__")
+        with contextlib.redirect_stdout(Unread(sys.stdout)):
+            runpy.run_path(str(chosen.path), run_name="__main__")
+            sys.stdout.flush()
     except SystemExit as end:
         if isinstance(end.code, str):  # a demo with wrong options exits with a message
             raise InvalidInputError(end.code) from end

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
-import threading
-from contextlib import suppress
-from typing import TextIO
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, TextIO
 
 from fenics_contact.io import OutputError
 from fenics_contact.progress import visible
@@ -15,7 +14,6 @@ from fenics_contact.progress import visible
 
 def prepare_streams() -> None:
     """Write characters that a stream cannot encode as escapes."""
-    _hear_no_broken_pipe()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
@@ -27,7 +25,6 @@ def say(text: str) -> None:
     Raises:
         OutputError: If it cannot be written, for instance to a full disk.
     """
-    _hear_no_broken_pipe()
     try:
         sys.stdout.write(text)
         sys.stdout.flush()
@@ -48,16 +45,39 @@ def unsaid(error: OSError) -> OutputError:
 
 def complain(text: str) -> None:
     """Write to stderr with control characters escaped; a failure cannot be reported."""
-    _hear_no_broken_pipe()
     with suppress(OSError):
         sys.stderr.write(visible(text))
         sys.stderr.flush()
 
 
-def _hear_no_broken_pipe() -> None:
-    """Let a write to a closed pipe raise, as in Python; PETSc's signal handler would end the whole run."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
+class Unread:
+    """A stream that goes on, writing nothing, once its reader has closed it: for code that prints itself."""
+
+    def __init__(self, stream: TextIO) -> None:
+        """Take the stream that is written to."""
+        self._stream = stream
+
+    def __getattr__(self, name: str) -> Any:
+        """Return everything else as of the stream."""
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        """Write a text."""
+        with self._going_on():
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """Write what is in the buffer."""
+        with self._going_on():
+            self._stream.flush()
+
+    @contextmanager
+    def _going_on(self) -> Iterator[None]:
+        try:
+            yield
+        except BrokenPipeError:
+            _lead_nowhere(self._stream)
 
 
 def _lead_nowhere(stream: TextIO) -> None:

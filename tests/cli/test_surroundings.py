@@ -166,6 +166,40 @@ def test_a_run_whose_reader_has_gone_comes_to_its_end(tmp_path: Path) -> None:
     assert (tmp_path / "result.json").exists()
 
 
+def test_progress_and_warnings_that_nobody_reads_end_nothing(tmp_path: Path) -> None:
+    """PETSc's handler of SIGPIPE would end all ranks with a banner of MPI."""
+    read, write = os.pipe()
+    os.close(read)
+    arguments = ("-v", "run", scene(tmp_path, STEPS), "-o", tmp_path, "--no-pictures")
+    answer = program(*arguments, stdout=subprocess.PIPE, stderr=write)
+    os.close(write)
+    assert answer.returncode == 0
+    assert f"results in {tmp_path}/" in answer.stdout
+    assert (tmp_path / "result.json").exists()
+
+
+def test_a_demo_whose_reader_has_gone_comes_to_its_end(tmp_path: Path) -> None:
+    (tmp_path / "demo_wordy.py").write_text(
+        "# # A wordy demo.\nfrom pathlib import Path\nfrom fenics_contact._dolfinx import version\n"
+        "version()\nfor k in range(3):\n    print('word', flush=True)\nPath('done').touch()\n"
+    )
+    code = (
+        "import sys; from pathlib import Path; from fenics_contact import __main__, cli; "
+        "from fenics_contact.cli import shipped; "
+        f"shipped.folder_of_demos = lambda: Path({str(tmp_path)!r}); "
+        "sys.exit(__main__.main(['demo', 'wordy']))"
+    )
+    read, write = os.pipe()
+    os.close(read)
+    answer = subprocess.run(
+        [sys.executable, "-c", code], stdout=write, stderr=subprocess.PIPE, text=True, check=False,
+        env={**clean_environment(), "PYTHONPATH": str(ROOT)}, cwd=tmp_path, timeout=120,
+    )  # fmt: skip
+    os.close(write)
+    assert (answer.returncode, answer.stderr) == (0, "")
+    assert (tmp_path / "done").exists()
+
+
 def test_what_cannot_be_said_is_told_in_a_sentence() -> None:
     with open("/dev/full", "w") as full:
         answer = program("schema", stdout=full, stderr=subprocess.PIPE)
