@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh
+from fenics_contact.mesh import BodyMesh, quadratic
 from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     AnySupport,
@@ -114,9 +114,10 @@ def numbers(state: State) -> dict[str, list[float]]:
     }
 
 
-def shaft(cells: int) -> BodyMesh:
+def shaft(cells: int, *, order: int = 1) -> BodyMesh:
     """A round shaft of radius one and length six, its axis that of z."""
-    square = block((-1.0, -1.0, 0.0), (1.0, 1.0, 6.0), (2 * cells, 2 * cells, 6 * cells))
+    square = block((-1.0, -1.0, 0.0), (1.0, 1.0, 6.0), (2 * cells, 2 * cells, 3 * cells))
+    square = quadratic(square) if order == 2 else square
     x, y, z = square.points.T
     return square.moved(np.stack([x * np.sqrt(1 - y**2 / 2), y * np.sqrt(1 - x**2 / 2), z], axis=1))
 

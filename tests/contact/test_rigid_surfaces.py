@@ -130,19 +130,20 @@ def test_a_force_at_a_point_is_that_of_a_spread_force() -> None:
 
 
 def test_a_round_shaft_turns_as_the_closed_form_says() -> None:
-    mesh, torque, length = shaft(2), 2.0, 6.0
-    mesh = quadratic(block((-1.0, -1.0, 0.0), (1.0, 1.0, length), (4, 4, 6)))
-    x, y, z = mesh.points.T
-    mesh = mesh.moved(np.stack([x * np.sqrt(1 - y**2 / 2), y * np.sqrt(1 - x**2 / 2), z], axis=1))
+    torque, length = 2.0, 6.0
+    exact = torque * length / (1000.0 / 2.6 * np.pi / 2)  # M L / (G J)
     end = RigidSurface("shaft", "z1", (0.0, 0.0, length), moment=(0.0, 0.0, torque))
-    state = solve_scene(Scene({"shaft": Body(mesh, SOFT)}, [Support("shaft", "z0"), end]), COMM)
-    (motion,) = state.rigid_motions()
-    shear, polar = 1000.0 / 2.6, np.pi / 2
-    np.testing.assert_allclose(
-        motion.rotation, (0.0, 0.0, torque * length / (shear * polar)), rtol=2e-3, atol=1e-9
-    )
-    np.testing.assert_allclose(motion.displacement, 0.0, atol=1e-9)
-    assert state.reactions()[0].torque((0, 0, 0), (0, 0, 1)) == pytest.approx(-torque, rel=1e-9)
+    errors = []
+    for cells, order in ((2, 1), (4, 1), (2, 2)):
+        body = Body(shaft(cells, order=order), SOFT)
+        state = solve_scene(Scene({"shaft": body}, [Support("shaft", "z0"), end]), COMM)
+        (motion,) = state.rigid_motions()
+        np.testing.assert_allclose([*motion.rotation[:2], *motion.displacement], 0.0, atol=1e-5 * exact)  # type: ignore[index]
+        assert state.reactions()[0].torque((0, 0, 0), (0, 0, 1)) == pytest.approx(-torque, rel=1e-9)
+        errors.append(abs(motion.rotation[2] / exact - 1))  # type: ignore[index]
+    assert errors[0] / errors[1] > 3.5, "of second order"
+    assert errors[1] < 0.02
+    assert errors[2] < 1e-3, "quadratic cells"
 
 
 @pytest.mark.parametrize("dim", [2, 3])
