@@ -79,9 +79,14 @@ def _draw(parts: Sequence[_Part], paper: BinaryIO, paints: Paints, *, below: boo
     height = sum(high) + (0.07 * len(lines) if below else 0.12)
     size = paints.width, round(float(np.clip(height, 0.3, 1.3)) * paints.width)
     with sheet(paper, size, paints.headline) as figure:
-        rows = figure.add_gridspec(len(lines), height_ratios=high)
-        grids = [rows[k].subgridspec(1, len(line), width_ratios=line) for k, line in enumerate(wide)]
-        panels = [figure.add_subplot(place) for grid in grids for place in grid]
+        columns = max(wide, key=len)
+        grid = figure.add_gridspec(len(lines), len(columns), height_ratios=high, width_ratios=columns)
+        places = [
+            grid[row, :] if len(line) == 1 else grid[row, column]
+            for row, line in enumerate(lines)
+            for column in range(len(line))
+        ]
+        panels = [figure.add_subplot(place) for place in places]
         for axes, part in zip(panels, parts, strict=True):
             part.draw(axes)
         paints.add_bar(figure, panels)
