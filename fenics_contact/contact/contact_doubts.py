@@ -9,6 +9,7 @@ import numpy as np
 from fenics_contact.contact.state import State
 from fenics_contact.errors import InvalidInputError, tell
 from fenics_contact.feti import TornSystem
+from fenics_contact.mesh import computed_rounding
 from fenics_contact.pairing import ContactPoints
 from fenics_contact.scene import ContactPair, Scene, Surface, surface_of
 
@@ -51,12 +52,14 @@ class ContactDoubts:
             before, after = contact.points.gap[mine], contact.gap[mine]
             touching = contact.normal_force[mine] > 0.0
             moved = _largest_motion(after - before, pressed_in[mine], touching)
+            if moved <= computed_rounding(torn.scene.bodies[pair.slave.body].mesh.points):
+                continue  # nothing moves
             nearest = np.minimum(before, after) + np.minimum(change[mine], 0.0)
             error = float(np.abs(change[mine][nearest <= moved]).max(initial=0.0))
-            if error > share * moved > 0.0:
+            if error > share * moved:
                 self._tell(torn, number, "facets", _words_of_facets(pair, error, moved))
             overlap = -float(before[touching].min(initial=0.0))
-            if overlap > max(error, share * moved) and moved > 0.0:
+            if overlap > max(error, share * moved):
                 self._tell(torn, number, "overlap", _words_of_overlap(pair, overlap, moved))
 
     def _tell(self, torn: TornSystem, pair: int, kind: str, words: str) -> None:
