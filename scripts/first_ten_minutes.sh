@@ -75,11 +75,12 @@ scene = Scene(
 )
 state = solve_scene(scene, MPI.COMM_WORLD)
 plot_contact_pressure(state, "output/first.png")
+errors = state.errors  # all ranks together
 
 if MPI.COMM_WORLD.rank == 0:
     print(f"normal force {state.contact.normal_force.sum():.1f} N")
     print(f"{state.contact.count(Status.STICK)} points stick, {state.contact.count(Status.SLIP)} slip")
-    print(state.errors)
+    print(errors)
 PYTHON
 run 0 ".venv/bin/python $mine/first.py"
 picture 'Contact pressure and status under the block' pictures/first_ten_minutes_block.png
