@@ -112,13 +112,13 @@ def _plotter(path: Path, look: tuple[str, float], *, off_screen: bool) -> Any:
             f"--field must be one of {names}, got {field!r}: {suggestion(field, names)}choose one of them"
         )
     plotter = pyvista.Plotter(off_screen=off_screen, window_size=(1600, 1000))
-    clim = _range(blocks, field)
+    clim, beyond = _range(blocks, field)
     for block in blocks.values():
         moved = block.copy()
         if "displacement" in moved.point_data:
             moved.points = moved.points + scale * np.asarray(moved.point_data["displacement"])
         if field in moved.array_names:
-            bar = {"title": f"{_WORDS.get(field, field.replace('_', ' '))}\n", **_BAR}
+            bar = {"title": f"{_WORDS.get(field, field.replace('_', ' '))}{beyond}\n", **_BAR}
             plotter.add_mesh(
                 moved, scalars=field, clim=clim, cmap=STRESS_MAP, ambient=0.3, scalar_bar_args=bar,
                 show_edges=True, edge_opacity=0.2,
@@ -142,12 +142,18 @@ _BAR = {
 }  # fmt: skip
 
 
-def _range(blocks: dict[str, Any], field: str) -> tuple[float, float]:
-    """Return the range of the colours: all but the few extreme values, which would leave one shade."""
+def _range(blocks: dict[str, Any], field: str) -> tuple[tuple[float, float], str]:
+    """Return the range of the colours, and in words what lies beyond.
+
+    It holds all but the few extreme values, which would leave one shade.
+    """
     arrays = [
         np.asarray(block[field], dtype=float) for block in blocks.values() if field in block.array_names
     ]
     sizes = [np.linalg.norm(values, axis=1) if values.ndim == 2 else values for values in arrays]
     values = np.concatenate([size.ravel() for size in sizes])
-    low = 0.0 if np.nanmin(values) >= 0.0 else 1 - QUANTILE
-    return float(np.nanquantile(values, low)), float(np.nanquantile(values, QUANTILE))
+    least, most = float(np.nanmin(values)), float(np.nanmax(values))
+    low = float(np.nanquantile(values, 0.0 if least >= 0.0 else 1 - QUANTILE))
+    high = float(np.nanquantile(values, QUANTILE))
+    beyond = f"\nsmallest {least:.4g}" if least < low else ""
+    return (low, high), beyond + (f"\nlargest {most:.4g}" if most > high else "")

@@ -50,13 +50,14 @@ def empty_corner(image: np.ndarray) -> str:
     return max(pieces, key=lambda name: round(float(np.mean(np.all(pieces[name] > 250, axis=-1))), 1))
 
 
-def axes_sign(axes: Axes, view: View, corner: str) -> None:
+def axes_sign(axes: Axes, view: View, corner: str, *, below: bool = False) -> None:
     """Draw the axes as arrows with names on a light ground in a corner.
 
     Args:
         axes: Where to.
         view: Direction of view.
         corner: Where in it, such as "lower right".
+        below: Draw it below the image instead, on the right.
     """
     arrows = {name: LENGTH * end for name, end in arrows_of(view).items()}
     names = {name: end * (1 + NAME / np.linalg.norm(end)) for name, end in arrows.items()}
@@ -64,9 +65,12 @@ def axes_sign(axes: Axes, view: View, corner: str) -> None:
     low, high = reached.min(axis=0) - NAME, reached.max(axis=0) + NAME
     area = DrawingArea(*(high - low), *-low)
     for name, end in arrows.items():
-        look = {"color": INK, "lw": 1.8, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 13}
-        area.add_artist(FancyArrowPatch((0, 0), tuple(end), arrowstyle="-|>", **look))
+        arrow = {"color": INK, "lw": 1.8, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 13}
+        area.add_artist(FancyArrowPatch((0, 0), tuple(end), arrowstyle="-|>", **arrow))
         area.add_artist(Text(*names[name], name, color=INK, ha="center", va="center", fontsize=14))
-    box = AnchoredOffsetbox(corner, child=area, pad=0.1, borderpad=0.3, frameon=True)
+    look = {"child": area, "pad": 0.1, "borderpad": 0.3, "frameon": True}
+    if below:
+        look |= {"bbox_to_anchor": (1.0, 0.0), "bbox_transform": axes.transAxes}
+    box = AnchoredOffsetbox("upper right" if below else corner, **look)
     box.patch.set(facecolor="white", edgecolor="none", alpha=0.75)
     axes.add_artist(box)

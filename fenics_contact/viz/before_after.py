@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -14,8 +14,8 @@ from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.shape import DesignPoint
 from fenics_contact.viz.colours import BLUE, GREY, ORANGE
-from fenics_contact.viz.patch import checked_pair, contact_patch
-from fenics_contact.viz.patch_axes import label_axes, pressure_bar
+from fenics_contact.viz.patch import checked_pair, contact_patches
+from fenics_contact.viz.patch_axes import label_axes, label_patch, pressure_bar
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.pressure import draw_pressure
 from fenics_contact.viz.profile import Profile, profiles
@@ -117,7 +117,7 @@ def _check(first: State, best: State, pair: int) -> None:
 
 
 def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> None:
-    patches = [contact_patch(state, look.pair, look.reach) for state in (first, best)]
+    patches = contact_patches((first, best), look.pair, look.reach)
     (one, other), peak = (
         (patch.frame for patch in patches),
         max(float(patch.pressure.max()) for patch in patches),
@@ -134,9 +134,8 @@ def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> N
         panels = upper.subplots(1, 2)
         for axes, patch, word in zip(panels, patches, ("before", "after"), strict=True):
             draw_pressure(axes, patch, shown)
-            axes.set_title(f"{word}: pressure on {patch.name}")
-            frame.fit(axes)
-            label_axes(axes, patch.view, look.units)
+            axes.set_title(f"{word}: pressure on {patch.name}{patch.behind}")
+            label_patch(axes, replace(patch, frame=frame), look.units)
         pressure_bar(panels[1], shown, "max" if peak > shown[1] else "neither", look.units)
         sections = lower.subplots(1, len(outlines), width_ratios=wide)
         for axes, profile in zip(sections, outlines, strict=True):

@@ -31,6 +31,7 @@ class Paints:
         reach: Extent of details to each side of the contact's centre, [length], or None.
         units: Names of the units.
         width: Width of the picture in pixels.
+        told: Whether the title names the largest value.
     """
 
     values: Mapping[str, np.ndarray]
@@ -42,6 +43,7 @@ class Paints:
     reach: float | None
     units: Units
     width: int
+    told: bool = False
 
     def shown(self, body: str) -> np.ndarray:
         """Return the values of a body scaled to 0 to 1, the range of the colours."""
@@ -57,14 +59,11 @@ class Paints:
         return painted
 
     def add_bar(self, figure: Figure, panels: Iterable[Axes]) -> None:
-        """Add a colour bar beside axes; its ends are pointed where values lie beyond."""
-        low = min(float(values.min()) for values in self.values.values()) < self.norm.vmin
-        high = max(float(values.max()) for values in self.values.values()) > self.norm.vmax
-        extend = {(False, False): "neither", (True, False): "min", (False, True): "max"}.get(
-            (low, high), "both"
-        )
+        """Add a colour bar beside axes; its ends are pointed where values lie beyond, and say how far."""
+        low = min(float(values.min()) for values in self.values.values())
+        high = max(float(values.max()) for values in self.values.values())
         key = ScalarMappable(self.norm, self.colours)
-        add_colour_bar(figure, panels, key, self.label, extend)
+        add_colour_bar(figure, panels, key, self.label, beyond=(low, high), told=self.told)
 
     @property
     def of_surfaces(self) -> dict[str, Any]:

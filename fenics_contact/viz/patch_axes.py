@@ -8,6 +8,7 @@ from matplotlib.colors import Normalize
 from matplotlib.ticker import FuncFormatter
 
 from fenics_contact.viz.colours import PRESSURE_MAP
+from fenics_contact.viz.patch import ContactPatch
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.view import View, axis_label
 
@@ -22,7 +23,7 @@ def label_axes(axes: Axes, view: View, units: Units, *, mirror: bool = False) ->
         mirror: Let x run forwards, as seen from the other side.
     """
     for axis, direction, word, back in (
-        (axes.xaxis, view.right, "right", "left"),
+        (axes.xaxis, view.right, "right", "to the left"),
         (axes.yaxis, view.up, "up", "down"),
     ):
         name = axis_label(direction)
@@ -35,6 +36,16 @@ def label_axes(axes: Axes, view: View, units: Units, *, mirror: bool = False) ->
                 seen = axis_label(view.towards)
                 label += f", runs {back}" + (f": seen from {seen}" if seen else "")
         axis.set_label_text(label)
+
+
+def label_patch(axes: Axes, patch: ContactPatch, units: Units, *, mirror: bool = False) -> None:
+    """Show the frame of a contact surface with equal scales, and name its axes; see `label_axes`."""
+    patch.frame.fit(axes)
+    if patch.unrolling is None:
+        label_axes(axes, patch.view, units, mirror=mirror)
+    else:
+        across, along = patch.unrolling.labels(units)
+        axes.set(xlabel=across, ylabel=along)
 
 
 def pressure_bar(axes: Axes, clim: tuple[float, float], extend: str, units: Units) -> None:

@@ -10,8 +10,8 @@ from matplotlib.collections import PolyCollection
 
 from fenics_contact.contact import State
 from fenics_contact.viz.colours import GREY, PRESSURE_MAP
-from fenics_contact.viz.patch import ContactPatch, checked_pair, contact_patch
-from fenics_contact.viz.patch_axes import label_axes, pressure_bar
+from fenics_contact.viz.patch import ContactPatch, checked_pair, contact_patches
+from fenics_contact.viz.patch_axes import label_patch, pressure_bar
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.plane import draw_field
 from fenics_contact.viz.sheet import sheet
@@ -20,6 +20,9 @@ from fenics_contact.viz.trace import contact_trace
 from fenics_contact.viz.traction import draw_traction
 from fenics_contact.viz.units import Units
 from fenics_contact.viz.words import checked_range, checked_reach, headline, written
+
+#: Surfaces wider than this relative to their height are drawn one above the other.
+WIDE = 2.5
 
 
 def plot_contact_pressure(
@@ -35,9 +38,10 @@ def plot_contact_pressure(
 ) -> Picture:
     """Draw a contact pair's slave surface seen from its master. Collective.
 
-    Left the nodal pressure, right the status of the points with the direction of slip on the master. For a
-    plane scene the pressure along the slave surface, below it the tangential traction on the slave between
-    its bounds, with the status of the points.
+    Left, or above, the nodal pressure, then the status of the points with the direction of slip on the
+    master. A surface around an axis that carries force on sides facing away, such as a bore, is unrolled; of
+    others the title says how many closed points are not seen. For a plane scene the pressure along the slave
+    surface, below it the tangential traction on the slave between its bounds, with the status of the points.
 
     Args:
         state: The state.
@@ -66,7 +70,7 @@ def plot_contact_pressure(
         if state.scene.dim == 2:
             draw_traction(contact_trace(state, pair), paper, (given, reach), title, named, width)
         else:
-            _draw(contact_patch(state, pair, reach), paper, given, title, named, width)
+            _draw(contact_patches([state], pair, reach)[0], paper, given, title, named, width)
 
     return draw_picture(state.torn.decomposition.comm, target, draw)
 
@@ -84,19 +88,19 @@ def _draw(
     facts = (
         f"largest pressure {written(peak)} {units.stress}, normal force {written(patch.force)} {units.force}"
     )
-    height = round((0.19 + 0.38 / patch.frame.proportion) * width)
-    with sheet(paper, (width, height), headline(title, facts)) as figure:
-        left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+    wide = patch.frame.proportion > WIDE
+    tall = 0.24 + 1.76 / patch.frame.proportion if wide else 0.19 + 0.38 / patch.frame.proportion
+    with sheet(paper, (width, round(tall * width)), headline(title, facts)) as figure:
+        left, right = figure.subplots(*((2, 1) if wide else (1, 2)), sharex=True, sharey=True)
         draw_pressure(left, patch, shown)
         pressure_bar(left, shown, "max" if peak > shown[1] else "neither", units)
         draw_status(right, patch)
         longest = f"{written(patch.largest_slip, 2)} {units.length}"
         slip = f"largest slip {longest}" if patch.largest_slip > 0 else "no slip"
-        right.set_title(f"status, {slip if patch.rubs else 'no friction'}")
+        right.set_title(f"status, {slip if patch.rubs else 'no friction'}{patch.behind}")
         for axes in (left, right):
-            patch.frame.fit(axes)
-            label_axes(axes, patch.view, units)
-        right.set_ylabel("")
+            label_patch(axes, patch, units)
+        (left.set_xlabel if wide else right.set_ylabel)("")
         handles, labels = right.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower right", ncols=3, handletextpad=0.2)
 

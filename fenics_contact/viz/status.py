@@ -13,8 +13,8 @@ from matplotlib.collections import PolyCollection
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz.colours import INK, PALE
-from fenics_contact.viz.patch import ContactPatch, contact_patch
-from fenics_contact.viz.patch_axes import label_axes
+from fenics_contact.viz.patch import ContactPatch, contact_patches
+from fenics_contact.viz.patch_axes import label_patch
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.sheet import sheet
 from fenics_contact.viz.symbols import symbols_of
@@ -70,7 +70,7 @@ def plot_contact_status(
     comm = next(iter(states.values())).torn.decomposition.comm
 
     def draw(paper: BinaryIO) -> None:
-        patches = {name: contact_patch(state, pair, reach) for name, state in states.items()}
+        patches = dict(zip(states, contact_patches(list(states.values()), pair, reach), strict=True))
         _draw(patches, paper, title or next(iter(patches.values())).name, units or Units(), width)
 
     return draw_picture(comm, target, draw)
@@ -86,8 +86,7 @@ def _draw(patches: Mapping[str, ContactPatch], paper: BinaryIO, title: str, unit
         for axes, (name, patch) in zip(panels, patches.items(), strict=False):
             draw_status(axes, patch, counted=False)
             axes.set_title(f"{name}\n{_words(patch, units)}")
-            patch.frame.fit(axes)
-            label_axes(axes, patch.view, units, mirror=True)
+            label_patch(axes, patch, units, mirror=True)
         for axes in panels[len(patches) :]:
             axes.set_axis_off()
         handles, labels = panels[0].get_legend_handles_labels()
@@ -97,7 +96,8 @@ def _draw(patches: Mapping[str, ContactPatch], paper: BinaryIO, title: str, unit
 def _words(patch: ContactPatch, units: Units) -> str:
     longest, slips = patch.largest_slip, patch.slips
     share = f"{np.count_nonzero(slips)} of {len(slips)} slip"
-    return f"{share}, by up to {written(longest, 2)} {units.length}" if longest > 0 else "none slips"
+    words = f"{share}, by up to {written(longest, 2)} {units.length}" if longest > 0 else "none slips"
+    return words + patch.behind
 
 
 def draw_status(axes: Axes, patch: ContactPatch, *, counted: bool = True) -> None:
@@ -110,8 +110,11 @@ def draw_status(axes: Axes, patch: ContactPatch, *, counted: bool = True) -> Non
         axes.scatter(*places[chosen].T, label=label, zorder=3, linewidths=1.0, **look)
     longest = patch.largest_slip
     if longest > 0:
-        reach = ARROW * float(np.max(patch.frame.size)) / longest
-        arrows = {"angles": "xy", "scale_units": "xy", "scale": 1, "color": INK, "width": 0.004, "zorder": 4}
+        # On wide strips arrows and their heads follow the height.
+        slender = min(1.0, 3.0 / patch.frame.proportion)
+        reach = ARROW * slender * float(np.max(patch.frame.size)) / longest
+        arrows = {"angles": "xy", "scale_units": "xy", "scale": 1, "color": INK, "zorder": 4}
+        arrows["width"] = 0.004 * slender
         # Short arrows stay arrows, as dots would hide the symbols.
         arrows |= {"minlength": 0.0}
         shown = patch.slips & patch.frame.holds(places)

@@ -89,7 +89,7 @@ def plot_stress(
     }
     label, words = f"von Mises stress ({named.stress})", headline(title, facts)
     norm = Normalize(*shown)
-    paints = Paints(values, STRESS_MAP, norm, label, words, factor, reach, named, width)
+    paints = Paints(values, STRESS_MAP, norm, label, words, factor, reach, named, width, told=True)
     return paint(state, bodies, paints, target, sections=sections)
 
 

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from fenics_contact import cli
 from fenics_contact.cli.blas import Blas, loaded_blas, numpy_speed
 from fenics_contact.cli.desk import Desk
-from fenics_contact.cli.field_files import fields_in
+from fenics_contact.cli.field_files import _plotter, fields_in
 from fenics_contact.cli.shipped import folder_of_demos, shipped
 from fenics_contact.cli.view import show_record
 from tests.conftest import ROOT
@@ -191,6 +191,21 @@ def test_view_draws_to_a_file(
     assert run("view", result / "state.vtm", "--save", picture, "--field", field) == 0
     assert f"picture in {picture}\n" in capsys.readouterr().out
     assert picture.stat().st_size > 5000
+
+
+def test_a_bar_of_a_field_says_what_lies_beyond_its_colours(result: Path) -> None:
+    titles = {}
+    for field in ("von_mises", "stress_xx"):
+        plotter = _plotter(result / "state.vtm", (field, 1.0), off_screen=True)
+        (bar,) = plotter.scalar_bars.values()
+        titles[field] = bar.GetTitle()
+        plotter.close()
+    least, _, most = fields_in(result / "state.vtm")["stress_xx"].split()
+    words = titles["stress_xx"].split()
+    assert [word for word in words if word.isalpha()] == ["stress", "xx", "smallest", "largest"]
+    assert [float(words[3]), float(words[5])] == pytest.approx([float(least), float(most)], rel=1e-3)
+    assert "smallest" not in titles["von_mises"], "the colours begin with the smallest value"
+    assert titles["von_mises"].startswith("von Mises stress\nlargest ")
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene import RigidCylinder, RigidPlane, RigidSphere
 from fenics_contact.viz import plot_contact_status, plot_stress
 from fenics_contact.viz.obstacles import obstacle_layers, obstacles_of
-from fenics_contact.viz.patch import contact_patch
+from fenics_contact.viz.patch import contact_patches
 from fenics_contact.viz.section import strongest_contact
 from fenics_contact.viz.view import oblique_view
 from tests.viz.plane_states import caged_block, plane_block
@@ -94,7 +94,7 @@ def test_status_maps_show_stick_and_slip_of_each_state(tmp_path: Path) -> None:
 
 
 def test_points_without_friction_have_no_arrows() -> None:
-    patch = contact_patch(touching_blocks(), 0, None)
+    patch = contact_patches([touching_blocks()], 0, None)[0]
     assert 0 < np.count_nonzero(patch.slips) < len(patch.status)
     assert patch.largest_slip > 0.0
     assert replace(patch, rubs=False).largest_slip == 0.0

@@ -135,9 +135,9 @@ def test_pictures_in_space_have_a_sign_in_every_part(tmp_path: Path, monkeypatch
     drawn: list[tuple[set[str], str]] = []
     sign = painting.axes_sign  # type: ignore[attr-defined]
 
-    def noted(axes: Any, view: Any, corner: str) -> None:
+    def noted(axes: Any, view: Any, corner: str, *, below: bool) -> None:
         drawn.append((set(arrows_of(view)), axes.get_title()))
-        sign(axes, view, corner)
+        sign(axes, view, corner, below=below)
 
     monkeypatch.setattr(painting, "axes_sign", noted)
     plot_stress(cut_model("x0 y1"), tmp_path / "stress.png", width=320)

@@ -12,7 +12,7 @@ from fenics_contact.contact import Status
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.viz import Units, plot_contact_pressure, plot_stress
 from fenics_contact.viz.fields import contact_places, drawn_bodies
-from fenics_contact.viz.patch import contact_patch
+from fenics_contact.viz.patch import contact_patches
 from fenics_contact.viz.plane import refined
 from fenics_contact.viz.stress import chosen_scale, stress_range
 from tests.viz.states import contains, painted, pixels, touching_blocks
@@ -89,7 +89,7 @@ def test_pressure_and_status_are_drawn(tmp_path: Path) -> None:
 
 def test_patch_holds_the_points_of_the_pair_where_they_are() -> None:
     state = touching_blocks()
-    patch, contact = contact_patch(state, 0, None), state.contact
+    patch, contact = contact_patches([state], 0, None)[0], state.contact
     assert len(patch.points) == contact.points.count
     np.testing.assert_allclose(patch.pressure[patch.points], contact.pressure)
     np.testing.assert_array_equal(patch.status, contact.status)
@@ -104,7 +104,7 @@ def test_patch_holds_the_points_of_the_pair_where_they_are() -> None:
 
 @pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])
 def test_refined_patch_keeps_the_integral_of_the_pressure(cell: str) -> None:
-    patch = contact_patch(touching_blocks(cell), 0, None)
+    patch = contact_patches([touching_blocks(cell)], 0, None)[0]
     mesh, values = refined(patch.places, patch.facets, patch.pressure)
     corners = np.column_stack([mesh.x, mesh.y])[mesh.triangles]
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
