@@ -11,6 +11,8 @@ import nbformat
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
+from _site.thumbnails import write_thumbnail
+
 #: The order of the gallery: what to read first. Others follow in the order of the alphabet.
 DEMOS = (
     "hertz_sphere punch_2d cattaneo_mindlin patch_test sheared_block shrink_fit bolted_joint five_links "
@@ -75,8 +77,8 @@ def title(path: Path) -> str:
     return found[1]
 
 
-def thumbnail(path: Path, root: Path) -> str | None:
-    """Return the picture of a card, as a path from ``root``: of those in the text bodies before curves."""
+def thumbnail(path: Path, root: Path) -> Path | None:
+    """Return the picture of a card: of those in the text bodies before curves."""
     links = re.findall(r"!\[[^\]]*\]\(([^)]+\.png)\)", prose(path))
     name = path.stem.removeprefix("demo_")
     bodies = [root / "docs" / "pictures" / f"{name}_{kind}.png" for kind in BODIES]
@@ -84,7 +86,7 @@ def thumbnail(path: Path, root: Path) -> str | None:
         *filter(Path.exists, bodies),
         *filter(Path.exists, ((path.parent / link).resolve() for link in links)),
     ]
-    return f"/{shown[0].relative_to(root)}" if shown else None
+    return shown[0] if shown else None
 
 
 def cards(paths: list[Path], root: Path) -> str:
@@ -96,7 +98,8 @@ def cards(paths: list[Path], root: Path) -> str:
         page = "/" + str(path.relative_to(root).with_suffix(""))
         grid += [f":::{{grid-item-card}} {name}", f":link: {page}", ":link-type: doc"]
         if picture:
-            grid += [f":img-top: {picture}", f":img-alt: {name}"]
+            small = write_thumbnail(picture, root / "docs").relative_to(root)
+            grid += [f":img-top: /{small}", f":img-alt: {name}"]
         grid += ["", what[:1].upper() + what[1:], ":::", ""]
     return "\n".join([*grid, "::::", ""])
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass, field
 from enum import Enum
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
+from matplotlib.image import imread, imsave
 
 from tests.docs.pages import DOCS, ROOT
 
 sys.path.append(str(DOCS))
-from _site import docstrings, reference, signatures
+from _site import docstrings, reference, signatures, thumbnails
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -100,3 +103,26 @@ def test_the_comment_above_a_constant_describes_it() -> None:
 
 def test_pages_of_the_reference_are_made_and_not_kept() -> None:
     assert "/docs/reference/" in (ROOT / ".gitignore").read_text().splitlines()
+
+
+def test_thumbnails_are_pieces_of_pictures_of_one_size(tmp_path: Path) -> None:
+    image = np.ones((100, 200, 3))
+    image[:4] = 0.0  # the title
+    image[20:80, 40:120, 1:] = 0.0
+    image[:, 180:] = 0.0  # the bar
+    imsave(tmp_path / "new.png", image)
+    target = thumbnails.write_thumbnail(tmp_path / "new.png", tmp_path)
+    found = imread(target)[..., :3]
+    assert found.shape == (400, 600, 3)
+    assert np.all(found[200, 300] == [1, 0, 0])
+    assert not np.any(np.all(found < 0.5, axis=-1)), "title and bar are cut off"
+    written = target.stat().st_mtime_ns
+    assert thumbnails.write_thumbnail(tmp_path / "new.png", tmp_path) == target
+    assert target.stat().st_mtime_ns == written, "the same one is not written again"
+
+
+def test_pieces_are_those_of_pictures_that_are_there() -> None:
+    assert set(thumbnails.PIECES) <= {picture.stem for picture in (DOCS / "pictures").rglob("*.png")}
+    for name, (left, top, right, bottom) in thumbnails.PIECES.items():
+        assert 0 <= left < right <= 1, name
+        assert 0 <= top < bottom <= 1, name
