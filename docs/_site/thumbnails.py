@@ -22,7 +22,7 @@ PIECES = {
     "patch_test_node": (0.08, 0.13, 0.47, 0.83),
     "sheared_block_status": (0.38, 0.15, 0.65, 0.405),
     "shrink_fit_stress": (0.07, 0.09, 0.86, 0.925),
-    "bolted_joint_stress": (0.02, 0.42, 0.62, 0.95),
+    "bolted_joint_stress": (0.00, 0.455, 0.62, 0.985),
     "five_links_stress": (0.00, 0.05, 0.50, 0.36),
     "orthotropic_stress": (0.06, 0.05, 0.86, 0.75),
     "chain_links_stress": (0.01, 0.06, 0.87, 0.53),

@@ -29,7 +29,7 @@ from fenics_contact.viz.view import IN_PLANE, Frame, View, frame_around, oblique
 REACH = 2.5
 #: A detail in the plane that shows more than this fraction of the bodies is omitted.
 LARGEST_DETAIL = 0.4
-#: Details wider than this relative to their height have scale and axes below them.
+#: Parts wider than this relative to their height have scale and axes below them.
 SLENDER = 4.0
 #: Fraction of the width for pictures; the rest is for the colour bar.
 WIDE = 0.84
@@ -158,7 +158,7 @@ def _image(
     def draw(axes: Axes) -> None:
         title, corner = detail or ("", empty_corner(image))
         show_image(axes, image, frame, title)
-        below = bool(detail) and frame.proportion > SLENDER
+        below = frame.proportion > SLENDER
         axes_sign(axes, view, corner, below=below)
         if detail:
             scale_bar(axes, frame, paints.units.length, below=below)

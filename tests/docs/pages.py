@@ -17,6 +17,9 @@ TOLERANCE = 0.05
 #: Numbers below this are errors and residuals, of which the size alone is compared, to this factor.
 SMALL, FACTOR = 1e-3, 3.0
 
+#: Before the fence of an output of which parts differ from run to run: what of it is compared, which pages
+#: do not show.
+_COMPARED = re.compile(r"<!-- compared as:\n(.*?)-->", re.DOTALL)
 _FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```[ \t]*$", re.MULTILINE | re.DOTALL)
 _NUMBER = re.compile(r"(?<![\w.])[-+−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w])")
 _TOKEN = re.compile(rf"{_NUMBER.pattern}|\w+|[^\w\s]")
@@ -31,11 +34,14 @@ class Snippet:
         code: The code.
         line: Line of the page on which it begins.
         output: What the page says that it prints, or None where the page says nothing.
+        compared: The output with ``...`` for what differs from run to run; the output itself where nothing
+            does.
     """
 
     code: str
     line: int
     output: str | None
+    compared: str | None
 
     @property
     def is_run(self) -> bool:
@@ -51,9 +57,12 @@ def snippets_of(text: str) -> list[Snippet]:
         if fence[1] != "python":
             continue
         follows = fences[index + 1] if index + 1 < len(fences) else None
-        direct = follows is not None and not text[fence.end() : follows.start()].strip()
-        output = follows[2] if follows is not None and direct and follows[1] == "text" else None
-        found.append(Snippet(fence[2], text.count("\n", 0, fence.start()) + 2, output))
+        between = "end" if follows is None else text[fence.end() : follows.start()].strip()
+        comment = _COMPARED.fullmatch(between)
+        direct = follows is not None and follows[1] == "text" and (comment is not None or not between)
+        output = follows[2] if follows is not None and direct else None
+        line = text.count("\n", 0, fence.start()) + 2
+        found.append(Snippet(fence[2], line, output, comment[1] if comment and direct else output))
     return found
 
 
@@ -65,7 +74,7 @@ def fences_of(text: str, language: str) -> list[str]:
 def agrees(printed: str, page: str) -> bool:
     """Tell whether a page shows what was printed: words as they are, numbers to `TOLERANCE`.
 
-    ``...`` on the page stands for anything; line breaks are no difference.
+    ``...`` of what is compared stands for anything; line breaks are no difference.
     """
     have = _TOKEN.findall(printed)
     parts = [_TOKEN.findall(part) for part in page.split("...")]

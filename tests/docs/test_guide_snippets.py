@@ -41,7 +41,7 @@ def test_a_page_does_what_it_says(page: Path, tmp_path: Path, monkeypatch: pytes
         printed = run(snippet, names, page)
         if page.name == "README.md":
             continue  # says in comments what there is
-        wanted = snippet.output or ""
+        wanted = snippet.compared or ""
         assert agrees(printed, wanted), f"{page}:{snippet.line} printed\n{printed}\nand says\n{wanted}"
 
 
@@ -83,6 +83,22 @@ def test_output_is_that_of_the_fence_right_behind() -> None:
 )
 def test_a_page_agrees_with_what_was_printed(printed: str, page: str, same: bool) -> None:
     assert agrees(printed, page) is same
+
+
+def test_what_is_compared_of_an_output_may_leave_out_what_varies() -> None:
+    comment = "<!-- compared as:\ntook ... s\n-->"
+    (snippet,) = snippets_of(f"```python\nprint(1)\n```\n\n{comment}\n```text\ntook 12 s\n```\n")
+    assert (snippet.output, snippet.compared) == ("took 12 s\n", "took ... s\n")
+    (other,) = snippets_of(f"```python\nprint(1)\n```\n\n{comment} words\n```text\ntook 12 s\n```\n")
+    assert other.output is None
+
+
+def test_pages_show_whole_outputs() -> None:
+    for page in PAGES:
+        for snippet in snippets_of((ROOT / page).read_text()):
+            shown, place = snippet.output or "", f"{page}:{snippet.line}"
+            assert "..." not in shown, f"{place} shows dots: put them into what is compared"
+            assert agrees(shown, snippet.compared or ""), place
 
 
 def test_the_scene_file_of_the_guide_is_read() -> None:
