@@ -30,6 +30,7 @@ class LinearTraction:
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """Return the traction at points, both of shape (n, dim)."""
         arm = points - self.centre
+        around: np.ndarray
         if len(self.centre) == 2:
             around = self.turning[0] * np.stack([-arm[:, 1], arm[:, 0]], axis=1)
         else:

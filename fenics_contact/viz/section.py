@@ -101,7 +101,7 @@ def _on_mirrors(middle: np.ndarray, places: np.ndarray, marks: np.ndarray) -> tu
     mirrors = marks.any(axis=0) & (len(middle) == 3)
     distance = np.where(marks, np.abs(places - middle), np.inf)
     nearest = places[np.argmin(distance, axis=0), np.arange(len(middle))] if len(places) else middle
-    return np.where(mirrors, nearest, middle), mirrors
+    return np.where(mirrors, nearest, middle), np.asarray(mirrors)
 
 
 def sections_of(spot: Spot, main: View) -> list[Section]:

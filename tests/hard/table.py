@@ -124,7 +124,6 @@ COLUMNS = {
     "law": "contact law",
     "same": "same",
     "status": "open / stick / slip",
-    "fallbacks": "fallbacks",
 }
 
 
@@ -206,10 +205,16 @@ def page(rows: Sequence[Row]) -> str:
 def _section(rows: Sequence[Row]) -> list[str]:
     """Return the lines of a group: a table of the cases with figures, and what is to say of single cases."""
     tolerances = {row.tolerance for row in rows}
-    one = [f"Tolerance {_cell(tolerances.pop())} in all cases.", ""] if len(tolerances) == 1 else []
-    measured = [replace(row, tolerance=None) if one else row for row in rows if row.scene or row.products]
-    told = [f"- {_cell(row.case)}: *{_cell(row.outcome)}*" for row in rows if row.outcome != "solved"]
+    one = [f"Tolerance {_cell(tolerances.pop())} in all cases.", ""] if len(tolerances) == 1 and None not in tolerances else []
+    shown = [replace(row, tolerance=None) if one else row for row in rows]
+    measured = [row for row in shown if row.outcome == "solved" or row.scene or row.products]
+    told = [f"- {_cell(row.case)}: *{words}*" for row in rows if (words := _remark(row))]
     return [*one, *(_table(measured) if measured else []), *([""] if measured and told else []), *told]
+
+
+def _remark(row: Row) -> str:
+    """Return what is to say of a case: how it ended other than solved, and what had to help."""
+    return "; ".join(_cell(words) for words in (row.outcome, row.fallbacks) if words not in ("solved", ""))
 
 
 def _table(rows: Sequence[Row]) -> list[str]:
