@@ -204,8 +204,8 @@ def page(rows: Sequence[Row]) -> str:
 
 def _section(rows: Sequence[Row]) -> list[str]:
     """Return the lines of a group: a table of the cases with figures, and what is to say of single cases."""
-    tolerances = {row.tolerance for row in rows}
-    one = [f"Tolerance {_cell(tolerances.pop())} in all cases.", ""] if len(tolerances) == 1 and None not in tolerances else []
+    tolerance, *others = {row.tolerance for row in rows}
+    one = [] if others or tolerance is None else [f"Tolerance {_cell(tolerance)} in all cases.", ""]
     shown = [replace(row, tolerance=None) if one else row for row in rows]
     measured = [row for row in shown if row.outcome == "solved" or row.scene or row.products]
     told = [f"- {_cell(row.case)}: *{words}*" for row in rows if (words := _remark(row))]
