@@ -9,12 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from fenics_contact.contact import STRESS_COMPONENTS
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.io import StoredFields, stored_fields
 from fenics_contact.scene_file import suggestion
-
-#: Names of the components of a stress, in VTK's order.
-COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 
 def newest_member(path: Path) -> StoredFields:
@@ -40,7 +38,7 @@ def _split_stress(data: Any) -> None:
     """Replace stresses by their components, ``stress_xx`` and so on, principal ones by ``sigma_1`` to 3."""
     for prefix in ("", "nodal_"):
         _split(data, f"{prefix}principal_stress", [f"{prefix}sigma_{k}" for k in (1, 2, 3)])
-        _split(data, f"{prefix}stress", [f"{prefix}stress_{ending}" for ending in COMPONENTS])
+        _split(data, f"{prefix}stress", [f"{prefix}stress_{ending}" for ending in STRESS_COMPONENTS])
 
 
 def _split(data: Any, name: str, parts: Sequence[str]) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from rich.table import Table
 
+from fenics_contact.io import listed_forces, scales_of
 from fenics_contact.linalg import ROUNDING
 
 
@@ -32,21 +33,13 @@ def forces_table(forces: Mapping[str, Any], units: Mapping[str, str] | None = No
         table.add_column(column, overflow="fold")
     for column in ("Fx", "Fy", "M") if plane else ("Fx", "Fy", "Fz", "Mx", "My", "Mz"):
         table.add_column(column, justify="right", no_wrap=True)
-    for what, where, entry in _rows(forces):
-        numbers = np.hstack([_rounded(entry[kind], balance[f"{kind}_scale"]) for kind in ("force", "moment")])
+    scales = scales_of(forces)
+    for what, entry in listed_forces(forces):
+        where = f"{entry['body']} {entry['surface']}" if "surface" in entry else ""
+        numbers = np.hstack([_rounded(entry[kind], scale) for kind, scale in scales.items()])
         if where or numbers.any():
             table.add_row(what, where, *(f"{number:.5g}" for number in numbers))
     return table
-
-
-def _rows(forces: Mapping[str, Any]) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
-    """Return what a row shows, the surface on which it acts (none of sums), and force and moment."""
-    for kind, one in (("reactions", "reaction"), ("contacts", "contact"), ("ties", "tie")):
-        for number, entry in enumerate(forces[kind]):
-            yield f"{one} {number}", f"{entry['body']} {entry['surface']}", entry
-    for name, entry in forces["balance"].items():
-        if isinstance(entry, Mapping):
-            yield f"sum of {name}", "", entry
 
 
 def _rounded(values: Any, scale: float) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from fenics_contact.contact.area import contact_area
 from fenics_contact.contact.balance import Balance
+from fenics_contact.contact.cell_stress import STRESS_COMPONENTS
 from fenics_contact.contact.coulomb import FixedPoint
 from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.equilibrium import default_solver
@@ -23,6 +24,7 @@ from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.contact.unheld import UnheldMotion
 
 __all__ = [
+    "STRESS_COMPONENTS",
     "Balance",
     "ContactProblem",
     "ContactResult",

@@ -27,6 +27,8 @@ from fenics_contact.scene import Body, Material
 
 #: The six components of a stress in VTK's order: xx, yy, zz, xy, yz, xz.
 COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+#: Their names, as files and menus call them.
+STRESS_COMPONENTS = tuple("xyz"[i] + "xyz"[j] for i, j in COMPONENTS)
 
 #: Builds a number (UFL) from a stress, shape (3, 3), and constants.
 OfStress = Callable[[Expr, Constants], Expr]

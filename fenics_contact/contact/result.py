@@ -52,15 +52,19 @@ class ContactResult:
 
     def _facts(self) -> dict[str, Any]:
         normal = self.normal_force
-        counts = ", ".join(f"{self.count(status)} {status.name.lower()}" for status in Status)
         return {
-            "points": f"{self.points.count}: {counts}",
+            "points": f"{self.points.count}: {self.counts_in_words}",
             "normal force": f"up to {normal.max(initial=0.0):.6g}, sum {normal.sum():.6g}",
             "friction force": f"up to {_longest(self.friction_force):.6g}",
             "pressure": f"up to {self.pressure.max(initial=0.0):.6g}",
             "gap": self.gap,
             "slip": f"up to {_longest(self.slip):.3g}",
         }
+
+    @property
+    def counts_in_words(self) -> str:
+        """Numbers of points by status: "4 open, 12 stick, 3 slip"."""
+        return ", ".join(f"{self.count(status)} {status.name.lower()}" for status in Status)
 
     @property
     def pressure(self) -> np.ndarray:

@@ -20,10 +20,9 @@ def answer_in_words(
     counts: Mapping[str, int],
 ) -> dict[str, str]:
     """Return the size of a problem, its answer and the work of its solver, by name."""
-    total = ", ".join(f"{contact.count(status)} {status.name.lower()}" for status in Status)
     return {
         "unknowns": f"{counts['torn_unknowns']} in {counts['subdomains']} subdomains",
-        "contact": f"{contact.points.count} points, {total}",
+        "contact": f"{contact.points.count} points, {contact.counts_in_words}",
         "largest force": f"{np.linalg.norm(contact.force, axis=1).max(initial=0.0):.6g}",
         "strain energy": f"{energies.strain:.6g}",
         "total potential": f"{energies.total_potential:.6g}",

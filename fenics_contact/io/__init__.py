@@ -4,7 +4,7 @@ On several ranks rank 0 writes (XDMF: all ranks together), and all raise if one 
 """
 
 from fenics_contact.io.field_files import FIELD_FILES, StoredFields, fields_of_result, stored_fields
-from fenics_contact.io.forces_record import forces_record
+from fenics_contact.io.forces_record import forces_record, listed_forces, scales_of
 from fenics_contact.io.json_file import json_text, write_json
 from fenics_contact.io.one_run import only_run_in
 from fenics_contact.io.provenance import versions
@@ -24,9 +24,11 @@ __all__ = [
     "fields_of_result",
     "forces_record",
     "json_text",
+    "listed_forces",
     "only_run_in",
     "read_result",
     "result_record",
+    "scales_of",
     "stored_fields",
     "versions",
     "write_json",

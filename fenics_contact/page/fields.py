@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fenics_contact.contact import STRESS_COMPONENTS
 from fenics_contact.viz import Units
 
 if TYPE_CHECKING:
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
     Grids = Mapping[str, pyvista.UnstructuredGrid]
 
 _AXES = ("x", "y", "z")
-_TENSOR = ("xx", "yy", "zz", "xy", "yz", "xz")
 _PRINCIPAL = ("first (largest)", "second", "third (smallest)")
 #: Fields of the library: part of the menu, words, and the unit's name in `Units`. In the order of the menu.
 _KNOWN = {
@@ -71,7 +71,7 @@ def _components(name: str, columns: int, units: Units) -> list[dict[str, Any]]:
         else dict(enumerate(range(1, columns + 1)))
     )
     if columns == 6:
-        parts = dict(enumerate(_TENSOR))
+        parts = dict(enumerate(STRESS_COMPONENTS))
     elif name.endswith("principal_stress"):
         parts = dict(enumerate(_PRINCIPAL))
     labels = {0: words} if columns == 1 else {number: f"{words}, {which}" for number, which in parts.items()}

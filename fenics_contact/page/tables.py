@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from fenics_contact.io import listed_forces, scales_of
 from fenics_contact.viz import Units
 
 Record = Mapping[str, Any]
@@ -172,26 +173,13 @@ def _forces(record: Record, units: Units) -> str:
     forces = record.get("forces") or {}
     if not forces:
         return ""
-    balance = forces["balance"]
+    scales, imbalance = scales_of(forces), forces["balance"]["imbalance"]
     entries = [
-        (f"{word} {place}{f' {_side(entry)}' if 'surface' in entry else ''}", entry)
-        for kind, word in (("reactions", "reaction"), ("contacts", "contact"), ("ties", "tie"))
-        for place, entry in enumerate(forces[kind])
+        (f"{what} {_side(entry)}" if "surface" in entry else what, entry)
+        for what, entry in listed_forces(forces)
     ]
-    entries += [
-        (f"sum of {name}", {**entry, "about": balance["about"]})
-        for name, entry in balance.items()
-        if isinstance(entry, Mapping)
-    ]
-    # Entries are added to results without a new version: earlier ones lack the scales.
-    scales = {
-        kind: balance.get(
-            f"{kind}_scale", max(abs(part) for _, each in entries for part in _several(each[kind]))
-        )
-        for kind in ("force", "moment")
-    }
     rows = [row for name, entry in entries for row in _force_rows(name, entry, scales, units)]
-    words = f"<p>Imbalance of all forces and moments: {escape(number(balance['imbalance']))}.</p>"
+    words = f"<p>Imbalance of all forces and moments: {escape(number(imbalance))}.</p>"
     axes = ("x", "y", "z")[: 2 if _plane(record) else 3]
     return _table(("", "", *axes), rows, words=2) + words
 

@@ -84,10 +84,9 @@ class Sampled:
             InvalidInputError: If one is farther than ``reach`` from all given ones, or in another space.
         """
         known, values = self._in_space(points.shape[1])
-        if len(points) == 0 or len(known) == 1:
-            self._refuse_far(points, known)
-            return np.repeat(values[:1], len(points), axis=0)
         self._refuse_far(points, known)
+        if len(points) == 0 or len(known) == 1:
+            return np.repeat(values[:1], len(points), axis=0)
         return np.asarray(_through(known, values, points))
 
     def _in_space(self, dim: int) -> tuple[np.ndarray, np.ndarray]:
