@@ -167,9 +167,11 @@ def tag_arrays(mesh: dolfinx.mesh.Mesh, arrays: MeshArrays, tags: dolfinx.mesh.M
     topology.create_connectivity(arrays.dim, tags.dim)
     core = mesh._mesh if old() else mesh._cpp_object
     corners = len(facet_vertices(arrays.cell_type)[0])  # before the other nodes of quadratic facets
-    rows = np.asarray(cpp.mesh.entities_to_geometry(core, tags.dim, indices, False))
-    facets = arrays.node[rows.reshape(len(indices), rows.size // max(len(indices), 1))][:, :corners]
-    facets, values = _from_all(mesh, facets.reshape(-1, corners)), _from_all(mesh, values)
+    facets = np.empty((0, corners), dtype=np.int64)
+    if len(indices):  # of no facets dolfinx 0.9 divides by their number
+        rows = np.asarray(cpp.mesh.entities_to_geometry(core, tags.dim, indices, False))
+        facets = arrays.node[rows.reshape(len(indices), -1)][:, :corners]
+    facets, values = _from_all(mesh, facets), _from_all(mesh, values)
     if mesh.comm.size > 1:  # a facet between two ranks may have its tag on both
         _, first = np.unique(np.column_stack([np.sort(facets, axis=1), values]), axis=0, return_index=True)
         facets, values = facets[first], values[first]
