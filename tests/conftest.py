@@ -33,6 +33,15 @@ hypothesis.settings.register_profile("house", deadline=None)
 hypothesis.settings.load_profile("house")
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave four ranks, which take long on two cores, to the tests that claims rest on."""
+    for item in items:
+        if isinstance(item, pytest.Function) and hasattr(item, "callspec"):
+            if item.callspec.params.get("ranks") == 4:
+                item.add_marker(pytest.mark.slow)
+                item.add_marker(pytest.mark.claim)
+
+
 def pytest_collection_finish() -> None:
     """Exempt what the imports left behind from garbage collection, which makes it cheap after each test."""
     gc.collect()

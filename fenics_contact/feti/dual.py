@@ -34,6 +34,7 @@ class DualSystem:
         kernel: This rank's R, shape (torn_size, n_modes), without the span of `unheld`.
         unheld: This rank's part of the motions in the kernel of B, as columns, shape (torn_size, k): loads
             must not drive them, and they are zero.
+        points: The motions q of rigid surfaces in terms of the modes, shape (n_free, n_modes), replicated.
         problem: The problem for the dual solvers.
         products: F-products so far.
     """
@@ -42,7 +43,7 @@ class DualSystem:
     problem: DualProblem
     kernel: sp.csr_matrix
     unheld: sp.csr_matrix
-    _points: sp.csr_matrix
+    points: sp.csr_matrix
     _unheld_points: np.ndarray
     _bent: np.ndarray
     _B_interface: sp.csr_matrix
@@ -93,7 +94,7 @@ class DualSystem:
         """Use the operators of an earlier system with the present load. Collective."""
         self._B_interface, self._Bt_interface = previous._B_interface, previous._Bt_interface
         self.kernel, self.unheld = previous.kernel, previous.unheld
-        self._points, self._unheld_points = previous._points, previous._unheld_points
+        self.points, self._unheld_points = previous.points, previous._unheld_points
         self._require_unloaded()
         with timer.phase("coarse space"):
             coarse = previous.problem.coarse.with_load(self._resultants(self.torn.numbering.comm))
@@ -231,9 +232,9 @@ class DualSystem:
         mine = offset[[subdomain.mesh.number for subdomain in self.torn.subdomains]]
         own = kernel_matrix(self.torn.subdomains, int(offset[-1]), mine)
         motions, count = (own @ whole_motions(self.torn, offset)).tocsr(), self.torn.free.count
-        self._points = sp.csr_matrix((count, motions.shape[1]))
+        self.points = sp.csr_matrix((count, motions.shape[1]))
         if count:  # the motions of points move nothing but the right sides of rows
-            self._points = sp.hstack([self._points, sp.identity(count)], format="csr")
+            self.points = sp.hstack([self.points, sp.identity(count)], format="csr")
             motions = sp.hstack([motions, sp.csr_matrix((motions.shape[0], count))], format="csr")
         return motions
 
@@ -252,12 +253,12 @@ class DualSystem:
         unfelt = unfelt @ np.linalg.inv(unfelt[order[:k]])
         unfelt[np.abs(unfelt) <= ROUNDING * np.abs(unfelt).max(initial=0.0)] = 0.0
         self.unheld = (self.kernel @ sp.csr_matrix(unfelt)).tocsr()
-        self._unheld_points = self._points @ unfelt
+        self._unheld_points = self.points @ unfelt
         if k == 0:
             return coarse
         self._require_unloaded()
         remaining = np.sort(order[k:])
-        self.kernel, self._points = self.kernel[:, remaining], self._points[:, remaining]
+        self.kernel, self.points = self.kernel[:, remaining], self.points[:, remaining]
         return CoarseSpace(coarse.comm, coarse.matrix[remaining], coarse.load[remaining])
 
     def _require_unloaded(self) -> None:
@@ -276,7 +277,7 @@ class DualSystem:
     def _resultants(self, comm: MPI.Comm) -> np.ndarray:
         """Return e = Rᵀ f, replicated; rounding of balanced loads is set to zero."""
         resultants = np.asarray(comm.allreduce(self.kernel.T @ self.torn.load))
-        resultants += self._points.T @ self.torn.free.load
+        resultants += self.points.T @ self.torn.free.load
         size = self._size(comm.allreduce(np.abs(self.torn.load).sum()))
         resultants[np.abs(resultants) <= ROUNDING * size] = 0.0
         return resultants
@@ -289,7 +290,7 @@ class DualSystem:
         """Return this rank's owned columns of G = Rᵀ Bᵀ, shape (n_modes, n_owned)."""
         columns = self.torn.numbering.sum_rows(self._B @ self.kernel).T.tocsr()
         if self.torn.free.count:
-            columns = (columns - self._points.T @ self.torn.free.columns.T).tocsr()
+            columns = (columns - self.points.T @ self.torn.free.columns.T).tocsr()
         columns.data[np.abs(columns.data) <= ROUNDING * np.abs(columns.data).max(initial=0.0)] = 0.0
         columns.eliminate_zeros()
         return columns

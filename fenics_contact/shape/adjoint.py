@@ -98,6 +98,8 @@ def solve_adjoint(
     flexed = system.inverse(partials.by_displacement)
     right = linearised.moving.T @ (factor * (system.jump(flexed) - partials.by_multiplier))
     load = np.asarray(problem.comm.allreduce(system.kernel.T @ partials.by_displacement))
+    if partials.by_motion is not None:
+        load += system.points.T @ partials.by_motion
     # At a minimum of the energy without slip the adjoint multiplier is minus the multiplier itself.
     guess = state.solution.multiplier if start is None else start
     begin = _begin(problem, transposed, right, load, linearised.tested.T @ (guess / factor))

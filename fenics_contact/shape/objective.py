@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
 from typing import Any, Protocol, cast
 
@@ -44,12 +44,15 @@ class Partials:
         by_multiplier: ∂J/∂λ, owned, shape (n_owned,).
         by_shape: ∂J/∂X at fixed u and λ, this rank's share, shape (n_nodes, dim) for the nodes of all bodies;
             undefined at nodes that no design moves.
+        by_motion: ∂J/∂q for the free motions of rigid surfaces, `FreeMotions`, replicated, shape (n_free,);
+            None where J depends on them through u alone.
     """
 
     value: float
     by_displacement: np.ndarray
     by_multiplier: np.ndarray
     by_shape: np.ndarray
+    by_motion: np.ndarray | None = None
 
 
 class Weighable:
@@ -178,13 +181,12 @@ class WeightedSum(Weighable):
     def partials(self, state: State, forms: ShapeForms) -> Partials:
         """Add the partial derivatives. Collective."""
         parts = [(weight, objective.partials(state, forms)) for weight, objective in self.terms]
-        return Partials(
-            float(sum(weight * part.value for weight, part in parts)),
-            *(
-                np.sum([weight * getattr(part, name) for weight, part in parts], axis=0)
-                for name in ("by_displacement", "by_multiplier", "by_shape")
-            ),
-        )
+
+        def total(name: str) -> Any:
+            terms = [weight * values for weight, part in parts if (values := getattr(part, name)) is not None]
+            return np.sum(terms, axis=0) if terms else None
+
+        return Partials(*(total(each.name) for each in fields(Partials)))
 
 
 def _terms(objective: Any) -> tuple[tuple[float, Objective], ...]:
@@ -193,19 +195,20 @@ def _terms(objective: Any) -> tuple[tuple[float, Objective], ...]:
 
 @dataclass(frozen=True)
 class TotalPotential(Weighable):
-    """J = ½ uᵀK u − fᵀu, [force · length]."""
+    """J = ½ uᵀK u − fᵀu, less the work of loads at the points of rigid surfaces, [force · length]."""
 
     def value(self, state: State, forms: ShapeForms) -> float:
         """Return the total potential energy."""
         return state.energies.total_potential
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
-        """∂J/∂u = K u − f, ∂J/∂X from UFL: half of a(u, u), all of L(u)."""
+        """∂J/∂u = K u − f, ∂J/∂q = −g, ∂J/∂X from UFL: half of a(u, u), all of L(u)."""
         system, u = state.dual, state.torn_displacement
         by_shape = work_by_shape(forms, system.torn, 0.5 * u, u)
         nothing = np.zeros(len(system.torn.numbering.owned))
         # In equilibrium K u − f = −Bᵀλ.
-        return Partials(self.value(state, forms), -system.force(state.solution.multiplier), nothing, by_shape)
+        by_displacement = -system.force(state.solution.multiplier)
+        return Partials(self.value(state, forms), by_displacement, nothing, by_shape, -system.torn.free.load)
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,14 @@ import numpy as np
 
 from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene import RigidSurface, Scene, Surface
+from fenics_contact.scene import Scene, Surface
 
 
 def checked_contact(contact: ContactProblem) -> ContactProblem:
     """Return the contact problem of a shape problem.
 
     Raises:
-        InvalidInputError: If it is none, or its scene has two dimensions or a rigid surface that is free.
+        InvalidInputError: If it is none, or its scene has two dimensions.
     """
     if not isinstance(contact, ContactProblem):
         raise InvalidInputError(
@@ -26,13 +26,6 @@ def checked_contact(contact: ContactProblem) -> ContactProblem:
         raise InvalidInputError(
             "shape problems need three dimensions, the scene has two: make it one layer thick"
         )
-    for support in contact.scene.supports:
-        if isinstance(support, RigidSurface) and support.free.any():
-            raise InvalidInputError(
-                "derivatives by the shape know no rigid surface with free components, got "
-                f"{support.surface!r} of body {support.body!r}: prescribe all of them, or load the surface "
-                "by TotalForce(..., moment=..., at=...), which leaves it flexible"
-            )
     return contact
 
 

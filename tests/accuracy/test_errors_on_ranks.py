@@ -20,7 +20,7 @@ def alone() -> dict[str, Any]:
     return dict(json.loads(run_on_ranks(SCRIPT, 1)))
 
 
-@pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("ranks", [2, 4])
 def test_errors_are_the_same_on_any_number_of_ranks(
     ranks: int, alone: dict[str, Any], mpirun: Mpirun
 ) -> None:

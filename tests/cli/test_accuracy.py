@@ -102,6 +102,8 @@ def start(*arguments: object) -> subprocess.Popen[str]:
     )  # fmt: skip
 
 
+@pytest.mark.slow
+@pytest.mark.claim
 def test_a_study_of_ones_own_scene_that_was_stopped_goes_on_and_reports(tmp_path: Path) -> None:
     scene, folder = tmp_path / "pressed_block.py", tmp_path / "study"
     scene.write_text(BLOCK)

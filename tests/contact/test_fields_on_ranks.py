@@ -26,7 +26,7 @@ def alone() -> Fields:
     return dict(json.loads(run_on_ranks(SCRIPT, 1)))
 
 
-@pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("ranks", [2, 4])
 def test_displacement_and_stress_are_the_same_on_any_number_of_ranks(
     ranks: int, alone: Fields, mpirun: Mpirun
 ) -> None:

@@ -34,10 +34,8 @@ from fenics_contact.scene import (
     TotalForce,
     gravity,
 )
-from fenics_contact.shape import ShapeProblem, SurfaceDesign, TotalPotential
 from tests.contact.rigid_cases import FORCE, MOMENT, POINT, SCENES, SOFT, bar, numbers, shaft, solved
 from tests.hard.invariants import Whole
-from tests.shape.blocks import side
 
 SCRIPT = Path(__file__).with_name("rigid_cases.py")
 COMM = MPI.COMM_SELF
@@ -363,13 +361,3 @@ def test_contacts_and_ties_of_rigid_surfaces_are_refused() -> None:
         [motion.displacement] * 9,
         atol=1e-9,
     )
-
-
-def test_a_design_with_a_free_rigid_surface_is_refused() -> None:
-    scene = bar([RigidSurface("bar", "x1", POINT, force=FORCE)])
-    mesh = scene.bodies["bar"].mesh
-    design = SurfaceDesign("bar", side(mesh, "z1"), (2, 2))
-    with pytest.raises(
-        InvalidInputError, match="derivatives by the shape know no rigid surface with free comp"
-    ):
-        ShapeProblem(ContactProblem(scene, COMM), design, TotalPotential())

@@ -61,9 +61,10 @@ DEMOS: dict[str, tuple[dict[str, float | list[float]], set[str]]] = {
 SLOW = {"uncertain_friction"}
 
 
-@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=[pytest.mark.slow, pytest.mark.claim])])
+@pytest.mark.slow
+@pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in DEMOS]
+    "name", [name if name in SLOW else pytest.param(name, marks=pytest.mark.claim) for name in DEMOS]
 )
 def test_a_demo_finds_its_number_on_one_rank_and_on_two(
     name: str, ranks: int, mpirun: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

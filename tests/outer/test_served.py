@@ -20,7 +20,7 @@ from tests.outer.pushed import response
 HERE = Path(__file__).parent
 
 
-@pytest.mark.parametrize("ranks", [1, 2, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("ranks", [1, 2, 4])
 def test_no_rank_is_left_waiting_whoever_fails(mpirun: Callable[..., str], ranks: int) -> None:
     lines = mpirun(HERE / "serving.py", ranks, timeout=60.0).splitlines()
     ranks_total = ranks * (ranks + 1)
@@ -40,7 +40,7 @@ def test_no_rank_is_left_waiting_whoever_fails(mpirun: Callable[..., str], ranks
     ]
 
 
-@pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("ranks", [2, 4])
 def test_rank_0_samples_a_scene_as_one_rank_would(mpirun: Callable[..., str], ranks: int) -> None:
     found = json.loads(mpirun(HERE / "sampled.py", ranks))
     alone, samples = response(failures="nan"), ((0.3, 1e3), (0.25, 9e2), (0.19, 1e3), (0.5, 5e2))

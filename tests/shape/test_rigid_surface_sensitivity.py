@@ -1,0 +1,69 @@
+"""Derivatives of blocks driven by rigid surfaces, the motion of which follows from a force and a moment."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fenics_contact.contact import State, Status
+from fenics_contact.scene import Coulomb, RigidSurface, Scene, Support
+from fenics_contact.shape import Partials
+from fenics_contact.shape import problem as problem_module
+from tests.shape.blocks import block_on_block, problem
+from tests.shape.objectives import objectives
+from tests.shape.quotients import Line, Patch
+
+OBJECTIVES = objectives("upper")
+#: Which body's surface is rigid, the other one being held.
+RIGID = {
+    "slave": (
+        RigidSurface(
+            "upper", "z1", (1.0, 0.5, 0.8), (None, None, None), (0.004, 0.0, None),
+            force=(0.4, 0.1, -2.4), moment=(0.0, 0.0, 0.05),
+        ),
+        Support("lower", "z0"),
+    ),
+    "master": (
+        RigidSurface(
+            "lower", "z0", (1.0, 0.6, -1.0), (-0.02, None, None), (-0.004, None, None),
+            force=(0.0, -0.3, 3.0), moment=(0.0, 0.1, 0.0),
+        ),
+        Support("upper", "z1"),
+    ),
+}  # fmt: skip
+
+
+@cache
+def line(name: str) -> Line:
+    blocks = block_on_block(Coulomb(0.3), load=(0.0, 0.0, 0.0))
+    shaped = problem(Scene(blocks.bodies, RIGID[name], [], blocks.contacts))
+    alpha = 0.002 * np.random.default_rng(1).standard_normal(shaped.size)
+    return Line(shaped, alpha, np.random.default_rng(14).standard_normal(shaped.size), 1e-5)
+
+
+@pytest.mark.parametrize("objective", OBJECTIVES)
+@pytest.mark.parametrize("name", RIGID)
+def test_the_adjoint_agrees_with_central_differences(name: str, objective: str) -> None:
+    here, judge = line(name), OBJECTIVES[objective]
+    assert all(here.counts()[status.name] > 0 for status in Status)
+    assert here.is_smooth()
+    assert here.steepness(judge) > 0.02
+    assert here.miss(judge) < 1e-5
+    assert here.taylor_rate(judge) > 1.9
+
+
+@pytest.mark.parametrize("name", RIGID)
+def test_the_work_of_the_load_at_the_point_counts(name: str, monkeypatch: Patch) -> None:
+    judge = OBJECTIVES["energy"]
+    here = Line(line(name).problem, line(name).alpha + 1e-7, line(name).direction, 1e-5)
+    whole = problem_module.solve_adjoint  # type: ignore[attr-defined]
+
+    def without_points(state: State, partials: Partials, *more: Any, **named: Any) -> Any:
+        return whole(state, replace(partials, by_motion=None), *more, **named)
+
+    monkeypatch.setattr(problem_module, "solve_adjoint", without_points)
+    assert here.miss(judge) > 1e-3
