@@ -28,16 +28,17 @@ class DesignSurface:
 
     Attributes:
         nodes: Node numbers in the body's mesh, (n,) int64; s runs slowest.
-        parameters: Surface coordinates (s, t), (n, 2), in [0, 1]: s along the ring over the contact crown's
-            half turn, t across the wire over its inner arc; both proportional to arc length.
-        directions: Unit normals of the smooth surface at these nodes, out of the body, (n, 3).
-        counts: Number of nodes along s and t; their product is n.
+        parameters: Surface coordinates (s, t) in [0, 1], (n, 2), of a curve in the plane s alone, (n, 1). On
+            the crown of a link s runs along the ring over the contact crown's half turn, t across the wire
+            over its inner arc; both proportional to arc length.
+        directions: Unit normals of the smooth surface at these nodes, out of the body, (n, dim).
+        counts: Number of nodes along s and t, or along s; their product is n.
     """
 
     nodes: np.ndarray
     parameters: np.ndarray
     directions: np.ndarray
-    counts: tuple[int, int]
+    counts: tuple[int, ...]
 
 
 @displayed

@@ -1,4 +1,4 @@
-"""Sides of structured meshes as surfaces that a design may move."""
+"""Sides of structured meshes, and curves of plane meshes, as surfaces that a design may move."""
 
 from __future__ import annotations
 
@@ -13,34 +13,42 @@ STEEP = 0.5
 
 
 def side_of(mesh: BodyMesh, surface: str) -> DesignSurface:
-    """Return a side of a structured mesh as a design surface: flat, or curved gently.
+    """Return a side of a structured mesh, flat or curved gently, or a curve, as a design surface.
 
-    Seen along one of the axes x, y, z its nodes form a rectangular grid, as those of every side of a `block`,
-    also of one whose nodes were moved along that axis. The parameters are the places in this grid; a node
-    moves along the mean of the normals of its facets, weighted by their areas.
+    In space, seen along one of the axes x, y, z its nodes form a rectangular grid, as those of every side of
+    a `block`, also of one whose nodes were moved along that axis. The parameters are the places in this grid.
+    In the plane any curve with two ends will do, of any mesh; the parameter is the length along it, with the
+    body on the left. A node moves along the mean of the normals of its facets, weighted by their areas.
 
     Args:
-        mesh: A mesh in space, of linear cells.
+        mesh: A mesh.
         surface: Name of the side.
 
     Raises:
-        InvalidInputError: If there is no such surface, or it is no grid.
+        InvalidInputError: If there is no such surface, or it is neither a grid nor a curve with two ends.
 
     Example:
-        >>> from fenics_contact.gallery import block
+        >>> from fenics_contact.gallery import block, half_disc
         >>> side_of(block((0, 0, 0), (4, 2, 1), (8, 4, 2)), "z1").counts
         (9, 5)
+        >>> side_of(half_disc(1.0, 4, symmetry=""), "contact").counts
+        (9,)
     """
-    facets = mesh.surfaces.get(surface)
-    found = None if facets is None or mesh.dim != 3 or mesh.order > 1 else _grid(mesh, facets)
-    if found is None:
+    facets = mesh.linear.surfaces.get(surface)
+    found = None if facets is None else (_grid if mesh.dim == 3 else _curve)(mesh, facets)
+    if found is not None:
+        return found
+    if mesh.dim == 2:
         raise InvalidInputError(
-            "a design by the name of a surface needs one whose nodes form a rectangular grid seen along x, y "
-            f"or z, such as a side of a block of linear cells, got {surface!r} of a mesh with "
-            f"{sorted(mesh.surfaces)}: name another one, take the crown of a chain link ('contact' in scene "
-            "files), or make a DesignSurface of its nodes, their parameters and directions"
+            "a design by the name of a curve needs one in one piece with two ends, got "
+            f"{surface!r} of a mesh with {sorted(mesh.surfaces)}: name another one, or name a part of it"
         )
-    return found
+    raise InvalidInputError(
+        "a design by the name of a surface needs one whose nodes form a rectangular grid seen along x, y "
+        f"or z, such as a side of a block, got {surface!r} of a mesh with "
+        f"{sorted(mesh.surfaces)}: name another one, take the crown of a chain link ('contact' in scene "
+        "files), or make a DesignSurface of its nodes, their parameters and directions"
+    )
 
 
 def _grid(mesh: BodyMesh, facets: np.ndarray) -> DesignSurface | None:
@@ -58,7 +66,30 @@ def _grid(mesh: BodyMesh, facets: np.ndarray) -> DesignSurface | None:
     order = np.lexsort((rounded[:, 1], rounded[:, 0]))
     if counts[0] * counts[1] != len(nodes) or len(np.unique(rounded, axis=0)) != len(nodes):
         return None
+    nodes = nodes[order]
+    return DesignSurface(nodes, parameters[order], _normals(mesh, facets, areas)[nodes], counts)
+
+
+def _curve(mesh: BodyMesh, facets: np.ndarray) -> DesignSurface | None:
+    """Return the nodes of edges in the order of a line; None if they are not one line with two ends."""
+    after = dict(facets.tolist())
+    starts = set(after) - set(after.values())
+    if len(after) != len(facets) or len(starts) != 1:
+        return None
+    line = [starts.pop()]
+    while line[-1] in after:
+        line.append(after[line[-1]])
+    if len(line) != len(facets) + 1:
+        return None
+    nodes = np.array(line)
+    length = np.linalg.norm(np.diff(mesh.points[nodes], axis=0), axis=1).cumsum()
+    parameters = np.append(0.0, length / length[-1])[:, None]
+    directions = _normals(mesh, facets, vector_areas(mesh.points, facets))[nodes]
+    return DesignSurface(nodes, parameters, directions, (len(nodes),))
+
+
+def _normals(mesh: BodyMesh, facets: np.ndarray, areas: np.ndarray) -> np.ndarray:
+    """Return the mean normal at every node of facets, weighted by their areas, (n_nodes, dim)."""
     normals = np.zeros_like(mesh.points)
     np.add.at(normals, facets, areas[:, None])
-    directions = normals[nodes] / np.linalg.norm(normals[nodes], axis=1)[:, None]
-    return DesignSurface(nodes[order], parameters[order], directions[order], (counts[0], counts[1]))
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None])

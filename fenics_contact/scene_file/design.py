@@ -8,7 +8,7 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, NonPositiveFloat, 
 
 from fenics_contact.optimize import BundleTrust
 from fenics_contact.scene_file.part import Part, keys_of
-from fenics_contact.scene_file.values import CountPair, Read, Row, one_of, said
+from fenics_contact.scene_file.values import Net, Read, Row, one_of, said
 
 TOTAL_POTENTIAL = "total_potential"
 _Own = Annotated[str, Field(pattern=r"^.+\.py:[A-Za-z_]\w*$")]
@@ -21,9 +21,12 @@ class DesignSurfacePart(Part):
     body: str = Field(description="name of the body")
     surface: str = Field(
         "contact",
-        description='"contact" of a chain link (its crown), or a side of a block',
+        description='"contact" of a chain link (its crown), a side of a block, or a curve of a plane body',
     )
-    net: CountPair = Field((7, 4), description="control points along the surface's two directions")
+    net: Net = Field(
+        (7, 4),
+        description="control points along the surface's two directions, of a plane body along its curve",
+    )
     transition: PositiveFloat | None = Field(
         None, description="width of the strip of boundary around it that follows, [length]"
     )

@@ -1,4 +1,4 @@
-"""Surfaces that a design may move: crowns of chain links, sides of structured meshes."""
+"""Surfaces that a design may move: crowns of chain links, sides of meshes, curves of plane ones."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ def design_surface(shape: Shaped, surface: str, body: str) -> DesignSurface:
 
     Args:
         shape: The body's mesh with its shape.
-        surface: "contact" of a chain link, or a side of a structured mesh.
+        surface: "contact" of a chain link, a side of a structured mesh, or a curve of a plane one.
         body: Name of the body, for messages.
 
     Raises:

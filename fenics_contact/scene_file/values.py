@@ -152,6 +152,11 @@ Triple: TypeAlias = Annotated[
 ]
 Vector: TypeAlias = Annotated[tuple[float, ...], _row(float, 2, 3, "two or three finite numbers in brackets")]
 CountPair: TypeAlias = Annotated[tuple[int, int], _row(_COUNT, 2, 2, f"two {_COUNTS}")]
+#: Number of control points along a curve, or along both directions of a surface.
+Net: TypeAlias = Annotated[
+    _COUNT | CountPair,
+    said(f"an integer from 1 to {MOST} for a curve, or two in brackets for a surface"),
+]
 CountTriple: TypeAlias = Annotated[tuple[int, int, int], _row(_COUNT, 3, 3, f"three {_COUNTS}")]
 Row: TypeAlias = Annotated[
     tuple[float, ...], _row(float, 1, None, "finite numbers in brackets, one for each design variable")

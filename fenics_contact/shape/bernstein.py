@@ -1,4 +1,4 @@
-"""Tensor-product Bernstein polynomials on the unit square."""
+"""Tensor-product Bernstein polynomials on the unit interval and square."""
 
 from __future__ import annotations
 
@@ -21,15 +21,17 @@ def bernstein(parameters: np.ndarray, count: int) -> np.ndarray:
     return comb(count - 1, k) * t**k * (1 - t) ** (count - 1 - k)
 
 
-def tensor_bernstein(parameters: np.ndarray, counts: tuple[int, int]) -> np.ndarray:
-    """Evaluate products B_k(s) B_l(t).
+def tensor_bernstein(parameters: np.ndarray, counts: tuple[int, ...]) -> np.ndarray:
+    """Evaluate products B_k(s) B_l(t), on a curve B_k(s).
 
     Args:
-        parameters: (s, t) in the unit square, shape (m, 2).
-        counts: Number of polynomials along s and t.
+        parameters: (s, t) in the unit square, shape (m, 2), or s in the unit interval, (m, 1).
+        counts: Number of polynomials along each.
 
     Returns:
-        Values, shape (m, counts[0] · counts[1]); l runs fastest.
+        Values, shape (m, product of the counts); l runs fastest.
     """
-    along_s, along_t = bernstein(parameters[:, 0], counts[0]), bernstein(parameters[:, 1], counts[1])
-    return (along_s[:, :, None] * along_t[:, None, :]).reshape(len(parameters), -1)
+    values = np.ones((len(parameters), 1))
+    for along, count in zip(parameters.T, counts, strict=True):
+        values = (values[:, :, None] * bernstein(along, count)[:, None]).reshape(len(parameters), -1)
+    return values

@@ -1,8 +1,9 @@
-"""Design variables: control points that move a surface of a body along its normals."""
+"""Design variables: control points that move a surface, or a curve of a plane body, along its normals."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import prod
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -18,6 +19,9 @@ from fenics_contact.shape.bernstein import tensor_bernstein
 
 #: Default width of the transition strip, relative to the extent of the design surface.
 TRANSITION = 0.15
+#: Parameters of a design surface to what a net on it needs, in words, and to one such net.
+_KINDS = {1: "a curve in the plane is a number of control points", 2: "a surface is a pair of numbers"}
+_NETS: dict[int, int | tuple[int, int]] = {1: 7, 2: (7, 4)}
 #: Distance from the surface, relative to its extent, beyond which nothing moves: behind a fixed boundary a
 #: harmonic displacement has decayed there.
 FAR = 0.4
@@ -30,13 +34,13 @@ class SurfaceDesign:
 
     Design variable k displaces the surface by B_k(s, t) times the outward unit normal of the reference
     surface, B_k a tensor-product Bernstein polynomial. α = 0 is the reference shape, positive α adds
-    material.
+    material. In plane scenes the surface is a curve, moved by B_k(s).
 
     Attributes:
         body: Name of the body.
         surface: Nodes of the surface, their parameters and directions; or the name of a side of a structured
-            mesh, see `gallery.side_of`.
-        net: Number of control points along s and t.
+            mesh, in the plane of any open curve, see `gallery.side_of`.
+        net: Number of control points along s and t; of a curve in the plane, which has no default, along s.
         transition: Width of the strip of boundary around the surface that follows it smoothly; the rest of
             the boundary is fixed, [length]. By default 0.15 times the extent of the surface. Inner nodes far
             from the surface are fixed, too.
@@ -44,21 +48,27 @@ class SurfaceDesign:
 
     body: str
     surface: DesignSurface | str
-    net: tuple[int, int] = (7, 4)
+    net: int | tuple[int, int] = (7, 4)
     transition: float | None = None
 
     def __post_init__(self) -> None:
         """Reject a net without points or with more points than the surface has nodes."""
-        if min(self.net) < 1:
+        if min(self.counts) < 1:
             raise InvalidInputError(
-                f"a net needs at least one control point each way, got {self.net}: try (7, 4)"
+                f"a net needs at least one control point each way, got {self.net}: try (7, 4), for a curve "
+                "in the plane 7"
             )
         if isinstance(self.surface, str):
             return  # its nodes are counted once it is `on` a scene
-        if any(points > nodes for points, nodes in zip(self.net, self.lattice.counts, strict=True)):
+        nodes, number = self.lattice.counts, len(self.lattice.counts)
+        if len(self.counts) != number:
+            raise InvalidInputError(
+                f"a net on {_KINDS[number]}, got {self.net} on {self.body!r}: give net={_NETS[number]}"
+            )
+        if any(points > most for points, most in zip(self.counts, nodes, strict=True)):
             raise InvalidInputError(
                 f"a net of {self.net} control points needs at least as many nodes each way, the surface has "
-                f"{self.lattice.counts}: use fewer control points or a finer mesh"
+                f"{nodes}: use fewer control points or a finer mesh"
             )
 
     def on(self, scene: Scene) -> SurfaceDesign:
@@ -90,17 +100,22 @@ class SurfaceDesign:
         return self.surface
 
     @property
+    def counts(self) -> tuple[int, ...]:
+        """Number of control points along each parameter."""
+        return (self.net,) if isinstance(self.net, int) else tuple(self.net)
+
+    @property
     def size(self) -> int:
         """Number of design variables."""
-        return self.net[0] * self.net[1]
+        return prod(self.counts)
 
     @property
     def basis(self) -> np.ndarray:
         """Values of the B_k at the surface's nodes, shape (n_nodes, size)."""
-        return tensor_bernstein(self.lattice.parameters, self.net)
+        return tensor_bernstein(self.lattice.parameters, self.counts)
 
     def displacement(self, alpha: np.ndarray) -> np.ndarray:
-        """Return the displacement of the surface's nodes, shape (n_nodes, 3), [length].
+        """Return the displacement of the surface's nodes, shape (n_nodes, dim), [length].
 
         Args:
             alpha: Design variables, shape (size,), [length].
@@ -111,7 +126,7 @@ class SurfaceDesign:
         """Return the gradient by the design variables from that by the surface's nodes.
 
         Args:
-            gradient: Derivative by the nodes' displacements, shape (n_nodes, 3).
+            gradient: Derivative by the nodes' displacements, shape (n_nodes, dim).
 
         Returns:
             Derivative by α, shape (size,).
@@ -137,20 +152,20 @@ class SurfaceDesign:
         return np.flatnonzero(far)
 
     def control_points(self, points: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-        """Return positions for drawing the control points, shape (net[0], net[1], 3), [length].
+        """Return positions for drawing the control points, shape (*counts, dim), [length].
 
         Each is drawn at its Greville abscissa on the reference surface, moved by its own variable.
 
         Args:
-            points: Reference coordinates of the body, shape (n_nodes, 3).
+            points: Reference coordinates of the body, shape (n_nodes, dim).
             alpha: Design variables, shape (size,), [length].
         """
-        s, t = (np.linspace(0, 1, count) if count > 1 else np.array([0.5]) for count in self.net)
-        wanted = np.stack(np.meshgrid(s, t, indexing="ij"), axis=-1).reshape(-1, 2)
+        ticks = [np.linspace(0, 1, count) if count > 1 else np.array([0.5]) for count in self.counts]
+        wanted = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, len(ticks))
         distance = np.linalg.norm(self.lattice.parameters[None] - wanted[:, None], axis=2)
         nearest = np.argmin(distance, axis=1)
-        on_surface = points[self.lattice.nodes[nearest]]
-        return (on_surface + alpha[:, None] * self.lattice.directions[nearest]).reshape(*self.net, 3)
+        moved = points[self.lattice.nodes[nearest]] + alpha[:, None] * self.lattice.directions[nearest]
+        return moved.reshape(*self.counts, -1)
 
 
 def checked_variables(alpha: np.ndarray, size: int, comm: MPI.Comm) -> np.ndarray:

@@ -78,7 +78,7 @@ class LinearisedFace:
         tested: Z_s, test directions of the rows, shape (n_owned, n_face).
         moving: Z_u, directions along which the multiplier varies: a slipping friction force grows with its
             normal force by μ d, shape (n_owned, n_face).
-        slip_direction: d at the slipping discs, zero elsewhere, shape (n_friction, 2), owned.
+        slip_direction: d at the slipping discs, zero elsewhere, shape (n_friction, dim − 1), owned.
         weak: Points on a switch.
     """
 

@@ -88,12 +88,12 @@ class HarmonicExtension:
         return ksp
 
     def extend(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the displacement of all nodes, shape (n_nodes, 3), from the moving ones'. Collective."""
+        """Return the displacement of all nodes, shape (n_nodes, dim), from the moving ones'. Collective."""
         check_not_forked()
         prescribed, right = self._laplacian.createVecs()
         solution = right.duplicate()
-        result = np.zeros((len(self._rows), 3))
-        for axis in range(3):
+        result = np.zeros((len(self._rows), displacement.shape[1]))
+        for axis in range(displacement.shape[1]):
             prescribed.zeroEntries()
             self._put(prescribed, self._rows[self.moving], displacement[:, axis])
             self._laplacian.mult(prescribed, right)
@@ -106,16 +106,16 @@ class HarmonicExtension:
         return result
 
     def pull_back(self, gradient: np.ndarray) -> np.ndarray:
-        """Return the transpose of `extend` applied to nodal derivatives, shape (n_moving, 3). Collective.
+        """Return the transpose of `extend` applied to nodal derivatives, shape (n_moving, dim). Collective.
 
         Args:
-            gradient: Derivative by the displacement of every node, shape (n_nodes, 3), replicated.
+            gradient: Derivative by the displacement of every node, shape (n_nodes, dim), replicated.
         """
         check_not_forked()
         right, image = self._laplacian.createVecs()
         adjoint = right.duplicate()
-        result = np.zeros((len(self.moving), 3))
-        for axis in range(3):
+        result = np.zeros((len(self.moving), gradient.shape[1]))
+        for axis in range(gradient.shape[1]):
             self._put(right, self._rows, gradient[:, axis])
             self._put(right, self._given, np.zeros(len(self._given)))
             self._ksp.solve(right, adjoint)

@@ -289,7 +289,7 @@ class VolumeIntegral(Weighable):
         return bodies[self.body]
 
 
-#: Returns value, derivative by normal forces (n,), derivative by friction forces (n, 2).
+#: Returns value, derivative by normal forces (n,), derivative by friction forces (n, dim − 1).
 ForceFunction = Callable[[ContactResult], tuple[float, np.ndarray, np.ndarray]]
 
 
@@ -298,15 +298,15 @@ class ContactForces(Weighable):
     """J = φ(λ_N, τ), a function of the contact forces alone, [any].
 
     Attributes:
-        function: Takes the contact result; returns φ, ∂φ/∂λ_N of shape (n,) and ∂φ/∂τ of shape (n, 2), the
-            latter in the points' tangents. Must be invariant under rotation of the tangents to be smooth.
+        function: Takes the contact result; returns φ, ∂φ/∂λ_N of shape (n,) and ∂φ/∂τ of shape (n, dim − 1),
+            the latter in the points' tangents. Must be invariant under rotation of the tangents to be smooth.
 
     Example:
         >>> def largest(contact):
         ...     k = int(contact.normal_force.argmax())
         ...     by_normal = np.zeros(len(contact.normal_force))
         ...     by_normal[k] = 1.0
-        ...     return contact.normal_force[k], by_normal, np.zeros((len(by_normal), 2))
+        ...     return contact.normal_force[k], by_normal, np.zeros_like(contact.friction_force)
         >>> objective = ContactForces(largest)
     """
 

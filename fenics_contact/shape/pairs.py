@@ -15,16 +15,12 @@ def checked_contact(contact: ContactProblem) -> ContactProblem:
     """Return the contact problem of a shape problem.
 
     Raises:
-        InvalidInputError: If it is none, or its scene has two dimensions.
+        InvalidInputError: If it is none.
     """
     if not isinstance(contact, ContactProblem):
         raise InvalidInputError(
             f"ShapeProblem needs a ContactProblem, got {type(contact).__name__}: write "
             "ShapeProblem(ContactProblem(scene, comm), designs, objective)"
-        )
-    if contact.scene.dim != 3:
-        raise InvalidInputError(
-            "shape problems need three dimensions, the scene has two: make it one layer thick"
         )
     return contact
 

@@ -182,7 +182,7 @@ class ShapeProblem:
             alpha: Design variables, shape (size,), [length].
 
         Returns:
-            Body name -> coordinates, shape (n_nodes, 3), [length].
+            Body name -> coordinates, shape (n_nodes, dim), [length].
 
         Raises:
             InvalidInputError: If alpha has another shape or is not finite.
@@ -368,7 +368,7 @@ class ShapeProblem:
 
     @collectively("ShapeProblem.volume", _comm)
     def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return the volume of the designed bodies and its gradient, [length³]. Collective."""
+        """Return the volume of the designed bodies, in the plane the area, and its gradient. Collective."""
         names = sorted({design.body for design in self.designs})
         total, by_points = volume_of(self.scene_of(alpha), names, self.contact.decomposition.tearing)
         return total, self._by_design(by_points)

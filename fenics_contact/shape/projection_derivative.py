@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.pairing import reference_axes
-from fenics_contact.shape.surface_derivative import normals_pulled_back, slopes_pulled_back
+from fenics_contact.shape.surface_derivative import normals_pulled_back, rotated_back, slopes_pulled_back
 from fenics_contact.surfaces import (
     FacetedSurface,
     heights,
@@ -23,10 +23,10 @@ class PointDerivatives:
 
     Attributes:
         gap: By the gap, shape (n,).
-        normal: By the normal, shape (n, 3).
-        tangents: By the tangents, shape (n, 2, 3).
+        normal: By the normal, shape (n, dim).
+        tangents: By the tangents, shape (n, dim − 1, dim).
         weight: By the weights of the facet's corners, shape (n, corners).
-        axes: Axes nearest to the first tangents, shape (n, 3); `reference_axes` by default.
+        axes: Axes nearest to the first tangents, shape (n, dim); `reference_axes` by default.
     """
 
     gap: np.ndarray
@@ -39,15 +39,17 @@ class PointDerivatives:
 def frames_pulled_back(
     normal: np.ndarray, by_tangents: np.ndarray, axes: np.ndarray | None = None
 ) -> np.ndarray:
-    """Return the derivative by the unit normals from that by the tangents built on them, shape (n, 3).
+    """Return the derivative by the unit normals from that by the tangents built on them, shape (n, dim).
 
     Reverse of `fenics_contact.pairing.contact_points.tangent_frames`.
 
     Args:
-        normal: Unit normals, shape (n, 3).
-        by_tangents: Derivative by both tangents, shape (n, 2, 3).
-        axes: Axes nearest to the first tangents, shape (n, 3); `reference_axes` by default.
+        normal: Unit normals, shape (n, dim).
+        by_tangents: Derivative by the tangents, shape (n, dim − 1, dim).
+        axes: Axes nearest to the first tangents, shape (n, dim); `reference_axes` by default.
     """
+    if normal.shape[1] == 2:
+        return rotated_back(by_tangents[:, 0])
     axes = reference_axes(normal) if axes is None else axes
     along = np.einsum("nd,nd->n", axes, normal)
     first = axes - along[:, None] * normal
@@ -73,12 +75,12 @@ def projection_pulled_back(
     Args:
         master: The master surface.
         facet: Facet of each point, shape (n,).
-        local: ξ, shape (n, 2).
+        local: ξ, shape (n, dim − 1).
         gap: r − h, shape (n,), [length].
         by: Derivatives by gap, normal, tangents and weights.
 
     Returns:
-        Derivative by each slave point, shape (n, 3), and by each node of the master surface, (n_nodes, 3).
+        Derivative by each slave point, shape (n, dim), and by each node of the master, (n_nodes, dim).
     """
     nodes = master.facets[facet]
     corners, normals = master.points[nodes], master.normals[nodes]

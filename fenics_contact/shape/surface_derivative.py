@@ -10,12 +10,12 @@ from fenics_contact.surfaces import FacetedSurface, corner_normals, corner_produ
 def normals_pulled_back(
     surface: FacetedSurface, by_normals: np.ndarray, by_averaged: np.ndarray | float = 0.0
 ) -> np.ndarray:
-    """Return the derivative by the surface's nodes from that by its unit normals, shape (n, 3).
+    """Return the derivative by the surface's nodes from that by its unit normals, shape (n, dim).
 
     Args:
         surface: The surface.
-        by_normals: Derivative by each nodal normal, shape (n, 3).
-        by_averaged: Direct derivative by each averaged normal, shape (n, 3).
+        by_normals: Derivative by each nodal normal, shape (n, dim).
+        by_averaged: Direct derivative by each averaged normal, shape (n, dim).
     """
     along = np.einsum("nd,nd->n", surface.normals, by_normals)
     by_true = by_normals - along[:, None] * surface.normals
@@ -44,7 +44,7 @@ def slopes_pulled_back(
         by_slopes: Derivative by the slopes at their corners, shape (n, corners, 2).
 
     Returns:
-        By nodes, by true normals and by averaged normals, shape (n_nodes, 3) each.
+        By nodes, by true normals and by averaged normals, shape (n_nodes, dim) each.
     """
     by_points, by_normals, by_averaged = (np.zeros_like(surface.points) for _ in range(3))
     if surface.relief is None:
@@ -69,7 +69,7 @@ def slopes_pulled_back(
 
 
 def areas_pulled_back(surface: FacetedSurface, by_areas: np.ndarray) -> np.ndarray:
-    """Return the derivative by the surface's nodes from that by its nodal areas, shape (n, 3).
+    """Return the derivative by the surface's nodes from that by its nodal areas, shape (n, dim).
 
     Args:
         surface: The surface.
@@ -77,18 +77,26 @@ def areas_pulled_back(surface: FacetedSurface, by_areas: np.ndarray) -> np.ndarr
     """
     total = corner_products(surface.points, surface.facets).sum(axis=1)
     direction = total / np.linalg.norm(total, axis=1)[:, None]
-    divisor = (4 if surface.corners == 4 else 6) * surface.corners
+    divisor = {2: 2, 3: 6, 4: 4}[surface.corners] * surface.corners
     by_total = by_areas[surface.facets].sum(axis=1)[:, None] * direction / divisor
     return _products_pulled_back(surface, np.repeat(by_total[:, None], surface.corners, axis=1))
 
 
 def _products_pulled_back(surface: FacetedSurface, by_products: np.ndarray) -> np.ndarray:
-    """Reverse of `corner_products`: (next − x) × (previous − x) at each corner."""
-    x = surface.points[surface.facets]
+    """Reverse of `corner_products`: (next − x) × (previous − x) at each corner, of edges their rotation."""
+    result, x = np.zeros_like(surface.points), surface.points[surface.facets]
+    if surface.corners == 2:
+        by_end = rotated_back(by_products.sum(axis=1))
+        np.add.at(result, surface.facets, np.stack([-by_end, by_end], axis=1))
+        return result
     to_next, to_previous = np.roll(x, -1, axis=1) - x, np.roll(x, 1, axis=1) - x
     # d(a × b)·c = (b × c)·da + (c × a)·db
     by_next, by_previous = np.cross(to_previous, by_products), np.cross(by_products, to_next)
     by_corner = np.roll(by_next, 1, axis=1) + np.roll(by_previous, -1, axis=1) - by_next - by_previous
-    result = np.zeros_like(surface.points)
     np.add.at(result, surface.facets, by_corner)
     return result
+
+
+def rotated_back(vectors: np.ndarray) -> np.ndarray:
+    """Return plane vectors, shape (n, 2), rotated counterclockwise: reverse of (x, y) -> (y, −x)."""
+    return np.stack([-vectors[:, 1], vectors[:, 0]], axis=1)

@@ -13,14 +13,14 @@ from fenics_contact.surfaces import shape_functions
 
 
 def volume_of(scene: Scene, names: Sequence[str], numbers: NodeNumbers) -> tuple[float, np.ndarray]:
-    """Return the volume of some bodies and its derivative by the nodes of all, shape (n_nodes, 3).
+    """Return the volume of some bodies and its derivative by the nodes of all, (n_nodes, dim).
 
     Args:
         scene: The scene.
         names: Names of the bodies.
         numbers: Numbers of the nodes of all bodies.
     """
-    total, by_points = 0.0, np.zeros((int(numbers.node_offset[-1]), 3))
+    total, by_points = 0.0, np.zeros((numbers.n_nodes, scene.dim))
     for name in names:
         mesh = scene.bodies[name].mesh
         total += mesh.volume

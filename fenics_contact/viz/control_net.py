@@ -14,6 +14,7 @@ from matplotlib.colors import Normalize
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import DesignSurface
 from fenics_contact.viz.colours import GREY, INK, ORANGE, SIGNED_MAP
+from fenics_contact.viz.control_curve import draw_control_curve
 from fenics_contact.viz.curved_net import curved_net
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
 from fenics_contact.viz.sheet import add_colour_bar, sheet, show_image
@@ -48,13 +49,15 @@ def plot_control_net(
 ) -> Picture:
     """Draw the design surface with its control net before and after, coloured by its outward movement.
 
+    The curve of a plane body is drawn with its control points, before in grey and after in colours.
+
     Args:
         design: Nodes of the surface, their order and outward normals.
-        points: The body's nodes before and after, (n_nodes, 3) each, [length].
-        net: Control points before and after, (n_s, n_t, 3) each, [length].
+        points: The body's nodes before and after, (n_nodes, 3 | 2) each, [length].
+        net: Control points before and after, (n_s, n_t, 3) or in the plane (n_s, 2) each, [length].
         path: PNG file to write, None to write none.
         clim: Range of the colours, [length]; symmetric about zero unless given.
-        magnify: Factor of the movement in the right picture; chosen and stated unless given.
+        magnify: Factor of the movement in the picture of after; chosen and stated unless given.
         title: Text before the facts in the title.
         units: Names of the units, mm, N and MPa unless given.
         width: Width of the picture in pixels.
@@ -71,8 +74,9 @@ def plot_control_net(
         Collective on ``comm`` if given.
     """
     target = png_path(path)
-    before, after = (_checked(f"points[{number}]", x, 2) for number, x in enumerate(points))
-    nets = [_checked(f"net[{number}]", x, 3) for number, x in enumerate(net)]
+    dim = design.directions.shape[1]
+    before, after = (_checked(f"points[{number}]", x, ("n_nodes",), dim) for number, x in enumerate(points))
+    nets = [_checked(f"net[{number}]", x, ("n_s", "n_t")[: dim - 1], dim) for number, x in enumerate(net)]
     if before.shape != after.shape or nets[0].shape != nets[1].shape:
         raise InvalidInputError(
             f"before and after must have the same shapes, got points {before.shape} and {after.shape}, nets "
@@ -87,16 +91,16 @@ def plot_control_net(
     largest = float(np.abs(outward).max()) or 1.0
     factor = _chosen_factor(start, movement) if magnify is None else float(magnify)
     shown = (-largest, largest) if clim is None else checked_range(clim)
-    surfaces = (x.reshape(*design.counts, 3) for x in (start, start + factor * movement))
+    surfaces = (x.reshape(*design.counts, dim) for x in (start, start + factor * movement))
     ends = nets[0], nets[0] + factor * (nets[1] - nets[0])
     change = _Change(tuple(surfaces), ends, outward, factor, shown)
     return draw_picture(comm, target, lambda paper: _draw(change, paper, title, units or Units(), width))
 
 
-def _checked(name: str, values: np.ndarray, dimensions: int) -> np.ndarray:
+def _checked(name: str, values: np.ndarray, counts: tuple[str, ...], dim: int) -> np.ndarray:
     array = np.asarray(values, dtype=float)
-    if array.ndim != dimensions or array.shape[-1] != 3:
-        wanted = "(n_nodes, 3)" if dimensions == 2 else "(n_s, n_t, 3)"
+    if array.ndim != len(counts) + 1 or array.shape[-1] != dim:
+        wanted = f"({', '.join(counts)}, {dim})"
         raise InvalidInputError(f"{name} must have shape {wanted}, got {array.shape}: pass coordinates")
     if not np.all(np.isfinite(array)):
         raise InvalidInputError(f"{name} must be finite, got NaN or infinity: check the design")
@@ -110,7 +114,7 @@ def _chosen_factor(start: np.ndarray, movement: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class _Change:
-    """Surface (m_s, m_t, 3) and net (n_s, n_t, 3) before and after, magnified."""
+    """Surface (m_s, m_t, 3) and net (n_s, n_t, 3), or curve (m_s, 2) and net (n_s, 2)."""
 
     surfaces: tuple[np.ndarray, np.ndarray]
     nets: tuple[np.ndarray, np.ndarray]
@@ -120,17 +124,22 @@ class _Change:
 
 
 def _draw(change: _Change, paper: BinaryIO, title: str, units: Units, width: int) -> None:
+    low, high = (written(float(value), 3) for value in (change.outward.min(), change.outward.max()))
+    words = headline(title, f"surface moved by {low} to {high} {units.length} along its outward normal")
+    shown = f"after, movement × {change.factor:g}"
     (start, end), (net, end_net) = change.surfaces, change.nets
+    if start.shape[-1] == 2:
+        named = words, f"before in grey, {shown}", units.length
+        draw_control_curve(change.surfaces, change.nets, change.outward, change.clim, named, width, paper)
+        return
     view = _view(start)
     frame = frame_around(view, np.concatenate([x.reshape(-1, 3) for x in (start, end, net, end_net)]), 0.05)
     before = [_surface_layer(start, 0.0 * change.outward, change.clim), *_net_layers(start, net, ORANGE, 1.0)]
     ghost, after = _net_layers(start, net, GREY, 0.5), _surface_layer(end, change.outward, change.clim)
     parts = {
         "before": before,
-        f"after, movement × {change.factor:g}": [after, *ghost, *_net_layers(start, end_net, ORANGE, 1.0)],
+        shown: [after, *ghost, *_net_layers(start, end_net, ORANGE, 1.0)],
     }
-    low, high = (written(float(value), 3) for value in (change.outward.min(), change.outward.max()))
-    words = headline(title, f"surface moved by {low} to {high} {units.length} along its outward normal")
     with sheet(paper, (width, round((0.09 + PART / frame.proportion) * width)), words) as figure:
         panels = figure.subplots(1, 2)
         for axes, (name, layers) in zip(panels, parts.items(), strict=True):

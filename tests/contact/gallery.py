@@ -33,8 +33,8 @@ def crowned(mesh: BodyMesh, rise: float) -> BodyMesh:
     points = mesh.points.copy()
     low, high = points.min(axis=0), points.max(axis=0)
     along = 2 * (points[:, 0] - low[0]) / (high[0] - low[0]) - 1
-    below = (high[2] - points[:, 2]) / (high[2] - low[2])
-    points[:, 2] += rise * along**2 * below
+    below = (high[-1] - points[:, -1]) / (high[-1] - low[-1])
+    points[:, -1] += rise * along**2 * below
     return mesh.moved(points)
 
 
@@ -88,7 +88,7 @@ def stack(upper: Friction, lower: Friction) -> Scene:
 
 def partitions(scene: Scene, boxes: tuple[int, int, int] = (2, 1, 1)) -> dict[str, np.ndarray]:
     """Cut every body into the same boxes."""
-    return {name: box_partition(body.mesh, boxes) for name, body in scene.bodies.items()}
+    return {name: box_partition(body.mesh, boxes[: scene.dim]) for name, body in scene.bodies.items()}
 
 
 def guided(scene: Scene, body: str) -> Scene:

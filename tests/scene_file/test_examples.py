@@ -52,6 +52,48 @@ def test_a_side_of_a_block_can_be_designed() -> None:
     np.testing.assert_allclose(limit, [0.01 * volume, 0.5 * volume, 0.01])
 
 
+def plane_scene(**change: object) -> dict[str, object]:
+    """Two rectangles of which the lower edge of the upper one is a design."""
+    surface = {"body": "upper", "surface": "y0", "net": 5, "lower": -0.05, "upper": 0.05, **change}
+    return {
+        "meshes": {
+            "upper": {"shape": "rectangle", "lower": [0.5, 0.0], "upper": [2.5, 1.0], "counts": [8, 4]},
+            "lower": {"shape": "rectangle", "lower": [0.0, -1.0], "upper": [3.0, 0.0], "counts": [9, 3]},
+        },
+        "materials": {"rubber": {"model": "plane_strain", "young_modulus": 100.0, "poisson_ratio": 0.3}},
+        "bodies": {name: {"mesh": name, "material": "rubber"} for name in ("upper", "lower")},
+        "supports": [{"body": "lower", "surface": "y0"}],
+        "loads": [{"kind": "traction", "body": "upper", "surface": "y1", "value": [0.0, -1.0]}],
+        "contacts": [
+            {
+                "slave": {"body": "upper", "surface": "y0"},
+                "master": {"body": "lower", "surface": "y1"},
+                "friction": {"law": "coulomb", "coefficient": 0.3},
+            }
+        ],
+        "design": {"surfaces": [surface], "max_iterations": 2},
+    }
+
+
+def test_a_curve_of_a_plane_body_can_be_designed() -> None:
+    task = read_scene_file(plane_scene(), MPI.COMM_SELF).shape_task()
+    assert task.problem.size == 5
+    moved = task.problem.points_of(np.full(5, 0.02))["upper"]
+    bottom = task.problem.designs[0].lattice.nodes
+    np.testing.assert_allclose(moved[bottom, 1], -0.02, atol=1e-12)
+    start, gradient = task.problem(task.start)
+    assert np.abs(gradient).max() > 0.0
+    assert task.minimize().value < start
+
+
+@pytest.mark.parametrize("net", [0.5, "five", [2, 2, 2]])
+def test_a_net_is_a_number_or_a_pair(net: object) -> None:
+    with pytest.raises(
+        SceneFileError, match=r"net must be an integer from 1 to .* for a curve, or two in bra"
+    ):
+        read_scene_file(plane_scene(net=net), MPI.COMM_SELF)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -17,7 +17,7 @@ def _squares(forces: np.ndarray) -> tuple[float, np.ndarray]:
 
 def normal_forces(contact: ContactResult) -> tuple[float, np.ndarray, np.ndarray]:
     value, by_normal = _squares(contact.normal_force)
-    return value, by_normal, np.zeros((len(by_normal), 2))
+    return value, by_normal, np.zeros_like(contact.friction_force)
 
 
 def friction_forces(contact: ContactResult) -> tuple[float, np.ndarray, np.ndarray]:
@@ -27,7 +27,7 @@ def friction_forces(contact: ContactResult) -> tuple[float, np.ndarray, np.ndarr
 
 def misfit(u: Any, x: Any, stress: Any) -> Any:
     """Displacement along x beside a given field."""
-    return (u[0] - 0.01 * ufl.sin(x[1] + x[2])) ** 2
+    return (u[0] - 0.01 * ufl.sin(x[1] + x[x.ufl_shape[0] - 1])) ** 2
 
 
 def squared_stress(u: Any, x: Any, stress: Any) -> Any:

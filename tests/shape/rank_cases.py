@@ -16,6 +16,7 @@ from fenics_contact.shape import HarmonicExtension
 from tests.shape.blocks import block_on_block, problem
 from tests.shape.chains import chain_problem
 from tests.shape.objectives import objectives
+from tests.shape.plane_blocks import SCENES, plane_problem
 from tests.shape.quotients import Remembering
 
 #: Four subdomains, two of each body: on four ranks every rank lacks a body. A chain of eight subdomains.
@@ -25,15 +26,17 @@ PROBLEMS: dict[str, Callable[[MPI.Comm], Remembering]] = {
     ),
     "blocks, Tresca": lambda comm: problem(block_on_block(Tresca(0.8), load=(0.6, 0.12, -2.0)), comm),
     "chain": lambda comm: chain_problem(Coulomb(0.3), comm),
+    "plane": lambda comm: plane_problem(SCENES["blocks"](), comm),
 }
 #: Who judges: between them they ask everything of a state.
 JUDGES = {
     "blocks, tetrahedra": ("stress", "friction forces"),
     "blocks, Tresca": ("displacement",),
     "chain": ("energy", "normal forces"),
+    "plane": ("displacement", "friction forces"),
 }
-BODY = {"chain": "link2"}
-SIZE = {"chain": 0.03}
+BODY = {"chain": "link2", "plane": "block"}
+SIZE = {"chain": 0.03, "plane": 0.004}
 
 
 def same_bits(comm: MPI.Comm, *arrays: np.ndarray | float) -> bool:

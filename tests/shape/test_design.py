@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block
+from fenics_contact.gallery import block, rectangle, side_of
 from fenics_contact.shape import SurfaceDesign
 from fenics_contact.shape.bernstein import bernstein, tensor_bernstein
 from tests.shape.blocks import side
@@ -94,7 +94,7 @@ def test_the_boundary_beyond_the_transition_strip_keeps_its_place(width: float |
 @pytest.mark.parametrize("net", [(0, 3), (4, -1)])
 def test_a_net_without_control_points_is_refused(net: tuple[int, int]) -> None:
     with pytest.raises(
-        InvalidInputError, match=r"at least one control point each way, got \(.*\): try \(7, 4\)"
+        InvalidInputError, match=r"at least one control point each way, got \(.*\): try \(7, 4\), for"
     ):
         crown(net)
 
@@ -105,3 +105,29 @@ def test_a_net_finer_than_the_mesh_is_refused() -> None:
     for net in ((counts[0] + 1, 2), (2, counts[1] + 1)):
         with pytest.raises(InvalidInputError, match="use fewer control points or a finer mesh"):
             crown(net)
+
+
+def test_a_number_of_control_points_moves_a_curve() -> None:
+    mesh = rectangle((0.0, 0.0), (4.0, 1.0), (8, 2))
+    design = SurfaceDesign("plate", side_of(mesh, "y1"), 3)
+    assert design.size == 3
+    moved = design.displacement(np.array([0.0, 1.0, 0.0]))
+    # From right to left, with the body on the left.
+    t = 1.0 - mesh.points[design.lattice.nodes, 0] / 4.0
+    np.testing.assert_allclose(moved, np.column_stack([0.0 * t, 2 * t * (1 - t)]), atol=1e-14)
+    np.testing.assert_allclose(
+        design.control_points(mesh.points, np.array([0.0, 0.5, 0.0])), [[4.0, 1.0], [2.0, 1.5], [0.0, 1.0]]
+    )
+
+
+def test_a_pair_on_a_curve_and_a_number_on_a_surface_are_refused() -> None:
+    curve = side_of(rectangle((0.0, 0.0), (4.0, 1.0), (8, 2)), "y1")
+    with pytest.raises(
+        InvalidInputError, match=r"a curve in the plane is a number .* got \(7, 4\) on 'plate': .* net=7"
+    ):
+        SurfaceDesign("plate", curve)
+    top = side_of(block((0.0, 0.0, 0.0), (4.0, 2.0, 1.0), (8, 4, 2)), "z1")
+    with pytest.raises(
+        InvalidInputError, match=r"a surface is a pair of numbers, got 7 on 'brick': give net=\(7, 4\)"
+    ):
+        SurfaceDesign("brick", top, 7)

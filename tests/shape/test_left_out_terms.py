@@ -4,97 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
-from typing import Any
 
 import numpy as np
 import pytest
 
-from fenics_contact.shape import contact_derivative, forms, problem, projection_derivative
-from fenics_contact.shape.linearised_face import LinearisedFace
 from tests.shape import moved_blocks as blocks
 from tests.shape.chains import line
+from tests.shape.left_out import (
+    TERMS,
+    without_areas,
+    without_growth_of_friction,
+    without_own_shape,
+    without_stiffness,
+    without_turning_of_friction,
+    without_weight,
+)
 from tests.shape.objectives import objectives
 from tests.shape.quotients import Line, Patch, miss_without
 
 OBJECTIVES = objectives("link1")
-
-
-def without(*terms: str) -> Callable[[Patch], None]:
-    """Drop derivatives of the contact points' geometry."""
-
-    def drop(patch: Patch) -> None:
-        whole = contact_derivative._by_point
-
-        def by_point(*arguments: Any) -> Any:
-            found = whole(*arguments)
-            return replace(found, **{term: np.zeros_like(getattr(found, term)) for term in terms})
-
-        patch.setattr(contact_derivative, "_by_point", by_point)
-
-    return drop
-
-
-def without_growth_of_friction(patch: Patch) -> None:
-    patch.setattr(problem, "linearise_face", partial(problem.linearise_face, coupling=False))  # type: ignore[attr-defined]
-
-
-def without_turning_of_friction(patch: Patch) -> None:
-    whole = problem.linearise_face  # type: ignore[attr-defined]
-
-    def stiff(*arguments: Any) -> LinearisedFace:
-        found = whole(*arguments)
-        # No overshoot, no curvature: the slip may not leave its direction.
-        return replace(found, face=replace(found.face, overshoot=np.ones_like(found.face.overshoot)))
-
-    patch.setattr(problem, "linearise_face", stiff)
-
-
-def without_stiffness(patch: Patch) -> None:
-    whole = problem.work_by_shape  # type: ignore[attr-defined]
-    patch.setattr(problem, "work_by_shape", lambda *given: np.zeros_like(whole(*given)))
-
-
-def without_own_shape(patch: Patch) -> None:
-    whole = problem.ShapeProblem._by_points
-
-    def by_points(self: Any, state: Any, adjoint: Any, by_shape: np.ndarray, by_bound: np.ndarray) -> Any:
-        return whole(self, state, adjoint, np.zeros_like(by_shape), by_bound)
-
-    patch.setattr(problem.ShapeProblem, "_by_points", by_points)
-
-
-def without_areas(patch: Patch) -> None:
-    whole = contact_derivative.areas_pulled_back  # type: ignore[attr-defined]
-    patch.setattr(
-        contact_derivative, "areas_pulled_back", lambda *arguments: np.zeros_like(whole(*arguments))
-    )
-
-
-def without_weight(patch: Patch) -> None:
-    patch.setattr(forms, "moving_loads", lambda torn, moving: [])
-
-
-def without_slopes(patch: Patch) -> None:
-    """Let true surfaces keep their height over a facet when its nodes move."""
-    whole = projection_derivative.slopes_pulled_back  # type: ignore[attr-defined]
-
-    def none(*arguments: Any) -> Any:
-        return tuple(np.zeros_like(part) for part in whole(*arguments))
-
-    patch.setattr(projection_derivative, "slopes_pulled_back", none)
-
-
-TERMS: dict[str, Callable[[Patch], None]] = {
-    "gap": without("gap"),
-    "slopes": without_slopes,
-    "normals": without("normal"),
-    "tangents": without("tangents"),
-    "weights": without("weight"),
-    "all rows": without("normal", "tangents", "weight"),
-    "growth of friction": without_growth_of_friction,
-    "turning of friction": without_turning_of_friction,
-}
 
 
 def slanted(regime: str) -> Line:

@@ -11,8 +11,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, ContactResult, State
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
-from fenics_contact.gallery import rectangle
-from fenics_contact.scene import Body, Coulomb, PlaneStrain, Scene, Surface, Tie
+from fenics_contact.scene import Coulomb, Scene, Surface, Tie
 from fenics_contact.shape import (
     ContactForces,
     Partials,
@@ -198,16 +197,6 @@ def test_a_tied_surface_may_not_move() -> None:
         ShapeProblem(
             ContactProblem(tied, MPI.COMM_SELF, partitions=partitions(scene())),
             designs_of(scene()),
-            TotalPotential(),
-        )
-
-
-def test_a_plane_scene_is_refused() -> None:
-    plate = Scene({"plate": Body(rectangle((0, 0), (1, 1), (2, 2)), PlaneStrain(1.0, 0.3))})
-    with pytest.raises(InvalidInputError, match="shape problems need three dimensions, the scene has two"):
-        ShapeProblem(
-            ContactProblem(plate, MPI.COMM_SELF, partitions={"plate": np.zeros(4, dtype=int)}),
-            (),
             TotalPotential(),
         )
 

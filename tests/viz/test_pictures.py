@@ -111,6 +111,26 @@ def test_control_net_refuses_arrays_that_do_not_fit(change: Any, message: str, t
         plot_control_net(design, *change(points, net), tmp_path / "net.png")
 
 
+def test_a_curve_of_a_plane_body_is_drawn_with_its_control_points(tmp_path: Path) -> None:
+    s = np.linspace(0.0, 1.0, 21)
+    points = np.column_stack([4 * s, np.sin(np.pi * s)])
+    design = DesignSurface(np.arange(21), s[:, None], np.tile([0.0, 1.0], (21, 1)), (21,))
+    bump = np.sin(np.pi * s)[:, None] * design.directions
+    still, moved = (
+        pixels(
+            plot_control_net(
+                design, (points, points + size * bump), (points[::5], points[::5] + size * bump[::5]),
+                tmp_path / f"{size}.png", width=600,
+            )
+        )
+        for size in (0.0, 0.1)
+    )  # fmt: skip
+    violet = [np.mean(part[..., 2] - part[..., 1] > 0.1) for part in (still, moved)]
+    assert violet[1] > violet[0] + 0.002, "outward movement is violet"
+    with pytest.raises(InvalidInputError, match=r"net\[0\] must have shape \(n_s, 2\), got \(7, 4, 3\)"):
+        plot_control_net(design, (points, points), (np.zeros((7, 4, 3)),) * 2, tmp_path / "no.png")
+
+
 @pytest.mark.parametrize("counts", [(5, 3), (1, 3), (1, 1)])
 def test_bars_of_a_net_end_at_its_points_and_lie_on_a_surface_that_holds_them(
     counts: tuple[int, int],

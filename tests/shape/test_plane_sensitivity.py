@@ -1,0 +1,54 @@
+"""Derivatives of plane scenes: obstacles, one block on another, Coulomb and Tresca friction."""
+
+from __future__ import annotations
+
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.contact import ContactProblem, Status
+from fenics_contact.shape import ShapeProblem
+from tests.shape.left_out import TERMS, without_areas
+from tests.shape.plane_blocks import OBJECTIVES, SCENES, line
+from tests.shape.quotients import miss_without
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_points_stick_slip_and_lift_off_all_along_the_line(name: str) -> None:
+    contact = line(name).state().contact
+    assert all(contact.count(status) > 0 for status in Status), line(name).counts()
+    assert line(name).is_smooth()
+
+
+@pytest.mark.parametrize("objective", OBJECTIVES)
+@pytest.mark.parametrize("name", SCENES)
+def test_the_adjoint_agrees_with_central_differences(name: str, objective: str) -> None:
+    here, judge = line(name), OBJECTIVES[objective]
+    assert here.steepness(judge) > 0.015
+    assert here.miss(judge) < 1e-5
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_taylor_remainders_are_quadratic(name: str) -> None:
+    for objective in ("energy", "friction forces"):
+        assert line(name).taylor_rate(OBJECTIVES[objective]) > 1.9
+
+
+@pytest.mark.parametrize("term", [term for term in TERMS if term != "turning of friction"])
+def test_every_term_counts_but_the_turning_of_friction_which_has_one_direction(term: str) -> None:
+    here, judge = line("blocks"), OBJECTIVES["displacement"]
+    assert miss_without(TERMS[term], here, judge) > 1e-3
+    assert miss_without(TERMS["turning of friction"], here, judge) < 1e-5
+
+
+def test_the_slip_bound_of_tresca_friction_changes_with_the_nodal_length() -> None:
+    here, judge = line("blocks, Tresca"), OBJECTIVES["friction forces"]
+    assert miss_without(without_areas, here, judge) > 1e-3
+
+
+@pytest.mark.parametrize("name", ["pipe", "blocks"])
+def test_default_settings_give_the_same_gradient(name: str) -> None:
+    here, judge = line(name), OBJECTIVES["energy"]
+    scene = SCENES[name]()
+    default = ShapeProblem(ContactProblem(scene, MPI.COMM_SELF), here.problem.designs, judge)
+    slope = float(default(here.alpha)[1] @ here.direction)
+    assert slope == pytest.approx(here.quotient(judge), rel=1e-3)
