@@ -4,7 +4,7 @@ from fenics_contact.feti.decomposition import Decomposition, decompose
 from fenics_contact.feti.direct import DirectSolution, DirectSystem
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.inverse import LocalKind
-from fenics_contact.feti.nodal_mean import nodal_mean, nodal_mean_at
+from fenics_contact.feti.nodal_mean import nodal_mean, nodal_mean_at, nodal_mean_transposed
 from fenics_contact.feti.nodal_sum import nodal_sum
 from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.feti.sharing import Sharing
@@ -26,5 +26,6 @@ __all__ = [
     "decompose",
     "nodal_mean",
     "nodal_mean_at",
+    "nodal_mean_transposed",
     "nodal_sum",
 ]

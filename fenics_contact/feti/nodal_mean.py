@@ -46,12 +46,38 @@ def nodal_mean_at(decomposition: Decomposition, field: np.ndarray, nodes: np.nda
         Shape (n, dim), replicated.
     """
     tearing = decomposition.tearing
+    place, copy, block = _copies_here(decomposition, nodes)
+    total = np.zeros((len(nodes), tearing.dim))
+    np.add.at(total, place, tearing.copy_share[copy, None] * field.reshape(-1, tearing.dim)[block])
+    return np.asarray(decomposition.comm.allreduce(total))
+
+
+def nodal_mean_transposed(decomposition: Decomposition, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the torn field that does the same work on a torn field as values at nodes do on its means.
+
+    Args:
+        decomposition: Numbering.
+        nodes: Different nodes among those of all bodies, shape (n,).
+        values: Values at these nodes, shape (n, dim).
+
+    Returns:
+        This rank's part of the field, shape (torn_size,).
+    """
+    tearing = decomposition.tearing
+    place, copy, block = _copies_here(decomposition, nodes)
+    result = np.zeros((decomposition.torn_size // tearing.dim, tearing.dim))
+    result[block] = tearing.copy_share[copy, None] * values[place]
+    return result.ravel()
+
+
+def _copies_here(
+    decomposition: Decomposition, nodes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return for each copy on this rank its place in ``nodes``, its number and its block of torn dofs."""
+    tearing = decomposition.tearing
     copies = tearing.multiplicity[nodes]
     within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
     copy = np.repeat(tearing.first_copy[nodes], copies) + within
     block = decomposition.copy_block[copy]
     here = np.flatnonzero(block >= 0)
-    total = np.zeros((len(nodes), tearing.dim))
-    shares = tearing.copy_share[copy[here], None] * field.reshape(-1, tearing.dim)[block[here]]
-    np.add.at(total, np.repeat(np.arange(len(nodes)), copies)[here], shares)
-    return np.asarray(decomposition.comm.allreduce(total))
+    return np.repeat(np.arange(len(nodes)), copies)[here], copy[here], block[here]

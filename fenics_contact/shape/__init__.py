@@ -1,31 +1,40 @@
 """Shape sensitivity of scenes with contact and friction."""
 
 from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
+from fenics_contact.shape.contact_forces import ContactForces
 from fenics_contact.shape.design import SurfaceDesign
+from fenics_contact.shape.energies import StrainEnergy, TotalPotential
+from fenics_contact.shape.friction_work import FrictionWork
+from fenics_contact.shape.largest_stress import LargestStress
 from fenics_contact.shape.linearised_face import WeakChoice, WeakPoints, linearise_face
 from fenics_contact.shape.memory import DesignPoint
 from fenics_contact.shape.motion import HarmonicExtension
-from fenics_contact.shape.objective import (
-    ContactForces,
-    Objective,
-    Partials,
-    TotalPotential,
-    VolumeIntegral,
-    Weighable,
-    WeightedSum,
-)
+from fenics_contact.shape.movement import Movement
+from fenics_contact.shape.objective import Objective, Partials
+from fenics_contact.shape.pressures import ContactArea, LargestPressure, PressureNorm, PressureUnevenness
 from fenics_contact.shape.problem import ShapeProblem
+from fenics_contact.shape.sums import Largest, Weighable, WeightedSum
 from fenics_contact.shape.tolerance import AdaptiveTolerance
+from fenics_contact.shape.volume_integral import VolumeIntegral
 
 __all__ = [
     "AdaptiveTolerance",
     "Adjoint",
+    "ContactArea",
     "ContactForces",
     "DesignPoint",
+    "FrictionWork",
     "HarmonicExtension",
+    "Largest",
+    "LargestPressure",
+    "LargestStress",
+    "Movement",
     "Objective",
     "Partials",
+    "PressureNorm",
+    "PressureUnevenness",
     "ShapeProblem",
+    "StrainEnergy",
     "SurfaceDesign",
     "TotalPotential",
     "VolumeIntegral",

@@ -47,14 +47,17 @@ class RowFields:
         return np.asarray(self.values[:, np.searchsorted(self.nodes, nodes)])
 
 
-def contact_by_shape(state: State, adjoint: Adjoint, by_bound: np.ndarray) -> np.ndarray:
-    """Return ∂/∂X of −λᵀ B w + ζᵀ(c − B u) plus the slip bounds' share, replicated, shape (n_nodes, dim).
+def contact_by_shape(state: State, adjoint: Adjoint, partials: Partials, by_bound: np.ndarray) -> np.ndarray:
+    """Return the derivative by the geometry of the contact points, replicated, shape (n_nodes, dim).
 
-    Pairs with mortar contact must lie where no node moves: their contribution is omitted. Collective.
+    It is ∂/∂X of −λᵀ B w + (ζ − j)ᵀ(c − B u), with the objective's derivative j by B u − c, and the shares of
+    slip bounds and areas. Pairs with mortar contact must lie where no node moves: their contribution is
+    omitted. Collective.
 
     Args:
         state: The state.
         adjoint: Its adjoint.
+        partials: Partial derivatives of the objective.
         by_bound: Derivative by each frictional point's slip bound, replicated, shape (n_friction,).
     """
     torn = state.torn
@@ -62,26 +65,35 @@ def contact_by_shape(state: State, adjoint: Adjoint, by_bound: np.ndarray) -> np
     result = np.zeros((tearing.n_nodes, torn.dim))
     if points.count == 0:
         return result
-    rows = _row_fields(state, adjoint)
-    by_bound_full = np.zeros(points.count)
-    by_bound_full[torn.frictional] = by_bound
+    rows = _row_fields(state, adjoint.multiplier - partials.by_jump, adjoint.displacement)
+    by_area = _by_area(torn, partials, by_bound)
     for index, pair in enumerate(torn.scene.contacts):
         mine = np.flatnonzero(points.pair == index)
-        # Tresca's nodal bound is a traction times a nodal area, which moves with the nodes. Those of a
-        # function of position do not move.
-        if isinstance(pair.friction, Tresca) and not callable(pair.friction.traction):
+        if by_area[mine].any():
             surface = surface_of(torn.scene, pair.slave, "faceted")
             nodes = tearing.global_nodes(pair.slave.body, surface.nodes)
             by_areas = np.zeros(len(nodes))
-            by_areas[np.searchsorted(nodes, points.slave[mine])] = (
-                pair.friction.traction * by_bound_full[mine]
-            )
+            by_areas[np.searchsorted(nodes, points.slave[mine])] = by_area[mine]
             result[nodes] += areas_pulled_back(surface, by_areas)
         if not isinstance(pair.master, Surface):
             result[points.slave[mine]] += _by_obstacle(torn, pair.master, rows, mine)
         elif pair.discretisation == "node":
             _add_projected(result, torn, pair, rows, mine)
     return result
+
+
+def _by_area(torn: TornSystem, partials: Partials, by_bound: np.ndarray) -> np.ndarray:
+    """Return the derivative by the areas of the points, shape (n_points,).
+
+    Tresca's nodal bound is a traction times a nodal area, which moves with the nodes. Those of a function of
+    position do not move.
+    """
+    by_area = np.zeros(torn.points.count) + partials.by_area
+    pair = torn.points.pair[torn.frictional]
+    for index, contact in enumerate(torn.scene.contacts):
+        if isinstance(contact.friction, Tresca) and not callable(contact.friction.traction):
+            by_area[torn.frictional[pair == index]] += contact.friction.traction * by_bound[pair == index]
+    return by_area
 
 
 def _by_obstacle(torn: TornSystem, obstacle: RigidObstacle, rows: RowFields, mine: np.ndarray) -> np.ndarray:
@@ -127,18 +139,19 @@ def bound_sensitivity(
     return np.asarray(system.problem.comm.allreduce(result))
 
 
-def _row_fields(state: State, adjoint: Adjoint) -> RowFields:
+def _row_fields(state: State, multiplier: np.ndarray, displacement: np.ndarray) -> RowFields:
+    """Gather those of the state and the given ones beside them. Collective."""
     system = state.dual
     torn = system.torn
     points, width = torn.points, torn.dim - 1
-    multipliers = (state.solution.multiplier, adjoint.multiplier)
+    multipliers = (state.solution.multiplier, multiplier)
     normal = np.stack([torn.numbering.gather(x, torn.normal_rows) for x in multipliers])
     friction = np.zeros((2, points.count, width))
     for k, x in enumerate(multipliers):
         gathered = torn.numbering.gather(x, torn.tangential_rows.ravel())
         friction[k, torn.frictional] = gathered.reshape(-1, width)
     nodes = np.unique(points.jump.indices)
-    fields = (adjoint.displacement, state.torn_displacement)
+    fields = (displacement, state.torn_displacement)
     values = np.stack([nodal_mean_at(torn.decomposition, field, nodes) for field in fields])
     jump = points.jump[:, nodes]
     return RowFields(normal, friction, nodes, values, np.stack([jump @ value for value in values]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import ufl
@@ -11,6 +12,7 @@ from ufl.core.expr import Expr
 from fenics_contact import _dolfinx
 from fenics_contact.errors import InvalidInputError, calling
 from fenics_contact.fem import (
+    Constants,
     Symbol,
     Temperature,
     Template,
@@ -22,15 +24,34 @@ from fenics_contact.fem import (
     load_parameters,
     load_work,
     material_sets,
+    scalar_constants,
+    stress_in_space,
     stress_left,
     volume_measure,
 )
 from fenics_contact.feti import Subdomain, TornSystem
 from fenics_contact.scene import Load, Material, ThermalStrain, VolumeLoad
 
-#: Builds an integrand (UFL) from a displacement u, the coordinate x and the stress σ(u).
-Integrand = Callable[[Expr, Expr, Expr], Expr]
+#: Builds an integrand (UFL) from a displacement u, the coordinate x, the stress σ(u) and constants.
+Integrand = Callable[..., Expr]
 Materials = tuple[Material, ...]
+
+
+@dataclass(frozen=True)
+class Density:
+    """What is integrated over a body.
+
+    Attributes:
+        name: Its name among compiled forms.
+        integrand: Takes displacement, coordinates, stress and the constants (UFL), returns a UFL scalar.
+        constants: Number of constants.
+        in_space: Whether the stress of plane bodies has the component normal to the plane, too.
+    """
+
+    name: str
+    integrand: Integrand
+    constants: int = 0
+    in_space: bool = False
 
 
 class ShapeForms:
@@ -80,38 +101,39 @@ class ShapeForms:
 
     def functional(
         self,
-        name: str,
-        integrand: Integrand,
+        density: Density,
         materials: Materials,
         cell_type: str,
         by: str,
         temperature: Temperature = Temperature(),
     ) -> Template:
-        """∫ integrand(u, x, σ) dx itself (by="value"), or its derivative by="displacement" or by="shape".
+        """∫ density dx itself (by="value"), or its derivative by="displacement" or by="shape".
 
-        Its constants are those of the temperature, then those of the materials; its coefficients are u and
-        those of the temperature.
+        Its constants are those of the density, of the temperature and of the materials; its coefficients are
+        u and those of the temperature.
         """
 
         def write() -> Written:
             (u,) = _dolfinx.field_symbols(cell_type, 1)
             x = ufl.SpatialCoordinate(_dolfinx.template(cell_type))
             change, numbers, fields = temperature.write(cell_type)
+            own = scalar_constants(cell_type, density.constants)
+            stress_of = stress_in_space if density.in_space else stress_left
 
-            def density(material: Material, constants: tuple[ufl.Constant, ...]) -> Expr:
-                with calling(f"the integrand of {name!r}"):
-                    return integrand(u, x, stress_left(material, u, constants, change))
+            def write_density(material: Material, constants: Constants) -> Expr:
+                with calling(f"the integrand of {density.name!r}"):
+                    return density.integrand(u, x, stress_of(material, u, constants, change), *own)
 
-            form, constants = integrate(materials, cell_type, density, volume_measure(cell_type, 2))
+            form, constants = integrate(materials, cell_type, write_density, volume_measure(cell_type, 2))
             if by == "displacement":
                 form = ufl.derivative(form, u, ufl.TestFunction(_dolfinx.displacement_space(cell_type)))
             elif by == "shape":
                 form = _by_shape(form, cell_type)
-            return form, (*numbers, *constants), [u, *fields]
+            return form, (*own, *numbers, *constants), [u, *fields]
 
         types = tuple(type(material) for material in materials)
-        key = (name, integrand, by, materials, cell_type, temperature.key)
-        return self._templates.get(key, (name, by, *types, cell_type), write)
+        key = (density, by, materials, cell_type, temperature.key)
+        return self._templates.get(key, (density.name, by, *types, cell_type), write)
 
 
 def _by_shape(form: ufl.Form, cell_type: str) -> ufl.Form:
@@ -120,42 +142,64 @@ def _by_shape(form: ufl.Form, cell_type: str) -> ufl.Form:
 
 
 def work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Return ∂/∂X of a(u, w) − L(w), this rank's share, at the nodes of all bodies, shape (n_nodes, dim).
+    """Return ∂/∂X of a(u, w) − L(w), this rank's share, at the nodes of all bodies, shape (n_nodes, dim)."""
+    return strain_work_by_shape(forms, torn, u, w) - load_work_by_shape(forms, torn, w)
 
-    Loads on surfaces are left out: loaded surfaces do not move with a design.
+
+def strain_work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Return ∂/∂X of a(u, w), this rank's share, at the nodes of all bodies, shape (n_nodes, dim).
 
     Args:
         forms: Compiled derivatives.
         torn: The torn system.
         u: Torn displacement of this rank, [length].
         w: Torn field used as the test function.
+    """
+    for body in torn.scene.bodies.values():  # all ranks compile, also for bodies without a part on them
+        for materials in material_sets(body):
+            forms.virtual_work_by_shape(materials, body.mesh.cell_type)
+
+    def on_subdomain(subdomain: Subdomain, functions: Sequence[_dolfinx.fem.Function]) -> np.ndarray:
+        parts, cell_type = subdomain.material, torn.scene.bodies[subdomain.mesh.body].mesh.cell_type
+        template = forms.virtual_work_by_shape(parts.materials, cell_type)
+        form = template.bind([subdomain.mesh.space], parts.parameters, functions, cells=parts.cells)
+        return _dolfinx.assemble_vector(form)
+
+    return sum_over_subdomains(torn, [u, w], on_subdomain, forms.moving)
+
+
+def load_work_by_shape(forms: ShapeForms, torn: TornSystem, w: np.ndarray) -> np.ndarray:
+    """Return ∂/∂X of L(w), this rank's share, at the nodes of all bodies, shape (n_nodes, dim).
+
+    Loads on surfaces are left out: loaded surfaces do not move with a design.
+
+    Args:
+        forms: Compiled derivatives.
+        torn: The torn system.
+        w: Torn field used as the test function.
 
     Raises:
         InvalidInputError: If a load on a body that moves is a function of position without a derivative.
     """
     loads = moving_loads(torn, forms.moving)
-    for name, body in torn.scene.bodies.items():  # all ranks compile, also for bodies without a part on them
+    for load in loads:  # all ranks compile
+        body = torn.scene.bodies[load.body]
         for materials in material_sets(body):
-            forms.virtual_work_by_shape(materials, body.mesh.cell_type)
-            for load in loads:
-                if load.body == name:
-                    forms.load_by_shape(load, materials, body.mesh.cell_type)
+            forms.load_by_shape(load, materials, body.mesh.cell_type)
 
     def on_subdomain(subdomain: Subdomain, functions: Sequence[_dolfinx.fem.Function]) -> np.ndarray:
-        space, parts = subdomain.mesh.space, subdomain.material
-        cell_type = torn.scene.bodies[subdomain.mesh.body].mesh.cell_type
-        template = forms.virtual_work_by_shape(parts.materials, cell_type)
-        form = template.bind([space], parts.parameters, functions, cells=parts.cells)
-        result = _dolfinx.assemble_vector(form)
+        parts, result = subdomain.material, np.zeros(subdomain.mesh.size)
         for load in loads:
             if load.body == subdomain.mesh.body:
+                cell_type = torn.scene.bodies[load.body].mesh.cell_type
                 template = forms.load_by_shape(load, parts.materials, cell_type)
                 cells = parts.cells if isinstance(load, ThermalStrain) else None
-                form = template.bind([space], load_parameters(load, parts), functions[1:], cells=cells)
-                result -= _dolfinx.assemble_vector(form)
+                values = load_parameters(load, parts)
+                form = template.bind([subdomain.mesh.space], values, functions, cells=cells)
+                result += _dolfinx.assemble_vector(form)
         return result
 
-    return sum_over_subdomains(torn, [u, w], on_subdomain, forms.moving)
+    return sum_over_subdomains(torn, [w], on_subdomain, forms.moving)
 
 
 def moving_loads(torn: TornSystem, moving: np.ndarray | None) -> list[Load]:

@@ -29,7 +29,7 @@ from fenics_contact.shape.forms import ShapeForms, work_by_shape
 from fenics_contact.shape.linearised_face import WeakChoice, linearise_face
 from fenics_contact.shape.memory import DesignMemory, DesignPoint, Stored
 from fenics_contact.shape.motion import motion_of, moving_nodes
-from fenics_contact.shape.objective import Objective, asking, finite, finite_partials, finite_value
+from fenics_contact.shape.objective import Objective, Partials, asking, finite, finite_partials, finite_value
 from fenics_contact.shape.pairs import check_pairs, checked_contact
 from fenics_contact.shape.state_error import state_error
 from fenics_contact.shape.tolerance import AdaptiveTolerance, tightest_of
@@ -345,8 +345,7 @@ class ShapeProblem:
             error = state_error(state, partials, linearised, adjoint)
         with self._timer.phase("gradient"):
             by_bound = bound_sensitivity(state, adjoint, partials, linearised)
-            by_points = self._by_points(state, adjoint, partials.by_shape, by_bound)
-            gradient = self._by_design(by_points)
+            gradient = self._by_design(self._by_points(state, adjoint, partials, by_bound))
         self.products += state.dual.products
         value = partials.value + (error.correction if self.inexact else 0.0)
         # Ranks must take the same decisions, whatever the rounding in sums over ranks.
@@ -374,13 +373,13 @@ class ShapeProblem:
         return total, self._by_design(by_points)
 
     def _by_points(
-        self, state: State, adjoint: Adjoint, by_shape: np.ndarray, by_bound: np.ndarray
+        self, state: State, adjoint: Adjoint, partials: Partials, by_bound: np.ndarray
     ) -> np.ndarray:
         """Sum the objective's own derivative, −wᵀ(δK u − δf) and the contact points' share over all ranks."""
         torn = state.torn
         work = work_by_shape(self._shape_forms(state), torn, state.torn_displacement, adjoint.displacement)
-        contact = contact_by_shape(state, adjoint, by_bound)
-        return np.asarray(torn.decomposition.comm.allreduce(by_shape - work)) + contact
+        contact = contact_by_shape(state, adjoint, partials, by_bound)
+        return np.asarray(torn.decomposition.comm.allreduce(partials.by_shape - work)) + contact
 
     def _by_design(self, by_points: np.ndarray) -> np.ndarray:
         parts = []
