@@ -64,8 +64,17 @@ from fenics_contact.scene import (
 )
 from fenics_contact.shape import (
     AdaptiveTolerance,
+    ContactArea,
     ContactForces,
+    FrictionWork,
+    Largest,
+    LargestPressure,
+    LargestStress,
+    Movement,
+    PressureNorm,
+    PressureUnevenness,
     ShapeProblem,
+    StrainEnergy,
     TotalPotential,
     VolumeIntegral,
     WeakChoice,
@@ -121,6 +130,8 @@ def objects() -> dict[str, Any]:
         OrthotropicElasticity((3.0, 2.0, 1.0), (0.1, 0.1, 0.1), (1.0, 1.0, 1.0)),
         ContactForces(lambda contact: (0.0, np.zeros(1), np.zeros((1, 2)))),
         TotalPotential() + 2.0 * VolumeIntegral("motion", lambda u, x, stress: u[0], "block"),
+        StrainEnergy(), PressureNorm(), PressureUnevenness(), ContactArea(), FrictionWork(),
+        LargestStress("block"), Movement("block", "z1", (1, 0, 0)), Largest((LargestPressure(),)),
     ]  # fmt: skip
     found: dict[str, Any] = {}
     for root in roots:

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
 from fenics_contact.scene import Coulomb, Tresca
 from fenics_contact.shape import HarmonicExtension
+from tests.shape.aims import aims
 from tests.shape.blocks import block_on_block, problem
 from tests.shape.chains import chain_problem
 from tests.shape.objectives import objectives
@@ -30,6 +31,7 @@ PROBLEMS: dict[str, Callable[[MPI.Comm], Remembering]] = {
 }
 #: Who judges: between them they ask everything of a state.
 JUDGES = {
+<<<<<<< HEAD
     "blocks, tetrahedra": ("stress", "friction forces"),
     "blocks, Tresca": ("displacement",),
     "chain": ("energy", "normal forces"),
@@ -37,6 +39,15 @@ JUDGES = {
 }
 BODY = {"chain": "link2", "plane": "block"}
 SIZE = {"chain": 0.03, "plane": 0.004}
+=======
+    "blocks, tetrahedra": ("stress", "friction forces", "largest stress", "movement", "friction work"),
+    "blocks, Tresca": ("displacement", "largest pressure", "unevenness"),
+    "chain": ("energy", "normal forces", "largest of two"),
+}
+BODY = {"chain": "link2"}
+SURFACE = {"chain": "contact"}
+SIZE = {"chain": 0.03}
+>>>>>>> cbd5eb6 (Objectives of pressure, stress, movement, wear and stiffness are tested and in the guide)
 
 
 def same_bits(comm: MPI.Comm, *arrays: np.ndarray | float) -> bool:
@@ -51,7 +62,8 @@ def design_case(name: str, comm: MPI.Comm) -> dict[str, Any]:
     alpha = SIZE.get(name, 0.01) * np.random.default_rng(1).standard_normal(moving.size)
     found: dict[str, Any] = {"same bits": True}
     for judge in JUDGES[name]:
-        objective = objectives(BODY.get(name, "upper"))[judge]
+        body = BODY.get(name, "upper")
+        objective = {**objectives(body), **aims(body, SURFACE.get(name, "z0"))}[judge]
         point = moving.evaluate_by(objective, alpha)
         found[judge] = [point.value, point.gradient.tolist()]
         found["same bits"] &= same_bits(comm, point.value, point.gradient, moving.value_by(objective, alpha))

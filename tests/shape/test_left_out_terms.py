@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from tests.shape import moved_blocks as blocks
+from tests.shape.aims import aims
 from tests.shape.chains import line
 from tests.shape.left_out import (
     TERMS,
     without_areas,
     without_growth_of_friction,
-    without_own_shape,
+    without_own,
     without_stiffness,
     without_turning_of_friction,
     without_weight,
@@ -22,7 +23,7 @@ from tests.shape.left_out import (
 from tests.shape.objectives import objectives
 from tests.shape.quotients import Line, Patch, miss_without
 
-OBJECTIVES = objectives("link1")
+OBJECTIVES, AIMS = objectives("link1"), aims("link1", "contact")
 
 
 def slanted(regime: str) -> Line:
@@ -48,9 +49,28 @@ def test_the_energy_alone_shows_most_of_them(term: str) -> None:
     assert miss_without(TERMS[term], here, judge) > 1e-3
 
 
-@pytest.mark.parametrize("term", [without_stiffness, without_own_shape])
+@pytest.mark.parametrize("term", [without_stiffness, without_own("by_shape")])
 def test_the_shape_derivatives_of_integrals_count(term: Callable[[Patch], None]) -> None:
     assert miss_without(term, line("mixed"), OBJECTIVES["stress"]) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("derivative", "aim"),
+    [
+        ("by_area", "largest pressure"),
+        ("by_area", "pressure norm"),
+        ("by_area", "unevenness"),
+        ("by_area", "area"),
+        ("by_jump", "friction work"),
+        ("by_shape", "largest stress"),
+        ("by_shape", "movement"),
+        ("by_shape", "strain energy"),
+    ],
+)
+def test_derivatives_of_objectives_by_the_geometry_count(derivative: str, aim: str) -> None:
+    here, judge = line("mixed"), AIMS[aim]
+    assert here.miss(judge) < 1e-5
+    assert miss_without(without_own(derivative), here, judge) > 1e-3
 
 
 def test_where_every_point_slips_friction_must_grow_with_its_normal_force() -> None:

@@ -27,8 +27,15 @@ from fenics_contact.scene import (
 from fenics_contact.shape import (
     ContactForces,
     DesignPoint,
+    FrictionWork,
+    LargestPressure,
+    LargestStress,
+    Movement,
     Objective,
+    PressureNorm,
+    PressureUnevenness,
     ShapeProblem,
+    StrainEnergy,
     SurfaceDesign,
     TotalPotential,
     VolumeIntegral,
@@ -45,7 +52,7 @@ Array = np.ndarray
 UNITS = {"N and mm": (1.0, 1.0), "N and m": (1.0, 1e-3), "kN and um": (1e-3, 1e3)}
 #: Factors of an objective that mean nothing.
 FACTORS = (1e6, 1e-2, 1e-4, 1e-6, 1e-8)
-STEP, STRICT = 1e-4, 1e-11
+STEP, STRICT = 5e-5, 1e-11
 DESIGN = 0.01 * np.random.default_rng(1).standard_normal(12)
 DIRECTION = np.random.default_rng(6).standard_normal(12)
 
@@ -73,6 +80,13 @@ OBJECTIVES: dict[str, tuple[Objective, int, int]] = {
     "normal forces": (ContactForces(normal_forces), 2, 0),
     "friction forces": (ContactForces(friction_forces), 2, 0),
     "share of forces": (ContactForces(share_of_forces), 0, 0),
+    "strain energy": (StrainEnergy(), 1, 1),
+    "pressure": (LargestPressure(), 1, -2),
+    "pressure norm": (PressureNorm(), 1, -2),
+    "unevenness": (PressureUnevenness(), 0, 0),
+    "work of friction": (FrictionWork(), 1, 1),
+    "largest stress": (LargestStress("upper"), 1, -2),
+    "movement": (Movement("upper", "z1", (1.0, 0.0, 0.0)), 0, 1),
 }
 
 

@@ -1,0 +1,32 @@
+"""What engineers ask of a contact: low and even pressure, little wear, low stress, stiffness."""
+
+from __future__ import annotations
+
+from fenics_contact.shape import (
+    ContactArea,
+    FrictionWork,
+    Largest,
+    LargestPressure,
+    LargestStress,
+    Movement,
+    Objective,
+    PressureNorm,
+    PressureUnevenness,
+    StrainEnergy,
+)
+
+
+def aims(body: str, surface: str) -> dict[str, Objective]:
+    """Objectives of the contact, and of a body with a surface that moves."""
+    return {
+        "strain energy": StrainEnergy(),
+        "largest pressure": LargestPressure(),
+        "pressure norm": PressureNorm(),
+        "unevenness": PressureUnevenness(0),
+        "area": ContactArea(),
+        "friction work": FrictionWork(),
+        "largest stress": LargestStress(body),
+        "movement": Movement(body, surface, (1.0, 0.0, 1.0)),
+        "movement of a node": Movement(body, 60, (1.0, 2.0, 0.0)),
+        "largest of two": Largest((0.01 * LargestStress(body), 2.0 * LargestPressure(0))),
+    }

@@ -1,0 +1,48 @@
+"""Derivatives of pressures, stress, movement and work of friction, where points stick, slip and lift off."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+
+from fenics_contact.shape import Objective
+from tests.shape import chains, moved_blocks
+from tests.shape.aims import aims
+from tests.shape.quotients import Line
+
+AIMS = {
+    "floor": aims("block", "z0"),
+    "floor, Tresca": aims("block", "z1"),
+    "blocks, tetrahedra": aims("upper", "z0"),
+    "chain": aims("link1", "contact"),
+}
+CASES = [(scene, aim) for scene in AIMS for aim in AIMS[scene]]
+
+
+@cache
+def line(scene: str) -> Line:
+    return chains.line("mixed") if scene == "chain" else moved_blocks.line(scene)
+
+
+def judged(scene: str, aim: str) -> tuple[Line, Objective]:
+    return line(scene), AIMS[scene][aim]
+
+
+@pytest.mark.parametrize("scene", AIMS)
+def test_points_stick_slip_and_lift_off_all_along_the_line(scene: str) -> None:
+    assert min(line(scene).counts().values()) > 0
+    assert line(scene).is_smooth()
+
+
+@pytest.mark.parametrize(("scene", "aim"), CASES)
+def test_the_adjoint_agrees_with_central_differences(scene: str, aim: str) -> None:
+    here, judge = judged(scene, aim)
+    assert here.steepness(judge) > 0.02
+    assert here.miss(judge) < 1e-5
+
+
+@pytest.mark.parametrize(("scene", "aim"), CASES)
+def test_taylor_remainders_are_quadratic(scene: str, aim: str) -> None:
+    here, judge = judged(scene, aim)
+    assert here.taylor_rate(judge) > 1.9

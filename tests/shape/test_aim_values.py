@@ -1,0 +1,294 @@
+"""Values of pressures, stress, movement and work of friction, beside closed forms and plain sums."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.contact import ContactProblem, State, Status
+from fenics_contact.errors import InvalidDesignError, InvalidInputError
+from fenics_contact.gallery import block
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    Coulomb,
+    IsotropicElasticity,
+    RigidPlane,
+    Scene,
+    Support,
+    Surface,
+    ThermalStrain,
+    Traction,
+)
+from fenics_contact.shape import (
+    ContactArea,
+    FrictionWork,
+    Largest,
+    LargestPressure,
+    LargestStress,
+    Movement,
+    Objective,
+    PressureNorm,
+    PressureUnevenness,
+    StrainEnergy,
+    TotalPotential,
+)
+from fenics_contact.shape.forms import ShapeForms
+from tests.contact.gallery import FLOOR, crowned
+from tests.shape import moved_blocks
+from tests.shape.blocks import RUBBER
+
+#: Of force and length in those of the numbers below; the last one's stresses are of the order 1e40.
+UNITS = {"N and mm": (1.0, 1.0), "N and m": (1.0, 1e-3), "tiny": (1e20, 1e-10)}
+WIDTH, DEPTH, HEIGHT, YOUNG, PRESSURE = 2.0, 1.0, 0.5, 100.0, 3.0
+
+
+@dataclass(frozen=True)
+class Column:
+    """An evenly pressed block on a floor, cut into unequal cells, in some units.
+
+    Attributes:
+        force: Unit of force.
+        length: Unit of length.
+    """
+
+    force: float
+    length: float
+
+    @property
+    def stress(self) -> float:
+        return self.force / self.length**2
+
+    def state(self, *more: ThermalStrain, pressure: float = PRESSURE, gap: float = 0.0) -> State:
+        mesh = block((0.0, 0.0, 0.0), (WIDTH, DEPTH, HEIGHT), (5, 3, 2), "tetrahedron")
+        mesh = mesh.moved(self.length * mesh.points)
+        material = IsotropicElasticity(YOUNG * self.stress, 0.3, 1e-5)
+        floor = RigidPlane((0.0, 0.0, -gap * self.length), (0.0, 0.0, 1.0))
+        sides = [Support("block", "x0", (0.0, None, None)), Support("block", "y0", (None, 0.0, None))]
+        held = [Support("block", "z1", (None, None, 0.0))] if pressure == 0.0 else []
+        scene = Scene(
+            {"block": Body(mesh, material)},
+            [*sides, *held],
+            [Traction("block", "z1", (0.0, 0.0, -pressure * self.stress)), *more],
+            [ContactPair(Surface("block", "z0"), floor)],
+        )
+        return ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-11).solve(sensitivity=True)
+
+
+def value(objective: Objective, state: State) -> float:
+    return objective.value(state, ShapeForms(state.torn))
+
+
+#: Of the column: objective, value, powers of force and length in its unit.
+EVEN: dict[str, tuple[Objective, float, int, int]] = {
+    "strain energy": (StrainEnergy(), 0.5 * PRESSURE**2 / YOUNG * WIDTH * DEPTH * HEIGHT, 1, 1),
+    "potential": (TotalPotential(), -0.5 * PRESSURE**2 / YOUNG * WIDTH * DEPTH * HEIGHT, 1, 1),
+    "largest pressure": (LargestPressure(), PRESSURE, 1, -2),
+    "pressure norm": (PressureNorm(p=30.0), PRESSURE, 1, -2),
+    "area": (ContactArea(0), WIDTH * DEPTH, 0, 2),
+    "largest stress": (LargestStress("block", p=30.0), PRESSURE, 1, -2),
+    "movement": (Movement("block", "z1", (0, 0, -3)), PRESSURE / YOUNG * HEIGHT, 0, 1),
+    "across": (Movement("block", "x1", (1, 0, 0)), 0.3 * PRESSURE / YOUNG * WIDTH, 0, 1),
+}
+
+
+@cache
+def even(units: str) -> State:
+    return Column(*UNITS[units]).state()
+
+
+@pytest.mark.parametrize("units", UNITS)
+@pytest.mark.parametrize("name", EVEN)
+def test_a_column_under_even_pressure_has_the_closed_form(name: str, units: str) -> None:
+    objective, expected, of_force, of_length = EVEN[name]
+    unit = UNITS[units][0] ** of_force * UNITS[units][1] ** of_length
+    assert value(objective, even(units)) == pytest.approx(expected * unit, rel=1e-6)
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_an_even_pressure_has_no_unevenness(units: str) -> None:
+    assert value(PressureUnevenness(), even(units)) == pytest.approx(0.0, abs=1e-8)
+
+
+@cache
+def mixed() -> State:
+    """A crowned block whose points stick, slip and lift off."""
+    state = moved_blocks.line("floor").state()
+    assert all(state.contact.count(status) > 0 for status in Status)
+    return state
+
+
+def test_pressures_are_judged_with_all_points_of_the_slave() -> None:
+    contact = mixed().contact
+    pressure, area = contact.pressure, contact.points.area
+    mean, total = (area * pressure).sum() / area.sum(), area.sum()
+    assert value(LargestPressure(), mixed()) == pytest.approx(pressure.max(), rel=1e-12)
+    spread = (area * (pressure - mean) ** 2).sum() / (mean**2 * total)
+    assert spread > 0.1
+    assert value(PressureUnevenness(), mixed()) == pytest.approx(spread, rel=1e-12)
+    assert value(ContactArea(), mixed()) == pytest.approx(total / (1 + spread), rel=1e-12)
+    for p in (2.0, 8.0, 200.0):
+        norm = value(PressureNorm(p=p), mixed())
+        assert norm == pytest.approx(((area * pressure**p).sum() / total) ** (1 / p), rel=1e-12)
+        bound = norm * (total / area[pressure.argmax()]) ** (1 / p)
+        assert norm < pressure.max() < bound * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("p", [2.0, 1e4])
+def test_powers_of_pressures_neither_overflow_nor_vanish(p: float) -> None:
+    force = np.array([1e300, 0.5e300, 0.0])
+    found, by_force, by_area = PressureNorm(p=p).of_points(force, np.ones(3))
+    assert found == pytest.approx(1e300 * ((1 + 0.5**p) / 3) ** (1 / p))
+    assert np.isfinite([*by_force, *by_area]).all()
+
+
+@pytest.mark.parametrize(("dim", "share"), [(2, 8 / 9), (1, 3 * np.pi**2 / 32)])
+def test_the_area_of_hertzian_contact_is_a_known_share_of_the_true_one(dim: int, share: float) -> None:
+    x = (np.arange(1000) + 0.5) / 1000
+    weight = 2 * np.pi * x if dim == 2 else np.full_like(x, 2.0)
+    area = weight / 1000
+    found, *_ = ContactArea().of_points(area * np.sqrt(1 - x**2), area)
+    assert found / area.sum() == pytest.approx(share, rel=1e-4)
+
+
+def test_the_first_of_equal_pressures_is_lowered() -> None:
+    force = np.array([1.0, 2.0, 2.0 * (1 + 1e-15), 0.0])
+    _, by_force, by_area = LargestPressure().of_points(force, np.ones(4))
+    assert by_force.tolist() == [0.0, 1.0, 0.0, 0.0]
+    assert by_area.tolist() == [0.0, -2.0, 0.0, 0.0]
+
+
+def test_stress_is_the_norm_of_that_of_the_cells() -> None:
+    state = moved_blocks.line("blocks, tetrahedra").state()
+    mesh, stress = state.scene.bodies["upper"].mesh, state.gather_von_mises("upper")
+    corners = mesh.points[mesh.cells]
+    volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
+    for p in (2.0, 8.0, 200.0):
+        judge = LargestStress("upper", p=p)
+        expected = ((stress / stress.max()) ** p @ volume / volume.sum()) ** (1 / p) * stress.max()
+        assert value(judge, state) == pytest.approx(expected, rel=1e-6)
+        assert judge.largest(state) == pytest.approx(stress.max(), rel=1e-12)
+    assert expected > 0.9 * stress.max()
+
+
+def test_the_work_of_friction_is_that_of_the_sliding_points() -> None:
+    contact = mixed().contact
+    slides = contact.status == Status.SLIP
+    work = contact.slip_bound[slides] @ np.linalg.norm(contact.slip[slides], axis=1)
+    assert work > 1e-4
+    assert value(FrictionWork(), mixed()) == pytest.approx(work, rel=1e-6)
+    assert value(FrictionWork(0), mixed()) == pytest.approx(mixed().energies.friction, rel=1e-6)
+
+
+def test_the_potential_is_what_is_stored_and_what_the_load_gains_on_the_gaps() -> None:
+    mesh = crowned(block((0.0, 0.0, 0.0), (2.0, 1.0, 1.0), (6, 3, 3)), 0.02)
+    sides = [Support("block", "x0", (0.0, None, None)), Support("block", "y0", (None, 0.0, None))]
+    pair = ContactPair(Surface("block", "z0"), FLOOR)
+    scene = Scene({"block": Body(mesh, RUBBER)}, sides, [Traction("block", "z1", (0, 0, -2.0))], [pair])
+    state = ContactProblem(scene, MPI.COMM_SELF, tolerance=1e-11).solve(sensitivity=True)
+    gained = float(state.contact.normal_force @ state.contact.points.gap)
+    stored = value(StrainEnergy(), state)
+    assert min(gained, stored) > 1e-3
+    assert value(TotalPotential(), state) == pytest.approx(-stored - gained, rel=1e-6)
+
+
+def test_the_largest_is_the_largest_and_the_first_of_equals() -> None:
+    state, forms = mixed(), ShapeForms(mixed().torn)
+    low, high = LargestPressure(), 2.0 * StrainEnergy()
+    scale = 3.0 * low.value(state, forms) / high.value(state, forms)
+    both = Largest([low, scale * high])  # type: ignore[arg-type]
+    assert both.value(state, forms) == pytest.approx(3.0 * low.value(state, forms))
+    found, expected = both.partials(state, forms), (scale * high).partials(state, forms)
+    np.testing.assert_array_equal(found.by_displacement, expected.by_displacement)
+    equal = Largest((low, PressureNorm(), low + 0.0 * high)).partials(state, forms)
+    assert not equal.by_displacement.any()
+    assert np.count_nonzero(equal.by_multiplier) == 1
+
+
+def refused(objective: Objective, state: State) -> str:
+    """What is said both when the value is asked for and when derivatives are."""
+    forms, said = ShapeForms(state.torn), []
+    for ask in (objective.value, objective.partials):
+        with pytest.raises((InvalidInputError, InvalidDesignError)) as caught:
+            ask(state, forms)
+        said.append(str(caught.value))
+    assert said[0] == said[1]
+    return said[0]
+
+
+@pytest.mark.parametrize("objective", [LargestPressure(1), PressureUnevenness(7), FrictionWork(-1)])
+def test_a_pair_that_is_not_there_is_refused(objective: Objective) -> None:
+    name, number = type(objective).__name__, objective.pair  # type: ignore[attr-defined]
+    known = f"{name}.pair must be the number of a contact pair of the scene, 0 to 0, got {number}"
+    assert refused(objective, mixed()).startswith(known)
+
+
+def test_bodies_surfaces_and_nodes_that_are_not_there_are_refused() -> None:
+    assert "LargestStress.body must name a body of the scene, got 'part'" in refused(
+        LargestStress("part"), mixed()
+    )
+    assert "Movement.body must name a body of the scene, got 'part'" in refused(
+        Movement("part", "z1", (1, 0, 0)), mixed()
+    )
+    message = "Movement.at must be a surface of body 'block', one of ['x0', "
+    assert refused(Movement("block", "top", (1, 0, 0)), mixed()).startswith(message)
+    assert refused(Movement("block", 10**6, (1, 0, 0)), mixed()).startswith(message)
+    assert "Movement.direction must be 3 finite numbers" in refused(
+        Movement("block", "z1", (0, 0, 0)), mixed()
+    )
+
+
+@pytest.mark.parametrize("kind", [PressureNorm, LargestStress])
+@pytest.mark.parametrize("p", [0.5, 1.9, -8.0, np.nan, np.inf])
+def test_small_exponents_are_refused(kind: type, p: float) -> None:
+    given = {"body": "block"} if kind is LargestStress else {}
+    with pytest.raises(InvalidInputError, match=f"{kind.__name__}.p must be a finite number of at least 2"):
+        kind(**given, p=p)
+
+
+@pytest.mark.parametrize(
+    "objective", [LargestPressure(), PressureNorm(0), PressureUnevenness(), ContactArea()]
+)
+def test_a_design_that_touches_nothing_is_refused(objective: Objective) -> None:
+    apart = Column(1.0, 1.0).state(pressure=0.0, gap=0.1)
+    said = refused(objective, apart)
+    assert said.startswith(f"{type(objective).__name__} needs surfaces that touch, but no")
+
+
+def test_nothing_is_stressed_where_nothing_is_loaded() -> None:
+    apart = Column(1.0, 1.0).state(pressure=0.0, gap=0.1)
+    found = LargestStress("block").partials(apart, ShapeForms(apart.torn))
+    assert found.value == 0.0
+    assert not found.by_displacement.any()
+
+
+def test_work_of_friction_needs_friction_and_a_single_load_step() -> None:
+    assert refused(FrictionWork(), even("N and mm")).startswith(
+        "FrictionWork needs friction, but the scene's"
+    )
+    pressed = Column(1.0, 1.0).state().scene
+    steps = ContactProblem(
+        Scene(pressed.bodies, [], pressed.loads, [ContactPair(Surface("block", "z0"), FLOOR, Coulomb(0.2))]),
+        MPI.COMM_SELF,
+        tolerance=1e-8,
+    )
+    first = steps.solve(sensitivity=True)
+    second = steps.solve(slip_from=first, sensitivity=True)
+    assert refused(FrictionWork(), second).startswith("FrictionWork needs a single load step from rest")
+
+
+def test_strain_energy_of_a_heated_body_is_refused_and_its_stress_is_not() -> None:
+    hot = Column(1.0, 1.0).state(ThermalStrain("block", 50.0))
+    assert refused(StrainEnergy(), hot).startswith("StrainEnergy needs a scene without ThermalStrain")
+    # It expands freely: no stress is added.
+    assert value(LargestStress("block"), hot) == pytest.approx(PRESSURE, rel=1e-6)
+
+
+@pytest.mark.parametrize("given", [(), None, (StrainEnergy(), 2.0), "energy"])
+def test_the_largest_of_what_are_no_objectives_is_refused(given: object) -> None:
+    with pytest.raises(InvalidInputError, match="Largest needs "):
+        Largest(given)  # type: ignore[arg-type]
