@@ -42,14 +42,16 @@ class FrictionWork(Weighable):
         return float((force * slip).sum())
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
-        """∂J/∂τ = s, ∂J/∂s = τ with the slips s = B_T u − c_T; raises as `value` does."""
+        """∂J/∂τ = s, ∂J/∂s = τ with the slips s = B_T u − Q_T q − c_T. Collective; raises as `value` does."""
         force, slip = self._vectors(state)
-        by_slip = on_rows(state, None, force)
+        by_slip, free = on_rows(state, None, force), state.torn.free
+        by_motion = -np.asarray(state.torn.decomposition.comm.allreduce(free.columns.T @ by_slip))
         return Partials.of(
             state,
             float((force * slip).sum()),
             by_displacement=state.dual.force(by_slip),
             by_multiplier=on_rows(state, None, slip),
+            by_motion=by_motion,
             by_jump=by_slip,
         )
 

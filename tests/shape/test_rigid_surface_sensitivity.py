@@ -8,16 +8,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
-from fenics_contact.contact import State, Status
+from fenics_contact.contact import ContactProblem, State, Status
 from fenics_contact.scene import Coulomb, RigidSurface, Scene, Support
-from fenics_contact.shape import Partials
+from fenics_contact.shape import FrictionWork, Partials
 from fenics_contact.shape import problem as problem_module
-from tests.shape.blocks import block_on_block, problem
+from tests.contact.gallery import partitions
+from tests.shape.aims import aims
+from tests.shape.blocks import block_on_block, designs_of, problem
+from tests.shape.chains import SOLVER
 from tests.shape.objectives import objectives
-from tests.shape.quotients import Line, Patch
+from tests.shape.quotients import Line, Patch, Remembering
 
-OBJECTIVES = objectives("upper")
+OBJECTIVES = {**objectives("upper"), **aims("upper", "z0")}
 #: Which body's surface is rigid, the other one being held.
 RIGID = {
     "slave": (
@@ -67,3 +71,26 @@ def test_the_work_of_the_load_at_the_point_counts(name: str, monkeypatch: Patch)
 
     monkeypatch.setattr(problem_module, "solve_adjoint", without_points)
     assert here.miss(judge) > 1e-3
+
+
+def test_slip_on_a_surface_beside_a_rigid_one_follows_its_motion(monkeypatch: Patch) -> None:
+    blocks = block_on_block(Coulomb(0.3), load=(0.5, 0.1, -2.0))
+    beam = RigidSurface(
+        "lower", "x1", (2.0, 0.6, -0.5), (None, None, None), (None, None, None), force=(2.0, 0.1, 0.2)
+    )
+    supports = (Support("lower", "x0"), beam)
+    scene = Scene(blocks.bodies, supports, blocks.loads, blocks.contacts)
+    contact = ContactProblem(scene, MPI.COMM_SELF, partitions=partitions(scene), solver=SOLVER)
+    moving = Remembering(contact, designs_of(scene)[:1], OBJECTIVES["friction work"])
+    alpha = 0.002 * np.random.default_rng(1).standard_normal(moving.size)
+    here, judge = (
+        Line(moving, alpha, np.random.default_rng(14).standard_normal(moving.size), 1e-5),
+        FrictionWork(),
+    )
+    assert here.is_smooth()
+    assert here.counts()["SLIP"] > 3
+    assert np.abs(judge.partials(here.state(), moving._shape_forms(here.state())).by_motion).max() > 0.0
+    assert here.miss(judge) < 1e-5
+    whole = FrictionWork.partials
+    monkeypatch.setattr(FrictionWork, "partials", lambda *given: replace(whole(*given), by_motion=None))
+    assert Line(moving, alpha + 1e-7, here.direction, 1e-5).miss(judge) > 1e-3
