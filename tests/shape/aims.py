@@ -16,8 +16,9 @@ from fenics_contact.shape import (
 )
 
 
-def aims(body: str, surface: str) -> dict[str, Objective]:
+def aims(body: str, surface: str, dim: int = 3) -> dict[str, Objective]:
     """Objectives of the contact, and of a body with a surface that moves."""
+    along, across = (1.0, 0.0, 1.0)[-dim:], (1.0, 2.0, 3.0)[:dim]
     return {
         "strain energy": StrainEnergy(),
         "largest pressure": LargestPressure(),
@@ -26,7 +27,7 @@ def aims(body: str, surface: str) -> dict[str, Objective]:
         "area": ContactArea(),
         "friction work": FrictionWork(),
         "largest stress": LargestStress(body),
-        "movement": Movement(body, surface, (1.0, 0.0, 1.0)),
-        "movement of a node": Movement(body, 60, (1.0, 2.0, 0.0)),
+        "movement": Movement(body, surface, along),
+        "movement of a node": Movement(body, 30, across),
         "largest of two": Largest((0.01 * LargestStress(body), 2.0 * LargestPressure(0))),
     }

@@ -49,13 +49,18 @@ def without_stiffness(patch: Patch) -> None:
     patch.setattr(problem, "work_by_shape", lambda *given: np.zeros_like(whole(*given)))
 
 
-def without_own_shape(patch: Patch) -> None:
-    whole = problem.ShapeProblem._by_points
+def without_own(derivative: str) -> Callable[[Patch], None]:
+    """Drop a derivative of the objective by the geometry."""
 
-    def by_points(self: Any, state: Any, adjoint: Any, by_shape: np.ndarray, by_bound: np.ndarray) -> Any:
-        return whole(self, state, adjoint, np.zeros_like(by_shape), by_bound)
+    def drop(patch: Patch) -> None:
+        whole = problem.ShapeProblem._by_points
 
-    patch.setattr(problem.ShapeProblem, "_by_points", by_points)
+        def by_points(self: Any, state: Any, adjoint: Any, partials: Any, by_bound: np.ndarray) -> Any:
+            return whole(self, state, adjoint, replace(partials, **{derivative: 0.0}), by_bound)
+
+        patch.setattr(problem.ShapeProblem, "_by_points", by_points)
+
+    return drop
 
 
 def without_areas(patch: Patch) -> None:

@@ -29,6 +29,7 @@ from fenics_contact.scene import (
 )
 from fenics_contact.shape import SurfaceDesign, TotalPotential
 from tests.contact.gallery import Friction, crowned, partitions
+from tests.shape.aims import aims
 from tests.shape.chains import SOLVER
 from tests.shape.objectives import objectives
 from tests.shape.quotients import Line, Remembering
@@ -74,7 +75,7 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "blocks, triangles": lambda: on_block(Coulomb(0.38), "triangle"),
     "blocks, Tresca": lambda: on_block(Tresca(0.8), "quadrilateral"),
 }
-OBJECTIVES = objectives("block")
+OBJECTIVES = {**objectives("block"), **aims("block", "y0", 2)}
 
 
 def plane_problem(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF) -> Remembering:
