@@ -31,6 +31,7 @@ LINEAR_TOLERANCE = 1e-10
 def dual_state(
     torn: TornSystem,
     previous: State | None,
+    known: State | None,
     solver: DualSolver,
     tolerance: float | Balanced | None,
     timer: PhaseTimer,
@@ -40,24 +41,24 @@ def dual_state(
     Args:
         torn: The torn system.
         previous: State of a neighbouring geometry or load to start from, or None.
+        known: State of which unchanged parts are reused, or None.
         solver: The dual solver.
         tolerance: Its tolerance, or its share of the discretisation error; None: `Balanced()`.
         timer: Collects the wall time.
     """
-    system, start = _dual_system(torn, previous, timer)
+    system, start = _dual_system(torn, previous, known, timer)
     if isinstance(tolerance, float):
         return _to_tolerance(system, solver.with_tolerance(tolerance), start, timer)
     return _balanced(system, solver, tolerance, start, timer)
 
 
 def _dual_system(
-    torn: TornSystem, previous: State | None, timer: PhaseTimer
+    torn: TornSystem, previous: State | None, known: State | None, timer: PhaseTimer
 ) -> tuple[DualSystem, np.ndarray | None]:
-    """Return the dual system and the start, both reusing an earlier state. Collective."""
-    known = known_system(previous)
-    system = DualSystem(torn, timer, previous=known)
-    if previous is not None and known is not None and isinstance(previous.solution, DualSolution):
-        return system, carried_over(known, previous.solution, system)
+    """Return the dual system, with parts of a known state, and a start from the previous one. Collective."""
+    system, old = DualSystem(torn, timer, previous=known_system(known)), known_system(previous)
+    if previous is not None and old is not None and isinstance(previous.solution, DualSolution):
+        return system, carried_over(old, previous.solution, system)
     return system, None
 
 

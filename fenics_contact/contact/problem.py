@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping
 from typing import Any, Literal
 
@@ -156,22 +157,23 @@ class ContactProblem:
         with together(self.comm):
             wanted = checked_tolerance(wanted)
             kind = choose_solver(scene, decomposition.tearing.n_subdomains, sensitivity=sensitivity)
+        known = self._alike(scene, previous)
         with self.timer.phase("assemble"):
-            torn = self._torn(scene, previous, overlap)
+            torn = self._torn(scene, known, overlap)
             if slip_from is not None:
                 earlier, moved = slip_from.torn, slip_from.torn_displacement
                 torn = torn.with_slip_from(earlier.relative(moved), earlier.sliding(moved))
-            same = previous is not None and torn.points is previous.torn.points
-            if previous is None or not same or _loads_of(torn.scene) != _loads_of(previous.scene):
+            same = known is not None and torn.points is known.torn.points
+            if known is None or not same or _loads_of(torn.scene) != _loads_of(known.scene):
                 check_held(torn)
         if self.solver is None and kind is SolverKind.DIRECT:
-            self.state = direct_state(torn, previous, self.timer)
+            self.state = direct_state(torn, known, self.timer)
             return self.state
         solver = self.solver or default_solver(kind)
         # Derivatives need the status of every contact point, which a balanced state leaves uncertain.
         if wanted is None and (self.solver is not None or sensitivity):
             wanted = solver.tolerance
-        self.state = dual_state(torn, previous, solver, wanted, self.timer)
+        self.state = dual_state(torn, previous, known, solver, wanted, self.timer)
         if not overlap:  # designs differ little from the first one
             with self.timer.phase("state"):
                 self._contact_doubts.warn(self.state)
@@ -203,6 +205,13 @@ class ContactProblem:
             solution = restored_solution(system, stored)
             displacement = system.displacement(solution.multiplier, solution.alpha)
         return state_of(system, solution, displacement, self.timer)
+
+    def _alike(self, scene: Scene, start: State | None) -> State | None:
+        """Return the state to reuse: the last one if it has the scene's meshes, else the start."""
+        if start is None or self.state is None:
+            return start
+        meshes = [[body.mesh for body in each.bodies.values()] for each in (scene, self.state.scene)]
+        return self.state if all(map(operator.is_, *meshes)) else start
 
     def _torn(self, scene: Scene, previous: State | None, overlap: bool) -> TornSystem:
         return build_torn_system(

@@ -7,6 +7,7 @@ from fenics_contact.shape.energies import StrainEnergy, TotalPotential
 from fenics_contact.shape.friction_work import FrictionWork
 from fenics_contact.shape.largest_stress import LargestStress
 from fenics_contact.shape.linearised_face import WeakChoice, WeakPoints, linearise_face
+from fenics_contact.shape.load_cases import LoadCases
 from fenics_contact.shape.memory import DesignPoint
 from fenics_contact.shape.motion import HarmonicExtension
 from fenics_contact.shape.movement import Movement
@@ -28,6 +29,7 @@ __all__ = [
     "Largest",
     "LargestPressure",
     "LargestStress",
+    "LoadCases",
     "Movement",
     "Objective",
     "Partials",

@@ -10,6 +10,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
+from fenics_contact._libraries import MPI
 from fenics_contact.errors import InvalidInputError, calling
 from fenics_contact.fem import (
     Constants,
@@ -64,10 +65,10 @@ class ShapeForms:
             nodes are not needed.
     """
 
-    def __init__(self, torn: TornSystem, moving: np.ndarray | None = None) -> None:
+    def __init__(self, comm: MPI.Comm, moving: np.ndarray | None = None) -> None:
         """Start empty."""
         self.moving = moving
-        self._templates = Templates(torn.decomposition.comm)
+        self._templates = Templates(comm)
 
     @property
     def compiled(self) -> tuple[tuple[object, ...], ...]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene import Scene, Surface
+from fenics_contact.scene import Scene, Surface, SurfaceLoad
 
 
 def checked_contact(contact: ContactProblem) -> ContactProblem:
@@ -52,6 +52,41 @@ def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
             _check(scene, moving, (pair.slave,), f"contact pair {number}, whose friction varies,", remedy)
     for number, tie in enumerate(scene.ties):
         _check(scene, moving, (tie.slave, tie.master), f"tie {number}", "move another part of the body")
+
+
+def check_case(first: Scene, scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
+    """Check that a scene is a load case of the same designs.
+
+    Args:
+        first: The scene of which designs move the bodies.
+        scene: The load case.
+        moving: As of `check_pairs`.
+
+    Raises:
+        InvalidInputError: Says what differs, or what has no derivative.
+    """
+    if set(scene.bodies) != set(first.bodies):
+        raise InvalidInputError(
+            f"load cases must share their bodies, got {sorted(scene.bodies)} beside {sorted(first.bodies)}: "
+            "take the scene from dataclasses.replace(scene, loads=...) or LoadStep.applied_to(scene)"
+        )
+    for name, body in scene.bodies.items():
+        mate = first.bodies[name]
+        if body.mesh is not mate.mesh or body.materials != mate.materials:
+            raise InvalidInputError(
+                f"load cases must share their bodies, but {name!r} has another mesh or material: take the "
+                "scene from dataclasses.replace(scene, loads=...) or LoadStep.applied_to(scene)"
+            )
+        if not np.array_equal(scene.fixed(name), first.fixed(name)):
+            raise InvalidInputError(
+                f"load cases must hold the same components, their supports of {name!r} differ: give other "
+                "values, or hold by RigidSurface what only some cases move"
+            )
+    for load in scene.loads:
+        if isinstance(load, SurfaceLoad):
+            surface = Surface(load.body, load.surface)
+            _check(scene, moving, (surface,), f"a {type(load).__name__}", "load another surface")
+    check_pairs(scene, moving)
 
 
 def _check(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,6 @@ from fenics_contact.errors import (
     ConvergenceError,
     InfeasibleError,
     InvalidDesignError,
-    InvalidInputError,
     collectively,
     tell,
 )
@@ -24,16 +24,15 @@ from fenics_contact.scene import Scene
 from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
 from fenics_contact.shape.beside import with_fewest_weak_points
 from fenics_contact.shape.contact_derivative import bound_sensitivity, contact_by_shape
-from fenics_contact.shape.design import SurfaceDesign, checked_variables
-from fenics_contact.shape.forms import ShapeForms, work_by_shape
+from fenics_contact.shape.design import SurfaceDesign
+from fenics_contact.shape.forms import work_by_shape
+from fenics_contact.shape.geometry import DesignGeometry
 from fenics_contact.shape.linearised_face import WeakChoice, linearise_face
 from fenics_contact.shape.memory import DesignMemory, DesignPoint, Stored
-from fenics_contact.shape.motion import motion_of, moving_nodes
 from fenics_contact.shape.objective import Objective, Partials, asking, finite, finite_partials, finite_value
-from fenics_contact.shape.pairs import check_pairs, checked_contact
+from fenics_contact.shape.pairs import check_case, check_pairs, checked_contact
 from fenics_contact.shape.state_error import state_error
 from fenics_contact.shape.tolerance import AdaptiveTolerance, tightest_of
-from fenics_contact.shape.volume import volume_of
 
 #: Tolerance of the adjoint relative to that of its state, and the smallest: no looser than the state's.
 ADJOINT_SHARE, ADJOINT_FLOOR = 1e-1, 1e-11
@@ -56,7 +55,8 @@ class ShapeProblem:
 
     Attributes:
         contact: The problem that computes the states.
-        designs: The moving surfaces; α is the concatenation of their variables.
+        scene: The scene in its reference shape.
+        geometry: How it moves with a design.
         products: F-products of states and adjoints so far.
         evaluations: Number of designs evaluated, without those for `beside`.
 
@@ -88,19 +88,17 @@ class ShapeProblem:
                 balanced state leaves the statuses uncertain on which derivatives depend.
         """
         self.contact, self.objective, self.choice = checked_contact(contact), objective, choice
-        given = (designs,) if isinstance(designs, SurfaceDesign) else designs
-        self.designs = tuple(design.on(contact.scene) for design in given)
+        self.scene = contact.scene
         self._adaptive = tolerance if isinstance(tolerance, AdaptiveTolerance) else None
         self._tightest = tightest_of(contact, tolerance)
-        self._timer, scene = contact.timer, contact.scene
+        self._timer = contact.timer
         self.evaluations, self.products = 0, 0
         self._memory = DesignMemory(self._restored)
-        self._forms: ShapeForms | None = None
-        decomposition = contact.decomposition
+        self._beside: ShapeProblem | None = None
         with self._timer.phase("mesh motion"):
-            self._motions = [motion_of(decomposition, scene, design) for design in self.designs]
-        self._moving = moving_nodes(scene, self.designs, self._motions)
-        check_pairs(scene, self._moving)
+            given = (designs,) if isinstance(designs, SurfaceDesign) else designs
+            self.geometry = DesignGeometry(self.scene, contact.decomposition, given)
+        check_pairs(self.scene, self.geometry.moving)
 
     def _facts(self) -> dict[str, Any]:
         work = f"{self.evaluations} designs, {self.products} products with F"
@@ -108,14 +106,14 @@ class ShapeProblem:
                 "choice": self.choice, "work": work, "contact": self.contact}  # fmt: skip
 
     @property
-    def size(self) -> int:
-        """Number of design variables."""
-        return sum(design.size for design in self.designs)
+    def designs(self) -> tuple[SurfaceDesign, ...]:
+        """The moving surfaces; α is the concatenation of their variables."""
+        return self.geometry.designs
 
     @property
-    def scene(self) -> Scene:
-        """The scene in its reference shape."""
-        return self.contact.scene
+    def size(self) -> int:
+        """Number of design variables."""
+        return self.geometry.size
 
     @property
     def comm(self) -> MPI.Comm:
@@ -187,13 +185,7 @@ class ShapeProblem:
         Raises:
             InvalidInputError: If alpha has another shape or is not finite.
         """
-        alpha = checked_variables(alpha, self.size, self.comm)
-        points: dict[str, np.ndarray] = {}
-        parts = np.split(alpha, np.cumsum([design.size for design in self.designs])[:-1])
-        for design, motion, part in zip(self.designs, self._motions, parts, strict=True):
-            start = points.get(design.body, self.scene.bodies[design.body].mesh.points)
-            points[design.body] = start + motion.extend(design.displacement(part))
-        return points
+        return self.geometry.points_of(alpha)
 
     def scene_of(self, alpha: np.ndarray) -> Scene:
         """Return the scene in the shape of a design. Collective.
@@ -201,11 +193,7 @@ class ShapeProblem:
         Raises:
             InvalidDesignError: If the design inverts a cell.
         """
-        points = self.points_of(alpha)
-        try:
-            return self.scene.reshaped(points)
-        except InvalidInputError as error:
-            raise InvalidDesignError(f"the design cannot be meshed: {error}") from error
+        return self.geometry.scene_of(self.scene, alpha)
 
     @collectively("ShapeProblem.state_of", _comm)
     def state_of(self, alpha: np.ndarray) -> State:
@@ -221,7 +209,7 @@ class ShapeProblem:
         """Return J(α) alone, without adjoint. Collective."""
         state = self.state_of(alpha)
         with asking(self.comm):
-            return finite_value(self.objective.value(state, self._shape_forms(state)))
+            return finite_value(self.objective.value(state, self.geometry.forms))
 
     @collectively("ShapeProblem.evaluate", _comm)
     def evaluate(self, alpha: np.ndarray) -> DesignPoint:
@@ -305,6 +293,8 @@ class ShapeProblem:
     def _solved(self, alpha: np.ndarray, tolerance: float, known: DesignPoint | None = None) -> State:
         """Compute an equilibrium, from a less accurate one of the same design if known. Collective."""
         previous = self._memory.state if known is None else known.state
+        if previous is None and self._beside is not None:  # the first state of a load case
+            previous = self._beside._memory.state
         with self._timer.phase("mesh motion"):
             scene = self.scene_of(alpha) if known is None else known.state.scene
         try:
@@ -332,9 +322,8 @@ class ShapeProblem:
     ) -> DesignPoint:
         """Return objective, subgradient and their errors at a state. Collective."""
         before = state.dual.products
-        forms = self._shape_forms(state)
         with self._timer.phase("objective"), asking(self.comm):
-            partials = finite_partials(self.objective.partials(state, forms))
+            partials = finite_partials(self.objective.partials(state, self.geometry.forms))
         with self._timer.phase("adjoint"):
             linearised = linearise_face(state, self.choice)
             adjoint = solve_adjoint(
@@ -345,7 +334,7 @@ class ShapeProblem:
             error = state_error(state, partials, linearised, adjoint)
         with self._timer.phase("gradient"):
             by_bound = bound_sensitivity(state, adjoint, partials, linearised)
-            gradient = self._by_design(self._by_points(state, adjoint, partials, by_bound))
+            gradient = self.geometry.pull_back(self._by_points(state, adjoint, partials, by_bound))
         self.products += state.dual.products
         value = partials.value + (error.correction if self.inexact else 0.0)
         # Ranks must take the same decisions, whatever the rounding in sums over ranks.
@@ -365,35 +354,46 @@ class ShapeProblem:
             adjoint_multiplier=adjoint.multiplier,
         )
 
+    @collectively("ShapeProblem.case", _comm)
+    def case(self, scene: Scene, objective: Objective | None = None) -> ShapeProblem:
+        """Return the problem of another load case of the same designs, see `LoadCases`. Collective.
+
+        The cases share mesh motion, matrices and factors; each starts from its own last state.
+
+        Args:
+            scene: The scene with other loads, values of supports, friction or obstacles.
+            objective: Objective of the case; by default that of this problem.
+
+        Raises:
+            InvalidInputError: If it has other bodies, its supports hold other components, or its pairs or
+                loads have no derivative by the designs.
+        """
+        check_case(self.scene, scene, self.geometry.moving)
+        other = copy(self)
+        other.scene, other.objective, other._beside = scene, objective or self.objective, self
+        other.evaluations, other.products = 0, 0
+        other._memory = DesignMemory(other._restored)
+        return other
+
+    def shares_with(self, other: ShapeProblem) -> bool:
+        """Return whether another problem is a `case` of the same designs."""
+        return self.geometry is other.geometry
+
     @collectively("ShapeProblem.volume", _comm)
     def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the volume of the designed bodies, in the plane the area, and its gradient. Collective."""
-        names = sorted({design.body for design in self.designs})
-        total, by_points = volume_of(self.scene_of(alpha), names, self.contact.decomposition.tearing)
-        return total, self._by_design(by_points)
+        return self.geometry.volume(self.scene_of(alpha))
 
     def _by_points(
         self, state: State, adjoint: Adjoint, partials: Partials, by_bound: np.ndarray
     ) -> np.ndarray:
         """Sum the objective's own derivative, −wᵀ(δK u − δf) and the contact points' share over all ranks."""
         torn = state.torn
-        work = work_by_shape(self._shape_forms(state), torn, state.torn_displacement, adjoint.displacement)
+        work = work_by_shape(self.geometry.forms, torn, state.torn_displacement, adjoint.displacement)
         contact = contact_by_shape(state, adjoint, partials, by_bound)
         return np.asarray(torn.decomposition.comm.allreduce(partials.by_shape - work)) + contact
-
-    def _by_design(self, by_points: np.ndarray) -> np.ndarray:
-        parts = []
-        for design, motion in zip(self.designs, self._motions, strict=True):
-            own = np.arange(self.scene.bodies[design.body].mesh.n_nodes)
-            nodes = self.contact.decomposition.tearing.global_nodes(design.body, own)
-            parts.append(design.pull_back(motion.pull_back(by_points[nodes])))
-        return np.concatenate(parts)
 
     def _restored(self, alpha: np.ndarray, stored: Stored) -> State:
         state = self.contact.restore(stored, self.scene_of(alpha))
         self.products += state.system.products
         return state
-
-    def _shape_forms(self, state: State) -> ShapeForms:
-        self._forms = self._forms or ShapeForms(state.torn, np.concatenate(list(self._moving.values())))
-        return self._forms

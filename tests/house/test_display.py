@@ -70,6 +70,7 @@ from fenics_contact.shape import (
     Largest,
     LargestPressure,
     LargestStress,
+    LoadCases,
     Movement,
     PressureNorm,
     PressureUnevenness,
@@ -105,7 +106,7 @@ def objects() -> dict[str, Any]:
     shape = ShapeProblem(contact, designs_of(scene), TotalPotential())
     point = shape.evaluate(np.zeros(shape.size))
     state = point.state
-    partials = shape.objective.partials(state, shape._shape_forms(state))
+    partials = shape.objective.partials(state, shape.geometry.forms)
     limits = LinearConstraints(np.ones((40, 60)), np.ones(40))
     search = ForScipy(bowl, np.zeros(60), constraints=limits)
     search.arguments("SLSQP")["fun"](np.zeros(60))
@@ -116,7 +117,8 @@ def objects() -> dict[str, Any]:
         solve_adjoint(state, partials, linearise_face(state, WeakChoice.RELEASED)),
         certify(state.dual, state.dual_solution), solver_errors(state.system, state.solution),
         Balanced(), FixedPoint(FaceNewton()), LoadSequence(shape.contact), AdaptiveTolerance(),
-        UnheldMotion({"block": np.eye(6)[0]}), *shape._motions, RigidSurface("block", "z1", (0.5, 0.5, 1.0)),
+        UnheldMotion({"block": np.eye(6)[0]}), RigidSurface("block", "z1", (0.5, 0.5, 1.0)),
+        *shape.geometry.motions, LoadCases({"one": shape}),
         RigidMotion(Surface("block", "z1"), np.zeros(3), np.ones(3), np.arange(3.0)),
         limits, Bounds(np.zeros(60), np.ones(60)), BundleTrust(), Checkpoint("run.npz"), search,
         pose(bowl, np.zeros(60), constraints=limits), minimize(bowl, np.ones(60)),

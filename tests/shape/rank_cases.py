@@ -72,7 +72,7 @@ def motion_case(comm: MPI.Comm) -> dict[str, Any]:
     rng, found = np.random.default_rng(2), {}
     bodies = {mesh.body for mesh in moving.contact.decomposition.meshes}
     motion: HarmonicExtension
-    for design, motion in zip(moving.designs, moving._motions, strict=True):
+    for design, motion in zip(moving.designs, moving.geometry.motions, strict=True):
         given = rng.standard_normal((len(motion.moving), 3))
         by_points = rng.standard_normal((moving.scene.bodies[design.body].mesh.n_nodes, 3))
         moved, pulled = motion.extend(given), motion.pull_back(by_points)

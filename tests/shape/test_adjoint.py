@@ -23,7 +23,7 @@ from tests.shape.objectives import objectives
 def solved(regime: str, objective: str) -> tuple[Partials, LinearisedFace, Adjoint]:
     here = line(regime)
     state = here.state()
-    partials = objectives("link1")[objective].partials(state, here.problem._shape_forms(state))
+    partials = objectives("link1")[objective].partials(state, here.problem.geometry.forms)
     linearised = linearise_face(state, WeakChoice.RELEASED)
     return partials, linearised, solve_adjoint(state, partials, linearised)
 

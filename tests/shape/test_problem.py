@@ -150,7 +150,7 @@ def test_an_earlier_state_is_judged_in_its_own_shape() -> None:
     judges = objectives("upper")
     blocks = fresh(solver=SOLVER)
     state = blocks.state_of(DESIGN)
-    forms = blocks._shape_forms(state)
+    forms = blocks.geometry.forms
     at_once = {name: judge.partials(state, forms) for name, judge in judges.items()}
     blocks.state_of(5 * DESIGN)
     for name, judge in judges.items():

@@ -89,7 +89,7 @@ def test_slip_on_a_surface_beside_a_rigid_one_follows_its_motion(monkeypatch: Pa
     )
     assert here.is_smooth()
     assert here.counts()["SLIP"] > 3
-    assert np.abs(judge.partials(here.state(), moving._shape_forms(here.state())).by_motion).max() > 0.0
+    assert np.abs(judge.partials(here.state(), moving.geometry.forms).by_motion).max() > 0.0
     assert here.miss(judge) < 1e-5
     whole = FrictionWork.partials
     monkeypatch.setattr(FrictionWork, "partials", lambda *given: replace(whole(*given), by_motion=None))

@@ -148,7 +148,7 @@ class Measured:
 
     def quotient(self, objective: str, kind: str) -> float:
         judge = OBJECTIVES[objective][0]
-        ahead, behind = (judge.value(state, self.usual._shape_forms(state)) for state in self.sides[kind])
+        ahead, behind = (judge.value(state, self.usual.geometry.forms) for state in self.sides[kind])
         return (ahead - behind) / (2 * STEP) / self.unit(objective)
 
 
@@ -212,7 +212,7 @@ def factored(objective: str, factor: float) -> tuple[Array, int]:
     """Multiplier of the adjoint of a multiple of an objective, divided by it, and the products it takes."""
     here = measured("N and mm").usual
     state = one_state()
-    partials = OBJECTIVES[objective][0].partials(state, here._shape_forms(state))
+    partials = OBJECTIVES[objective][0].partials(state, here.geometry.forms)
     partials = replace(
         partials,
         by_displacement=factor * partials.by_displacement,
@@ -249,7 +249,7 @@ def test_the_adjoint_of_a_state_at_default_tolerance_is_more_accurate_than_the_s
     objective: str, units: str
 ) -> None:
     here, point = measured(units), measured(units).point(objective)
-    partials = OBJECTIVES[objective][0].partials(point.state, here.usual._shape_forms(point.state))
+    partials = OBJECTIVES[objective][0].partials(point.state, here.usual.geometry.forms)
     linearised = linearise_face(point.state, here.usual.choice)
     exact = solve_adjoint(point.state, partials, linearised, tolerance=STRICT)
     assert 0.0 < apart(point.adjoint_multiplier, exact.multiplier) < 0.5 * point.tolerance

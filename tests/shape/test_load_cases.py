@@ -1,0 +1,121 @@
+"""One design under several loads: values, subgradients, what the cases share, and what is no case."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.optimize import minimize
+from fenics_contact.scene import Body, Scene, Support
+from fenics_contact.shape import LoadCases
+from tests.shape.blocks import RUBBER
+from tests.shape.load_cases_on_ranks import WEIGHTS, cases_of
+
+
+@cache
+def cases(weighted: bool) -> LoadCases:
+    return cases_of(MPI.COMM_SELF, WEIGHTS if weighted else None)
+
+
+def design(seed: int, size: float) -> np.ndarray:
+    return size * np.random.default_rng(seed).standard_normal(cases(True).size)
+
+
+@pytest.mark.parametrize("weighted", [True, False])
+def test_the_subgradient_agrees_with_central_differences(weighted: bool) -> None:
+    both, alpha, v, step = cases(weighted), design(0, 0.003), design(1, 1.0), 1e-5
+
+    def value(s: float) -> float:
+        values = both.values_of(alpha + s * step * v)
+        return (
+            sum(WEIGHTS[name] * each for name, each in values.items()) if weighted else max(values.values())
+        )
+
+    found, gradient = both(alpha)
+    assert found == pytest.approx(value(0.0), rel=1e-9)
+    assert gradient @ v == pytest.approx((value(1.0) - value(-1.0)) / (2 * step), rel=1e-5)
+
+
+def test_the_cases_of_a_design_share_meshes_matrices_and_factors() -> None:
+    states = list(cases(True).states_of(design(2, 0.002)).values())
+    pieces = [state.dual.inverse.operators for state in states]
+    for other in pieces[1:]:
+        assert all(mine is theirs for mine, theirs in zip(pieces[0], other, strict=True))
+    assert states[0].torn.points is states[1].torn.points, "another load needs no search for contact"
+    moved = cases(True).states_of(design(3, 0.002))["pressed"].dual.inverse.operators
+    assert any(mine is not theirs for mine, theirs in zip(pieces[0], moved, strict=True))
+
+
+def test_a_minimum_of_the_largest_case_lies_above_each_case_alone() -> None:
+    both, bounds = cases(False), (-0.004, 0.004)
+    start = both(np.zeros(both.size))[0]
+    result = minimize(both, np.zeros(both.size), bounds=bounds)
+    values = both.values_of(result.x)
+    assert result.value == pytest.approx(max(values.values()), rel=1e-8)
+    assert result.value < start - 1e-3 * abs(start)
+
+
+def test_what_was_stored_is_recalled() -> None:
+    first = cases_of(MPI.COMM_SELF, None)
+    first(design(4, 0.002))
+    again = cases_of(MPI.COMM_SELF, None)
+    again.recall(first.memory())
+    assert first.fingerprint() == again.fingerprint()
+    assert (again.products, again.evaluations) > (0, 0)
+    value, gradient = again(design(5, 0.002))
+    expected, known = first(design(5, 0.002))
+    assert value == pytest.approx(expected, rel=1e-9)
+    np.testing.assert_allclose(gradient, known, rtol=1e-6, atol=1e-9 * np.abs(known).max())
+
+
+def test_two_ranks_find_the_same(mpirun: Callable[..., str]) -> None:
+    script = Path(__file__).with_name("load_cases_on_ranks.py")
+    said = [np.array(mpirun(script, ranks).split(), dtype=float) for ranks in (1, 2)]
+    np.testing.assert_allclose(said[1], said[0], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            lambda s: {"bodies": {"lower": s.bodies["lower"]}, "loads": [], "contacts": []},
+            "share their bodies, got",
+        ),
+        (
+            lambda s: {
+                "bodies": {**s.bodies, "upper": Body(s.bodies["upper"].mesh, RUBBER.__class__(7.0, 0.1))}
+            },
+            "'upper' has another mesh or material",
+        ),
+        (
+            lambda s: {"supports": [Support("lower", "z0", (0.0, None, 0.0))]},
+            "their supports of 'lower' differ",
+        ),
+    ],
+)
+def test_what_is_no_load_case_is_refused(change: Callable[[Scene], Any], words: str) -> None:
+    first = cases(True).problems["pressed"]
+    with pytest.raises(InvalidInputError, match=words):
+        first.case(replace(first.scene, **change(first.scene)))
+
+
+def test_cases_that_share_nothing_are_refused() -> None:
+    own, other = cases(True).problems["pressed"], cases(False).problems["dragged"]
+    with pytest.raises(
+        InvalidInputError, match=r"'other' shares nothing with 'own': make it by problem\.case"
+    ):
+        LoadCases({"own": own, "other": other})
+    with pytest.raises(InvalidInputError, match="LoadCases needs a problem"):
+        LoadCases({})
+    with pytest.raises(InvalidInputError, match=r"must name the cases \['own'\], got \['one'\]"):
+        LoadCases({"own": own}, {"one": 1.0})
+    with pytest.raises(InvalidInputError, match="must be finite numbers"):
+        LoadCases({"own": own}, {"own": float("nan")})
