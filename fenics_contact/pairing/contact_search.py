@@ -83,13 +83,11 @@ class _Side:
     Attributes:
         surface: The surface.
         nodes: Its nodes among those of all bodies, shape (n,).
-        whole: Its facets before they were cut into linear ones, as nodes among those of all bodies.
         n_nodes: Number of nodes of all bodies.
     """
 
     surface: FacetedSurface
     nodes: np.ndarray
-    whole: np.ndarray
     n_nodes: int
 
     @classmethod
@@ -98,16 +96,15 @@ class _Side:
     ) -> _Side:
         """Return a named surface as a side."""
         own = surface_of(scene, surface, geometry, finer=finer)
-        whole = scene.bodies[surface.body].mesh.surfaces[surface.name]
-        nodes = numbers.global_nodes(surface.body, own.nodes)
-        return cls(own, nodes, numbers.global_nodes(surface.body, whole), numbers.n_nodes)
+        return cls(own, numbers.global_nodes(surface.body, own.nodes), numbers.n_nodes)
 
     def weights(self, hit: Projection) -> sp.csr_matrix:
         """Return the weights of the nodes of all bodies at projections on this side, (n, n_nodes)."""
         values, _ = shape_functions(hit.local, self.surface.corners)
-        nodes = self.nodes[self.surface.facets[hit.facet]]
-        if bears_on_midpoints(self.whole):
-            nodes, values = shape_weights(self.whole, hit.facet, values)
+        nodes, whole = self.surface.facets[hit.facet], self.surface.whole
+        if whole is not None and bears_on_midpoints(whole):
+            nodes, values = shape_weights(whole, hit.facet, values)
+        nodes = self.nodes[nodes]
         row = np.repeat(np.arange(len(nodes)), nodes.shape[1])
         return sp.csr_matrix((values.ravel(), (row, nodes.ravel())), shape=(len(nodes), self.n_nodes))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,13 @@ from fenics_contact.shape.projection_derivative import (
 )
 from fenics_contact.shape.surface_derivative import areas_pulled_back
 from fenics_contact.surface_shapes import asked
+from fenics_contact.surfaces import (
+    FacetedSurface,
+    bears_on_midpoints,
+    shape_functions,
+    shape_weight_gradients,
+    shape_weights,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,13 +120,32 @@ def _add_projected(
     assert isinstance(master, Surface)
     points, surface = torn.points, surface_of(torn.scene, master, pair.geometry)
     nodes = torn.decomposition.tearing.global_nodes(master.body, surface.nodes)
-    corners = rows.at(nodes[surface.facets[points.facet[mine]]])
-    by = _by_point(points, rows, mine, corners)
+    carriers, gradients = _carriers(surface, points.facet[mine], points.local[mine])
+    by = replace(_by_point(points, rows, mine, rows.at(nodes[carriers])), gradients=gradients)
     by_slave, by_master = projection_pulled_back(
         surface, points.facet[mine], points.local[mine], points.distance[mine], by
     )
     result[points.slave[mine]] += by_slave
     result[nodes] += by_master
+
+
+def _carriers(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes that carry a master's motion at points and the gradients of their weights.
+
+    Args:
+        surface: The master.
+        facet: Facet of each point, shape (n,).
+        local: Local coordinates on it, shape (n, dim − 1).
+
+    Returns:
+        Positions among the surface's nodes, shape (n, nodes), and gradients, shape (n, nodes, dim − 1).
+    """
+    values, gradients = shape_functions(local, surface.corners)
+    whole = surface.whole
+    if whole is None or not bears_on_midpoints(whole):
+        return surface.facets[facet], gradients
+    nodes, _ = shape_weights(whole, facet, values)
+    return nodes, shape_weight_gradients(facet, values, gradients)
 
 
 def _points(torn: TornSystem, nodes: np.ndarray) -> np.ndarray:
@@ -150,11 +176,19 @@ def _row_fields(state: State, multiplier: np.ndarray, displacement: np.ndarray) 
     for k, x in enumerate(multipliers):
         gathered = torn.numbering.gather(x, torn.tangential_rows.ravel())
         friction[k, torn.frictional] = gathered.reshape(-1, width)
-    nodes = np.unique(points.jump.indices)
+    nodes = np.unique(np.concatenate([points.jump.indices, _masters_nodes(torn)]))
     fields = (displacement, state.torn_displacement)
     values = np.stack([nodal_mean_at(torn.decomposition, field, nodes) for field in fields])
     jump = points.jump[:, nodes]
     return RowFields(normal, friction, nodes, values, np.stack([jump @ value for value in values]))
+
+
+def _masters_nodes(torn: TornSystem) -> np.ndarray:
+    """Return the nodes of the masters of all pairs among those of all bodies; some have no weight."""
+    masters = [pair.master for pair in torn.scene.contacts if isinstance(pair.master, Surface)]
+    tearing, scene = torn.decomposition.tearing, torn.scene
+    nodes = [tearing.global_nodes(master.body, np.unique(scene.facets(master))) for master in masters]
+    return np.concatenate([np.zeros(0, dtype=np.int64), *nodes])
 
 
 def _by_point(

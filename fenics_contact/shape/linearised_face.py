@@ -190,7 +190,8 @@ def _points_on_edges(state: State) -> int:
     for index, pair in enumerate(state.scene.contacts):
         if isinstance(pair.master, Surface):
             closed = (points.pair == index) & (points.facet >= 0) & (state.contact.normal_force > 0)
-            corners = state.scene.facets(pair.master).shape[1]
+            mesh = state.scene.bodies[pair.master.body].mesh.linear
+            corners = mesh.surfaces[pair.master.name].shape[1]
             distance = np.abs(edge_distance(points.local[closed], corners))
             total += int(np.count_nonzero(distance < EDGE_TOLERANCE))
     return total

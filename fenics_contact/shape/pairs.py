@@ -26,7 +26,7 @@ def checked_contact(contact: ContactProblem) -> ContactProblem:
 
 
 def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
-    """Reject designs that move surfaces without derivatives, or bodies of quadratic cells.
+    """Reject designs that move surfaces without derivatives.
 
     Mortar contact, ties and friction that varies have none.
 
@@ -35,14 +35,8 @@ def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
         moving: Body name -> whether a design moves each node, shape (n_nodes,).
 
     Raises:
-        InvalidInputError: Names the pair and the surface, or the body.
+        InvalidInputError: Names the pair and the surface.
     """
-    for body, nodes in moving.items():
-        if nodes.any() and scene.bodies[body].mesh.order > 1:
-            raise InvalidInputError(
-                f"a design may move only bodies of linear cells, those of {body!r} are of order "
-                f"{scene.bodies[body].mesh.order}: use the linear mesh that `quadratic` was given"
-            )
     for number, pair in enumerate(scene.contacts):
         if pair.discretisation == "mortar" and isinstance(pair.master, Surface):
             remedy = "use discretisation='node' for it"

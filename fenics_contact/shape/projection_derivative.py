@@ -25,8 +25,10 @@ class PointDerivatives:
         gap: By the gap, shape (n,).
         normal: By the normal, shape (n, dim).
         tangents: By the tangents, shape (n, dim − 1, dim).
-        weight: By the weights of the facet's corners, shape (n, corners).
+        weight: By the weights of the facet's nodes, shape (n, nodes).
         axes: Axes nearest to the first tangents, shape (n, dim); `reference_axes` by default.
+        gradients: Of these weights in local coordinates, shape (n, nodes, dim − 1); by default those of the
+            linear shape functions of the corners.
     """
 
     gap: np.ndarray
@@ -34,6 +36,7 @@ class PointDerivatives:
     tangents: np.ndarray
     weight: np.ndarray
     axes: np.ndarray | None = None
+    gradients: np.ndarray | None = None
 
 
 def frames_pulled_back(
@@ -89,7 +92,8 @@ def projection_pulled_back(
     normal, length = interpolated_normal(values, normals)
     by_normal = by.normal + frames_pulled_back(normal, by.tangents, by.axes)
     by_mean = _tangential(by_normal, normal) / length[:, None]
-    by_local = np.einsum("nk,nka->na", by.weight, derivatives) - by.gap[:, None] * height.by_local
+    gradients = derivatives if by.gradients is None else by.gradients
+    by_local = np.einsum("nk,nka->na", by.weight, gradients) - by.gap[:, None] * height.by_local
     by_local += np.einsum("nka,nkd,nd->na", derivatives, normals, by_mean)
     along_ray = gap + height.value
     matrix = newton_matrix(corners, normals, derivatives, along_ray, normal, length)

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.surfaces import FacetedSurface, corner_normals, corner_products, edges_at_corners, slopes
+from fenics_contact.surfaces import (
+    FacetedSurface,
+    bearing_pulled_back,
+    corner_normals,
+    corner_products,
+    edges_at_corners,
+    gauss_points,
+    slopes,
+)
 
 
 def normals_pulled_back(
@@ -75,11 +83,29 @@ def areas_pulled_back(surface: FacetedSurface, by_areas: np.ndarray) -> np.ndarr
         surface: The surface.
         by_areas: Derivative by each nodal area, shape (n,).
     """
+    if surface.whole is not None:
+        by_bearing = by_areas[surface.whole]
+        return _nodal_areas_pulled_back(surface.points, surface.whole, bearing_pulled_back(by_bearing))
     total = corner_products(surface.points, surface.facets).sum(axis=1)
     direction = total / np.linalg.norm(total, axis=1)[:, None]
     divisor = {2: 2, 3: 6, 4: 4}[surface.corners] * surface.corners
     by_total = by_areas[surface.facets].sum(axis=1)[:, None] * direction / divisor
     return _products_pulled_back(surface, np.repeat(by_total[:, None], surface.corners, axis=1))
+
+
+def _nodal_areas_pulled_back(points: np.ndarray, facets: np.ndarray, by_areas: np.ndarray) -> np.ndarray:
+    """Reverse of `nodal_areas`: from derivatives by the area of each node of each facet, facets' shape."""
+    result = np.zeros_like(points)
+    for at in gauss_points(points, facets):
+        by_area = at.weight * (by_areas @ at.values)[:, None]
+        unit = at.normals / at.areas[:, None]
+        if points.shape[1] == 3:
+            first, second = at.tangents[:, 0], at.tangents[:, 1]
+            by_tangents = np.stack([np.cross(second, unit), np.cross(unit, first)], axis=1)
+        else:
+            by_tangents = rotated_back(unit)[:, None]
+        np.add.at(result, facets, np.einsum("ka,nad->nkd", at.gradients, by_area[:, None] * by_tangents))
+    return result
 
 
 def _products_pulled_back(surface: FacetedSurface, by_products: np.ndarray) -> np.ndarray:

@@ -1,7 +1,9 @@
 """Surfaces of meshes: facets, the true surfaces that they approximate, and projections on them."""
 
 from fenics_contact.surfaces.facet_areas import (
+    GaussPoint,
     SurfaceMoments,
+    gauss_points,
     nodal_areas,
     quadrature_areas,
     surface_moments,
@@ -16,8 +18,10 @@ from fenics_contact.surfaces.facets import (
     shape_functions,
 )
 from fenics_contact.surfaces.midpoints import (
+    bearing_pulled_back,
     bears_on_midpoints,
     filled_at_corners,
+    shape_weight_gradients,
     shape_weights,
     share_areas,
 )
@@ -27,10 +31,12 @@ from fenics_contact.surfaces.true_surface import Geometry, true_surface
 
 __all__ = [
     "FacetedSurface",
+    "GaussPoint",
     "Geometry",
     "Projection",
     "Relief",
     "SurfaceMoments",
+    "bearing_pulled_back",
     "bears_on_midpoints",
     "corner_normals",
     "corner_products",
@@ -39,6 +45,7 @@ __all__ = [
     "facet_shape_values",
     "faceted_surface",
     "filled_at_corners",
+    "gauss_points",
     "heights",
     "interpolated_normal",
     "join",
@@ -47,6 +54,7 @@ __all__ = [
     "project",
     "quadrature_areas",
     "shape_functions",
+    "shape_weight_gradients",
     "shape_weights",
     "share_areas",
     "slopes",

@@ -32,8 +32,8 @@ def nodal_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
         Shape (n_facets, nodes of a facet), [length²] or [length].
     """
     total = np.zeros(facets.shape)
-    for area, value in _at_gauss_points(points, facets):
-        total += area[:, None] * value
+    for at in gauss_points(points, facets):
+        total += at.areas[:, None] * at.values
     return total
 
 
@@ -56,9 +56,7 @@ def surface_moments(points: np.ndarray, facets: np.ndarray) -> SurfaceMoments:
     """Return area, centroid and second moments of a surface; arguments as of `quadrature_areas`."""
     origin = points[facets[0, 0]]  # moments are as exact far from the origin of coordinates as near it
     corners = points[facets] - origin
-    rule = [
-        (area, np.einsum("k,nkd->nd", value, corners)) for area, value in _at_gauss_points(points, facets)
-    ]
+    rule = [(at.areas, np.einsum("k,nkd->nd", at.values, corners)) for at in gauss_points(points, facets)]
     areas, places = np.concatenate([area for area, _ in rule]), np.concatenate([place for _, place in rule])
     area = float(areas.sum())
     centre = areas @ places / area
@@ -66,13 +64,41 @@ def surface_moments(points: np.ndarray, facets: np.ndarray) -> SurfaceMoments:
     return SurfaceMoments(area, origin + centre, (areas[:, None] * arms).T @ arms)
 
 
-def _at_gauss_points(points: np.ndarray, facets: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Return for each Gauss point the area of it in every facet, (n_facets,), and the shape functions."""
+@dataclass(frozen=True, eq=False)
+class GaussPoint:
+    """One point of a quadrature rule in every facet.
+
+    Attributes:
+        weight: Its weight in the reference facet.
+        values: Shape functions, shape (nodes of a facet,).
+        gradients: Their derivatives by the reference coordinates, shape (nodes of a facet, dim − 1).
+        tangents: Derivatives of the place by these, shape (n_facets, dim − 1, dim), [length].
+    """
+
+    weight: float
+    values: np.ndarray
+    gradients: np.ndarray
+    tangents: np.ndarray
+
+    @property
+    def normals(self) -> np.ndarray:
+        """Outward normals times the area that belongs to the point, shape (n_facets, dim)."""
+        if self.tangents.shape[2] == 3:
+            return np.asarray(self.weight * np.cross(self.tangents[:, 0], self.tangents[:, 1]))
+        along = self.tangents[:, 0]
+        return np.asarray(self.weight * np.stack([along[:, 1], -along[:, 0]], axis=1))
+
+    @property
+    def areas(self) -> np.ndarray:
+        """The area that belongs to the point, shape (n_facets,), [length²] or [length]."""
+        return np.asarray(np.linalg.norm(self.normals, axis=1))
+
+
+def gauss_points(points: np.ndarray, facets: np.ndarray) -> Iterator[GaussPoint]:
+    """Return the points of a quadrature rule on facets; arguments as of `quadrature_areas`."""
     kind = FACET_TYPES[facets.shape[1], points.shape[1]]
     positions, weights = quadrature(kind, 2 * kind.order)  # as in load forms: resultants are exact
     values, gradients = shape_values(kind, positions), shape_gradients(kind, positions)
     corners = points[facets]
     for weight, value, gradient in zip(weights, values, gradients, strict=True):
-        tangents = np.einsum("ka,nkd->nad", gradient, corners)
-        normal = np.cross(tangents[:, 0], tangents[:, 1]) if points.shape[1] == 3 else tangents[:, 0]
-        yield weight * np.linalg.norm(normal, axis=1), value
+        yield GaussPoint(float(weight), value, gradient, np.einsum("ka,nkd->nad", gradient, corners))

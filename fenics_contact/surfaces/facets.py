@@ -130,6 +130,8 @@ class FacetedSurface:
             at the corners of quadratic triangles, on which a pressure does not bear.
         mirrored: Components that the normals lack on planes of symmetry, shape (n, dim).
         relief: The true surface relative to the facets; None if it is unknown or coincides with them.
+        whole: The quadratic facets that were cut into these, as rows of positions in ``nodes``; None if they
+            are whole.
     """
 
     nodes: np.ndarray
@@ -139,6 +141,7 @@ class FacetedSurface:
     areas: np.ndarray
     mirrored: np.ndarray
     relief: Relief | None = None
+    whole: np.ndarray | None = None
 
     @cached_property
     def normals(self) -> np.ndarray:

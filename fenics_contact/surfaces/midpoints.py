@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fenics_contact.mesh import FACET_TYPES, BodyMesh, shape_values
+from fenics_contact.mesh import FACET_TYPES, BodyMesh, CellType, shape_gradients, shape_values
 from fenics_contact.surfaces.facet_areas import nodal_areas
 
 #: The nodes of a quadratic triangle.
@@ -36,6 +36,15 @@ def bearing_areas(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
         areas[:, _MIDPOINTS] += areas[:, _CORNERS].mean(axis=1, keepdims=True)
         areas[:, _CORNERS] = 0.0
     return areas
+
+
+def bearing_pulled_back(by_areas: np.ndarray) -> np.ndarray:
+    """Return the derivative by `nodal_areas` from that by `bearing_areas`, the shape of facets each."""
+    if not bears_on_midpoints(by_areas):
+        return by_areas
+    result = by_areas.copy()
+    result[:, _CORNERS] = by_areas[:, _MIDPOINTS].mean(axis=1, keepdims=True)
+    return result
 
 
 def share_areas(mesh: BodyMesh, name: str) -> np.ndarray:
@@ -88,7 +97,28 @@ def shape_weights(
     Returns:
         Node numbers and quadratic shape functions, (m, 6) each.
     """
+    kind, corners = _pieces(facet)
+    places = np.einsum("mk,mkd->md", weights, corners)
+    return facets[facet // len(kind.pieces)], shape_values(kind, places)
+
+
+def shape_weight_gradients(facet: np.ndarray, weights: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+    """Return the derivatives of the weights that `shape_weights` returns by the pieces' local coordinates.
+
+    Args:
+        facet: Numbers of linear pieces, (m,).
+        weights: Linear shape functions of the pieces at the points, (m, 3).
+        gradients: Their derivatives, (m, 3, 2).
+
+    Returns:
+        Shape (m, 6, 2).
+    """
+    kind, corners = _pieces(facet)
+    by_place = shape_gradients(kind, np.einsum("mk,mkd->md", weights, corners))
+    return np.asarray(by_place @ np.einsum("mka,mkd->mda", gradients, corners))
+
+
+def _pieces(facet: np.ndarray) -> tuple[CellType, np.ndarray]:
+    """Return the type of quadratic triangles and the reference corners of pieces, (m, 3, 2)."""
     kind = FACET_TYPES[_MIDPOINTS.stop, 3]
-    count = len(kind.pieces)
-    places = np.einsum("mk,mkd->md", weights, kind.nodes[kind.pieces[facet % count]])
-    return facets[facet // count], shape_values(kind, places)
+    return kind, kind.nodes[kind.pieces[facet % len(kind.pieces)]]

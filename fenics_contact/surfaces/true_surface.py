@@ -74,7 +74,8 @@ def _with_areas(surface: FacetedSurface, mesh: BodyMesh, name: str) -> FacetedSu
         return surface
     facets = mesh.surfaces[name]
     areas = np.bincount(facets.ravel(), bearing_areas(mesh.points, facets).ravel(), minlength=mesh.n_nodes)
-    return replace(surface, areas=areas[surface.nodes])
+    whole = np.searchsorted(surface.nodes, facets)
+    return replace(surface, areas=areas[surface.nodes], whole=whole)
 
 
 def _relief(

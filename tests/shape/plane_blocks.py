@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem
 from fenics_contact.gallery import rectangle
-from fenics_contact.mesh import quadratic
+from fenics_contact.mesh import BodyMesh, quadratic
 from fenics_contact.scene import (
     Body,
     BodyForce,
@@ -41,11 +41,12 @@ PIPE = RigidSphere((1.1, -6.0), 6.0)
 
 def on_obstacle(friction: Friction, cell: str, obstacle: RigidObstacle = FLOOR, order: int = 1) -> Scene:
     """A crowned block that nothing but an obstacle holds, pressed and pushed on top."""
-    mesh = crowned(rectangle((0.0, 0.0), (2.0, 1.0), (10, 4), cell), 0.02 if obstacle is FLOOR else -0.04)
+    mesh = _of_order(order, rectangle((0.0, 0.0), (2.0, 1.0), (10, 4), cell))
+    mesh = crowned(mesh, 0.02 if obstacle is FLOOR else -0.04)
     lowest = obstacle.distance(mesh.points[np.unique(mesh.surfaces["y0"])]).min()
     mesh = mesh.moved(mesh.points - (0.0, lowest))
     return Scene(
-        {"block": Body(quadratic(mesh) if order == 2 else mesh, RUBBER)},
+        {"block": Body(mesh, RUBBER)},
         loads=[Traction("block", "y1", (0.45, -2.0))],
         contacts=[ContactPair(Surface("block", "y0"), obstacle, friction)],
     )
@@ -53,18 +54,20 @@ def on_obstacle(friction: Friction, cell: str, obstacle: RigidObstacle = FLOOR, 
 
 def on_block(friction: Friction, cell: str, order: int = 1) -> Scene:
     """A heavy crowned block that only the rounded one under it holds; no node lies over an end of an edge."""
-    lower = rectangle((0.0, -1.0), (2.0, 0.0), (7, 3), cell)
+    lower = _of_order(order, rectangle((0.0, -1.0), (2.0, 0.0), (7, 3), cell))
     x, y = lower.points.T
     lower = lower.moved(np.column_stack([x, y - 0.02 * (x - 1.0) ** 2 * (y + 1.0)]))
-    upper = crowned(rectangle((0.13, 0.0), (1.87, 0.8), (9, 3), cell), 0.04)
-    if order == 2:
-        lower, upper = quadratic(lower), quadratic(upper)
+    upper = crowned(_of_order(order, rectangle((0.13, 0.0), (1.87, 0.8), (9, 3), cell)), 0.04)
     return Scene(
         {"lower": Body(lower, PLASTIC), "block": Body(upper, RUBBER)},
         [Support("lower", "y0")],
         [Traction("block", "y1", (0.6, -2.0)), BodyForce("block", (0.1, -1.0))],
         [ContactPair(Surface("block", "y0"), Surface("lower", "y1"), friction)],
     )
+
+
+def _of_order(order: int, mesh: BodyMesh) -> BodyMesh:
+    return quadratic(mesh) if order == 2 else mesh
 
 
 SCENES: dict[str, Callable[[], Scene]] = {
@@ -79,9 +82,10 @@ OBJECTIVES = {**objectives("block"), **aims("block", "y0", 2)}
 
 
 def plane_problem(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF) -> Remembering:
-    """All contact curves of a scene move."""
+    """All contact curves, or surfaces, of a scene move."""
     surfaces = [s for pair in scene.contacts for s in (pair.slave, pair.master) if isinstance(s, Surface)]
-    designs = tuple(SurfaceDesign(s.body, s.name, 5) for s in surfaces)
+    net = 5 if scene.dim == 2 else (3, 2)
+    designs = tuple(SurfaceDesign(s.body, s.name, net) for s in surfaces)
     contact = ContactProblem(scene, comm, partitions=partitions(scene), solver=SOLVER)
     return Remembering(contact, designs, TotalPotential())
 

@@ -17,7 +17,7 @@ from tests.shape.aims import aims
 from tests.shape.blocks import block_on_block, problem
 from tests.shape.chains import chain_problem
 from tests.shape.objectives import objectives
-from tests.shape.plane_blocks import SCENES, plane_problem
+from tests.shape.plane_blocks import on_block, plane_problem
 from tests.shape.quotients import Remembering
 
 #: Four subdomains, two of each body: on four ranks every rank lacks a body. A chain of eight subdomains.
@@ -27,18 +27,18 @@ PROBLEMS: dict[str, Callable[[MPI.Comm], Remembering]] = {
     ),
     "blocks, Tresca": lambda comm: problem(block_on_block(Tresca(0.8), load=(0.6, 0.12, -2.0)), comm),
     "chain": lambda comm: chain_problem(Coulomb(0.3), comm),
-    "plane": lambda comm: plane_problem(SCENES["blocks"](), comm),
+    "plane, quadratic": lambda comm: plane_problem(on_block(Coulomb(0.38), "quadrilateral", 2), comm),
 }
 #: Who judges: between them they ask everything of a state.
 JUDGES = {
     "blocks, tetrahedra": ("stress", "friction forces", "largest stress", "movement", "friction work"),
     "blocks, Tresca": ("displacement", "largest pressure", "unevenness"),
     "chain": ("energy", "normal forces", "largest of two"),
-    "plane": ("displacement", "friction forces", "largest stress"),
+    "plane, quadratic": ("displacement", "friction forces", "largest stress"),
 }
-BODY = {"chain": "link2", "plane": "block"}
-SURFACE = {"chain": "contact", "plane": "y0"}
-SIZE = {"chain": 0.03, "plane": 0.004}
+BODY = {"chain": "link2", "plane, quadratic": "block"}
+SURFACE = {"chain": "contact", "plane, quadratic": "y0"}
+SIZE = {"chain": 0.03, "plane, quadratic": 0.004}
 
 
 def same_bits(comm: MPI.Comm, *arrays: np.ndarray | float) -> bool:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.mesh import BodyMesh
+from fenics_contact.mesh import BodyMesh, quadratic
 from fenics_contact.shape.surface_derivative import areas_pulled_back, normals_pulled_back
 from fenics_contact.shape.volume import volume_by_points
+from fenics_contact.surfaces import true_surface
 from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface
 
 CELLS = ("hexahedron", "tetrahedron")
@@ -20,14 +21,16 @@ Reverse = Callable[[FacetedSurface, np.ndarray], np.ndarray]
 REVERSE: dict[str, Reverse] = {"normals": normals_pulled_back, "areas": areas_pulled_back}
 
 
-def crumpled(cell: str) -> BodyMesh:
+def crumpled(cell: str, order: int = 1) -> BodyMesh:
     """A block without any plane face, or a rectangle without any straight edge."""
     rng = np.random.default_rng(2)
     if cell in PLANE_CELLS:
         mesh = rectangle((0.0, 0.0), (2.0, 1.5), (4, 3), cell)
     else:
         mesh = block((0.0, 0.0, 0.0), (2.0, 1.5, 1.0), (4, 3, 3), cell)
-    return mesh.moved(mesh.points + 0.04 * rng.standard_normal(mesh.points.shape))
+    if order == 2:
+        mesh = quadratic(mesh)
+    return mesh.moved(mesh.points + 0.04 / order**2 * rng.standard_normal(mesh.points.shape))
 
 
 @pytest.mark.parametrize("what", REVERSE)
@@ -46,6 +49,21 @@ def test_normals_and_areas_agree_with_central_differences(cell: str, what: str) 
     assert adjoint == pytest.approx(quotient, rel=1e-7)
 
 
+@pytest.mark.parametrize("cell", [*CELLS, *PLANE_CELLS])
+def test_areas_on_which_a_pressure_bears_agree_with_central_differences(cell: str) -> None:
+    rng = np.random.default_rng(4)
+    mesh, name = crumpled(cell, 2), "x1"
+    surface = true_surface(mesh, name, "faceted")
+    by, move = rng.standard_normal(surface.areas.shape), rng.standard_normal(mesh.points.shape)
+    up, down = (
+        true_surface(mesh.moved(mesh.points + sign * STEP * move), name, "faceted") for sign in (1, -1)
+    )
+    quotient = by @ (up.areas - down.areas) / (2 * STEP)
+    adjoint = np.sum(areas_pulled_back(surface, by) * move[surface.nodes])
+    assert abs(adjoint) > 0.1
+    assert adjoint == pytest.approx(quotient, rel=1e-7)
+
+
 @pytest.mark.parametrize("cell", CELLS)
 def test_nodal_areas_grow_with_the_square_of_a_plane_surface(cell: str) -> None:
     mesh = block((0.0, 0.0, 0.0), (2.0, 1.5, 1.0), (4, 3, 1), cell)
@@ -54,9 +72,10 @@ def test_nodal_areas_grow_with_the_square_of_a_plane_surface(cell: str) -> None:
     assert np.sum(gradient * surface.points) == pytest.approx(2 * 2.0 * 1.5)
 
 
+@pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("cell", [*CELLS, *PLANE_CELLS])
-def test_the_volume_agrees_with_central_differences(cell: str) -> None:
-    mesh = crumpled(cell)
+def test_the_volume_agrees_with_central_differences(cell: str, order: int) -> None:
+    mesh = crumpled(cell, order)
     move = np.random.default_rng(6).standard_normal(mesh.points.shape)
     up, down = (mesh.moved(mesh.points + sign * STEP * move).volume for sign in (1, -1))
     adjoint = np.sum(volume_by_points(mesh) * move)
