@@ -13,6 +13,7 @@ from fenics_contact._libraries import MPI
 from fenics_contact.errors import InvalidInputError, tell, together
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.mesh import computed_rounding, coordinate_rounding
+from fenics_contact.pairing.closable_gaps import closable_gaps
 from fenics_contact.pairing.contact_points import (
     ContactPoints,
     in_free_frames,
@@ -21,7 +22,9 @@ from fenics_contact.pairing.contact_points import (
     tangent_frames,
 )
 from fenics_contact.pairing.given_gaps import with_given_gaps
+from fenics_contact.pairing.mortar import mortar_coupling
 from fenics_contact.pairing.node_numbers import NodeNumbers
+from fenics_contact.pairing.shared_projection import shared_projection
 from fenics_contact.pairing.surface_doubts import warn_of_surface
 from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, Tie, master_share, surface_of
 from fenics_contact.surface_shapes import asked
@@ -30,8 +33,6 @@ from fenics_contact.surfaces import (
     Geometry,
     Projection,
     bears_on_midpoints,
-    join,
-    project,
     shape_functions,
     shape_weights,
 )
@@ -187,7 +188,7 @@ def _symmetric(points: ContactPoints, slave: _Side, master: _Side) -> np.ndarray
 def _by_projection(slave: _Side, movable: np.ndarray, master: _Side, comm: MPI.Comm) -> ContactPoints:
     """Pair each slave node with the master facet on which it projects. Collective."""
     candidates = np.flatnonzero(movable)
-    hit = _shared_projection(slave.surface, candidates, master.surface, comm)
+    hit = shared_projection(slave.surface, candidates, master.surface, comm)
     if len(hit.lost) and comm.rank == 0:
         _tell_of_lost(slave.surface.points[candidates[hit.lost]], len(candidates))
     points = _points(slave, candidates[hit.point], hit.normal, hit.gap, master.weights(hit))
@@ -216,45 +217,16 @@ def _by_mortar(
         comm: Communicator of the ranks that share the work.
         share: The master's share of the motion that closes the gap.
     """
-    from fenics_contact.pairing.mortar import mortar_coupling  # only imported if a pair needs it
-
-    coupling = mortar_coupling(slave.surface, master.surface, comm)
-    chosen = np.flatnonzero(movable[coupling.node])
+    whole = mortar_coupling(slave.surface, master.surface, comm)
+    coupling = whole.part(np.flatnonzero(movable[whole.node]))
     count = len(master.nodes)
     spread = sp.csr_matrix((np.ones(count), (np.arange(count), master.nodes)), shape=(count, master.n_nodes))
-    weight = (coupling.weight[chosen] @ spread).tocsr()
-    gap = coupling.gap[chosen]
+    gap = coupling.gap
     if slave.surface.relief is not None or master.surface.relief is not None:
-        gap = _closable(slave, coupling.node[chosen], master, coupling.weight[chosen], gap, comm, share)
-    points = _points(slave, coupling.node[chosen], coupling.normal[chosen], gap, weight)
-    return replace(points, area=coupling.area[chosen])
-
-
-def _closable(
-    slave: _Side,
-    chosen: np.ndarray,
-    master: _Side,
-    weight: sp.csr_matrix,
-    mean: np.ndarray,
-    comm: MPI.Comm,
-    share: float,
-) -> np.ndarray:
-    """Return the gaps between true surfaces that linear displacements can close, shape (n,). Collective.
-
-    Where the gap g closes, the slave moves by (1 − s) g and the master by s g, s its share of the compliance,
-    up to rigid motions. The constraint contains linear interpolants of that, I g on the slave and J g on the
-    master: it can close (1 − s) g(x_i) + s ∫ ψ_i J g. The mean of g itself includes its curvature between
-    nodes. Nodes that are partly beside the other surface keep that mean.
-    """
-    nodes = np.flatnonzero(np.bincount(weight.indices, minlength=weight.shape[1]))
-    here = _shared_projection(slave.surface, chosen, master.surface, comm)
-    there = _shared_projection(master.surface, nodes, slave.surface, comm)
-    own, opposite = np.full(len(chosen), np.nan), np.full(weight.shape[1], np.nan)
-    own[here.point], opposite[nodes[there.point]] = here.gap, there.gap
-    lost = abs(weight) @ np.isnan(opposite).astype(np.float64) > 0
-    across = np.where(lost, own, weight @ np.nan_to_num(opposite))
-    closable = (1.0 - share) * own + share * across
-    return np.where(np.isnan(closable), mean, closable)
+        gap = closable_gaps(slave.surface, master.surface, coupling, share, comm).value
+    weight = (coupling.weight @ spread).tocsr()
+    points = _points(slave, coupling.node, coupling.normal, gap, weight)
+    return replace(points, area=coupling.area)
 
 
 def _on_obstacle(slave: _Side, movable: np.ndarray, obstacle: RigidObstacle) -> ContactPoints:
@@ -278,16 +250,3 @@ def _points(
         gap, slave.surface.areas[chosen], np.full(count, -1), np.zeros((count, normal.shape[1] - 1)), axes,
         np.zeros(normal.shape, dtype=bool), gap, np.zeros(count, dtype=bool),
     )  # fmt: skip
-
-
-def _shared_projection(
-    slave: FacetedSurface, movable: np.ndarray, master: FacetedSurface, comm: MPI.Comm
-) -> Projection:
-    """Project the movable nodes, distributed round-robin over the ranks. Collective."""
-    mine = np.arange(comm.rank, len(movable), comm.size)
-    projection: Projection | None = None
-    with together(comm):
-        chosen = movable[mine]
-        hit = project(slave.points[chosen], slave.normals[chosen], master)
-        projection = replace(hit, point=mine[hit.point], lost=mine[hit.lost])
-    return join([part for part in comm.allgather(projection) if part is not None])

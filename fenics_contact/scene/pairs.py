@@ -92,9 +92,9 @@ class ContactPair:
         master: Surface of another body, or a rigid obstacle.
         friction: Law of friction; without one (None) contact is frictionless.
         discretisation: ``"node"`` keeps the gap of every slave node non-negative; ``"mortar"`` does so for
-            weighted means of the gap. The former is simple and supports shape derivatives. The latter (dual
-            basis, integration over the common segments of both meshes) passes the contact patch test on
-            non-matching meshes. Contact with a rigid obstacle is always nodal.
+            weighted means of the gap. The former is simple. The latter (dual basis, integration over the
+            common segments of both meshes) passes the contact patch test on non-matching meshes. Contact with
+            a rigid obstacle is always nodal.
         geometry: What gaps and normals are measured between: ``"best"``, true shapes that the meshes know,
             else smooth surfaces through the nodes; ``"reconstructed"``, always the latter; ``"faceted"``, the
             flat facets, for comparison. Between round bodies the error of facets is often larger than the

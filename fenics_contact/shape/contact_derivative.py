@@ -9,10 +9,11 @@ import numpy as np
 from fenics_contact.contact import State
 from fenics_contact.errors import together
 from fenics_contact.feti import TornSystem, nodal_mean_at
-from fenics_contact.pairing import ContactPoints
-from fenics_contact.scene import ContactPair, RigidObstacle, Surface, Tresca, surface_of
+from fenics_contact.pairing import ContactPoints, CouplingDerivatives
+from fenics_contact.scene import ContactPair, RigidObstacle, Surface, Tresca, master_share, surface_of
 from fenics_contact.shape.adjoint import Adjoint
 from fenics_contact.shape.linearised_face import LinearisedFace
+from fenics_contact.shape.mortar_derivative import mortar_points_pulled_back
 from fenics_contact.shape.objective import Partials
 from fenics_contact.shape.projection_derivative import (
     PointDerivatives,
@@ -58,8 +59,7 @@ def contact_by_shape(state: State, adjoint: Adjoint, partials: Partials, by_boun
     """Return the derivative by the geometry of the contact points, replicated, shape (n_nodes, dim).
 
     It is ∂/∂X of −λᵀ B w + (ζ − j)ᵀ(c − B u), with the objective's derivative j by B u − c, and the shares of
-    slip bounds and areas. Pairs with mortar contact must lie where no node moves: their contribution is
-    omitted. Collective.
+    slip bounds and areas. Collective.
 
     Args:
         state: The state.
@@ -76,6 +76,9 @@ def contact_by_shape(state: State, adjoint: Adjoint, partials: Partials, by_boun
     by_area = _by_area(torn, partials, by_bound)
     for index, pair in enumerate(torn.scene.contacts):
         mine = np.flatnonzero(points.pair == index)
+        if isinstance(pair.master, Surface) and pair.discretisation == "mortar":
+            _add_mortar(result, torn, pair, rows, mine, by_area[mine])
+            continue
         if by_area[mine].any():
             surface = surface_of(torn.scene, pair.slave, "faceted")
             nodes = tearing.global_nodes(pair.slave.body, surface.nodes)
@@ -84,7 +87,7 @@ def contact_by_shape(state: State, adjoint: Adjoint, partials: Partials, by_boun
             result[nodes] += areas_pulled_back(surface, by_areas)
         if not isinstance(pair.master, Surface):
             result[points.slave[mine]] += _by_obstacle(torn, pair.master, rows, mine)
-        elif pair.discretisation == "node":
+        else:
             _add_projected(result, torn, pair, rows, mine)
     return result
 
@@ -101,6 +104,39 @@ def _by_area(torn: TornSystem, partials: Partials, by_bound: np.ndarray) -> np.n
         if isinstance(contact.friction, Tresca) and not callable(contact.friction.traction):
             by_area[torn.frictional[pair == index]] += contact.friction.traction * by_bound[pair == index]
     return by_area
+
+
+def _add_mortar(
+    result: np.ndarray,
+    torn: TornSystem,
+    pair: ContactPair,
+    rows: RowFields,
+    mine: np.ndarray,
+    by_area: np.ndarray,
+) -> None:
+    """Add the derivative by slave and master nodes of points of mortar contact. Collective."""
+    points, scene, tearing = torn.points, torn.scene, torn.decomposition.tearing
+    assert isinstance(pair.master, Surface)
+    slave, master = (surface_of(scene, side, pair.geometry) for side in (pair.slave, pair.master))
+    nodes, opposite = (
+        tearing.global_nodes(side.body, surface.nodes)
+        for side, surface in ((pair.slave, slave), (pair.master, master))
+    )
+    by = _by_point(points, rows, mine)
+    pulled = _pulled_master(points, rows, mine)
+    known = np.isin(opposite, rows.nodes)
+    values = np.zeros((2, len(opposite), torn.dim))
+    values[:, known] = rows.at(opposite[known])  # other nodes have no weight, nor do they get one at once
+    by_coupling = CouplingDerivatives(
+        by_area, np.hstack(list(pulled)), np.hstack(list(values)),
+        by.normal + frames_pulled_back(points.normal[mine], by.tangents, by.axes), by.gap,
+    )  # fmt: skip
+    by_slave, by_master = mortar_points_pulled_back(
+        slave, master, np.searchsorted(nodes, points.slave[mine]), master_share(scene, pair),
+        by_coupling, torn.decomposition.comm,
+    )  # fmt: skip
+    result[nodes] += by_slave
+    result[opposite] += by_master
 
 
 def _by_obstacle(torn: TornSystem, obstacle: RigidObstacle, rows: RowFields, mine: np.ndarray) -> np.ndarray:
@@ -207,7 +243,12 @@ def _by_point(
     tangents = -np.einsum("kna,knd->nad", friction, relative)
     if corners is None:
         return PointDerivatives(force[1], normal, tangents, np.zeros((len(mine), 0)), points.axes[mine])
-    pulled = -force[:, :, None] * points.normal[mine]
-    pulled = pulled + np.einsum("kna,nad->knd", friction, points.tangents[mine])
-    weight = np.einsum("knd,knjd->nj", pulled, corners)
+    weight = np.einsum("knd,knjd->nj", _pulled_master(points, rows, mine), corners)
     return PointDerivatives(force[1], normal, tangents, weight, points.axes[mine])
+
+
+def _pulled_master(points: ContactPoints, rows: RowFields, mine: np.ndarray) -> np.ndarray:
+    """Return the forces on the master, whose work in the other field is derived, shape (2, m, dim)."""
+    pressed = -rows.normal[:, mine, None] * points.normal[mine]
+    rubbed = np.einsum("kna,nad->knd", rows.friction[:, mine], points.tangents[mine])
+    return np.asarray(pressed + rubbed)

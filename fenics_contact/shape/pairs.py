@@ -28,7 +28,7 @@ def checked_contact(contact: ContactProblem) -> ContactProblem:
 def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
     """Reject designs that move surfaces without derivatives.
 
-    Mortar contact, ties and friction that varies have none.
+    Ties and friction that varies have none.
 
     Args:
         scene: The scene.
@@ -38,9 +38,6 @@ def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
         InvalidInputError: Names the pair and the surface.
     """
     for number, pair in enumerate(scene.contacts):
-        if pair.discretisation == "mortar" and isinstance(pair.master, Surface):
-            remedy = "use discretisation='node' for it"
-            _check(scene, moving, (pair.slave, pair.master), f"mortar contact pair {number}", remedy)
         if pair.friction_varies:
             remedy = "give its friction as a number, as the derivative of a function is not known"
             _check(scene, moving, (pair.slave,), f"contact pair {number}, whose friction varies,", remedy)

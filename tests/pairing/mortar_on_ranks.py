@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.pairing.mortar import mortar_coupling
+from fenics_contact.pairing.mortar import CouplingDerivatives, mortar_coupling, mortar_pulled_back
 from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface
 from tests.pairing.mortar_surfaces import plate
 
@@ -28,12 +28,20 @@ def pairs() -> dict[str, tuple[FacetedSurface, FacetedSurface]]:
 
 
 def collect(comm: MPI.Comm) -> Numbers:
-    """Couple all pairs, with the ranks' work shared."""
-    numbers = {}
+    """Couple all pairs, and differentiate that, with the ranks' work shared."""
+    numbers, rng = {}, np.random.default_rng(5)
     for name, (slave, master) in pairs().items():
         coupling = mortar_coupling(slave, master, comm)
         numbers[name + " node"], numbers[name + " area"] = coupling.node, coupling.area
         numbers[name + " weight"], numbers[name + " gap"] = coupling.weight.toarray(), coupling.gap
+        count = len(coupling.node)
+        by = CouplingDerivatives(
+            rng.standard_normal(count), rng.standard_normal((count, 1)),
+            rng.standard_normal((len(master.nodes), 1)), coupling.normal, rng.standard_normal(count),
+        )  # fmt: skip
+        by_slave, by_master = mortar_pulled_back(slave, master, coupling, by, comm)
+        numbers[name + " by slave"], numbers[name + " by normals"] = by_slave.points, by_slave.normals
+        numbers[name + " by master"] = by_master.points
     return numbers
 
 

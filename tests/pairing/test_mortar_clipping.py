@@ -61,7 +61,7 @@ def intersection_area(p: np.ndarray, q: np.ndarray) -> float:
 
 def clipped_area(p: np.ndarray, q: np.ndarray) -> float:
     vertices, count = clip(p[None], q[None])
-    triangles, _ = simplices(vertices, count)
+    triangles, *_ = simplices(vertices, count)
     assert (measure(triangles) > -1e-15).all()
     return float(measure(triangles).sum())
 
@@ -96,7 +96,7 @@ def test_many_pairs_are_clipped_as_each_alone() -> None:
     turned = square @ np.array([[0.8, 0.6], [-0.6, 0.8]])
     subject, window = turned + shift, np.tile(square, (200, 1, 1))
     vertices, count = clip(subject, window)
-    triangles, pair = simplices(vertices, count)
+    triangles, pair, _ = simplices(vertices, count)
     together = np.bincount(pair, weights=measure(triangles), minlength=200)
     alone = [clipped_area(p, q) for p, q in zip(subject, window, strict=True)]
     np.testing.assert_allclose(together, alone, atol=1e-15)
@@ -107,7 +107,7 @@ def test_many_pairs_are_clipped_as_each_alone() -> None:
 def test_intervals_are_clipped_too() -> None:
     subject = np.array([[0.0, 1], [0.0, 1], [0.0, 1], [2.0, 5]])[:, :, None]
     window = np.array([[0.5, 2], [-1, 3], [1, 2], [3, 4]])[:, :, None]
-    pieces, pair = simplices(*clip(subject, window))
+    pieces, pair, _ = simplices(*clip(subject, window))
     np.testing.assert_array_equal(pair, [0, 1, 3])
     np.testing.assert_array_equal(pieces[:, :, 0], [[0.5, 1], [0, 1], [3, 4]])
 
@@ -150,6 +150,6 @@ def test_nothing_is_left_of_no_pairs_and_of_pairs_apart(count: int) -> None:
     square = np.tile(np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]), (count, 1, 1))
     vertices, left = clip(square + 2, square)
     np.testing.assert_array_equal(left, np.zeros(count))
-    triangles, pair = simplices(vertices, left)
+    triangles, pair, _ = simplices(vertices, left)
     assert triangles.shape == (0, 3, 2)
     assert len(pair) == 0

@@ -16,6 +16,7 @@ from fenics_contact.shape import HarmonicExtension
 from tests.shape.aims import aims
 from tests.shape.blocks import block_on_block, problem
 from tests.shape.chains import chain_problem
+from tests.shape.mortar_lines import chain_problem_by_mortar
 from tests.shape.objectives import objectives
 from tests.shape.plane_blocks import on_block, plane_problem
 from tests.shape.quotients import Remembering
@@ -28,6 +29,7 @@ PROBLEMS: dict[str, Callable[[MPI.Comm], Remembering]] = {
     "blocks, Tresca": lambda comm: problem(block_on_block(Tresca(0.8), load=(0.6, 0.12, -2.0)), comm),
     "chain": lambda comm: chain_problem(Coulomb(0.3), comm),
     "plane, quadratic": lambda comm: plane_problem(on_block(Coulomb(0.38), "quadrilateral", 2), comm),
+    "chain by mortar": chain_problem_by_mortar,
 }
 #: Who judges: between them they ask everything of a state.
 JUDGES = {
@@ -35,10 +37,11 @@ JUDGES = {
     "blocks, Tresca": ("displacement", "largest pressure", "unevenness"),
     "chain": ("energy", "normal forces", "largest of two"),
     "plane, quadratic": ("displacement", "friction forces", "largest stress"),
+    "chain by mortar": ("energy", "stress", "unevenness"),
 }
-BODY = {"chain": "link2", "plane, quadratic": "block"}
-SURFACE = {"chain": "contact", "plane, quadratic": "y0"}
-SIZE = {"chain": 0.03, "plane, quadratic": 0.004}
+BODY = {"chain": "link2", "plane, quadratic": "block", "chain by mortar": "link2"}
+SURFACE = {"chain": "contact", "plane, quadratic": "y0", "chain by mortar": "contact"}
+SIZE = {"chain": 0.03, "plane, quadratic": 0.004, "chain by mortar": 0.03}
 
 
 def same_bits(comm: MPI.Comm, *arrays: np.ndarray | float) -> bool:

@@ -177,18 +177,6 @@ def test_evaluations_and_products_are_counted_and_the_best_design_is_kept() -> N
     assert {"decompose", "mesh motion", "solve", "adjoint", "gradient"} <= set(blocks.seconds)
 
 
-def test_a_surface_of_mortar_contact_may_not_move_and_one_by_nodes_may() -> None:
-    by_mortar = replace(scene(), contacts=[replace(scene().contacts[0], discretisation="mortar")])
-    message = r"mortar contact pair 0 lies on 'z0' of body 'upper', of which \d+ nodes move: use discr"
-    with pytest.raises(InvalidInputError, match=message):
-        ShapeProblem(
-            ContactProblem(by_mortar, MPI.COMM_SELF, partitions=partitions(scene())),
-            designs_of(scene()),
-            TotalPotential(),
-        )
-    assert fresh().size == 12
-
-
 def test_a_tied_surface_may_not_move() -> None:
     tied = replace(scene(), contacts=[], ties=[Tie(Surface("upper", "z0"), Surface("lower", "z1"))])
     with pytest.raises(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 
 import numpy as np
@@ -12,7 +12,7 @@ from scipy import sparse
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.pairing.mortar.candidates import candidate_pairs
-from fenics_contact.pairing.mortar.cells import cells_of
+from fenics_contact.pairing.mortar.cells import cells_of, overlaps_of
 from fenics_contact.pairing.mortar.dual_basis import dual_integrals
 from fenics_contact.pairing.mortar.planes import check_convex, planes_of
 from fenics_contact.pairing.mortar.relief import relief_of_cells
@@ -38,15 +38,21 @@ class MortarCoupling:
         weight: M_ij / D_i with M_ij = ∫ ψ_i N_j, N_j of the master, shape (n, len(master.nodes)); rows add up
             to one.
         normal: Unit normal from master to slave, the averaged slave normal reversed, shape (n, dim).
-        gap: n_i · (x_i − Σ_j weight_ij x_j), less the weighted mean height of the true surfaces over their
-            facets, positive when open, shape (n,), [length].
+        relief: Weighted mean height of the true surfaces over their facets, slave less master, along the
+            slave facets' normals, shape (n, dim), [length].
+        gap: n_i · (x_i − Σ_j weight_ij x_j + relief_i), positive when open, shape (n,), [length].
     """
 
     node: np.ndarray
     area: np.ndarray
     weight: sparse.csr_matrix
     normal: np.ndarray
+    relief: np.ndarray
     gap: np.ndarray
+
+    def part(self, chosen: np.ndarray) -> MortarCoupling:
+        """Return some of the nodes, by indices or a mask."""
+        return MortarCoupling(**{each.name: getattr(self, each.name)[chosen] for each in fields(self)})
 
 
 def mortar_coupling(
@@ -106,9 +112,9 @@ def _coupling(
     weight = (sparse.diags(1 / np.asarray(chosen.sum(axis=1)).ravel()) @ chosen).tocsr()
     weight.sort_indices()
     normal = -slave.normals[node]
-    apart = slave.points[node] - weight @ master.points + relief[node] / area[node, None]
-    gap = np.einsum("nd,nd->n", normal, apart)
-    return MortarCoupling(node, area[node], weight, normal, gap)
+    raised = relief[node] / area[node, None]
+    gap = np.einsum("nd,nd->n", normal, slave.points[node] - weight @ master.points + raised)
+    return MortarCoupling(node, area[node], weight, normal, raised, gap)
 
 
 def _integrals(
@@ -129,11 +135,12 @@ def _integrals(
     pairs = candidate_pairs(planes, planes_of(master, np.arange(len(master.facets))))
     rows, columns, values = [], [], []
     # Entries of M are collected and summed once: adding sparse matrices chunk by chunk would copy them all.
-    for pair_slave, pair_master in _chunks(*pairs):
-        cells, facets, at_slave, at_master = cells_of(planes, pair_slave, pair_master, master)
+    for pair_slave, pair_master in chunks(*pairs):
+        overlaps = overlaps_of(planes, pair_slave, pair_master, master)
+        cells, at_slave, at_master = cells_of(overlaps), overlaps.slave, overlaps.master
         closer = relief_of_cells(cells, slave, master, (chosen[at_slave], at_master), planes.normal[at_slave])
         coverage, integrals, of_relief = dual_integrals(cells, closer)
-        np.add.at(area, slave.facets[chosen[facets]], coverage)
+        np.add.at(area, slave.facets[chosen[overlaps.facets]], coverage)
         along = planes.normal[at_slave][:, None]
         np.add.at(relief, slave.facets[chosen[at_slave]], of_relief[:, :, None] * along)
         row, column = slave.facets[chosen[at_slave]][:, :, None], master.facets[at_master][:, None]
@@ -146,7 +153,7 @@ def _integrals(
     return area, total, relief
 
 
-def _chunks(pair_slave: np.ndarray, pair_master: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def chunks(pair_slave: np.ndarray, pair_master: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Split the list of pairs where the slave facet changes, after about `CHUNK` of them."""
     starts = np.flatnonzero(np.diff(pair_slave, prepend=-1))
     cuts = starts[np.flatnonzero(np.diff(starts // CHUNK, prepend=-1))]

@@ -21,12 +21,12 @@ References:
 
 from __future__ import annotations
 
-import math
+from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
 
 from fenics_contact.pairing.mortar.cells import Cells
+from fenics_contact.pairing.mortar.sums import SumsBy
 
 #: Extent of a covered part, as root mean square in local coordinates, below which it is a sliver.
 SLIVER = 1e-4
@@ -53,42 +53,78 @@ def dual_integrals(cells: Cells, field: np.ndarray) -> tuple[np.ndarray, np.ndar
         shape (n_pairs, corners, master corners), both [length²] or [length], and ∫ ψ_i v of each pair, shape
         (n_pairs, corners).
     """
-    over_facet, over_pair = _SumsBy(cells.facet), _SumsBy(cells.pair)
-    area = over_facet(cells.weight.sum(axis=1))
-    coverage = over_facet(np.einsum("nq,nqk->nk", cells.weight, cells.slave))
-    modes, at_corners = _modes(cells, area)
-    second = over_facet(np.einsum("nqa,nqb->nab", modes * cells.weight[:, :, None], modes))
-    inverse = _pseudo_inverse(second / area[:, None, None]) / area[:, None, None]
-    weighted = np.concatenate([cells.weight[:, :, None], cells.weight[:, :, None] * modes], axis=2)
-    functions = np.concatenate([cells.master, field[:, :, None]], axis=2)
-    moments = over_pair(weighted.transpose(0, 2, 1) @ functions)
-    facet = np.zeros(len(moments), dtype=np.int64)
-    facet[cells.pair] = cells.facet
-    values = moments[:, :1] / area[facet][:, None, None] + (at_corners @ inverse)[facet] @ moments[:, 1:]
-    integrals = coverage[facet][:, :, None] * values
-    return coverage, integrals[:, :, :-1], integrals[:, :, -1]
+    basis = DualBasis.on(cells)
+    integrals = basis.integrals(np.concatenate([cells.master, field[:, :, None]], axis=2))
+    return basis.coverage, integrals[:, :, :-1], integrals[:, :, -1]
 
 
-class _SumsBy:
-    """Sums of arrays over the entries with the same number."""
+@dataclass(frozen=True)
+class DualBasis:
+    """The dual functions on the covered parts of slave facets.
 
-    def __init__(self, number: np.ndarray) -> None:
-        rows, count = int(number.max(initial=-1)) + 1, len(number)
-        self.matrix = sparse.csr_matrix((np.ones(count), (number, np.arange(count))), shape=(rows, count))
+    Attributes:
+        cells: The integration cells.
+        over_facet: Sums over the cells of each facet.
+        over_pair: Sums over the cells of each pair.
+        facet: Facet of each pair, shape (n_pairs,).
+        area: Covered area of each facet, shape (n_facets,), [length²] or [length].
+        coverage: D_e, shape (n_facets, corners), in the same unit.
+        modes: The functions beside 1 at the quadrature points, see `_modes`, shape (n, q, m).
+        at_corners: The same at the corners, shape (n_facets, corners, m).
+        covariance: Means of the products of two of them over the covered part, shape (n_facets, m, m).
+        inverse: Its pseudo-inverse over the area, shape (n_facets, m, m).
+    """
 
-    def __call__(self, values: np.ndarray) -> np.ndarray:
-        shape = values.shape[1:]
-        summed = self.matrix @ values.reshape(len(values), math.prod(shape))
-        return np.asarray(summed.reshape(len(summed), *shape), dtype=np.float64)
+    cells: Cells
+    over_facet: SumsBy
+    over_pair: SumsBy
+    facet: np.ndarray
+    area: np.ndarray
+    coverage: np.ndarray
+    modes: np.ndarray
+    at_corners: np.ndarray
+    covariance: np.ndarray
+    inverse: np.ndarray
+
+    @classmethod
+    def on(cls, cells: Cells) -> DualBasis:
+        """Build the basis of some cells."""
+        over_facet, over_pair = SumsBy(cells.facet), SumsBy(cells.pair)
+        facet = np.zeros(over_pair.groups, dtype=np.int64)
+        facet[cells.pair] = cells.facet
+        area = over_facet(cells.weight.sum(axis=1))
+        coverage = over_facet(np.einsum("nq,nqk->nk", cells.weight, cells.slave))
+        modes, at_corners = _modes(cells, over_facet, area)
+        second = over_facet(np.einsum("nqa,nqb->nab", modes * cells.weight[:, :, None], modes))
+        covariance = second / area[:, None, None]
+        inverse = _pseudo_inverse(covariance) / area[:, None, None]
+        return cls(
+            cells, over_facet, over_pair, facet, area, coverage, modes, at_corners, covariance, inverse
+        )
+
+    def moments(self, functions: np.ndarray) -> np.ndarray:
+        """Integrate functions, shape (n, q, f), times 1 and the modes over each pair, (n_pairs, 1 + m, f)."""
+        weight = self.cells.weight[:, :, None]
+        weighted = np.concatenate([weight, weight * self.modes], axis=2)
+        return self.over_pair(weighted.transpose(0, 2, 1) @ functions)
+
+    def values(self, moments: np.ndarray) -> np.ndarray:
+        """Return the projections of functions at the corners, each pair's share, (n_pairs, corners, f)."""
+        mean = moments[:, :1] / self.area[self.facet][:, None, None]
+        return np.asarray(mean + (self.at_corners @ self.inverse)[self.facet] @ moments[:, 1:])
+
+    def integrals(self, functions: np.ndarray) -> np.ndarray:
+        """Integrate the dual functions times functions, shape (n, q, f), shape (n_pairs, corners, f)."""
+        return np.asarray(self.coverage[self.facet][:, :, None] * self.values(self.moments(functions)))
 
 
-def _modes(cells: Cells, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _modes(cells: Cells, over_facet: SumsBy, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Evaluate the non-constant functions, of mean zero, that span the shape functions together with 1.
 
     Returns:
         At the quadrature points, shape (n, q, m), and at the corners of each facet, (n_facets, corners, m).
     """
-    over_facet, corners = _SumsBy(cells.facet), cells.slave.shape[2]
+    corners = cells.slave.shape[2]
 
     def centred(modes: np.ndarray, at_corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         # Twice: if the covered part is small, the first subtraction leaves a mean of its rounding errors.
@@ -106,11 +142,50 @@ def _modes(cells: Cells, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _pseudo_inverse(covariance: np.ndarray) -> np.ndarray:
     """Invert symmetric matrices (n, m, m) except in directions of slivers, where the inverse is zero."""
-    floor = np.array([FLOOR, FLOOR, FLOOR**2])[: covariance.shape[1]]
-    scale = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), floor**2))
+    scale, _ = _scales(covariance)
     scaled = covariance / (scale[:, :, None] * scale[:, None])
     values, vectors = np.linalg.eigh(scaled)
-    large = values > (SLIVER / FLOOR) ** 2
-    inverted = np.where(large, 1 / np.where(large, values, 1.0), 0.0)
-    inverse = (vectors * inverted[:, None]) @ vectors.transpose(0, 2, 1)
+    inverse = (vectors * _inverted(values)[:, None]) @ vectors.transpose(0, 2, 1)
     return np.asarray(inverse / (scale[:, :, None] * scale[:, None]), dtype=np.float64)
+
+
+def _scales(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the extents (n, m) by which covariances are scaled, and which of them are their own."""
+    floor = np.array([FLOOR, FLOOR, FLOOR**2])[: covariance.shape[1]]
+    squares = np.diagonal(covariance, axis1=1, axis2=2)
+    return np.sqrt(np.maximum(squares, floor**2)), squares > floor**2
+
+
+def _inverted(values: np.ndarray) -> np.ndarray:
+    """Return the inverses of eigenvalues, zero for those of slivers."""
+    large = values > (SLIVER / FLOOR) ** 2
+    return np.where(large, 1 / np.where(large, values, 1.0), 0.0)
+
+
+def inverted_pulled_back(covariance: np.ndarray, by_inverse: np.ndarray) -> np.ndarray:
+    """Return the derivative by covariances from that by their pseudo-inverses, shape (n, m, m).
+
+    With the eigenvectors V of X and a function f of its eigenvalues λ, δf(X) = V (Γ ∘ Vᵀ δX V) Vᵀ with the
+    quotients Γ_ij = (f(λ_i) − f(λ_j)) / (λ_i − λ_j) (Daleckii and Krein): of 1/λ they are −1/(λ_i λ_j), and
+    between λ and a sliver's, where f is zero, f(λ) / (λ − λ').
+    """
+    scale, own = _scales(covariance)
+    both = scale[:, :, None] * scale[:, None]
+    scaled = covariance / both
+    values, vectors = np.linalg.eigh(scaled)
+    inverted = _inverted(values)
+    one, other = inverted[:, :, None], inverted[:, None]
+    apart = values[:, :, None] - values[:, None]
+    alone = (one == 0.0) != (other == 0.0)
+    quotients = np.where(alone, (one - other) / np.where(alone, apart, 1.0), -one * other)
+    inverse = (vectors * inverted[:, None]) @ vectors.transpose(0, 2, 1)
+    by_scaled_inverse = by_inverse / both
+    turned = vectors.transpose(0, 2, 1) @ by_scaled_inverse @ vectors
+    by_scaled = vectors @ (quotients * turned) @ vectors.transpose(0, 2, 1)
+    # Each entry is divided by the scales of its row and of its column.
+    products = by_scaled_inverse * inverse + by_scaled * scaled
+    by_scale = -(products.sum(axis=1) + products.sum(axis=2)) / scale
+    result = by_scaled / both
+    diagonal = np.arange(scale.shape[1])
+    result[:, diagonal, diagonal] += np.where(own, by_scale / (2 * scale), 0.0)
+    return np.asarray(result)

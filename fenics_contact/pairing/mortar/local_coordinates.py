@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.mesh import CELL_TYPES, FACET_TYPES, quadrature
+from fenics_contact.surfaces import shape_functions
 
 
 def local_coordinates(points: np.ndarray, flat: np.ndarray) -> np.ndarray:
@@ -34,6 +35,36 @@ def local_coordinates(points: np.ndarray, flat: np.ndarray) -> np.ndarray:
     product, sum_ = s * t, 1 + d2 * s + d1 * t
     root = np.sqrt(np.maximum(sum_**2 - 4 * d1 * d2 * product, 0))
     return start - (2 * product / (sum_ + root))[:, :, None] * twist
+
+
+def local_coordinates_pulled_back(
+    local: np.ndarray, flat: np.ndarray, by_local: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the derivatives by points and by corners from that by the local coordinates of the points.
+
+    From x = Σ N_j(ξ) x_j follows J δξ = δx − Σ N_j δx_j with J = ∂x/∂ξ.
+
+    Args:
+        local: ξ, shape (n, q, dim − 1).
+        flat: Corners, shape (n, corners, dim − 1).
+        by_local: Derivative by ξ, in its shape.
+
+    Returns:
+        By the points, shape (n, q, dim − 1), and by the corners, in the shape of ``flat``.
+    """
+    n, points, width = local.shape
+    values, slopes = shape_functions(local.reshape(-1, width), flat.shape[1])
+    tangents = np.einsum("nqka,nkd->nqad", slopes.reshape(n, points, -1, width), flat)
+    if width == 1:
+        by_points = by_local / tangents[:, :, 0]
+    else:
+        a, b = tangents[:, :, 0], tangents[:, :, 1]
+        det = a[:, :, 0] * b[:, :, 1] - a[:, :, 1] * b[:, :, 0]
+        first, second = by_local[:, :, 0] / det, by_local[:, :, 1] / det
+        by_points = np.stack(
+            [first * b[:, :, 1] - second * a[:, :, 1], second * a[:, :, 0] - first * b[:, :, 0]], axis=2
+        )
+    return by_points, -values.reshape(n, points, -1).transpose(0, 2, 1) @ by_points
 
 
 #: Corners to the coefficients of 1, s, t and s t, times four.

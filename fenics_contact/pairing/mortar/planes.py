@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.pairing.mortar.sums import SumsBy
 from fenics_contact.surfaces import FacetedSurface, corner_products
 
 #: Double area of a corner's triangle, relative to the facet's area, below which a facet counts as re-entrant.
@@ -33,6 +34,10 @@ class Planes:
     flat: np.ndarray
     area: np.ndarray
 
+    def part(self, chosen: np.ndarray) -> Planes:
+        """Return some of the planes, by indices or a mask."""
+        return Planes(**{each.name: getattr(self, each.name)[chosen] for each in fields(self)})
+
 
 def measure(flat: np.ndarray) -> np.ndarray:
     """Return the signed area of polygons (n, k, 2), the signed length of intervals (n, 2, 1), shape (n,)."""
@@ -40,6 +45,15 @@ def measure(flat: np.ndarray) -> np.ndarray:
         return flat[:, 1, 0] - flat[:, 0, 0]
     x, y = flat[:, :, 0], flat[:, :, 1]
     return 0.5 * (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
+
+
+def measure_pulled_back(flat: np.ndarray, by_measure: np.ndarray) -> np.ndarray:
+    """Return the derivative by the corners from that by `measure`, in the shape of ``flat``."""
+    if flat.shape[2] == 1:
+        return np.asarray(by_measure[:, None, None] * np.array([[-1.0], [1.0]]))
+    across = np.roll(flat, -1, axis=1) - np.roll(flat, 1, axis=1)
+    turned = np.stack([across[:, :, 1], -across[:, :, 0]], axis=2)
+    return np.asarray(0.5 * by_measure[:, None, None] * turned)
 
 
 def planes_of(surface: FacetedSurface, chosen: np.ndarray) -> Planes:
@@ -73,6 +87,55 @@ def laid_flat(points: np.ndarray, planes: Planes, index: np.ndarray) -> tuple[np
     away = points - planes.origin[index][:, None]
     flat = away @ planes.axes[index].transpose(0, 2, 1)
     return flat, np.einsum("nkd,nd->nk", away, planes.normal[index])
+
+
+def planes_pulled_back(
+    planes: Planes,
+    corners: np.ndarray,
+    by_flat: np.ndarray,
+    by_normal: np.ndarray,
+    opposite: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the derivatives by the facets' corners and by the points laid flat on their planes.
+
+    The derived function must not depend on where in a plane its origin is and how its axes lie in it, which
+    an integral does not. So origins may stay, and axes a change by −(a · δn) n only.
+
+    Args:
+        planes: The planes.
+        corners: Corners of their facets, shape (n, corners, dim).
+        by_flat: Derivative by ``planes.flat``.
+        by_normal: Direct derivative by the normals, shape (n, dim).
+        opposite: Points laid flat, shape (m, k, dim), their planes, shape (m,), and the derivative by their
+            coordinates in the plane, shape (m, k, dim − 1).
+
+    Returns:
+        In the shapes of ``corners`` and of the points.
+    """
+    points, index, by_points = opposite
+    axes, normal = planes.axes, planes.normal
+    # The heights of the points, times the derivatives by their coordinates, turn the axes.
+    tilt = np.einsum("nka,nkd,nd->na", by_flat, corners - planes.origin[:, None], normal)
+    height = np.einsum("nkd,nd->nk", points - planes.origin[index][:, None], normal[index])
+    tilt += SumsBy(index, len(normal))(np.einsum("nka,nk->na", by_points, height))
+    by_normal = by_normal - np.einsum("na,nad->nd", tilt, axes)
+    by_corners = by_flat @ axes + _normals_pulled_back(corners, normal, by_normal)
+    return by_corners, by_points @ axes[index]
+
+
+def _normals_pulled_back(corners: np.ndarray, normal: np.ndarray, by_normal: np.ndarray) -> np.ndarray:
+    """Return the derivative by corners from that by the mean normals, shape (n, corners, dim)."""
+    by_unit = by_normal - np.einsum("nd,nd->n", by_normal, normal)[:, None] * normal
+    if corners.shape[1] == 2:
+        length = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
+        turned = np.stack([-by_unit[:, 1], by_unit[:, 0]], axis=1) / length[:, None]
+        return np.stack([-turned, turned], axis=1)
+    following = np.roll(corners, -1, axis=1)
+    # Twice the area vector is Σ x_k × x_(k+1), taken relative to the first corner.
+    away = corners - corners[:, :1]
+    double = np.linalg.norm(np.cross(away, following - corners[:, :1]).sum(axis=1), axis=1)
+    across = following - np.roll(corners, 1, axis=1)
+    return np.asarray(np.cross(across, (by_unit / double[:, None])[:, None]))
 
 
 def check_convex(planes: Planes, chosen: np.ndarray) -> None:

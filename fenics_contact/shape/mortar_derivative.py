@@ -1,0 +1,74 @@
+"""Reverse mode through mortar contact points: from gaps, normals, weights and areas back to coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fenics_contact._libraries import MPI
+from fenics_contact.pairing import CouplingDerivatives, closable_gaps, mortar_coupling, mortar_pulled_back
+from fenics_contact.shape.projection_derivative import PointDerivatives, projection_pulled_back
+from fenics_contact.shape.surface_derivative import normals_pulled_back, slopes_pulled_back
+from fenics_contact.surfaces import FacetedSurface, Projection
+
+
+def mortar_points_pulled_back(
+    slave: FacetedSurface,
+    master: FacetedSurface,
+    chosen: np.ndarray,
+    share: float,
+    by: CouplingDerivatives,
+    comm: MPI.Comm,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the derivatives by the nodes of both surfaces, shape (n_nodes, dim) each. Collective.
+
+    Gaps between true surfaces are those that linear displacements can close: combinations of gaps at the
+    nodes of both, each of which is a projection.
+
+    Args:
+        slave: The slave surface.
+        master: The master surface.
+        chosen: Positions of the contact points in ``slave.nodes``, ascending, shape (n,).
+        share: The master's share of the motion that closes the gap.
+        by: Derivatives by the results of their coupling.
+        comm: Communicator of the ranks that share the work, all with the same arguments.
+    """
+    whole = mortar_coupling(slave, master, comm)
+    coupling = whole.part(np.searchsorted(whole.node, chosen))
+    by_slave, by_master = np.zeros_like(slave.points), np.zeros_like(master.points)
+    if slave.relief is not None or master.relief is not None:
+        gaps = closable_gaps(slave, master, coupling, share, comm)
+        across = gaps.share * by.gap
+        by_own = np.where(gaps.kept, 0.0, by.gap) - across
+        here, there = gaps.here, gaps.there
+        at_slave, at_master = _gaps_pulled_back(master, here, by_own[here.point])
+        by_slave[coupling.node[here.point]] += at_slave
+        by_master += at_master
+        at_master, at_slave = _gaps_pulled_back(slave, there, (coupling.weight.T @ across)[there.point])
+        by_master[there.point] += at_master
+        by_slave += at_slave
+        by = replace(
+            by,
+            gap=np.where(gaps.kept, by.gap, 0.0),
+            left=np.column_stack([by.left, across]),
+            right=np.column_stack([by.right, gaps.opposite]),
+        )
+    parts = mortar_pulled_back(slave, master, coupling, by, comm)
+    for surface, part, result in zip((slave, master), parts, (by_slave, by_master), strict=True):
+        every = np.arange(len(surface.facets))
+        by_points, by_normals, by_averaged = slopes_pulled_back(surface, every, part.slopes)
+        result += part.points + by_points
+        result += normals_pulled_back(surface, part.normals + by_normals, by_averaged)
+    return by_slave, by_master
+
+
+def _gaps_pulled_back(
+    surface: FacetedSurface, hit: Projection, by_gap: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the derivatives by projected points and by the surface's nodes from that by the gaps."""
+    count, dim, corners = len(hit.point), surface.dim, surface.corners
+    by = PointDerivatives(
+        by_gap, np.zeros((count, dim)), np.zeros((count, dim - 1, dim)), np.zeros((count, corners))
+    )
+    return projection_pulled_back(surface, hit.facet, hit.local, hit.gap, by)

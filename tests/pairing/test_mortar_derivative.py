@@ -1,0 +1,207 @@
+"""The reverse mode through the mortar coupling agrees with difference quotients, term by term."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from fenics_contact.pairing.mortar import (
+    CouplingDerivatives,
+    MortarCoupling,
+    coupling_derivative,
+    mortar_coupling,
+    mortar_pulled_back,
+)
+from fenics_contact.pairing.mortar.planes import Planes
+from fenics_contact.surfaces import FacetedSurface, faceted_surface, slopes
+from fenics_contact.surfaces.reconstruction import reconstructed
+from tests.pairing.mortar_surfaces import KINDS, lattice, plate, shell
+
+STEP = 1e-7
+TOLERANCE = {"plates": 1e-7, "shells": 1e-7, "matching": 1e-6, "nested": 1e-6}
+TERMS = ("area", "weight", "normal", "gap")
+
+
+def warped(surface: FacetedSurface, size: float, seed: int) -> FacetedSurface:
+    """A surface whose nodes are moved a little, each in its own direction."""
+    by = size * np.random.default_rng(seed).standard_normal(surface.points.shape)
+    return faceted_surface(surface.points + by, surface.facets, surface.mirrored)
+
+
+def plates(kinds: tuple[str, str]) -> tuple[FacetedSurface, FacetedSurface]:
+    """Plates that do not match; the slave hangs over the rim of the master."""
+    slave = plate(kinds[0], 4, up=False, height=0.1, skew=1.0)
+    master = plate(kinds[1], 5, low=0.13, high=1.4, turn=0.3, skew=1.0)
+    return warped(slave, 0.01, 1), warped(master, 0.01, 2)
+
+
+def shells(kinds: tuple[str, str]) -> tuple[FacetedSurface, FacetedSurface]:
+    """A shaft in a hole, both with true surfaces over their facets; the shaft is longer."""
+    slave = shell(kinds[0], 6, 1.0, convex=True, span=(0.3, 1.5))
+    master = shell(kinds[1], 8, 1.05, convex=False, span=(0.6, 2.0), uneven=-0.2)
+    return reconstructed(warped(slave, 0.004, 1)), reconstructed(warped(master, 0.004, 2))
+
+
+def matching(kinds: tuple[str, str]) -> tuple[FacetedSurface, FacetedSurface]:
+    """Surfaces of the same mesh, of which the master has more: their edges lie over one another."""
+    return regular(kinds[0], 3, up=False, height=0.1), regular(kinds[1], 3, around=1)
+
+
+def nested(kinds: tuple[str, str]) -> tuple[FacetedSurface, FacetedSurface]:
+    """Each master facet lies over four of the slave, and some of the master hangs over."""
+    return regular(kinds[0], 8, up=False, height=0.1), regular(kinds[1], 4, around=1)
+
+
+def regular(
+    kind: str, cells: int, *, around: int = 0, up: bool = True, height: float = 0.0
+) -> FacetedSurface:
+    """The unit square or interval in equal cells, with some more around it."""
+    x = np.arange(-around, cells + around + 1) / cells
+    if kind == "edges":
+        return lattice(np.column_stack([x, np.full(len(x), height)]), kind, not up)
+    return lattice(np.stack(np.meshgrid(x, x, [height], indexing="ij"), axis=-1)[:, :, 0], kind, up)
+
+
+PAIRS: dict[str, Callable[[tuple[str, str]], tuple[FacetedSurface, FacetedSurface]]] = {
+    "plates": plates,
+    "shells": shells,
+    "matching": matching,
+    "nested": nested,
+}
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A coupling and random derivatives by it."""
+
+    slave: FacetedSurface
+    master: FacetedSurface
+    coupling: MortarCoupling
+    by: CouplingDerivatives
+
+    def alone(self, term: str) -> CouplingDerivatives:
+        """Derivatives by one of the results alone."""
+        names = {"weight": "left"}
+        zero = {name: np.zeros_like(getattr(self.by, name)) for name in ("area", "left", "normal", "gap")}
+        del zero[names.get(term, term)]
+        return replace(self.by, **zero)
+
+
+@cache
+def setting(name: str, kinds: tuple[str, str]) -> Setting:
+    slave, master = PAIRS[name](kinds)
+    coupling, rng = mortar_coupling(slave, master), np.random.default_rng(3)
+    count = len(coupling.node)
+    by = CouplingDerivatives(
+        rng.standard_normal(count),
+        rng.standard_normal((count, 3)),
+        rng.standard_normal((len(master.nodes), 3)),
+        rng.standard_normal(coupling.normal.shape),
+        rng.standard_normal(count),
+    )
+    return Setting(slave, master, coupling, by)
+
+
+def moved(surface: FacetedSurface, by: np.ndarray) -> FacetedSurface:
+    """The surface with other nodes; what lies over the facets goes with them."""
+    plain = faceted_surface(surface.points + by, surface.facets, surface.mirrored)
+    return replace(plain, relief=surface.relief)
+
+
+def scalar(slave: FacetedSurface, master: FacetedSurface, here: Setting, by: CouplingDerivatives) -> float:
+    found = mortar_coupling(slave, master)
+    assert np.array_equal(found.node, here.coupling.node)
+    weights = np.einsum("nr,nr->", by.left, found.weight @ by.right)
+    return float(by.area @ found.area + weights + np.sum(by.normal * found.normal) + by.gap @ found.gap)
+
+
+def both_ways(
+    here: Setting, by: CouplingDerivatives, ways: tuple[np.ndarray, np.ndarray]
+) -> tuple[float, float, float]:
+    """The derivative along motions of both surfaces, the difference quotient, and the size of summands."""
+    pulled = mortar_pulled_back(here.slave, here.master, here.coupling, by)
+    found, size = 0.0, 0.0
+    for surface, way, part in zip((here.slave, here.master), ways, pulled, strict=True):
+        ahead, behind = moved(surface, STEP * way), moved(surface, -STEP * way)
+        found += np.sum(part.points * way)
+        size += np.abs(part.points * way).sum() + np.abs(part.normals).sum()
+        found += np.sum(part.normals * (ahead.normals - behind.normals)) / (2 * STEP)
+        if surface.relief is not None:
+            every = np.arange(len(surface.facets))
+            found += np.sum(part.slopes * (slopes(ahead, every) - slopes(behind, every))) / (2 * STEP)
+    ends = [
+        scalar(moved(here.slave, s * ways[0]), moved(here.master, s * ways[1]), here, by)
+        for s in (STEP, -STEP)
+    ]
+    return float(found), (ends[0] - ends[1]) / (2 * STEP), float(size)
+
+
+def random_ways(here: Setting, which: str) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(11)
+    slave, master = (rng.standard_normal(each.points.shape) for each in (here.slave, here.master))
+    return (slave, 0.0 * master) if which == "slave" else (0.0 * slave, master)
+
+
+@pytest.mark.parametrize("which", ["slave", "master"])
+@pytest.mark.parametrize("term", TERMS)
+@pytest.mark.parametrize("kinds", KINDS, ids="-".join)
+@pytest.mark.parametrize("name", PAIRS)
+def test_each_term_agrees_with_central_differences(
+    name: str, kinds: tuple[str, str], term: str, which: str
+) -> None:
+    here = setting(name, kinds)
+    found, quotient, size = both_ways(here, here.alone(term), random_ways(here, which))
+    # Where edges lie over one another the second derivative jumps, and the quotient is of the first order.
+    assert abs(found - quotient) < TOLERANCE[name] * size + 3e-8
+    assert size > 1e-3 or (which == "master" and term in ("normal", "area"))
+
+
+@pytest.mark.parametrize(
+    "kinds", [("quads", "triangles"), ("triangles", "quads"), ("triangles", "triangles")], ids="-".join
+)
+def test_what_passes_over_the_edges_of_a_matching_master_counts(
+    kinds: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the functions of both sides are not the same, so that one side's do not continue the other's."""
+    here = setting("matching", kinds)
+    ways = random_ways(here, "master")
+    by = here.alone("weight")
+    _, quotient, size = both_ways(here, by, ways)
+    monkeypatch.setattr(coupling_derivative, "_moved_aside", lambda master, beside: master)
+    _, exactly = mortar_pulled_back(here.slave, here.master, here.coupling, by)
+    assert abs(np.sum(exactly.points * ways[1]) - quotient) > 1e-3 * size
+
+
+@pytest.mark.parametrize("kinds", KINDS, ids="-".join)
+@pytest.mark.parametrize("name", PAIRS)
+def test_moving_everything_together_changes_nothing(name: str, kinds: tuple[str, str]) -> None:
+    here = setting(name, kinds)
+    for term in TERMS:
+        slave, master = mortar_pulled_back(here.slave, here.master, here.coupling, here.alone(term))
+        total = slave.points.sum(axis=0) + master.points.sum(axis=0)
+        size = np.abs(slave.points).sum() + np.abs(slave.normals).sum()
+        assert size > 1e-3
+        assert np.abs(total).max() < 1e-9 * size
+
+
+def test_only_facets_beside_nodes_with_derivatives_are_integrated_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    here, seen = setting("plates", ("quads", "quads")), []
+    whole = coupling_derivative.planes_of  # type: ignore[attr-defined]
+
+    def planes_of(surface: FacetedSurface, chosen: np.ndarray) -> Planes:
+        seen.append(len(chosen))
+        return whole(surface, chosen)
+
+    monkeypatch.setattr(coupling_derivative, "planes_of", planes_of)
+    first = np.arange(len(here.coupling.node)) == 0
+    by = replace(here.alone("gap"), gap=np.where(first, 1.0, 0.0))
+    found = mortar_pulled_back(here.slave, here.master, here.coupling, by)
+    assert seen[0] == np.count_nonzero((here.slave.facets == here.coupling.node[0]).any(axis=1))
+    assert seen[0] < len(here.slave.facets)
+    assert np.abs(found[0].points).max() > 1e-3
