@@ -1,4 +1,4 @@
-"""Minimise a nonsmooth function, of which one subgradient at a point is known, over linear constraints."""
+"""Minimise a nonsmooth function, of which one subgradient at a point is known, over constraints."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from fenics_contact.optimize.bundle_trust import BundleTrust
 from fenics_contact.optimize.constraints import Bounds, LinearConstraints, nearest_feasible
 from fenics_contact.optimize.for_scipy import ForScipy, Visit
 from fenics_contact.optimize.minimization import minimize
+from fenics_contact.optimize.nonlinear import ConstraintValue, NonlinearConstraint
 from fenics_contact.optimize.objective import Inexact, Kinked
 from fenics_contact.optimize.problem import PosedProblem, pose
 from fenics_contact.optimize.progress import Callback, Resumable
@@ -20,11 +21,13 @@ __all__ = [
     "Callback",
     "Checkpoint",
     "CheckpointError",
+    "ConstraintValue",
     "ForScipy",
     "Inexact",
     "InvalidDesignError",
     "Kinked",
     "LinearConstraints",
+    "NonlinearConstraint",
     "NotConvergedError",
     "PosedProblem",
     "Reason",

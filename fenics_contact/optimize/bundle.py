@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
@@ -30,6 +30,7 @@ class Bundle:
             seen from a centre whose value is too low by e_0, and is lowered by both: an inexact plane
             predicts no less decrease than possible.
         doubtful: Marks of planes whose slope may not be a subgradient, see `Kinked`, shape (m,).
+        pushes: Multiples of the gradients of r equality constraints that g_i contains, shape (m, r).
 
     References:
         K. C. Kiwiel, Methods of Descent for Nondifferentiable Optimization, Lecture Notes in
@@ -43,14 +44,21 @@ class Bundle:
     locality: float
     noise: Array
     doubtful: NDArray[np.bool_]
+    pushes: Array
 
     @classmethod
     def of_centre(
-        cls, gradient: Array, locality: float, noise: float = 0.0, doubtful: bool = False
+        cls,
+        gradient: Array,
+        locality: float,
+        noise: float = 0.0,
+        doubtful: bool = False,
+        pushes: ArrayLike = (),
     ) -> Bundle:
         """Return the bundle that holds only the centre's own plane."""
         zero = np.zeros(1)
-        return cls(gradient[None], zero, zero, locality, np.array([noise]), np.array([doubtful]))
+        marks, more = np.array([doubtful]), np.array([pushes], dtype=float)
+        return cls(gradient[None], zero, zero, locality, np.array([noise]), marks, more)
 
     @property
     def size(self) -> int:
@@ -69,7 +77,13 @@ class Bundle:
         return float(np.max(self.gradients @ step - self.measures))
 
     def with_cut(
-        self, gradient: Array, error: float, distance: float, noise: float = 0.0, doubtful: bool = False
+        self,
+        gradient: Array,
+        error: float,
+        distance: float,
+        noise: float = 0.0,
+        doubtful: bool = False,
+        pushes: ArrayLike = (),
     ) -> Bundle:
         """Return the bundle with one more plane at the end."""
         return Bundle(
@@ -79,9 +93,12 @@ class Bundle:
             self.locality,
             np.append(self.noise, noise),
             np.append(self.doubtful, doubtful),
+            np.vstack([self.pushes, np.asarray(pushes, dtype=float)]),
         )
 
-    def refined(self, gradient: Array, change: float, noise: float, doubtful: bool = False) -> Bundle:
+    def refined(
+        self, gradient: Array, change: float, noise: float, doubtful: bool = False, pushes: ArrayLike = ()
+    ) -> Bundle:
         """Return the bundle after its centre was re-evaluated.
 
         Args:
@@ -89,11 +106,12 @@ class Bundle:
             change: Change of the centre's value.
             noise: Its new error.
             doubtful: Whether its slope may not be a subgradient.
+            pushes: Multiples of gradients of equalities that it contains, shape (r,).
         """
         gradients, errors, noises = self.gradients.copy(), self.errors + change, self.noise.copy()
-        doubts = self.doubtful.copy()
-        gradients[0], errors[0], noises[0], doubts[0] = gradient, 0.0, noise, doubtful
-        return Bundle(gradients, errors, self.distances, self.locality, noises, doubts)
+        doubts, more = self.doubtful.copy(), self.pushes.copy()
+        gradients[0], errors[0], noises[0], doubts[0], more[0] = gradient, 0.0, noise, doubtful, pushes
+        return Bundle(gradients, errors, self.distances, self.locality, noises, doubts, more)
 
     def moved(self, step: Array, change: float, locality: float) -> Bundle:
         """Return the bundle seen from a new centre, whose own plane is the last one.
@@ -143,6 +161,7 @@ class Bundle:
             float(share @ self.distances),
             float(share @ self.noise),
             bool(np.any(self.doubtful & carrying)),
+            share @ self.pushes,
         )
 
     def chosen(self, rows: NDArray[np.intp]) -> Bundle:
@@ -154,4 +173,5 @@ class Bundle:
             self.locality,
             self.noise[rows],
             self.doubtful[rows],
+            self.pushes[rows],
         )

@@ -12,12 +12,25 @@ from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.errors import InvalidDesignError, InvalidInputError, tell
 from fenics_contact.optimize.bundle import Bundle
 from fenics_contact.optimize.care import surely, without_doubt
+from fenics_contact.optimize.conclusion import conclude
+from fenics_contact.optimize.evaluation import Known, evaluate_problem
+from fenics_contact.optimize.first_centre import first_centre
 from fenics_contact.optimize.inexactness import Demand, again, demand
-from fenics_contact.optimize.objective import Accuracy, Evaluation, can_be_inexact, evaluate
+from fenics_contact.optimize.merit import (
+    first_soft,
+    irreducible,
+    merit_planes,
+    multipliers,
+    priced_step,
+    surroundings,
+)
+from fenics_contact.optimize.objective import Accuracy, Evaluation, can_be_inexact
 from fenics_contact.optimize.problem import PosedProblem
 from fenics_contact.optimize.progress import Callback, Progress
 from fenics_contact.optimize.quadratic_program import SubproblemError
-from fenics_contact.optimize.result import NotConvergedError, Reason, Record, Result, StepKind
+from fenics_contact.optimize.recording import recorded
+from fenics_contact.optimize.restoration import restored
+from fenics_contact.optimize.result import Reason, Record, Result, StepKind
 from fenics_contact.optimize.state import MethodState
 from fenics_contact.optimize.stopping import StoppingTest, stopping_test
 from fenics_contact.optimize.subproblem import Step, solve_step
@@ -32,7 +45,12 @@ _RADIUS_LEAST = 1e-8  # least one, in lengths of the problem
 _T_LEAST, _T_MOST = 1e-10, 1e4  # range of t, in units of the first t
 _FIRST_SUBGRADIENT = 0.01  # relative error that the first subgradient of an inexact function may have
 _SLOPE_SHARE = 0.1  # error of an inexact subgradient along a step, relative to the predicted decrease
-_OF_THE_MODEL = (Reason.CONVERGED, Reason.STATIONARY, Reason.NO_DESCENT)  # based on subgradients alone
+_OF_THE_MODEL = (
+    Reason.CONVERGED,
+    Reason.STATIONARY,
+    Reason.NO_DESCENT,
+    Reason.INFEASIBLE,
+)  # based on subgradients alone
 _BESIDE = "a gradient from beside, as the centre lies on a kink"
 
 
@@ -83,6 +101,7 @@ class BundleTrust:
         inexactness: Errors of J requested from an inexact function, as a fraction of the predicted decrease,
             less than half of ``descent``.
         value_scale: Absolute part of the stopping test, for an objective whose minimum is about 0.
+        feasibility: Largest violation of a nonlinear constraint at the stop, relative to its size.
         raise_on_failure: Whether a stop for any other reason than CONVERGED or STATIONARY raises.
 
     References:
@@ -101,11 +120,12 @@ class BundleTrust:
     descent: float = 0.05
     inexactness: float = 0.02
     value_scale: float = 1.0
+    feasibility: float = 1e-6
     raise_on_failure: bool = True
 
     def __post_init__(self) -> None:
         """Reject parameters with which the method cannot work."""
-        for name in ("tolerance", "first_step", "value_scale"):
+        for name in ("tolerance", "first_step", "value_scale", "feasibility"):
             if not 0.0 < getattr(self, name) < np.inf:
                 raise InvalidInputError(f"{name} must be positive and finite, got {getattr(self, name)}")
         for name, least in (("max_iterations", 0), ("max_evaluations", 1), ("max_bundle", 3)):
@@ -143,7 +163,7 @@ class BundleTrust:
         with progress.reporting() as task:
             state, reason = self._run(problem, progress)
             task.outcome = reason.name.lower().replace("_", " ")
-        return _finish(self, state, reason)
+        return conclude(problem, state, reason, raises=self.raise_on_failure)
 
     def _run(self, problem: PosedProblem, progress: Progress) -> tuple[MethodState, Reason]:
         """Run from where an earlier run ended, or from the start, to the stop."""
@@ -165,26 +185,27 @@ class BundleTrust:
 
 
 def _start(method: BundleTrust, problem: PosedProblem) -> MethodState:
-    try:
-        centre = evaluate(problem.fun, problem.start, 1, Accuracy(np.inf, _FIRST_SUBGRADIENT))
-    except InvalidDesignError as error:
-        raise InvalidDesignError(f"the starting design must be valid: {error}") from error
-    gradient = centre.subgradient * problem.scale
-    norm = float(np.linalg.norm(gradient))
+    centre = first_centre(problem, _FIRST_SUBGRADIENT, method.feasibility)
+    planes = merit_planes(problem, centre)
+    norm = planes[0].length
     t = method.first_step * problem.length / (norm or 1.0)
-    locality = method.locality * norm / problem.length
-    bundle = Bundle.of_centre(gradient, locality, centre.error, centre.doubtful)
+    locality, first = method.locality * norm / problem.length, planes[0]
+    bundle = Bundle.of_centre(first.gradient, locality, centre.error, centre.doubtful, first.pushes)
     radius = _RADIUS * problem.length
     trust = Trust(t, radius, _T_LEAST * t, _T_MOST * t, _RADIUS_LEAST * problem.length)
-    record = Record(0, StepKind.START, centre.value, centre.value, 0.0, t, 0.0, norm, 0.0, 1, 1, centre.error)
-    return MethodState(centre, bundle, trust, t, (record,))
+    violation = problem.constraints_at(centre).violation
+    record = Record(
+        0, StepKind.START, centre.value, centre.value, 0.0, t, 0.0, norm, 0.0, 1, 1, centre.error, violation
+    )
+    soft = first_soft(planes, method.locality / problem.length, centre.doubtful)
+    pushes = np.zeros(len(problem.nonlinear))
+    return MethodState(centre, bundle, trust, t, (record,), soft=soft, multipliers=pushes)
 
 
 def _iterated(
     method: BundleTrust, problem: PosedProblem, state: MethodState
 ) -> tuple[MethodState, Reason | None]:
-    step, trust = _guarded_step(problem, state)
-    state = replace(state, trust=trust)
+    step, state = _guarded_step(method, problem, state)
     test = stopping_test(
         state.centre.value,
         tolerance=method.tolerance,
@@ -196,30 +217,35 @@ def _iterated(
     wanted = _wanted(method, problem, state, step, test, claim=reason is not None and reason.success)
     if wanted is not None and state.evaluations < method.max_evaluations:
         return _refined(problem, state, step, wanted), None
-    if reason in _OF_THE_MODEL and state.bundle.doubtful.any():
+    if reason in _OF_THE_MODEL and state.doubtful:
         return _reconsidered(method, problem, state, step)
     if reason is not None:
         return state, reason
     return _advanced(method, problem, state, step, _demand(method, state, step, test)), None
 
 
-def _evaluated(problem: PosedProblem, state: MethodState, x: Array, accuracy: Accuracy) -> Evaluation:
-    """Call the function, and once more near x where needed."""
-    evaluation = evaluate(problem.fun, x, state.evaluations + 1, accuracy)
-    return surely(problem, evaluation, state.evaluations + 1) if state.careful else evaluation
+def _evaluated(
+    problem: PosedProblem, state: MethodState, x: Array, accuracy: Accuracy, known: Known
+) -> Evaluation:
+    """Call the functions, and once more near x where needed."""
+    number = state.evaluations + 1
+    unequal = [k for k, one in enumerate(problem.nonlinear) if not one.equality]
+    penalties = {k: one.penalty for k, one in zip(unequal, state.soft, strict=True)}
+    evaluation = evaluate_problem(problem, x, number, accuracy, penalties, known)
+    return surely(problem, evaluation, number) if state.careful else evaluation
 
 
-def _guarded_step(problem: PosedProblem, state: MethodState) -> tuple[Step, Trust]:
+def _guarded_step(method: BundleTrust, problem: PosedProblem, state: MethodState) -> tuple[Step, MethodState]:
     """Solve the step's programme, with t small enough to stay in the trust region."""
-    near = problem.allowed.around(state.centre.x, problem.scale)
-    trust = state.trust
-    step = solve_step(state.bundle, near, trust.t)
+    near, trust = surroundings(problem, state.centre), state.trust
+    step, soft = priced_step(state.bundle, near, trust.t, state.soft, method.feasibility)
     while step.length > 1.001 * trust.radius and not trust.exhausted:
         # A kink can keep the length constant while t falls, so t must be able to fall fast.
         t = trust.t * max(0.05, min(0.5, 0.95 * trust.radius / step.length))
         trust = replace(trust, t=max(t, trust.t_least))
-        step = solve_step(state.bundle, near, trust.t)
-    return step, trust
+        step = solve_step(state.bundle, near, trust.t, soft)
+    state = replace(state, trust=trust, soft=soft)
+    return step, replace(state, multipliers=multipliers(problem, state, step))
 
 
 def _demand(
@@ -227,6 +253,7 @@ def _demand(
 ) -> Demand:
     """Return the accuracy needed by a trial of the step, or by a claim about all points within ``reach``."""
     norm = float(np.linalg.norm(state.bundle.gradients[0]))
+    norm += sum(one.penalty * float(np.linalg.norm(one.bundle.gradients[0])) for one in state.soft)
     worth = max(step.decrease, test.limit if reach else test.rounding)
     return demand(worth, max(step.length, reach), norm, (method.inexactness, _SLOPE_SHARE))
 
@@ -251,14 +278,17 @@ def _wanted(
 
 def _refined(problem: PosedProblem, state: MethodState, step: Step, accuracy: Accuracy) -> MethodState:
     """Re-evaluate the centre, more accurately."""
-    centre = state.centre
-    evaluation = again(centre, _evaluated(problem, state, centre.x, accuracy))
-    change = evaluation.value - centre.value
-    bundle = state.bundle.refined(
-        evaluation.subgradient * problem.scale, change, evaluation.error, evaluation.doubtful
-    )
+    centre, equal = state.centre, [k for k, one in enumerate(problem.nonlinear) if one.equality]
+    met = {k: replace(centre, value=centre.constraints[k], subgradient=centre.slopes[k]) for k in equal}
+    evaluation = again(centre, _evaluated(problem, state, centre.x, accuracy, met))
+    planes, doubtful = merit_planes(problem, evaluation), evaluation.doubtful
+    change, first = evaluation.value - centre.value, planes[0]
     return replace(
-        state, centre=evaluation, bundle=bundle, history=_recorded(state, step, StepKind.REFINED, evaluation)
+        state,
+        centre=evaluation,
+        bundle=state.bundle.refined(first.gradient, change, first.noise, doubtful, first.pushes),
+        soft=tuple(one.refined(plane, doubtful) for one, plane in zip(state.soft, planes[1:], strict=True)),
+        history=recorded(problem, state, step, StepKind.REFINED, evaluation),
     )
 
 
@@ -271,15 +301,19 @@ def _reconsidered(
     if state.evaluations >= method.max_evaluations:
         return state, Reason.EVALUATION_LIMIT
     sure = without_doubt(problem, state)
-    return replace(sure, history=_recorded(state, step, StepKind.REFINED, sure.centre, _BESIDE)), None
+    return replace(sure, history=recorded(problem, state, step, StepKind.REFINED, sure.centre, _BESIDE)), None
 
 
 def _reason_to_stop(
     method: BundleTrust, problem: PosedProblem, state: MethodState, step: Step, test: StoppingTest
 ) -> Reason | None:
     """Return why the method must stop before trying the step, or None."""
-    near = problem.allowed.around(state.centre.x, problem.scale)
-    solved = test.reason(step, lambda t: solve_step(state.bundle, near, t))
+    near = surroundings(problem, state.centre)
+    solved = test.reason(step, lambda t: solve_step(state.bundle, near, t, state.soft))
+    if problem.constraints_at(state.centre).violation > method.feasibility:
+        solved = None
+        if state.trust.exhausted or irreducible(step, state.soft, method.feasibility):
+            return Reason.INFEASIBLE
     if solved is not None:
         return solved
     if state.trust.cornered:
@@ -299,73 +333,45 @@ def _advanced(
     x = problem.allowed.project(state.centre.x + problem.scale * step.move)
     step = replace(step, move=(x - state.centre.x) / problem.scale)
     try:
-        evaluation = _evaluated(problem, state, x, needed.asked)
+        x, known = restored(problem, x, state.evaluations + 1, method.feasibility)
+        evaluation = _evaluated(problem, state, x, needed.asked, known)
     except InvalidDesignError as error:
         tell(_LOG.info, "trial design %d is invalid: %s", state.evaluations + 1, error)
         trust = state.trust.after_rejection(step.length)
         return replace(
-            state, trust=trust, history=_recorded(state, step, StepKind.REJECTED, None, str(error))
+            state, trust=trust, history=recorded(problem, state, step, StepKind.REJECTED, None, str(error))
         )
-    gradient = evaluation.subgradient * problem.scale
-    change, slope = evaluation.value - state.centre.value, float(gradient @ step.move)
+    return _judged(method, problem, state, step, evaluation)
+
+
+def _judged(
+    method: BundleTrust, problem: PosedProblem, state: MethodState, step: Step, evaluation: Evaluation
+) -> MethodState:
+    """Return the state after a trial that exists: a serious or a null step."""
+    first, *others = merit_planes(problem, evaluation)
+    change, slope = evaluation.value - state.centre.value, float(first.gradient @ step.move)
+    error, doubtful, room = slope - change, evaluation.doubtful, method.max_bundle - 1
     # Reduced before the cut is added: the weights belong to the old planes, and the new one must stay.
-    bundle = state.bundle.reduced(step.weights, method.max_bundle - 1)
-    bundle = bundle.with_cut(gradient, slope - change, step.length, evaluation.error, evaluation.doubtful)
-    trial = Trial(step, change, slope, float(bundle.measures[-1]))
-    if change > -method.descent * step.decrease:
-        history = _recorded(state, step, StepKind.NULL, evaluation)
-        return replace(state, bundle=bundle, trust=state.trust.after_null(trial), history=history)
-    locality = method.locality * float(np.linalg.norm(gradient)) / problem.length
+    bundle = state.bundle.reduced(step.weights, room)
+    bundle = bundle.with_cut(first.gradient, error, step.length, first.noise, doubtful, first.pushes)
+    cuts = [
+        one.reduced(weights, room).with_cut(plane, step.move, doubtful)
+        for one, weights, plane in zip(state.soft, step.soft_weights, others, strict=True)
+    ]
+    soft, rises = tuple(one for one, _ in cuts), [rise for _, rise in cuts]
+    measure = float(bundle.measures[-1]) + sum(rise.slope - rise.predicted for rise in rises)
+    merit = change + sum(rise.change for rise in rises)
+    trial = Trial(step, merit, slope + sum(rise.slope for rise in rises), measure)
+    if merit > -method.descent * step.decrease:
+        history = recorded(problem, state, step, StepKind.NULL, evaluation)
+        trust = state.trust.after_null(trial)
+        return replace(state, bundle=bundle, soft=soft, trust=trust, history=history)
+    locality = method.locality / problem.length
     return replace(
         state,
         centre=evaluation,
-        bundle=bundle.moved(step.move, change, locality),
+        bundle=bundle.moved(step.move, change, method.locality * first.length / problem.length),
+        soft=tuple(one.moved(plane, step.move, locality) for one, plane in zip(soft, others, strict=True)),
         trust=state.trust.after_serious(trial),
-        history=_recorded(state, step, StepKind.SERIOUS, evaluation),
-    )
-
-
-def _recorded(
-    state: MethodState, step: Step, kind: StepKind, evaluation: Evaluation | None, note: str = ""
-) -> tuple[Record, ...]:
-    value = np.nan if evaluation is None else evaluation.value
-    record = Record(
-        iteration=state.iterations + (kind is StepKind.SERIOUS),
-        kind=kind,
-        value=value,
-        best=value if kind in (StepKind.SERIOUS, StepKind.REFINED) else state.centre.value,
-        predicted_decrease=step.decrease,
-        t=step.t,
-        step_length=step.length,
-        aggregate_norm=step.aggregate_norm,
-        aggregate_error=step.aggregate_error,
-        bundle_size=state.bundle.size,
-        evaluations=state.evaluations + 1,
-        error=0.0 if evaluation is None else evaluation.error,
-        note=note,
-    )
-    return (*state.history, record)
-
-
-def _finish(method: BundleTrust, state: MethodState, reason: Reason) -> Result:
-    centre = state.centre
-    result = Result(
-        x=centre.x,
-        value=centre.value,
-        subgradient=centre.subgradient,
-        reason=reason,
-        iterations=state.iterations,
-        evaluations=state.evaluations,
-        history=state.history,
-        error=centre.error,
-    )
-    if reason.success or not method.raise_on_failure:
-        return result
-    refusals = [record.note for record in state.history if record.kind is StepKind.REJECTED]
-    last = f"; the last trial: {refusals[-1]}" if reason is Reason.INVALID_DESIGNS else ""
-    raise NotConvergedError(
-        f"{reason.value} (after {result.iterations} serious steps and {result.evaluations} evaluations, "
-        f"best value {result.value:.9g}{last})",
-        result.history,
-        result,
+        history=recorded(problem, state, step, StepKind.SERIOUS, evaluation),
     )

@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fenics_contact.optimize.objective import Evaluation, beside
+from fenics_contact.optimize.evaluation import beside_problem
+from fenics_contact.optimize.merit import merit_planes
+from fenics_contact.optimize.objective import Evaluation
 from fenics_contact.optimize.problem import PosedProblem
 from fenics_contact.optimize.state import MethodState
 
@@ -33,7 +35,7 @@ def surely(problem: PosedProblem, given: Evaluation, number: int) -> Evaluation:
         J. V. Burke, A. S. Lewis, M. L. Overton, A robust gradient sampling algorithm for nonsmooth, nonconvex
         optimization, SIAM J. Optim. 15 (2005) 751-779.
     """
-    return beside(problem.fun, given, neighbour(problem, given.x), number) if given.doubtful else given
+    return beside_problem(problem, given, neighbour(problem, given.x), number) if given.doubtful else given
 
 
 def without_doubt(problem: PosedProblem, state: MethodState) -> MethodState:
@@ -42,10 +44,14 @@ def without_doubt(problem: PosedProblem, state: MethodState) -> MethodState:
     A proximal parameter that wrong predictions have reduced is reset.
     """
     centre = surely(problem, state.centre, state.evaluations + 1)
-    bundle = state.bundle.refined(centre.subgradient * problem.scale, 0.0, centre.error)
+    planes = merit_planes(problem, centre)
+    bundle = state.bundle.refined(planes[0].gradient, 0.0, centre.error, pushes=planes[0].pushes)
+    soft = [
+        one.refined(plane, False).without_doubt() for one, plane in zip(state.soft, planes[1:], strict=True)
+    ]
     trust = replace(state.trust, t=state.first_t) if state.trust.exhausted else state.trust
     remaining = bundle.chosen(np.flatnonzero(~bundle.doubtful))
-    return replace(state, centre=centre, bundle=remaining, trust=trust, careful=True)
+    return replace(state, centre=centre, bundle=remaining, trust=trust, careful=True, soft=tuple(soft))
 
 
 def neighbour(problem: PosedProblem, x: Array) -> Array:

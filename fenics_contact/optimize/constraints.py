@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,16 +12,20 @@ from numpy.typing import ArrayLike, NDArray
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.optimize.from_scipy import rows_of
+from fenics_contact.optimize.nonlinear import NonlinearConstraint
 from fenics_contact.optimize.quadratic_program import QuadraticProgram, solve
 
 if TYPE_CHECKING:
     import scipy.optimize
 
 Array = NDArray[np.float64]
-#: Linear constraints, as this package or as SciPy writes them.
-Constraints: TypeAlias = (
-    "LinearConstraints | scipy.optimize.LinearConstraint | Sequence[scipy.optimize.LinearConstraint]"
+#: A constraint, as this package or as SciPy writes it.
+Constraint: TypeAlias = (
+    "LinearConstraints | NonlinearConstraint | scipy.optimize.LinearConstraint |"
+    "scipy.optimize.NonlinearConstraint"
 )
+#: One or several of them.
+Constraints: TypeAlias = "Constraint | Sequence[Constraint]"
 
 # A row counts as satisfied within this fraction of the size of its terms, which is rounding.
 _FEASIBILITY = 1e-9
@@ -67,8 +71,6 @@ class Bounds:
 @dataclass(frozen=True)
 class LinearConstraints:
     """Rows A x ≤ b and, optionally, E x = e.
-
-    A nonlinear constraint (a volume) is given by its linearisation at the start.
 
     Attributes:
         matrix: A, shape (m, n).
@@ -245,15 +247,22 @@ def feasible_set(
         InvalidInputError: If a shape does not fit, a value is nan, or a lower bound lies above its upper one.
     """
     lower, upper = _box(n, bounds)
-    given = () if constraints is None else constraints
+    given = [] if constraints is None else constraints
+    parts = [_checked_rows(n, one) for one in (given if isinstance(given, list | tuple) else [given])]
+    nothing = (np.zeros((0, n)), np.zeros(0), np.zeros((0, n)), np.zeros(0))
+    rows = (_frozen(np.concatenate(side), "rows", side[0].ndim) for side in zip(nothing, *parts, strict=True))
+    return FeasibleSet(lower, upper, *rows)
+
+
+def _checked_rows(n: int, given: Any) -> tuple[Array, Array, Array, Array]:
+    """Return A, b, E, e of linear constraints in either form."""
     rows = given if isinstance(given, LinearConstraints) else LinearConstraints(*rows_of(given, n))
     matrix, limit = _rows(n, rows.matrix, rows.limit, "A", "b")
     if (rows.equality_matrix is None) != (rows.equality_value is None):
         raise InvalidInputError("an equality needs both equality_matrix and equality_value, got only one")
     if rows.equality_matrix is None or rows.equality_value is None:
-        return FeasibleSet(lower, upper, matrix, limit, np.zeros((0, n)), np.zeros(0))
-    equality = _rows(n, rows.equality_matrix, rows.equality_value, "E", "e")
-    return FeasibleSet(lower, upper, matrix, limit, *equality)
+        return matrix, limit, np.zeros((0, n)), np.zeros(0)
+    return matrix, limit, *_rows(n, rows.equality_matrix, rows.equality_value, "E", "e")
 
 
 def _box(n: int, bounds: Bounds | tuple[ArrayLike, ArrayLike] | None) -> tuple[Array, Array]:

@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
 from fenics_contact.optimize.constraints import Bounds, Constraints, ranges
-from fenics_contact.optimize.objective import Fun, evaluate, require_finite
+from fenics_contact.optimize.evaluation import evaluate_constraint
+from fenics_contact.optimize.nonlinear import NonlinearConstraint, scaled_constraints
+from fenics_contact.optimize.objective import Evaluation, Fun, evaluate, require_finite
 from fenics_contact.optimize.problem import pose
 
 if TYPE_CHECKING:
@@ -35,7 +37,8 @@ class Visit:
     Attributes:
         x: Design, shape (n,), in the caller's variables.
         value: J there; nan where it does not exist.
-        violation: Distance by which x leaves the feasible set, in scaled variables; 0 inside.
+        violation: Distance by which x leaves bounds and linear constraints, in scaled variables, or violation
+            of a nonlinear constraint over its size, whichever is larger; 0 inside.
         note: Why J does not exist; empty if it does.
     """
 
@@ -47,7 +50,7 @@ class Visit:
 
 @displayed
 class ForScipy:
-    r"""min J(x) over a box and linear constraints, for `scipy.optimize.minimize`.
+    r"""min J(x) over a box, linear and nonlinear constraints, for `scipy.optimize.minimize`.
 
     SciPy's methods see z = x / scale and J / (1 + \|J(x0)\|), so that their default tolerances are
     meaningful. SciPy has no notion of invalid designs: where J raises `InvalidDesignError` they see a wall
@@ -87,7 +90,7 @@ class ForScipy:
             fun: Returns J(x) and one subgradient; raises `InvalidDesignError` where there is none.
             x0: Feasible starting point, shape (n,).
             bounds: Box, or a pair (lower, upper), or None.
-            constraints: Linear constraints, as for `minimize`.
+            constraints: As for `minimize`; nonlinear ones may be violated at the start and on the way.
             scale: Size of each variable, as for `minimize`.
             value: J(x) alone, where that is cheaper (`ShapeProblem.value_of`), for methods that take no
                 derivative.
@@ -96,7 +99,8 @@ class ForScipy:
         Raises:
             InvalidInputError: If a shape does not fit or x0 is not feasible.
         """
-        self._problem = pose(fun, x0, bounds, constraints, scale)
+        self._problem = pose(fun, x0, bounds, constraints, scale, restore=True)
+        self._nonlinear = [_Remembered(one) for one in self._problem.nonlinear]
         self._value, self._invalid = value, invalid
         self._unit = 1.0
         self.visits: list[Visit] = []
@@ -112,14 +116,14 @@ class ForScipy:
 
     @property
     def best(self) -> Visit:
-        """The feasible design with the smallest value so far."""
-        return self.best_within(1e-9)
+        """The feasible design with the smallest value so far; nonlinear constraints are met to 1e-6."""
+        return self.best_within(1e-6 if self._nonlinear else 1e-9)
 
     def best_within(self, violation: float) -> Visit:
         """Return the design with the smallest value among those whose violation is within a limit.
 
         Args:
-            violation: Largest distance to the feasible set, in scaled variables.
+            violation: Largest violation, see `Visit`.
 
         Raises:
             InvalidInputError: If there is none.
@@ -152,9 +156,10 @@ class ForScipy:
             InvalidInputError: If the method cannot handle the constraints.
         """
         name, allowed = method.lower(), self._problem.allowed
-        if (len(allowed.matrix) or len(allowed.equality_matrix)) and name not in _CONSTRAINED:
+        rows = len(allowed.matrix) + len(allowed.equality_matrix) + len(self._nonlinear)
+        if rows and name not in _CONSTRAINED:
             raise InvalidInputError(
-                f"a problem with linear constraints needs a method that keeps them, got {method!r}: use "
+                f"a problem with constraints needs a method that keeps them, got {method!r}: use "
                 "SLSQP, trust-constr or COBYLA"
             )
         arguments: dict[str, Any] = {"x0": self._problem.start / self._problem.scale, "method": method}
@@ -162,11 +167,12 @@ class ForScipy:
             arguments["fun"] = self.value_alone
         else:
             arguments.update(fun=self, jac=True)
-        box, rows = self._box(keep_feasible=name == "trust-constr"), self._rows(name in _WITHOUT_BOUNDS)
+        box, given = self._box(keep_feasible=name == "trust-constr"), self._rows(name in _WITHOUT_BOUNDS)
         if box is not None and name not in _WITHOUT_BOUNDS:
             arguments["bounds"] = box
-        if rows:
-            arguments["constraints"] = rows
+        given.extend(one.to_scipy(self._problem.scale) for one in self._nonlinear)
+        if given:
+            arguments["constraints"] = given
         return arguments
 
     def __call__(self, z: ArrayLike) -> tuple[float, Array]:
@@ -201,7 +207,9 @@ class ForScipy:
 
     def _violation(self, x: Array) -> float:
         near = self._problem.allowed.around(x, self._problem.scale)
-        return float(max(-near.room.min(initial=0.0), np.abs(near.miss).max(initial=0.0), 0.0))
+        values = np.array([one.at(x).value for one in self._nonlinear])
+        curved = scaled_constraints(self._problem.nonlinear, values).violation
+        return float(max(-near.room.min(initial=0.0), np.abs(near.miss).max(initial=0.0), curved))
 
     def _refused(self, x: Array, error: InvalidDesignError) -> tuple[float, Array]:
         """Record an invalid design, and return what methods see there."""
@@ -228,13 +236,46 @@ class ForScipy:
 
         return ScipyBounds(allowed.lower / scale, allowed.upper / scale, keep_feasible)
 
-    def _rows(self, with_box: bool) -> list[scipy.optimize.LinearConstraint]:
+    def _rows(self, with_box: bool) -> list[Any]:
         """All rows in scaled variables, optionally with those of the box."""
         allowed, scale = self._problem.allowed, self._problem.scale
         rows = ranges(allowed)
         if with_box:
             rows.append((np.eye(scale.size), allowed.lower, allowed.upper))
         return [_linear_constraint(matrix * scale, below, above) for matrix, below, above in rows]
+
+
+class _Remembered:
+    """A nonlinear constraint in SciPy's form, which asks for value and derivative apart, evaluated once."""
+
+    def __init__(self, constraint: NonlinearConstraint) -> None:
+        self._constraint, self._last, self._count = constraint, None, 0
+
+    _last: Evaluation | None
+
+    def at(self, x: Array) -> Evaluation:
+        """Return the constraint at x; where it does not exist what was found last."""
+        if self._last is not None and np.array_equal(self._last.x, x):
+            return self._last
+        self._count += 1
+        try:
+            self._last = evaluate_constraint(self._constraint, x, self._count)
+        except InvalidDesignError:
+            if self._last is None:
+                raise
+        return self._last
+
+    def to_scipy(self, scale: Array) -> scipy.optimize.NonlinearConstraint:
+        """Return the constraint over its size, as a function of scaled variables."""
+        from scipy.optimize import NonlinearConstraint as ScipyConstraint
+
+        size = self._constraint.size
+        return ScipyConstraint(
+            lambda z: np.array([self.at(scale * np.asarray(z)).value / size]),
+            self._constraint.lower / size,
+            self._constraint.upper / size,
+            jac=lambda z: (scale * self.at(scale * np.asarray(z)).subgradient / size)[None],
+        )
 
 
 def _linear_constraint(matrix: Array, below: Array, above: Array) -> scipy.optimize.LinearConstraint:

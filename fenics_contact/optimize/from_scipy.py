@@ -1,7 +1,8 @@
-"""Linear constraints of scipy.optimize as rows A x ≤ b and E x = e."""
+"""Constraints of scipy.optimize: linear ones as rows A x ≤ b and E x = e, nonlinear ones one by one."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.optimize.nonlinear import NonlinearConstraint
 
 Array = NDArray[np.float64]
 
@@ -66,16 +68,59 @@ def _sides(given: Any, n: int) -> tuple[Array, Array, Array]:
     return matrix, low, high
 
 
+def is_nonlinear(given: Any) -> bool:
+    """Return whether a constraint is SciPy's NonlinearConstraint; without importing SciPy's optimisers."""
+    return type(given).__name__ == "NonlinearConstraint" and hasattr(given, "jac")
+
+
+def components_of(given: Any, start: Array) -> list[NonlinearConstraint]:
+    """Return SciPy's nonlinear constraint, which may have several components, one by one.
+
+    Args:
+        given: A `scipy.optimize.NonlinearConstraint` whose ``jac`` is a function.
+        start: A point, shape (n,), at which the function exists.
+
+    Raises:
+        InvalidInputError: If it has no derivative, or its limits do not fit.
+    """
+    if not callable(given.jac):
+        raise InvalidInputError(
+            f"a NonlinearConstraint must have its derivative as the function jac, got {given.jac!r}: give "
+            "it, or fenics_contact.optimize.NonlinearConstraint with a function x -> (value, subgradient)"
+        )
+    values = np.atleast_1d(np.asarray(given.fun(start.copy()), dtype=float))
+    if np.size(given.lb) not in (1, values.size) or np.size(given.ub) not in (1, values.size):
+        raise InvalidInputError(
+            f"a NonlinearConstraint with {values.size} components must have as many limits, or one for all, "
+            f"got lb {given.lb} and ub {given.ub}"
+        )
+    low, high = (
+        np.broadcast_to(np.asarray(side, dtype=float), values.shape) for side in (given.lb, given.ub)
+    )
+    return [
+        NonlinearConstraint(partial(_component, given, k), float(high[k]), float(low[k]))
+        for k in range(values.size)
+    ]
+
+
+def _component(given: Any, k: int, x: Array) -> tuple[float, Array]:
+    derivative = given.jac(x)
+    rows = np.atleast_2d(derivative.toarray() if sp.issparse(derivative) else np.asarray(derivative))
+    return float(np.atleast_1d(given.fun(x))[k]), rows[k]
+
+
 def _what_to_give(given: Any) -> str:
-    name = "a dict" if isinstance(given, dict) else f"a {type(given).__name__}"
-    if isinstance(given, dict) or type(given).__name__ == "NonlinearConstraint":
+    if isinstance(given, NonlinearConstraint) or is_nonlinear(given):
         return (
-            f"constraints must be linear, got {name}: give its linearisation at the start, c(x0) + "
-            "J (x - x0), as LinearConstraints(J, ub - c(x0) + J @ x0), with bounds within which that is "
-            "accurate, and minimise again from the result; or let a method of SciPy keep it "
-            "(optimize.ForScipy)"
+            "points are projected onto linear constraints only, got a NonlinearConstraint: leave it out, and "
+            "let minimize restore it with restore=True"
+        )
+    if isinstance(given, dict):
+        return (
+            "constraints must be objects, got a dict: write NonlinearConstraint(fun, lower=0.0) for fun(x) "
+            ">= 0, where fun returns value and gradient, or let a method of SciPy keep it (optimize.ForScipy)"
         )
     return (
-        f"constraints must be LinearConstraints, or SciPy's LinearConstraint or a list of them, got {name}: "
-        "write LinearConstraints(A, b) for A x <= b"
+        "constraints must be LinearConstraints or NonlinearConstraint, or SciPy's, or a list of them, got "
+        f"a {type(given).__name__}: write LinearConstraints(A, b) for A x <= b"
     )

@@ -1,4 +1,4 @@
-"""Entry point of the package: min J(x) over a box and linear constraints."""
+"""Entry point of the package: min J(x) over a box, linear and nonlinear constraints."""
 
 from __future__ import annotations
 
@@ -21,10 +21,11 @@ def minimize(
     bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
     constraints: Constraints | None = None,
     scale: ArrayLike | None = None,
+    restore: bool = False,
     callback: Callback | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> Result:
-    """Minimise a locally Lipschitz function, convex or not, over a box and linear constraints.
+    """Minimise a locally Lipschitz function, convex or not, over a box, linear and nonlinear constraints.
 
     The iterates depend only on the arguments: replicated on the ranks of a communicator, with a ``fun`` that
     returns bitwise equal values on all of them, they are bitwise equal, too.
@@ -36,9 +37,11 @@ def minimize(
         x0: Feasible starting point, shape (n,).
         method: Parameters; None for the default ones.
         bounds: Box, or a pair (lower, upper), or None.
-        constraints: Linear constraints, also SciPy's `LinearConstraint` or a list of them, or None.
+        constraints: `LinearConstraints`, `NonlinearConstraint`, SciPy's of either kind, or a list of them.
+            All are met at the stop, linear ones and, after corrections, equalities at every point tried.
         scale: Size of each variable, shape (n,) or a number. None takes the widths of the box where it is
             bounded on all sides, so choose meaningful bounds; else 1.
+        restore: Whether x0 may violate nonlinear constraints; the method then restores them.
         callback: Called after every evaluation with its record and the best point so far, and before the
             checkpoint is written: a run that died in between reports the record again when it continues.
         checkpoint: File that is written after evaluations and from which an interrupted run continues with
@@ -48,7 +51,7 @@ def minimize(
         The best point, its value and subgradient, the reason for the stop and the history.
 
     Raises:
-        InvalidInputError: If a shape does not fit, x0 is infeasible, ``fun`` returns nan or inf, or the
+        InvalidInputError: If a shape does not fit, x0 is infeasible, a function returns nan or inf, or the
             checkpoint is unreadable or belongs to another problem.
         CheckpointError: If the checkpoint cannot be written; the previous one is unchanged.
         InvalidDesignError: If J does not exist at x0.
@@ -64,5 +67,5 @@ def minimize(
         >>> round(result.value, 3), result.reason.name
         (1.0, 'STATIONARY')
     """
-    problem = pose(fun, x0, bounds, constraints, scale)
+    problem = pose(fun, x0, bounds, constraints, scale, restore=restore)
     return (method or BundleTrust()).minimize(problem, callback, checkpoint)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -91,7 +91,10 @@ class Evaluation:
         asked_subgradient: Allowed relative error of the subgradient.
         turned: Relative change of the subgradient since a less accurate evaluation of the same point: 0 for
             an exact function, inf without such an evaluation.
-        doubtful: Whether it may not be a subgradient, see `Kinked`.
+        doubtful: Whether it, or one of a constraint, may not be a subgradient, see `Kinked`.
+        constraints: Values c(x) of the nonlinear constraints, shape (k,).
+        slopes: Their subgradients, shape (k, n), in the caller's variables.
+        constraint_errors: Estimated errors of their values, shape (k,).
     """
 
     x: Array
@@ -102,6 +105,9 @@ class Evaluation:
     asked_subgradient: float = 0.0
     turned: float = 0.0
     doubtful: bool = False
+    constraints: Array = field(default_factory=lambda: np.zeros(0))
+    slopes: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    constraint_errors: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def can_be_inexact(fun: Fun) -> bool:
@@ -109,7 +115,9 @@ def can_be_inexact(fun: Fun) -> bool:
     return isinstance(fun, Inexact) and fun.inexact
 
 
-def evaluate(fun: Fun, x: Array, number: int, accuracy: Accuracy | None = None) -> Evaluation:
+def evaluate(
+    fun: Fun, x: Array, number: int, accuracy: Accuracy | None = None, name: str = "fun"
+) -> Evaluation:
     """Call the function with a copy of x and check what it returns.
 
     Args:
@@ -117,6 +125,7 @@ def evaluate(fun: Fun, x: Array, number: int, accuracy: Accuracy | None = None) 
         x: Point, shape (n,).
         number: Count of this evaluation, for the message.
         accuracy: Accuracy requested from an inexact function; None for the best possible.
+        name: Name of the function, for the message.
 
     Returns:
         Copies of all three.
@@ -126,11 +135,11 @@ def evaluate(fun: Fun, x: Array, number: int, accuracy: Accuracy | None = None) 
         InvalidDesignError: If the function raises it.
     """
     if accuracy is None or not (isinstance(fun, Inexact) and fun.inexact):
-        evaluation = _checked(fun(x.copy()), x, f"at evaluation {number}")
+        evaluation = _checked(fun(x.copy()), x, f"at evaluation {number}", name)
     else:
         value, subgradient, error = fun.within(x.copy(), accuracy.value, accuracy.subgradient)
         evaluation = replace(
-            _checked((value, subgradient), x, f"at evaluation {number}"),
+            _checked((value, subgradient), x, f"at evaluation {number}", name),
             error=float(error),
             asked_value=accuracy.value,
             asked_subgradient=accuracy.subgradient,
@@ -139,7 +148,7 @@ def evaluate(fun: Fun, x: Array, number: int, accuracy: Accuracy | None = None) 
     return replace(evaluation, doubtful=isinstance(fun, Kinked) and bool(fun.doubtful(x.copy())))
 
 
-def beside(fun: Fun, evaluation: Evaluation, end: Array, number: int) -> Evaluation:
+def beside(fun: Fun, evaluation: Evaluation, end: Array, number: int, name: str = "fun") -> Evaluation:
     """Return a doubtful evaluation with a nearby gradient as its subgradient; any other unchanged.
 
     Where the function does not exist near the point, its result at the point is used.
@@ -154,21 +163,23 @@ def beside(fun: Fun, evaluation: Evaluation, end: Array, number: int) -> Evaluat
     except InvalidDesignError as error:
         tell(_LOG.warning, "the subgradient of evaluation %d may be none: %s", number, error)
         return replace(evaluation, doubtful=False)
-    checked = _checked((evaluation.value, gradient), evaluation.x, f"beside evaluation {number}")
+    checked = _checked((evaluation.value, gradient), evaluation.x, f"beside evaluation {number}", name)
     return replace(evaluation, subgradient=checked.subgradient, doubtful=False)
 
 
-def _checked(answer: Any, x: Array, where: str) -> Evaluation:
+def _checked(answer: Any, x: Array, where: str, name: str = "fun") -> Evaluation:
     if not isinstance(answer, tuple) or len(answer) != 2:
-        raise InvalidInputError(f"fun must return (value, subgradient), got {type(answer).__name__} {where}")
+        raise InvalidInputError(
+            f"{name} must return (value, subgradient), got {type(answer).__name__} {where}"
+        )
     value, subgradient = np.array(answer[0], dtype=float), np.array(answer[1], dtype=float)
     if value.size != 1 or subgradient.shape != x.shape:
         raise InvalidInputError(
-            f"fun must return a number and a subgradient of shape {x.shape}, got shapes {value.shape} and "
+            f"{name} must return a number and a subgradient of shape {x.shape}, got shapes {value.shape} and "
             f"{subgradient.shape} {where}"
         )
-    require_finite("fun must return a finite value", value, where)
-    require_finite("fun must return a finite subgradient", subgradient, where)
+    require_finite(f"{name} must return a finite value", value, where)
+    require_finite(f"{name} must return a finite subgradient", subgradient, where)
     return Evaluation(x.copy(), float(value.item()), subgradient)
 
 

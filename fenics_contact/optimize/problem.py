@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,7 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.optimize.constraints import Bounds, Constraints, FeasibleSet, feasible_set
-from fenics_contact.optimize.objective import Fun
+from fenics_contact.optimize.from_scipy import components_of, is_nonlinear
+from fenics_contact.optimize.nonlinear import NonlinearConstraint, Scaled, scaled_constraints
+from fenics_contact.optimize.objective import Evaluation, Fun
 
 Array = NDArray[np.float64]
 
@@ -26,6 +30,8 @@ class PosedProblem:
         allowed: The feasible set.
         scale: Size of each variable, shape (n,): the method sees x/scale.
         length: Length scale of the problem in scaled variables.
+        nonlinear: Nonlinear constraints, every one with a name.
+        restore: Whether the start may violate them.
     """
 
     fun: Fun
@@ -33,6 +39,12 @@ class PosedProblem:
     allowed: FeasibleSet
     scale: Array
     length: float
+    nonlinear: tuple[NonlinearConstraint, ...] = ()
+    restore: bool = False
+
+    def constraints_at(self, evaluation: Evaluation) -> Scaled:
+        """Return the nonlinear constraints of an evaluation in units of their sizes."""
+        return scaled_constraints(self.nonlinear, evaluation.constraints)
 
 
 def pose(
@@ -41,6 +53,8 @@ def pose(
     bounds: Bounds | tuple[ArrayLike, ArrayLike] | None = None,
     constraints: Constraints | None = None,
     scale: ArrayLike | None = None,
+    *,
+    restore: bool = False,
 ) -> PosedProblem:
     """Check a problem and choose its scales.
 
@@ -50,6 +64,7 @@ def pose(
         bounds: As for `minimize`.
         constraints: As for `minimize`.
         scale: As for `minimize`.
+        restore: As for `minimize`.
 
     Returns:
         The checked problem; the caller's arrays are copied.
@@ -63,7 +78,11 @@ def pose(
     if not np.isfinite(start).all():
         k = np.flatnonzero(~np.isfinite(start))[0]
         raise InvalidInputError(f"x0 must be finite, got x0[{k}] = {start[k]}")
-    allowed = feasible_set(start.size, bounds, constraints)
+    given = () if constraints is None else constraints
+    parts = list(given) if isinstance(given, Sequence) else [given]
+    curved = [one for one in parts if isinstance(one, NonlinearConstraint) or is_nonlinear(one)]
+    linear = [one for one in parts if all(one is not other for other in curved)]
+    allowed = feasible_set(start.size, bounds, linear)
     violations = allowed.violations(start)
     if violations:
         more = f" and {len(violations) - 3} more" if len(violations) > 3 else ""
@@ -73,7 +92,15 @@ def pose(
         )
     start = allowed.clip(start)
     size = _scale(start.size, allowed, scale)
-    return PosedProblem(fun, start, allowed, size, _length(start, allowed, size))
+    length = _length(start, allowed, size)
+    return PosedProblem(fun, start, allowed, size, length, _named(curved, start), restore)
+
+
+def _named(given: Sequence[Any], start: Array) -> tuple[NonlinearConstraint, ...]:
+    """Return nonlinear constraints, SciPy's one by one, with a name for each."""
+    groups = ([one] if isinstance(one, NonlinearConstraint) else components_of(one, start) for one in given)
+    found = [one for group in groups for one in group]
+    return tuple(replace(one, name=one.name or f"constraint {k}") for k, one in enumerate(found))
 
 
 def _scale(n: int, allowed: FeasibleSet, scale: ArrayLike | None) -> Array:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 KIND = "minimisation by the bundle trust method"
 #: Parameters that only decide when to stop: a run may continue with others.
-LIMITS = {"tolerance", "max_iterations", "max_evaluations", "raise_on_failure"}
+LIMITS = {"tolerance", "max_iterations", "max_evaluations", "feasibility", "raise_on_failure"}
 _OF_FUN = "fun."
 
 
@@ -207,6 +207,10 @@ def _fingerprint(method: Method, problem: PosedProblem) -> dict[str, str]:
     for field in fields(problem.allowed):
         values = np.asarray(getattr(problem.allowed, field.name))
         descriptions.update(described(values, f"constraints.{field.name}"))
+    limits = [
+        f"{one.name} in [{one.lower!r}, {one.upper!r}], scale {one.size!r}" for one in problem.nonlinear
+    ]
+    descriptions["nonlinear constraints"] = "; ".join(limits) or "none"
     descriptions.update(described(problem.scale, "scale"))
     descriptions.update(described(problem.start, "x0"))
     return descriptions

@@ -59,12 +59,14 @@ class QuadraticSolution:
     Attributes:
         point: y, shape (n,).
         multipliers: Multipliers of C y ≤ c, shape (m,), not negative.
+        equality_multipliers: Multipliers of E y = e, shape (r,).
         status: Clarabel's status.
         exact: False where only Clarabel's reduced tolerances were met.
     """
 
     point: Array
     multipliers: Array
+    equality_multipliers: Array
     status: str
     exact: bool
 
@@ -115,8 +117,10 @@ def _solution(
     program: QuadraticProgram, answer: clarabel.DefaultSolution, *, exact: bool
 ) -> QuadraticSolution:
     first = program.equality_values.size
-    multipliers = np.maximum(np.array(answer.z, dtype=float)[first:], 0.0)
-    return QuadraticSolution(np.array(answer.x, dtype=float), multipliers, str(answer.status), exact)
+    pushes = np.array(answer.z, dtype=float)
+    multipliers = np.maximum(pushes[first:], 0.0)
+    point = np.array(answer.x, dtype=float)
+    return QuadraticSolution(point, multipliers, pushes[:first], str(answer.status), exact)
 
 
 def _run_clarabel(program: QuadraticProgram, changes: Mapping[str, Any]) -> clarabel.DefaultSolution:

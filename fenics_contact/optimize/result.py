@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import Enum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fenics_contact.display import displayed
 from fenics_contact.errors import ConvergenceError
+from fenics_contact.optimize.nonlinear import ConstraintValue
 
 Array = NDArray[np.float64]
 
@@ -36,6 +38,10 @@ class Reason(Enum):
     INVALID_DESIGNS = (
         "every trial design was invalid, down to the shortest step: bound the design away from the "
         "invalid region by bounds or linear constraints"
+    )
+    INFEASIBLE = (
+        "no step reduces the violation of the nonlinear constraints: relax those that contradict each other, "
+        "the bounds or linear constraints, start elsewhere, or loosen feasibility"
     )
     STEP_FAILED = (
         "the quadratic programme of a step could not be solved: rescale the variables with scale, and look "
@@ -80,6 +86,7 @@ class Record:
         bundle_size: Cutting planes in the model that made the step.
         evaluations: Evaluations up to and with this one.
         error: Estimated error of `value`; 0 for a function that is exact or does not report it.
+        violation: Largest violation of a nonlinear constraint, relative to its size; nan where rejected.
         note: Why a trial point was rejected, or that a nearby gradient was used; else empty.
     """
 
@@ -95,6 +102,7 @@ class Record:
     bundle_size: int
     evaluations: int
     error: float = 0.0
+    violation: float = 0.0
     note: str = ""
 
 
@@ -112,6 +120,7 @@ class Result:
         evaluations: Evaluations of the objective, failed ones included.
         history: One record for each evaluation, oldest first.
         error: Estimated error of the value; 0 for a function that is exact or does not report it.
+        constraints: The nonlinear constraints there.
     """
 
     x: Array
@@ -122,6 +131,20 @@ class Result:
     evaluations: int
     history: tuple[Record, ...]
     error: float = 0.0
+    constraints: tuple[ConstraintValue, ...] = ()
+
+    @property
+    def violation(self) -> float:
+        """Largest violation of a nonlinear constraint, relative to its size; 0 without any."""
+        return max((one.violation for one in self.constraints), default=0.0)
+
+    def _facts(self) -> dict[str, Any]:
+        facts = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        if not self.constraints:
+            return {name: value for name, value in facts.items() if name != "constraints"}
+        active = ", ".join(one.name for one in self.constraints if one.active) or "none"
+        facts["constraints"] = f"active {active}; largest violation {self.violation:.1e}"
+        return facts
 
 
 class NotConvergedError(ConvergenceError):

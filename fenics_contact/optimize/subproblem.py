@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fenics_contact.errors import tell
+from fenics_contact.errors import InvalidInputError, tell
 from fenics_contact.optimize.bundle import Bundle
 from fenics_contact.optimize.constraints import Surroundings
 from fenics_contact.optimize.quadratic_program import (
@@ -17,6 +18,7 @@ from fenics_contact.optimize.quadratic_program import (
     SubproblemError,
     solve,
 )
+from fenics_contact.optimize.soft_constraint import SoftConstraint
 
 Array = NDArray[np.float64]
 
@@ -33,11 +35,16 @@ class Step:
 
     Attributes:
         move: y, shape (n,).
-        decrease: Predicted decrease w = -max_i (g_i·y - β_i) of J, not negative.
+        decrease: Predicted decrease w = -max_i (g_i·y - β_i) of J, not negative; with nonlinear constraints
+            that of J + Σ ρ_k max(c_k, 0).
         weights: Multipliers of the cutting planes, shape (m,), not negative, sum one.
         aggregate_norm: ‖z‖ = ‖y‖/t, length of the aggregate subgradient (with the constraints' normals).
-        aggregate_error: σ = Σ λ_i β_i + Σ μ_k room_k; w = σ + t ‖z‖².
+        aggregate_error: σ = Σ λ_i β_i + Σ μ_k room_k, and Σ_ki θ_ki ρ_k (β_ki - c_k) + Σ_k ρ_k max(c_k, 0);
+            w = σ + t ‖z‖².
         t: Proximal parameter used.
+        soft_weights: Multipliers θ_ki of the planes of each nonlinear inequality in units of its penalty.
+        violations: Predicted max(c_k, 0) after the move.
+        equality_multipliers: Multipliers of the rows of E, shape (r,).
     """
 
     move: Array
@@ -46,6 +53,9 @@ class Step:
     aggregate_norm: float
     aggregate_error: float
     t: float
+    soft_weights: tuple[Array, ...] = ()
+    violations: tuple[float, ...] = ()
+    equality_multipliers: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def length(self) -> float:
@@ -53,8 +63,32 @@ class Step:
         return float(np.linalg.norm(self.move))
 
 
-def solve_step(bundle: Bundle, near: Surroundings, t: float) -> Step:
-    r"""Minimise v + ‖y‖²/(2t) subject to g_i·y - β_i ≤ v, C y ≤ room and E y = 0.
+@dataclass(frozen=True)
+class Model:
+    """What the programme of a step knows of the problem at the centre.
+
+    Attributes:
+        bundle: Cutting planes of J.
+        near: Constraints around the centre, which satisfies them.
+        soft: Nonlinear inequalities with their cutting planes.
+    """
+
+    bundle: Bundle
+    near: Surroundings
+    soft: Sequence[SoftConstraint] = ()
+
+    def chosen(self, rows: NDArray[np.intp], soft_rows: Sequence[NDArray[np.intp]]) -> Model:
+        """Return the model of some planes only."""
+        soft = [
+            replace(one, bundle=one.bundle.chosen(own)) for one, own in zip(self.soft, soft_rows, strict=True)
+        ]
+        return replace(self, bundle=self.bundle.chosen(rows), soft=soft)
+
+
+def solve_step(bundle: Bundle, near: Surroundings, t: float, soft: Sequence[SoftConstraint] = ()) -> Step:
+    r"""Minimise v + Σ ρ_k s_k + ‖y‖²/(2t) subject to g_i·y - β_i ≤ v, C y ≤ room and E y = 0.
+
+    Each nonlinear inequality adds c_k + a_ki·y - β_ki ≤ s_k for its planes, and s_k ≥ 0.
 
     The programme is solved in units of its own solution, lengths in t γ and decreases in t γ², so
     that objective and variables may have any size. γ is the length of a subgradient at first. Near a minimum
@@ -66,6 +100,7 @@ def solve_step(bundle: Bundle, near: Surroundings, t: float) -> Step:
         bundle: Cutting planes at the centre.
         near: Constraints around the centre, which satisfies them.
         t: Proximal parameter, positive: units of (scaled length)²/J.
+        soft: Nonlinear inequalities, which the centre may violate.
 
     Returns:
         The step.
@@ -76,71 +111,116 @@ def solve_step(bundle: Bundle, near: Surroundings, t: float) -> Step:
     References:
         H. Schramm and J. Zowe, SIAM J. Optim. 2 (1992) 121-152, section 2.
     """
+    model = Model(bundle, near, soft)
     lengths = np.sqrt((bundle.gradients**2).sum(axis=1))
-    step, unit = _solved(bundle, near, t, lengths)
+    step, unit = _solved(model, t, lengths)
     for _ in range(_REFINEMENTS):
         if not _VANISHED * lengths.max() < step.aggregate_norm < _BLURRED * unit:
             break
         unit = step.aggregate_norm
-        sharper = _refined(bundle, near, step, lengths)
+        sharper = _refined(model, step, lengths)
         if sharper is None:
             break
         step = sharper
     return step
 
 
-def _solved(bundle: Bundle, near: Surroundings, t: float, lengths: Array) -> tuple[Step, float]:
+def _solved(model: Model, t: float, lengths: Array) -> tuple[Step, float]:
     """Solve in the units of the shortest subgradient or, where that fails, of a longer one."""
-    units = [float(unit) for unit in (lengths.min(), lengths[0], lengths.max()) if unit > 0.0] or [1.0]
+    steepest = [np.linalg.norm(one.gradients, axis=1).max() for one in model.soft]
+    candidates = (lengths.min(), lengths[0], lengths.max(), *steepest)
+    units = [float(unit) for unit in candidates if unit > 0.0] or [1.0]
     for unit in units[:-1]:
         try:
-            return _step(bundle, near, solve(_program(bundle, near, t, unit)), t, unit), unit
+            return _step(model, _solution(model, t, unit), t, unit), unit
         except SubproblemError as error:
             tell(_LOG.debug, "step's programme not solved in units of %g: %s", unit, error)
-    return _step(bundle, near, solve(_program(bundle, near, t, units[-1])), t, units[-1]), units[-1]
+    return _step(model, _solution(model, t, units[-1]), t, units[-1]), units[-1]
 
 
-def _refined(bundle: Bundle, near: Surroundings, step: Step, lengths: Array) -> Step | None:
-    # Plane i is active at a move y only if β_i ≤ g_i·y - g_0·y; the factor two is a margin.
-    live = np.flatnonzero(bundle.measures <= 2.0 * (lengths + lengths[0]) * step.length)
-    unit = step.aggregate_norm
+def _solution(model: Model, t: float, unit: float) -> QuadraticSolution:
     try:
-        solution = solve(_program(bundle.chosen(live), near, step.t, unit))
+        return solve(_program(model, t, unit))
+    except InvalidInputError as error:
+        # The centre itself satisfies the programme: the solver is mistaken.
+        raise SubproblemError(f"the quadratic programme of a step cannot be solved: {error}") from error
+
+
+def _refined(model: Model, step: Step, lengths: Array) -> Step | None:
+    # Plane i is active at a move y only if β_i ≤ g_i·y - g_0·y; the factor two is a margin.
+    bundle = model.bundle
+    live = np.flatnonzero(bundle.measures <= 2.0 * (lengths + lengths[0]) * step.length)
+    reached = [np.flatnonzero(_reaching(one, step.length)) for one in model.soft]
+    unit = step.aggregate_norm
+    smaller = model.chosen(live, reached)
+    try:
+        solution = _solution(smaller, step.t, unit)
     except SubproblemError:
         return None
     if not solution.exact:
         return None
-    multipliers = np.zeros(bundle.size + near.room.size)
-    multipliers[live] = solution.multipliers[: live.size]
-    multipliers[bundle.size :] = solution.multipliers[live.size :]
-    return _step(bundle, near, replace(solution, multipliers=multipliers), step.t, unit)
+    sizes = [bundle.size, *(one.bundle.size for one in model.soft)]
+    multipliers, to, of = np.zeros(sum(sizes) + model.near.room.size + len(model.soft)), 0, 0
+    for size, rows in zip(sizes, [live, *reached], strict=True):
+        multipliers[to + rows] = solution.multipliers[of : of + rows.size]
+        to, of = to + size, of + rows.size
+    multipliers[to:] = solution.multipliers[of:]
+    return _step(model, replace(solution, multipliers=multipliers), step.t, unit)
 
 
-def _program(bundle: Bundle, near: Surroundings, t: float, unit: float) -> QuadraticProgram:
-    n, m, k = bundle.gradients.shape[1], bundle.size, near.room.size
-    cuts = np.hstack([bundle.gradients / unit, -np.ones((m, 1))])
-    walls = np.hstack([near.rows, np.zeros((k, 1))])
-    equalities = np.hstack([near.equality_rows, np.zeros((near.miss.size, 1))])
-    slope = np.zeros(n + 1)
-    slope[-1] = 1.0
-    curvature = np.ones(n + 1)
-    curvature[-1] = 0.0
-    limits = np.concatenate([bundle.measures / (t * unit**2), np.maximum(near.room, 0.0) / (t * unit)])
+def _reaching(one: SoftConstraint, length: float) -> NDArray[np.bool_]:
+    """Mark the planes that a move of this length can take to the limit, and that of the centre."""
+    marks = one.depths <= 2.0 * np.linalg.norm(one.gradients, axis=1) * length
+    marks[0] = True
+    return np.asarray(marks)
+
+
+def _program(model: Model, t: float, unit: float) -> QuadraticProgram:
+    """Return the programme in the variables y/(t γ), v/(t γ²) and ρ s/(t γ²)."""
+    bundle, near, soft = model.bundle, model.near, model.soft
+    n, k, slacks = bundle.gradients.shape[1], near.room.size, len(soft)
+    epigraph = np.eye(1 + slacks)
+    gradients = [bundle.gradients, *(one.gradients for one in soft)]
+    cuts = np.vstack(
+        [np.hstack([rows / unit, np.tile(-epigraph[i], (len(rows), 1))]) for i, rows in enumerate(gradients)]
+    )
+    walls = np.hstack([near.rows, np.zeros((k, 1 + slacks))])
+    positive = np.hstack([np.zeros((slacks, n)), -epigraph[1:]])
+    equalities = np.hstack([near.equality_rows, np.zeros((near.miss.size, 1 + slacks))])
+    depths = np.concatenate([bundle.measures, *(one.depths for one in soft)])
+    limits = [depths / (t * unit**2), np.maximum(near.room, 0.0) / (t * unit), np.zeros(slacks)]
     return QuadraticProgram(
-        curvature, slope, equalities, np.zeros(near.miss.size), np.vstack([cuts, walls]), limits
+        curvature=np.append(np.ones(n), np.zeros(1 + slacks)),
+        slope=np.append(np.zeros(n), np.ones(1 + slacks)),
+        equality_rows=equalities,
+        equality_values=np.zeros(near.miss.size),
+        rows=np.vstack([cuts, walls, positive]),
+        limits=np.concatenate(limits),
     )
 
 
-def _step(bundle: Bundle, near: Surroundings, solution: QuadraticSolution, t: float, unit: float) -> Step:
-    move = t * unit * solution.point[:-1]
+def _step(model: Model, solution: QuadraticSolution, t: float, unit: float) -> Step:
+    bundle, near, soft = model.bundle, model.near, model.soft
+    move = t * unit * solution.point[: bundle.gradients.shape[1]]
+    ends = np.cumsum([bundle.size, *(one.bundle.size for one in soft)])
     weights = solution.multipliers[: bundle.size]
     weights = weights / weights.sum()
-    pushes = unit * solution.multipliers[bundle.size :]
+    shares = tuple(np.split(solution.multipliers, ends)[1:-1])
+    pushes = unit * solution.multipliers[ends[-1] : ends[-1] + near.room.size]
+    violations = tuple(one.predicted(move) for one in soft)
+    gained = sum(one.penalty * (one.violation - rest) for one, rest in zip(soft, violations, strict=True))
+    penalties = sum(
+        share @ one.depths + one.penalty * one.violation for share, one in zip(shares, soft, strict=True)
+    )
+    error = float(weights @ bundle.measures + pushes @ np.maximum(near.room, 0.0))
     return Step(
         move=move,
-        decrease=max(-bundle.model(move), 0.0),
+        decrease=max(-bundle.model(move) + gained, 0.0),
         weights=weights,
         aggregate_norm=float(np.linalg.norm(move)) / t,
-        aggregate_error=float(weights @ bundle.measures + pushes @ np.maximum(near.room, 0.0)),
+        aggregate_error=error + float(penalties),
         t=t,
+        soft_weights=shares,
+        violations=violations,
+        equality_multipliers=unit * solution.equality_multipliers,
     )

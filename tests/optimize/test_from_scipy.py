@@ -1,4 +1,4 @@
-"""Constraints in the form of SciPy: linear ones are taken, others refused by name."""
+"""Constraints in the form of SciPy: linear and nonlinear ones are taken, others refused by name."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from scipy.optimize import LinearConstraint, NonlinearConstraint
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize import ForScipy, LinearConstraints, minimize, nearest_feasible
+from fenics_contact.optimize import BundleTrust, ForScipy, LinearConstraints, minimize, nearest_feasible
 from fenics_contact.optimize.constraints import feasible_set
 
 START = np.zeros(3)
@@ -64,13 +64,13 @@ def test_no_constraints_are_none() -> None:
 @pytest.mark.parametrize(
     ("given", "told"),
     [
+        (NonlinearConstraint(curve, 0.0, 1.0), "must have its derivative as the function jac, got '2-point'"),
         (
-            NonlinearConstraint(curve, 0.0, 1.0),
-            "must be linear, got a NonlinearConstraint: give its linearisation",
+            NonlinearConstraint(curve, [0.0, 0.0], [1.0, 1.0], jac=lambda x: 2 * x),
+            "a NonlinearConstraint with 1 components must have as many limits, or one for all, got lb",
         ),
-        ({"type": "ineq", "fun": curve}, "must be linear, got a dict: give its linearisation at the start"),
-        ([LinearConstraint(A, LOW, HIGH), NonlinearConstraint(curve, 0, 1)], "must be linear, got a Nonlin"),
-        (A, "must be LinearConstraints, or SciPy's LinearConstraint or a list of them, got a ndarray: write"),
+        ({"type": "ineq", "fun": curve}, "must be objects, got a dict: write NonlinearConstraint"),
+        (A, "must be LinearConstraints or NonlinearConstraint, or SciPy's, .*, got a ndarray: write"),
         (LinearConstraint(A[:, :2]), r"a matrix of 3 columns, one for each variable, got shape \(3, 2\)"),
         (LinearConstraint(A[0], 2.0, 1.0), "must have lb <= ub in every row, got lb"),
         (LinearConstraint(A[0], np.nan, 1.0), "must have lb <= ub in every row, got lb"),
@@ -79,6 +79,30 @@ def test_no_constraints_are_none() -> None:
 def test_other_constraints_are_refused_by_name(given: Any, told: str) -> None:
     with pytest.raises(InvalidInputError, match=told):
         minimize(bowl, START, constraints=given)
+
+
+def test_a_nonlinear_constraint_of_scipy_is_taken_component_by_component() -> None:
+    def values(x: np.ndarray) -> np.ndarray:
+        return np.array([x @ x, x[0] * x[1]])
+
+    def slopes(x: np.ndarray) -> sp.csr_matrix:
+        return sp.csr_matrix([2 * x, [x[1], x[0], 0.0]])
+
+    given = [
+        NonlinearConstraint(values, [-np.inf, 0.25], [4.0, 0.25], jac=slopes),
+        LinearConstraint(A[0], ub=9),
+    ]
+    result = minimize(bowl, [0.5, 0.5, 0.0], BundleTrust(tolerance=1e-8), constraints=given)
+    ball, product = result.constraints
+    assert (ball.upper, ball.active, product.lower, product.upper) == (4.0, True, 0.25, 0.25)
+    assert values(result.x) == pytest.approx([4.0, 0.25], rel=1e-6)
+
+
+def test_points_are_not_projected_onto_nonlinear_constraints() -> None:
+    with pytest.raises(
+        InvalidInputError, match="onto linear constraints only, got a NonlinearConstraint: leave"
+    ):
+        nearest_feasible(START, None, [NonlinearConstraint(curve, 0.0, 1.0)])
 
 
 def test_a_value_alone_that_is_no_number_is_refused() -> None:

@@ -33,6 +33,7 @@ def random_bundle(seed: int, m: int = 7, n: int = 4) -> Bundle:
         0.0,
         np.zeros(m),
         np.zeros(m, dtype=bool),
+        np.zeros((m, 0)),
     )
 
 
@@ -84,6 +85,7 @@ def test_units_of_value_and_length_do_not_matter(value: float, length: float) ->
         0.0,
         plain.noise,
         plain.doubtful,
+        plain.pushes,
     )
     near = feasible_set(4, (-0.4 * length, 0.9 * length)).around(np.zeros(4), np.ones(4))
     other = solve_step(bundle, near, 0.7 * length**2 / value)
@@ -100,6 +102,7 @@ def test_aggregate_much_shorter_than_the_subgradients_is_resolved() -> None:
         0.0,
         np.zeros(2),
         np.zeros(2, dtype=bool),
+        np.zeros((2, 0)),
     )
     step = solve_step(bundle, feasible_set(2).around(np.zeros(2), np.ones(2)), 1.0)
     assert step.aggregate_norm == pytest.approx(1e-6, rel=1e-3)
@@ -109,7 +112,13 @@ def test_aggregate_much_shorter_than_the_subgradients_is_resolved() -> None:
 def test_planes_far_below_do_not_blur_the_step() -> None:
     gradients = np.array([[1.0, 1e-4], [-1.0, 1e-4], [1e3, 1e3]])
     bundle = Bundle(
-        gradients, np.array([0.0, 0.0, 1e12]), np.zeros(3), 0.0, np.zeros(3), np.zeros(3, dtype=bool)
+        gradients,
+        np.array([0.0, 0.0, 1e12]),
+        np.zeros(3),
+        0.0,
+        np.zeros(3),
+        np.zeros(3, dtype=bool),
+        np.zeros((3, 0)),
     )
     step = solve_step(bundle, feasible_set(2).around(np.zeros(2), np.ones(2)), 1.0)
     assert step.aggregate_norm == pytest.approx(1e-4, rel=1e-4)

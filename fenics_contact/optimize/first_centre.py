@@ -1,0 +1,65 @@
+"""The starting point, evaluated, and checked against the nonlinear constraints."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.errors import InvalidDesignError, InvalidInputError
+from fenics_contact.optimize.evaluation import Known, evaluate_constraint, evaluate_problem
+from fenics_contact.optimize.nonlinear import NonlinearConstraint, scaled_constraints
+from fenics_contact.optimize.objective import Accuracy, Evaluation
+from fenics_contact.optimize.problem import PosedProblem
+from fenics_contact.optimize.restoration import restored
+
+
+def first_centre(problem: PosedProblem, subgradient: float, feasibility: float) -> Evaluation:
+    """Evaluate the starting point, corrected to meet the equalities where it need not be feasible.
+
+    Args:
+        problem: The problem.
+        subgradient: Largest relative error of the first subgradient.
+        feasibility: Largest violation of nonlinear constraints, relative to their sizes.
+
+    Raises:
+        InvalidDesignError: If a function does not exist there, or no point near it meets the equalities.
+        InvalidInputError: If it violates nonlinear constraints although it must not.
+    """
+    equal = [k for k, one in enumerate(problem.nonlinear) if one.equality]
+    accuracy, penalties = (
+        Accuracy(np.inf, subgradient),
+        {k: 1.0 for k, one in enumerate(problem.nonlinear) if not one.equality},
+    )
+    try:
+        if equal and problem.restore:
+            x, known = restored(problem, problem.start, 1, feasibility)
+        else:
+            x = problem.start
+            known = {k: evaluate_constraint(problem.nonlinear[k], x, 1) for k in equal}
+            _require_feasible(problem, known, feasibility)
+        centre = evaluate_problem(problem, x, 1, accuracy, penalties, known)
+    except InvalidDesignError as error:
+        raise InvalidDesignError(f"the starting design must be valid: {error}") from error
+    here = problem.constraints_at(centre)
+    if not problem.restore and here.violation > feasibility:
+        _refuse(problem.nonlinear, centre.constraints.tolist(), feasibility)
+    return centre
+
+
+def _require_feasible(problem: PosedProblem, known: Known, feasibility: float) -> None:
+    constraints = tuple(problem.nonlinear[k] for k in known)
+    _refuse(constraints, [one.value for one in known.values()], feasibility)
+
+
+def _refuse(constraints: tuple[NonlinearConstraint, ...], values: list[float], feasibility: float) -> None:
+    """Raise an error that names the violated constraints, if any."""
+    violations = scaled_constraints(constraints, np.array(values)).violations
+    words = [
+        f"{one.name} is {value:.6g}, to lie in [{one.lower:.6g}, {one.upper:.6g}]"
+        for one, value, violation in zip(constraints, values, violations, strict=True)
+        if violation > feasibility
+    ]
+    if words:
+        raise InvalidInputError(
+            f"x0 must meet the nonlinear constraints, but {'; '.join(words)}: start from a feasible point, "
+            "or let the method restore it with restore=True"
+        )

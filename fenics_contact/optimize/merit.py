@@ -1,0 +1,151 @@
+"""The merit function J + Σ ρ_k max(c_k, 0), its planes, and the step that they predict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenics_contact.optimize.bundle import Bundle
+from fenics_contact.optimize.constraints import Surroundings
+from fenics_contact.optimize.nonlinear import Scaled
+from fenics_contact.optimize.objective import Evaluation
+from fenics_contact.optimize.problem import PosedProblem
+from fenics_contact.optimize.soft_constraint import Plane, SoftConstraint
+from fenics_contact.optimize.state import MethodState
+from fenics_contact.optimize.subproblem import Step, solve_step
+
+Array = NDArray[np.float64]
+
+
+def surroundings(problem: PosedProblem, centre: Evaluation) -> Surroundings:
+    """Return linear constraints and linearised equalities around a centre, in scaled variables."""
+    near = problem.allowed.around(centre.x, problem.scale)
+    if not any(one.equality for one in problem.nonlinear):
+        return near
+    here, slopes = _slopes(problem, centre)
+    rows = slopes[here.equal]
+    lengths = np.linalg.norm(rows, axis=1)
+    return Surroundings(
+        near.rows,
+        near.room,
+        np.vstack([rows / np.where(lengths > 0.0, lengths, 1.0)[:, None], near.equality_rows]),
+        np.concatenate([np.zeros(len(rows)), near.miss]),
+    )
+
+
+def merit_planes(problem: PosedProblem, evaluation: Evaluation) -> list[Plane]:
+    """Return the planes of J and of the inequalities, these in units of their sizes.
+
+    A move along the tangents of equalities is followed by a correction to their surface. Of g·y and the
+    correction's share Lagrange's gradient g + Σ λ_j ∇e_j remains, with the multipliers λ that make it
+    shortest beside the normals of active constraints. It carries the curvature of the surface: without it
+    planes of earlier trial points would promise a decrease along the tangents that the correction takes away.
+    """
+    gradient = evaluation.subgradient * problem.scale
+    if not problem.nonlinear:
+        steepness = float(np.linalg.norm(gradient))
+        return [Plane(evaluation.value, gradient, evaluation.error, np.zeros(0), steepness)]
+    here, slopes = _slopes(problem, evaluation)
+    gradients, normals = np.vstack([gradient, slopes[~here.equal]]), slopes[here.equal]
+    pushes = np.zeros((len(gradients), len(normals)))
+    if len(normals):
+        near = problem.allowed.around(evaluation.x, problem.scale)
+        every = np.vstack([normals, near.rows[near.room <= 1e-9], near.equality_rows])
+        pushes = np.linalg.lstsq(every.T, -gradients.T, rcond=None)[0][: len(normals)].T
+    values = [evaluation.value, *here.excess[~here.equal].tolist()]
+    noises = [evaluation.error, *(np.abs(here.factors) * evaluation.constraint_errors)[~here.equal].tolist()]
+    steep = np.linalg.norm(gradients, axis=1).tolist()
+    along = gradients + pushes @ normals
+    return [Plane(*each) for each in zip(values, along, noises, pushes, steep, strict=True)]
+
+
+def _slopes(problem: PosedProblem, evaluation: Evaluation) -> tuple[Scaled, Array]:
+    """Return the constraints of an evaluation and their gradients in scaled variables, over their sizes."""
+    here = problem.constraints_at(evaluation)
+    return here, here.factors[:, None] * evaluation.slopes * problem.scale
+
+
+def first_soft(
+    planes: Sequence[Plane], locality: float, doubtful: bool, *, factor: float = 2.0
+) -> tuple[SoftConstraint, ...]:
+    """Return the inequalities at the start, their penalty a multiple of the ratio of the gradients.
+
+    Args:
+        planes: Planes of J and of the inequalities.
+        locality: Locality of a plane in units of the length of its gradient.
+        doubtful: Whether the planes may not belong to subgradients.
+        factor: The multiple.
+    """
+    size = factor * (planes[0].steepness or 1.0)
+    return tuple(
+        SoftConstraint(
+            Bundle.of_centre(one.gradient, locality * one.length, one.noise, doubtful, one.pushes),
+            one.value,
+            *(2 * [size / (one.steepness or 1.0)]),
+        )
+        for one in planes[1:]
+    )
+
+
+def priced_step(
+    bundle: Bundle,
+    near: Surroundings,
+    t: float,
+    soft: Sequence[SoftConstraint],
+    feasibility: float,
+    *,
+    share: float = 0.9,
+    factor: float = 10.0,
+) -> tuple[Step, tuple[SoftConstraint, ...]]:
+    """Return the step, with penalties large enough for it to reduce violations.
+
+    The penalty of a constraint is raised while the planes predict that more than ``share`` of its violation
+    remains, and more than is allowed.
+
+    References:
+        R. H. Byrd, J. Nocedal, R. A. Waltz, Steering exact penalty methods for nonlinear programming, Optim.
+        Methods Softw. 23 (2008) 197-213.
+    """
+    step = solve_step(bundle, near, t, soft)
+    while True:
+        wanting = [
+            left > max(share * one.violation, 0.1 * feasibility) and not one.dearest
+            for one, left in zip(soft, step.violations, strict=True)
+        ]
+        if not any(wanting):
+            return step, tuple(soft)
+        soft = [one.raised(factor) if more else one for one, more in zip(soft, wanting, strict=True)]
+        step = solve_step(bundle, near, t, soft)
+
+
+def irreducible(step: Step, soft: Sequence[SoftConstraint], feasibility: float, share: float = 0.9) -> bool:
+    """Return whether the planes leave most of the violation at the largest penalties."""
+    violated = [k for k, one in enumerate(soft) if one.violation > feasibility]
+    if not violated or not any(soft[k].dearest for k in violated):
+        return False
+    before = sum(one.penalty * one.violation for one in soft)
+    after = sum(one.penalty * left for one, left in zip(soft, step.violations, strict=True))
+    return after > share * before
+
+
+def multipliers(problem: PosedProblem, state: MethodState, step: Step) -> Array:
+    """Return the multipliers of all nonlinear constraints that a step predicts, units of J by those of c.
+
+    Those that carry less than a millionth of the gradient of J are 0.
+    """
+    if not problem.nonlinear:
+        return np.zeros(0)
+    here, slopes = _slopes(problem, state.centre)
+    lengths = np.linalg.norm(slopes, axis=1)
+    found = np.zeros(len(problem.nonlinear))
+    rows = step.equality_multipliers[: int(here.equal.sum())]
+    found[here.equal] = rows / np.where(lengths > 0.0, lengths, 1.0)[here.equal]
+    found[here.equal] += step.weights @ state.bundle.pushes
+    shares = [one.penalty * share for one, share in zip(state.soft, step.soft_weights, strict=True)]
+    found[~here.equal] = [share.sum() for share in shares]
+    for one, share in zip(state.soft, shares, strict=True):
+        found[here.equal] += share @ one.bundle.pushes
+    least = 1e-6 * np.linalg.norm(state.centre.subgradient * problem.scale)
+    return np.where(np.abs(found) * lengths > least, found * here.factors, 0.0)

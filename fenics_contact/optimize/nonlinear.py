@@ -1,0 +1,169 @@
+"""Nonlinear constraints, and what a result says about them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenics_contact.display import displayed
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.optimize.objective import Fun
+
+Array = NDArray[np.float64]
+
+
+@displayed
+@dataclass(frozen=True)
+class NonlinearConstraint:
+    """The constraint lower ≤ c(x) ≤ upper; an equality where both are the same number.
+
+    An inequality may be nonsmooth, such as a largest stress. An equality must be smooth: every trial point is
+    corrected by Newton's method until it meets the equality, which calls ``fun`` a few times per step.
+
+    Attributes:
+        fun: Takes x of shape (n,), returns c(x) and one subgradient of shape (n,), as the objective does.
+        upper: Upper limit, inf for none.
+        lower: Lower limit, -inf for none.
+        name: Name in results and messages; "constraint 0" and so on where it is empty.
+        scale: Size of c by which violations are divided; None for the larger finite limit, 1 where that is 0.
+
+    Raises:
+        InvalidInputError: If ``fun`` cannot be called, there is no limit, or lower exceeds upper.
+
+    Example:
+        >>> import numpy as np
+        >>> def squares(x):
+        ...     return float(x @ x), 2.0 * x
+        >>> NonlinearConstraint(squares, upper=2.0, name="disc").size
+        2.0
+    """
+
+    fun: Fun = field(repr=False)
+    upper: float = np.inf
+    lower: float = -np.inf
+    name: str = ""
+    scale: float | None = None
+
+    def __post_init__(self) -> None:
+        """Reject limits that leave nothing, or everything."""
+        if not callable(self.fun):
+            raise InvalidInputError(
+                f"a NonlinearConstraint needs a function x -> (value, subgradient), got "
+                f"{type(self.fun).__name__}: give such a function and then its limits"
+            )
+        if np.isnan(self.lower) or np.isnan(self.upper) or self.lower > self.upper:
+            raise InvalidInputError(
+                f"a NonlinearConstraint must have lower <= upper, got {self.lower} and {self.upper}"
+            )
+        if not np.isfinite([self.lower, self.upper]).any():
+            raise InvalidInputError(
+                f"a NonlinearConstraint needs a finite limit, got {self.lower} and {self.upper}: give upper, "
+                "lower or both"
+            )
+        if self.scale is not None and not 0.0 < self.scale < np.inf:
+            raise InvalidInputError(f"scale of a constraint must be positive and finite, got {self.scale}")
+
+    @property
+    def equality(self) -> bool:
+        """Whether both limits are the same number."""
+        return self.lower == self.upper
+
+    @property
+    def size(self) -> float:
+        """Size of c by which violations are divided."""
+        if self.scale is not None:
+            return self.scale
+        return (
+            max((abs(limit) for limit in (self.lower, self.upper) if np.isfinite(limit)), default=0.0) or 1.0
+        )
+
+    def excess(self, value: float) -> tuple[float, float]:
+        """Return (c - limit)/size, positive where violated, and its derivative by c.
+
+        That of an equality has the sign of c - limit.
+        """
+        above, below = (value - self.upper) / self.size, (self.lower - value) / self.size
+        return (above, 1.0 / self.size) if self.equality or above >= below else (below, -1.0 / self.size)
+
+
+@displayed
+@dataclass(frozen=True)
+class ConstraintValue:
+    """A nonlinear constraint at the best point.
+
+    Attributes:
+        name: Its name.
+        value: c(x).
+        lower: Lower limit.
+        upper: Upper limit.
+        violation: How far c lies outside its limits, divided by its size; 0 inside.
+        multiplier: m of the stationarity ∇J + Σ m ∇c = 0, positive at an upper limit, negative at a lower
+            one: a small change δ of that limit changes the least J by about -m δ. 0 where it is inactive.
+    """
+
+    name: str
+    value: float
+    lower: float
+    upper: float
+    violation: float
+    multiplier: float
+
+    @property
+    def active(self) -> bool:
+        """Whether a limit restrains J at the best point."""
+        return self.multiplier != 0.0
+
+    def __str__(self) -> str:
+        """Describe value, limits and multiplier in one line."""
+        limits = (
+            f"= {self.upper:.9g}"
+            if self.lower == self.upper
+            else " and ".join(
+                f"{sign} {limit:.9g}"
+                for sign, limit in (("≥", self.lower), ("≤", self.upper))
+                if np.isfinite(limit)
+            )
+        )
+        state = f"active, multiplier {self.multiplier:.4g}" if self.active else "inactive"
+        broken = f", violated by {self.violation:.1e} of its size" if self.violation > 0.0 else ""
+        return f"{self.name}: {self.value:.9g} ({limits}), {state}{broken}"
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """Nonlinear constraints at a point, divided by their sizes.
+
+    Attributes:
+        excess: (c - limit)/size, shape (k,), positive where an inequality is violated.
+        factors: Its derivatives by c, shape (k,).
+        equal: Marks of equalities, shape (k,).
+    """
+
+    excess: Array
+    factors: Array
+    equal: NDArray[np.bool_]
+
+    @property
+    def violations(self) -> Array:
+        """How far each constraint is violated, shape (k,), not negative."""
+        return np.where(self.equal, np.abs(self.excess), np.maximum(self.excess, 0.0))
+
+    @property
+    def violation(self) -> float:
+        """The largest violation, 0 without constraints."""
+        return float(self.violations.max(initial=0.0))
+
+
+def scaled_constraints(constraints: Sequence[NonlinearConstraint], values: Array) -> Scaled:
+    """Return constraints in units of their sizes.
+
+    Args:
+        constraints: The constraints.
+        values: Their values c, shape (k,).
+    """
+    pairs = [constraint.excess(float(value)) for constraint, value in zip(constraints, values, strict=True)]
+    excess, factors = np.array(pairs, dtype=float).reshape(-1, 2).T
+    return Scaled(excess, factors, np.array([one.equality for one in constraints], dtype=bool))
