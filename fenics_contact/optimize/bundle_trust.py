@@ -80,6 +80,11 @@ class BundleTrust:
     that is longer. On the published convex test functions the error of J at the stop is below ε (s + \|J\|);
     for a nonconvex one the test implies only stationarity.
 
+    With nonlinear constraints the merit function J + Σ ρ_k max(c_k, 0) takes the place of J; every inequality
+    has planes of its own, and the penalties ρ_k grow until the step reduces violations. Equalities are
+    linearised at the centre, and trial points corrected until they meet them. It stops as above only where no
+    constraint is violated by more than ``feasibility``; INFEASIBLE where violations cannot be reduced.
+
     A function that can be evaluated inexactly (`Inexact`) is evaluated no more accurately than the predicted
     decrease requires. The centre is re-evaluated where that has fallen so far that its error matters, and
     once more before the method stops: at the end value and subgradient are as accurate as ε requires.
@@ -109,6 +114,8 @@ class BundleTrust:
         idea, convergence analysis, numerical results, SIAM J. Optim. 2 (1992) 121-152.
         K. C. Kiwiel, Proximity control in bundle methods for convex nondifferentiable
         minimization, Math. Program. 46 (1990) 105-122.
+        R. H. Byrd, J. Nocedal, R. A. Waltz, Steering exact penalty methods for nonlinear programming, Optim.
+        Methods Softw. 23 (2008) 197-213.
     """
 
     tolerance: float = 1e-4
