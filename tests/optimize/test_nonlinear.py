@@ -332,6 +332,10 @@ def test_a_result_names_its_active_constraints() -> None:
     assert "= 1)" in str(solved("circle").constraints[0])
 
 
+def no_pair(x: Array) -> Any:
+    return 1.0
+
+
 @pytest.mark.parametrize(
     ("build", "text"),
     [
@@ -342,9 +346,7 @@ def test_a_result_names_its_active_constraints() -> None:
         (lambda: NonlinearConstraint(square, 1.0, scale=0.0), "scale of a constraint must be positive"),
         (lambda: BundleTrust(feasibility=0.0), "feasibility must be positive and finite"),
         (
-            lambda: minimize(
-                hs86, np.ones(5), constraints=NonlinearConstraint(lambda x: 1.0, 2.0, name="force")
-            ),
+            lambda: minimize(hs86, np.ones(5), constraints=NonlinearConstraint(no_pair, 2.0, name="force")),
             r"fun of force must return \(value, subgradient\), got float at evaluation 1",
         ),
     ],
