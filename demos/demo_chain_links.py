@@ -261,7 +261,8 @@ assert imbalance < 1e-9
 # ## What to try next
 #
 # - `Coulomb(0.1)`: most of the contact slips.
-# - Another objective, for example the largest contact force: see `fenics_contact.shape.ContactForces`.
+# - Another objective, for example `StrainEnergy()`, which rewards no retreat, or `PressureNorm()` (both from
+#   `fenics_contact.shape`).
 # - `checkpoint=Checkpoint(output / "run.npz")` in `minimize` (from `fenics_contact.optimize`): a run that is
 #   interrupted goes on from there when it is started again. Within `with interruptible(comm):` (from
 #   `fenics_contact.checkpoint`) Ctrl-C lets the evaluation under way come to its end first.

@@ -59,7 +59,8 @@ def optimize(
             show_outputs(desk, file, draws=pictures)
             return
         task = file.shape_task()
-        desk.say(f"{task.problem.size} design variables, objective {file.document.design.objective}")  # type: ignore[union-attr]
+        words = file.document.design.objective_in_words  # type: ignore[union-attr]
+        desk.say(f"{task.problem.size} design variables, objective {words}")
         with only_run_in(file.folder, desk.comm):
             result = _minimised(desk, file, task, resume)
             desk.show(facts(_facts(file, task, result)))

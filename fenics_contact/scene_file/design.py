@@ -7,12 +7,9 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, NonPositiveFloat, PositiveFloat, PositiveInt
 
 from fenics_contact.optimize import BundleTrust
+from fenics_contact.scene_file.objectives import AnyObjective, in_words
 from fenics_contact.scene_file.part import Part, keys_of
-from fenics_contact.scene_file.values import Net, Read, Row, one_of, said
-
-TOTAL_POTENTIAL = "total_potential"
-_Own = Annotated[str, Field(pattern=r"^.+\.py:[A-Za-z_]\w*$")]
-_OBJECTIVES = said(f'"{TOTAL_POTENTIAL}", or an objective of your own as "file.py:NAME"')
+from fenics_contact.scene_file.values import Net, Row, one_of
 
 
 class DesignSurfacePart(Part):
@@ -57,9 +54,10 @@ Constraint: TypeAlias = Annotated[Any, one_of("kind", VolumeConstraint, LinearCo
 class DesignPart(Part):
     """A shape optimisation of the scene."""
 
-    objective: Annotated[str, Read(Annotated[Literal["total_potential"] | _Own, _OBJECTIVES])] = Field(
-        TOTAL_POTENTIAL,
-        description='what is minimised: "total_potential" (½ uᵀK u − fᵀu), or "file.py:NAME", an Objective',
+    objective: AnyObjective = Field(
+        "total_potential",
+        description="what is minimised: a name, a table with its kind and arguments, a list of tables, which "
+        'are added, or "file.py:NAME", an Objective',
     )
     surfaces: list[DesignSurfacePart] = Field(min_length=1, description="what moves")
     constraints: list[Constraint] = Field([], description="what must hold")
@@ -71,3 +69,8 @@ class DesignPart(Part):
         False,
         description="solve states no more accurately than the optimiser needs; else to solver.tolerance",
     )
+
+    @property
+    def objective_in_words(self) -> str:
+        """The objective for a line of text."""
+        return in_words(self.objective)

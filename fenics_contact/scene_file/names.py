@@ -43,7 +43,7 @@ def wrong_names(source: Source, document: Document) -> list[Mistake]:
     wrong = [
         unknown(source, path, name, what, known[what]) for path, name, what in used if name not in known[what]
     ]
-    return wrong or [*_twice(source, document), *_unlike(source, document)]
+    return wrong or [*_twice(source, document), *_unlike(source, document), *_wrong_pairs(source, document)]
 
 
 def _names(parts: Iterable[Any]) -> list[str]:
@@ -76,6 +76,19 @@ def surface_parts(document: Document) -> Iterator[tuple[Path, Any]]:
     for path, part in branches(document):
         if isinstance(part, Part) and hasattr(part, "surface") and path[0] != "design":
             yield path, part
+
+
+def _wrong_pairs(source: Source, document: Document) -> Iterator[Mistake]:
+    """Yield numbers of contact pairs that are not there."""
+    count = len(document.contacts)
+    for path, part in branches(document):
+        pair = getattr(part, "pair", None) if isinstance(part, Part) else None
+        if pair is not None and pair >= count:
+            known = f"0 to {count - 1}" if count else "but it has none"
+            words = (
+                f"{written((*path, 'pair'))} must be the number of a contact of the file, {known}, got {pair}"
+            )
+            yield source.mistake((*path, "pair"), words)
 
 
 def _twice(source: Source, document: Document) -> Iterator[Mistake]:

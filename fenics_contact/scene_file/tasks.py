@@ -12,13 +12,14 @@ from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError, running, together
 from fenics_contact.optimize import BundleTrust, Callback, LinearConstraints, Result, minimize
-from fenics_contact.scene_file.design import TOTAL_POTENTIAL, DesignPart, VolumeConstraint
+from fenics_contact.scene_file.design import DesignPart, VolumeConstraint
 from fenics_contact.scene_file.design_surfaces import design_surface
 from fenics_contact.scene_file.document import Document
-from fenics_contact.scene_file.own_python import load
+from fenics_contact.scene_file.objectives import objective_of
+from fenics_contact.scene_file.own_python import is_reference, load
 from fenics_contact.scene_file.placing import Shaped
 from fenics_contact.scene_file.source import Source
-from fenics_contact.shape import AdaptiveTolerance, Objective, ShapeProblem, SurfaceDesign, TotalPotential
+from fenics_contact.shape import AdaptiveTolerance, Objective, ShapeProblem, SurfaceDesign
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +100,9 @@ def _paired(moving: tuple[SurfaceDesign, ...], design: DesignPart) -> Any:
     return zip(moving, design.surfaces, strict=True)
 
 
-def _objective(name: str, source: Source) -> Objective:
-    if name == TOTAL_POTENTIAL:
-        return TotalPotential()
+def _objective(name: Any, source: Source) -> Objective:
+    if not is_reference(name):
+        return objective_of(name)
     given: Any = load(name, source.folder)
     with running(f"objective {name!r}"):
         missing = [part for part in ("value", "partials") if not hasattr(given, part)]

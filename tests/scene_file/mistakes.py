@@ -71,6 +71,15 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
         "scene.toml, line 40: contacts.0.friction.law must be one of 'none', 'coulomb', 'tresca', got "
         "\"culomb\": did you mean 'coulomb'?",
     ),
+    "an objective is not known": (
+        "[solver]",
+        '[design]\nobjective = "largest_presure"\nsurfaces = [{ body = "upper", lower = -1, upper = 1 }]\n\n'
+        "[solver]",
+        "scene.toml, line 43: design.objective must be one of 'total_potential', 'strain_energy', "
+        "'largest_pressure', 'pressure_norm', 'pressure_unevenness', 'contact_area', 'friction_work', got "
+        "\"largest_presure\": did you mean 'largest_pressure'? (what is minimised: a name, a table with its "
+        'kind and arguments, a list of tables, which are added, or "file.py:NAME", an Objective)',
+    ),
     "a material is not there": (
         'material = "steel"',
         'material = "steal"',
