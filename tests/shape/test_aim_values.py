@@ -80,7 +80,7 @@ class Column:
 
 
 def value(objective: Objective, state: State) -> float:
-    return objective.value(state, ShapeForms(state.torn))
+    return objective.value(state, ShapeForms(state.torn.decomposition.comm))
 
 
 #: Of the column: objective, value, powers of force and length in its unit.
@@ -197,7 +197,7 @@ def test_the_potential_is_what_is_stored_and_what_the_load_gains_on_the_gaps() -
 
 
 def test_the_largest_is_the_largest_and_the_first_of_equals() -> None:
-    state, forms = mixed(), ShapeForms(mixed().torn)
+    state, forms = mixed(), ShapeForms(mixed().torn.decomposition.comm)
     low, high = LargestPressure(), 2.0 * StrainEnergy()
     scale = 3.0 * low.value(state, forms) / high.value(state, forms)
     both = Largest([low, scale * high])  # type: ignore[arg-type]
@@ -211,7 +211,7 @@ def test_the_largest_is_the_largest_and_the_first_of_equals() -> None:
 
 def refused(objective: Objective, state: State) -> str:
     """What is said both when the value is asked for and when derivatives are."""
-    forms, said = ShapeForms(state.torn), []
+    forms, said = ShapeForms(state.torn.decomposition.comm), []
     for ask in (objective.value, objective.partials):
         with pytest.raises((InvalidInputError, InvalidDesignError)) as caught:
             ask(state, forms)
@@ -261,7 +261,7 @@ def test_a_design_that_touches_nothing_is_refused(objective: Objective) -> None:
 
 def test_nothing_is_stressed_where_nothing_is_loaded() -> None:
     apart = Column(1.0, 1.0).state(pressure=0.0, gap=0.1)
-    found = LargestStress("block").partials(apart, ShapeForms(apart.torn))
+    found = LargestStress("block").partials(apart, ShapeForms(apart.torn.decomposition.comm))
     assert found.value == 0.0
     assert not found.by_displacement.any()
 
