@@ -149,7 +149,7 @@ AnyObjective: TypeAlias = Annotated[
     Read(
         Annotated[
             Annotated[Literal[tuple(BY_NAME)], Tag(f"{MARK}name")]  # type: ignore[valid-type]
-            | Annotated[str, Tag(f"{MARK}own")]
+            | Annotated[str, Field(pattern=r"\.py:"), Tag(f"{MARK}own")]
             | Annotated[_ANY, Tag(f"{MARK}table")]
             | Annotated[list[_ANY], Field(min_length=1), Tag(f"{MARK}list")],
             Discriminator(_form),
