@@ -33,6 +33,7 @@ from fenics_contact.scene.materials import (
     material_axes,
     strain,
 )
+from fenics_contact.scene.mirrors import mirrored
 from fenics_contact.scene.obstacles import (
     DistanceObstacle,
     RigidCylinder,
@@ -108,6 +109,7 @@ __all__ = [
     "held_components",
     "master_share",
     "material_axes",
+    "mirrored",
     "point_loads",
     "read_field",
     "resisted_motions",

@@ -13,8 +13,9 @@ from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.gallery import DesignSurface, side_of
+from fenics_contact.linalg import LAST_PLACES
 from fenics_contact.mesh import BodyMesh, boundary_faces
-from fenics_contact.scene import Scene
+from fenics_contact.scene import Scene, mirrored
 from fenics_contact.shape.bernstein import tensor_bernstein
 
 #: Default width of the transition strip, relative to the extent of the design surface.
@@ -81,9 +82,24 @@ class SurfaceDesign:
             raise InvalidInputError(
                 f"a design names body {self.body!r}, the scene has {sorted(scene.bodies)}: use one of them"
             )
-        if isinstance(self.surface, str):
-            return replace(self, surface=side_of(scene.bodies[self.body].mesh, self.surface))
-        return self
+        mesh, surface = scene.bodies[self.body].mesh, self.surface
+        whole = side_of(mesh, surface) if isinstance(surface, str) else surface
+        return replace(self, surface=self._within(whole, mirrored(scene, self.body)))
+
+    def _within(self, surface: DesignSurface, cut: np.ndarray) -> DesignSurface:
+        """Return the surface with directions within the planes of symmetry, marks of shape (n_nodes, dim)."""
+        at = np.flatnonzero(cut[surface.nodes].any(axis=1))
+        inside = np.where(cut[surface.nodes[at]], 0.0, surface.directions[at])
+        length = np.linalg.norm(inside, axis=1)
+        leaving = np.count_nonzero(length <= LAST_PLACES)
+        if leaving:
+            raise InvalidInputError(
+                f"a design surface may end at a plane of symmetry, but {leaving} nodes of that on "
+                f"{self.body!r} would leave it: choose another surface"
+            )
+        directions = surface.directions.copy()
+        directions[at] = inside / length[:, None]
+        return replace(surface, directions=directions)
 
     @property
     def lattice(self) -> DesignSurface:
@@ -133,13 +149,15 @@ class SurfaceDesign:
         """
         return self.basis.T @ np.einsum("nd,nd->n", gradient, self.lattice.directions)
 
-    def nodes_beyond_transition(self, mesh: BodyMesh) -> np.ndarray:
+    def nodes_beyond_transition(self, mesh: BodyMesh, cut: np.ndarray) -> np.ndarray:
         """Return the nodes of the body that do not follow the surface.
 
         Only subdomains with other nodes are reassembled and refactored for a new design.
 
         Args:
             mesh: The body in its reference shape.
+            cut: Which nodes lie on a plane of symmetry normal to each axis, shape (n_nodes, dim): behind it
+                the body continues.
         """
         surface = mesh.points[self.lattice.nodes]
         extent = float(np.linalg.norm(np.ptp(surface, axis=0)))
@@ -147,6 +165,7 @@ class SurfaceDesign:
         distance, _ = cKDTree(surface).query(mesh.points)
         far = distance > max(FAR * extent, width)
         facets, _ = boundary_faces(mesh.cells, mesh.dim)
+        facets = facets[~cut[facets].all(axis=1).any(axis=1)]
         boundary = np.setdiff1d(facets, self.lattice.nodes)
         far[boundary] |= distance[boundary] > width
         return np.flatnonzero(far)

@@ -15,7 +15,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.fem import Template, volume_measure
 from fenics_contact.feti import Decomposition
 from fenics_contact.linalg import dispose_with
-from fenics_contact.scene import Body, Scene, SurfaceLoad
+from fenics_contact.scene import Body, Scene, SurfaceLoad, mirrored
 from fenics_contact.shape.design import SurfaceDesign
 
 
@@ -28,7 +28,7 @@ class HarmonicExtension:
 
     Attributes:
         moving: Nodes of the design surface.
-        held: Nodes that do not move.
+        held: Components of nodes that do not move, shape (n_nodes, dim).
     """
 
     def _facts(self) -> dict[str, np.ndarray]:
@@ -44,15 +44,16 @@ class HarmonicExtension:
             name: Name of the body.
             body: The body in its reference shape.
             moving: Nodes of the design surface.
-            held: Nodes that do not move.
+            held: Components of nodes that do not move, shape (n_nodes, dim): all of them, or on a plane of
+                symmetry the one across it.
 
         Raises:
             InvalidInputError: If a node is both moved and held.
         """
-        both = np.intersect1d(moving, held)
-        if len(both):
+        both = int(np.count_nonzero(held[moving].all(axis=1)))
+        if both:
             raise InvalidInputError(
-                f"the design surface must keep away from supports and loads, but {len(both)} nodes of "
+                f"the design surface must keep away from supports and loads, but {both} nodes of "
                 f"body {name!r} "
                 "lie on both: choose another surface"
             )
@@ -71,7 +72,14 @@ class HarmonicExtension:
         mesh.comm.Allreduce(mine, everywhere := np.empty_like(mine), op=MPI.MAX)
         self._rows[:] = everywhere
         dispose_with(self, self._laplacian, comm=decomposition.comm, keep=space)
-        self._ksp = self._factor(np.concatenate([moving, held]))
+        known: dict[bytes, PETSc.KSP] = {}
+        self._given, self._ksp = [], []
+        for column in held.T:
+            given = np.union1d(moving, np.flatnonzero(column))
+            self._given.append(self._rows[given])
+            key = given.tobytes()
+            known[key] = known.get(key) or self._factor(given)
+            self._ksp.append(known[key])
 
     def _factor(self, given: np.ndarray) -> PETSc.KSP:
         matrix = self._laplacian.copy()
@@ -82,7 +90,6 @@ class HarmonicExtension:
         ksp.getPC().setType(PETSc.PC.Type.LU)
         ksp.getPC().setFactorSolverType("mumps")
         ksp.setUp()
-        self._given = self._rows[given]
         comm = self._laplacian.getComm().tompi4py()
         dispose_with(self, ksp.getPC(), ksp, matrix, comm=comm, keep=self._space)
         return ksp
@@ -98,8 +105,8 @@ class HarmonicExtension:
             self._put(prescribed, self._rows[self.moving], displacement[:, axis])
             self._laplacian.mult(prescribed, right)
             right.scale(-1.0)
-            self._put(right, self._given, self._values(prescribed)[self._given])
-            self._ksp.solve(right, solution)
+            self._put(right, self._given[axis], self._values(prescribed)[self._given[axis]])
+            self._ksp[axis].solve(right, solution)
             result[:, axis] = self._values(solution)[self._rows]
         for vector in (prescribed, right, solution):
             vector.destroy()
@@ -117,8 +124,8 @@ class HarmonicExtension:
         result = np.zeros((len(self.moving), gradient.shape[1]))
         for axis in range(gradient.shape[1]):
             self._put(right, self._rows, gradient[:, axis])
-            self._put(right, self._given, np.zeros(len(self._given)))
-            self._ksp.solve(right, adjoint)
+            self._put(right, self._given[axis], np.zeros(len(self._given[axis])))
+            self._ksp[axis].solve(right, adjoint)
             self._laplacian.mult(adjoint, image)
             result[:, axis] = gradient[self.moving, axis] - self._values(image)[self._rows[self.moving]]
         for vector in (right, image, adjoint):
@@ -147,11 +154,17 @@ def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign)
     """
     name = design.body
     body = scene.bodies[name]
-    surfaces = {part.surface for part in scene.supports if part.body == name}
-    surfaces |= {load.surface for load in scene.loads if load.body == name and isinstance(load, SurfaceLoad)}
-    held = [body.mesh.surfaces[surface].ravel() for surface in sorted(surfaces)]
-    held.append(design.nodes_beyond_transition(body.mesh))
-    return HarmonicExtension(decomposition, name, body, design.lattice.nodes, np.unique(np.concatenate(held)))
+    cut = mirrored(scene, name)
+    held = cut.copy()
+    for support in scene.supports:
+        if support.body == name:
+            facets = body.mesh.surfaces[support.surface]
+            held[facets[~cut[facets].all(axis=1).any(axis=1)]] = True
+    for load in scene.loads:
+        if load.body == name and isinstance(load, SurfaceLoad):
+            held[body.mesh.surfaces[load.surface]] = True
+    held[design.nodes_beyond_transition(body.mesh, cut)] = True
+    return HarmonicExtension(decomposition, name, body, design.lattice.nodes, held)
 
 
 def moving_nodes(
@@ -160,5 +173,5 @@ def moving_nodes(
     """Return which nodes of each body its designs move, body name -> marks, shape (n_nodes,)."""
     moving = {name: np.zeros(body.mesh.n_nodes, dtype=bool) for name, body in scene.bodies.items()}
     for design, motion in zip(designs, motions, strict=True):
-        moving[design.body][np.setdiff1d(np.arange(len(moving[design.body])), motion.held)] = True
+        moving[design.body] |= ~motion.held.all(axis=1)
     return moving
