@@ -7,7 +7,7 @@ from functools import cache
 import pytest
 
 from fenics_contact.shape import Objective
-from tests.shape import chains, moved_blocks
+from tests.shape import chains, mortar_lines, moved_blocks, quadratic_blocks
 from tests.shape.aims import aims
 from tests.shape.quotients import Line
 
@@ -16,13 +16,24 @@ AIMS = {
     "floor, Tresca": aims("block", "z1"),
     "blocks, tetrahedra": aims("upper", "z0"),
     "chain": aims("link1", "contact"),
+    "mortar": aims("upper", "z0"),
+    "quadratic tetrahedra": aims("block", "z0"),
+    "quadratic hexahedra": aims("block", "z0"),
+    "quadratic triangles": aims("block", "y0", 2),
+}
+LINES = {
+    "chain": lambda: chains.line("mixed"),
+    "mortar": lambda: mortar_lines.line("hexahedra"),
+    "quadratic tetrahedra": lambda: quadratic_blocks.line("blocks, tetrahedra"),
+    "quadratic hexahedra": lambda: quadratic_blocks.line("blocks"),
+    "quadratic triangles": lambda: quadratic_blocks.line("plane blocks, triangles"),
 }
 CASES = [(scene, aim) for scene in AIMS for aim in AIMS[scene]]
 
 
 @cache
 def line(scene: str) -> Line:
-    return chains.line("mixed") if scene == "chain" else moved_blocks.line(scene)
+    return LINES[scene]() if scene in LINES else moved_blocks.line(scene)
 
 
 def judged(scene: str, aim: str) -> tuple[Line, Objective]:

@@ -26,6 +26,7 @@ from fenics_contact.scene import (
 )
 from fenics_contact.shape import Objective, forms
 from tests.contact.gallery import FLOOR, crowned
+from tests.shape.aims import aims
 from tests.shape.blocks import problem
 from tests.shape.objectives import objectives
 from tests.shape.quotients import Line, miss_without
@@ -33,7 +34,9 @@ from tests.shape.quotients import Line, miss_without
 WOOD = OrthotropicElasticity(
     (90.0, 60.0, 80.0), (0.2, 0.3, 0.25), (30.0, 35.0, 25.0), thermal_expansion=(1e-3, 2e-3, 0.0)
 )
-JUDGES = objectives("block")
+JUDGES = objectives("block") | {
+    name: aims("block", "z0")[name] for name in ("largest stress", "friction work")
+}
 
 
 def two_materials() -> Scene:
