@@ -8,51 +8,35 @@ import numpy as np
 
 from fenics_contact.contact import State
 from fenics_contact.errors import together
-from fenics_contact.feti import TornSystem, nodal_mean_at
+from fenics_contact.feti import TornSystem
 from fenics_contact.pairing import ContactPoints, CouplingDerivatives
 from fenics_contact.scene import ContactPair, RigidObstacle, Surface, Tresca, master_share, surface_of
 from fenics_contact.shape.adjoint import Adjoint
 from fenics_contact.shape.linearised_face import LinearisedFace
 from fenics_contact.shape.mortar_derivative import mortar_points_pulled_back
 from fenics_contact.shape.objective import Partials
+from fenics_contact.shape.point_motions import PointMotions, point_motions
 from fenics_contact.shape.projection_derivative import (
     PointDerivatives,
+    carriers,
     frames_pulled_back,
     projection_pulled_back,
 )
 from fenics_contact.shape.surface_derivative import areas_pulled_back
 from fenics_contact.surface_shapes import asked
-from fenics_contact.surfaces import (
-    FacetedSurface,
-    bears_on_midpoints,
-    shape_functions,
-    shape_weight_gradients,
-    shape_weights,
-)
 
 
 @dataclass(frozen=True, eq=False)
-class RowFields:
+class RowFields(PointMotions):
     """Multipliers and displacements of state and adjoint at the contact points, replicated.
 
     Attributes:
         normal: λ_N and ζ_N, shape (2, n).
         friction: τ and ζ_T in the points' tangents, shape (2, n, dim - 1).
-        nodes: Nodes of slaves and masters, ascending, shape (n_nodes,).
-        values: Displacement of these nodes, of the adjoint and of the state, shape (2, n_nodes, dim): each
-            multiplier is paired with the other field.
-        relative: Slave minus master displacement, shape (2, n, dim), in the same order.
     """
 
     normal: np.ndarray
     friction: np.ndarray
-    nodes: np.ndarray
-    values: np.ndarray
-    relative: np.ndarray
-
-    def at(self, nodes: np.ndarray) -> np.ndarray:
-        """Return the displacements of some of the nodes, shape (2, ..., dim)."""
-        return np.asarray(self.values[:, np.searchsorted(self.nodes, nodes)])
 
 
 def contact_by_shape(state: State, adjoint: Adjoint, partials: Partials, by_bound: np.ndarray) -> np.ndarray:
@@ -124,11 +108,8 @@ def _add_mortar(
     )
     by = _by_point(points, rows, mine)
     pulled = _pulled_master(points, rows, mine)
-    known = np.isin(opposite, rows.nodes)
-    values = np.zeros((2, len(opposite), torn.dim))
-    values[:, known] = rows.at(opposite[known])  # other nodes have no weight, nor do they get one at once
     by_coupling = CouplingDerivatives(
-        by_area, np.hstack(list(pulled)), np.hstack(list(values)),
+        by_area, np.hstack(list(pulled)), np.hstack(list(rows.at(opposite))),
         by.normal + frames_pulled_back(points.normal[mine], by.tangents, by.axes), by.gap,
     )  # fmt: skip
     by_slave, by_master = mortar_points_pulled_back(
@@ -156,32 +137,13 @@ def _add_projected(
     assert isinstance(master, Surface)
     points, surface = torn.points, surface_of(torn.scene, master, pair.geometry)
     nodes = torn.decomposition.tearing.global_nodes(master.body, surface.nodes)
-    carriers, gradients = _carriers(surface, points.facet[mine], points.local[mine])
-    by = replace(_by_point(points, rows, mine, rows.at(nodes[carriers])), gradients=gradients)
+    carrying, gradients = carriers(surface, points.facet[mine], points.local[mine])
+    by = replace(_by_point(points, rows, mine, rows.at(nodes[carrying])), gradients=gradients)
     by_slave, by_master = projection_pulled_back(
         surface, points.facet[mine], points.local[mine], points.distance[mine], by
     )
     result[points.slave[mine]] += by_slave
     result[nodes] += by_master
-
-
-def _carriers(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nodes that carry a master's motion at points and the gradients of their weights.
-
-    Args:
-        surface: The master.
-        facet: Facet of each point, shape (n,).
-        local: Local coordinates on it, shape (n, dim − 1).
-
-    Returns:
-        Positions among the surface's nodes, shape (n, nodes), and gradients, shape (n, nodes, dim − 1).
-    """
-    values, gradients = shape_functions(local, surface.corners)
-    whole = surface.whole
-    if whole is None or not bears_on_midpoints(whole):
-        return surface.facets[facet], gradients
-    nodes, _ = shape_weights(whole, facet, values)
-    return nodes, shape_weight_gradients(facet, values, gradients)
 
 
 def _points(torn: TornSystem, nodes: np.ndarray) -> np.ndarray:
@@ -212,19 +174,9 @@ def _row_fields(state: State, multiplier: np.ndarray, displacement: np.ndarray) 
     for k, x in enumerate(multipliers):
         gathered = torn.numbering.gather(x, torn.tangential_rows.ravel())
         friction[k, torn.frictional] = gathered.reshape(-1, width)
-    nodes = np.unique(np.concatenate([points.jump.indices, _masters_nodes(torn)]))
-    fields = (displacement, state.torn_displacement)
-    values = np.stack([nodal_mean_at(torn.decomposition, field, nodes) for field in fields])
-    jump = points.jump[:, nodes]
-    return RowFields(normal, friction, nodes, values, np.stack([jump @ value for value in values]))
-
-
-def _masters_nodes(torn: TornSystem) -> np.ndarray:
-    """Return the nodes of the masters of all pairs among those of all bodies; some have no weight."""
-    masters = [pair.master for pair in torn.scene.contacts if isinstance(pair.master, Surface)]
-    tearing, scene = torn.decomposition.tearing, torn.scene
-    nodes = [tearing.global_nodes(master.body, np.unique(scene.facets(master))) for master in masters]
-    return np.concatenate([np.zeros(0, dtype=np.int64), *nodes])
+    masters = [pair.master for pair in torn.scene.contacts]
+    motions = point_motions(torn, points, masters, (displacement, state.torn_displacement))
+    return RowFields(motions.nodes, motions.values, motions.relative, normal, friction)
 
 
 def _by_point(

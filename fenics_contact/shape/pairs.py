@@ -28,7 +28,7 @@ def checked_contact(contact: ContactProblem) -> ContactProblem:
 def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
     """Reject designs that move surfaces without derivatives.
 
-    Ties and friction that varies have none.
+    Mortar ties and friction that varies have none.
 
     Args:
         scene: The scene.
@@ -42,7 +42,9 @@ def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
             remedy = "give its friction as a number, as the derivative of a function is not known"
             _check(scene, moving, (pair.slave,), f"contact pair {number}, whose friction varies,", remedy)
     for number, tie in enumerate(scene.ties):
-        _check(scene, moving, (tie.slave, tie.master), f"tie {number}", "move another part of the body")
+        if tie.discretisation == "mortar":
+            remedy = "use discretisation='node' for it"
+            _check(scene, moving, (tie.slave, tie.master), f"mortar tie {number}", remedy)
 
 
 def check_case(first: Scene, scene: Scene, moving: Mapping[str, np.ndarray]) -> None:

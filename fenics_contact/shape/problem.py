@@ -32,6 +32,7 @@ from fenics_contact.shape.memory import DesignMemory, DesignPoint, Stored
 from fenics_contact.shape.objective import Objective, Partials, asking, finite, finite_partials, finite_value
 from fenics_contact.shape.pairs import check_case, check_pairs, checked_contact
 from fenics_contact.shape.state_error import state_error
+from fenics_contact.shape.tied_derivative import ties_by_shape
 from fenics_contact.shape.tolerance import AdaptiveTolerance, tightest_of
 
 #: Tolerance of the adjoint relative to that of its state, and the smallest: no looser than the state's.
@@ -387,11 +388,11 @@ class ShapeProblem:
     def _by_points(
         self, state: State, adjoint: Adjoint, partials: Partials, by_bound: np.ndarray
     ) -> np.ndarray:
-        """Sum the objective's own derivative, −wᵀ(δK u − δf) and the contact points' share over all ranks."""
+        """Sum the objective's own derivative, −wᵀ(δK u − δf) and the share of contacts and ties."""
         torn = state.torn
         work = work_by_shape(self.geometry.forms, torn, state.torn_displacement, adjoint.displacement)
-        contact = contact_by_shape(state, adjoint, partials, by_bound)
-        return np.asarray(torn.decomposition.comm.allreduce(partials.by_shape - work)) + contact
+        rows = contact_by_shape(state, adjoint, partials, by_bound) + ties_by_shape(state, adjoint, partials)
+        return np.asarray(torn.decomposition.comm.allreduce(partials.by_shape - work)) + rows
 
     def _restored(self, alpha: np.ndarray, stored: Stored) -> State:
         state = self.contact.restore(stored, self.scene_of(alpha))

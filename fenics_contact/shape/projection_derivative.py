@@ -10,10 +10,13 @@ from fenics_contact.pairing import reference_axes
 from fenics_contact.shape.surface_derivative import normals_pulled_back, rotated_back, slopes_pulled_back
 from fenics_contact.surfaces import (
     FacetedSurface,
+    bears_on_midpoints,
     heights,
     interpolated_normal,
     newton_matrix,
     shape_functions,
+    shape_weight_gradients,
+    shape_weights,
 )
 
 
@@ -107,6 +110,25 @@ def projection_pulled_back(
     np.add.at(by_points, nodes, values[:, :, None] * z[:, None])
     np.add.at(by_normals, nodes, values[:, :, None] * by_mean[:, None])
     return -z, by_points + normals_pulled_back(master, by_normals, by_averaged)
+
+
+def carriers(surface: FacetedSurface, facet: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes that carry a master's motion at points and the gradients of their weights.
+
+    Args:
+        surface: The master.
+        facet: Facet of each point, shape (n,).
+        local: Local coordinates on it, shape (n, dim − 1).
+
+    Returns:
+        Positions among the surface's nodes, shape (n, nodes), and gradients, shape (n, nodes, dim − 1).
+    """
+    values, gradients = shape_functions(local, surface.corners)
+    whole = surface.whole
+    if whole is None or not bears_on_midpoints(whole):
+        return surface.facets[facet], gradients
+    nodes, _ = shape_weights(whole, facet, values)
+    return nodes, shape_weight_gradients(facet, values, gradients)
 
 
 def _tangential(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
@@ -81,17 +81,17 @@ SCENES: dict[str, Callable[[], Scene]] = {
 OBJECTIVES = {**objectives("block"), **aims("block", "y0", 2)}
 
 
-def plane_problem(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF) -> Remembering:
-    """All contact curves, or surfaces, of a scene move."""
+def plane_problem(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF, also: Sequence[Surface] = ()) -> Remembering:
+    """All contact curves, or surfaces, of a scene move, and others."""
     surfaces = [s for pair in scene.contacts for s in (pair.slave, pair.master) if isinstance(s, Surface)]
     net = 5 if scene.dim == 2 else (3, 2)
-    designs = tuple(SurfaceDesign(s.body, s.name, net) for s in surfaces)
+    designs = tuple(SurfaceDesign(s.body, s.name, net) for s in (*surfaces, *also))
     contact = ContactProblem(scene, comm, partitions=partitions(scene), solver=SOLVER)
     return Remembering(contact, designs, TotalPotential())
 
 
-def line_of(scene: Scene, way: int = 6) -> Line:
-    blocks = plane_problem(scene)
+def line_of(scene: Scene, way: int = 6, also: Sequence[Surface] = ()) -> Line:
+    blocks = plane_problem(scene, also=also)
     alpha = 0.004 * np.random.default_rng(1).standard_normal(blocks.size)
     return Line(blocks, alpha, np.random.default_rng(way).standard_normal(blocks.size), 1e-5)
 

@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
-from fenics_contact.scene import Coulomb, Tresca
+from fenics_contact.scene import Coulomb, Surface, Tresca
 from fenics_contact.shape import HarmonicExtension
 from tests.shape.aims import aims
 from tests.shape.blocks import block_on_block, problem
@@ -20,6 +20,7 @@ from tests.shape.mortar_lines import chain_problem_by_mortar
 from tests.shape.objectives import objectives
 from tests.shape.plane_blocks import on_block, plane_problem
 from tests.shape.quotients import Remembering
+from tests.shape.tied_blocks import capped
 
 #: Four subdomains, two of each body: on four ranks every rank lacks a body. A chain of eight subdomains.
 PROBLEMS: dict[str, Callable[[MPI.Comm], Remembering]] = {
@@ -30,6 +31,7 @@ PROBLEMS: dict[str, Callable[[MPI.Comm], Remembering]] = {
     "chain": lambda comm: chain_problem(Coulomb(0.3), comm),
     "plane, quadratic": lambda comm: plane_problem(on_block(Coulomb(0.38), "quadrilateral", 2), comm),
     "chain by mortar": chain_problem_by_mortar,
+    "tied": lambda comm: plane_problem(capped("triangle", sliding=True), comm, also=[Surface("block", "y1")]),
 }
 #: Who judges: between them they ask everything of a state.
 JUDGES = {
@@ -38,10 +40,11 @@ JUDGES = {
     "chain": ("energy", "normal forces", "largest of two"),
     "plane, quadratic": ("displacement", "friction forces", "largest stress"),
     "chain by mortar": ("energy", "stress", "unevenness"),
+    "tied": ("stress", "normal forces"),
 }
-BODY = {"chain": "link2", "plane, quadratic": "block", "chain by mortar": "link2"}
-SURFACE = {"chain": "contact", "plane, quadratic": "y0", "chain by mortar": "contact"}
-SIZE = {"chain": 0.03, "plane, quadratic": 0.004, "chain by mortar": 0.03}
+BODY = {"chain": "link2", "plane, quadratic": "block", "chain by mortar": "link2", "tied": "cap"}
+SURFACE = {"chain": "contact", "plane, quadratic": "y0", "chain by mortar": "contact", "tied": "y0"}
+SIZE = {"chain": 0.03, "plane, quadratic": 0.004, "chain by mortar": 0.03, "tied": 0.004}
 
 
 def same_bits(comm: MPI.Comm, *arrays: np.ndarray | float) -> bool:

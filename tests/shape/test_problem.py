@@ -177,10 +177,10 @@ def test_evaluations_and_products_are_counted_and_the_best_design_is_kept() -> N
     assert {"decompose", "mesh motion", "solve", "adjoint", "gradient"} <= set(blocks.seconds)
 
 
-def test_a_tied_surface_may_not_move() -> None:
+def test_a_surface_of_a_mortar_tie_may_not_move() -> None:
     tied = replace(scene(), contacts=[], ties=[Tie(Surface("upper", "z0"), Surface("lower", "z1"))])
     with pytest.raises(
-        InvalidInputError, match=r"tie 0 lies on 'z0' of body 'upper', of which \d+ nodes move"
+        InvalidInputError, match=r"mortar tie 0 lies on 'z0' of body 'upper', of which \d+ nodes move: use d"
     ):
         ShapeProblem(
             ContactProblem(tied, MPI.COMM_SELF, partitions=partitions(scene())),

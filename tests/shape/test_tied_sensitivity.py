@@ -1,0 +1,71 @@
+"""Derivatives of tied surfaces that move: bonded and sliding, in the plane and in space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.contact import ContactProblem, Status
+from fenics_contact.shape import ShapeProblem, tied_derivative
+from tests.shape.quotients import Patch, miss_without
+from tests.shape.tied_blocks import OBJECTIVES, SCENES, line
+
+
+def without(term: str) -> Callable[[Patch], None]:
+    """Drop a derivative of the tied points' geometry."""
+
+    def drop(patch: Patch) -> None:
+        whole: Any = tied_derivative.projection_pulled_back  # type: ignore[attr-defined]
+
+        def pulled_back(*given: Any) -> Any:
+            *before, by = given
+            return whole(*before, replace(by, **{term: np.zeros_like(getattr(by, term))}))
+
+        patch.setattr(tied_derivative, "projection_pulled_back", pulled_back)
+
+    return drop
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_points_stick_slip_and_lift_off_all_along_the_line(name: str) -> None:
+    contact = line(name).state().contact
+    assert all(contact.count(status) > 0 for status in Status), line(name).counts()
+    assert line(name).state().torn.ties.count > 5
+    assert line(name).is_smooth()
+
+
+@pytest.mark.parametrize("objective", OBJECTIVES)
+@pytest.mark.parametrize("name", SCENES)
+def test_the_adjoint_agrees_with_central_differences(name: str, objective: str) -> None:
+    here, judge = line(name), OBJECTIVES[objective]
+    assert here.steepness(judge) > 0.02
+    assert here.miss(judge) < 1e-5
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_taylor_remainders_are_quadratic(name: str) -> None:
+    for objective in ("energy", "stress"):
+        assert line(name).taylor_rate(OBJECTIVES[objective]) > 1.9
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_weights_of_the_master_count(name: str) -> None:
+    assert miss_without(without("weight"), line(name), OBJECTIVES["stress"]) > 2e-4
+
+
+@pytest.mark.parametrize("name", [name for name in SCENES if "sliding" in name])
+def test_the_normals_of_sliding_ties_count(name: str) -> None:
+    assert miss_without(without("normal"), line(name), OBJECTIVES["stress"]) > 1e-3
+
+
+@pytest.mark.parametrize("name", ["plane", "sliding"])
+def test_default_settings_give_the_same_gradient(name: str) -> None:
+    here, judge = line(name), OBJECTIVES["energy"]
+    default = ShapeProblem(ContactProblem(SCENES[name](), MPI.COMM_SELF), here.problem.designs, judge)
+    slope = float(default(here.alpha)[1] @ here.direction)
+    assert slope == pytest.approx(here.quotient(judge), rel=1e-3)
