@@ -18,7 +18,6 @@ from fenics_contact.optimize.first_centre import first_centre
 from fenics_contact.optimize.inexactness import Demand, again, demand
 from fenics_contact.optimize.merit import (
     first_soft,
-    irreducible,
     merit_planes,
     multipliers,
     priced_step,
@@ -250,7 +249,7 @@ def _guarded_step(method: BundleTrust, problem: PosedProblem, state: MethodState
         # A kink can keep the length constant while t falls, so t must be able to fall fast.
         t = trust.t * max(0.05, min(0.5, 0.95 * trust.radius / step.length))
         trust = replace(trust, t=max(t, trust.t_least))
-        step = solve_step(state.bundle, near, trust.t, soft)
+        step = replace(solve_step(state.bundle, near, trust.t, soft), stuck=step.stuck)
     state = replace(state, trust=trust, soft=soft)
     return step, replace(state, multipliers=multipliers(problem, state, step))
 
@@ -319,7 +318,7 @@ def _reason_to_stop(
     solved = test.reason(step, lambda t: solve_step(state.bundle, near, t, state.soft))
     if problem.constraints_at(state.centre).violation > method.feasibility:
         solved = None
-        if state.trust.exhausted or irreducible(step, state.soft, method.feasibility):
+        if state.trust.exhausted or step.stuck:
             return Reason.INFEASIBLE
     if solved is not None:
         return solved

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,38 +97,42 @@ def priced_step(
     soft: Sequence[SoftConstraint],
     feasibility: float,
     *,
-    share: float = 0.9,
+    share: float = 0.1,
+    least: float = 0.01,
     factor: float = 10.0,
 ) -> tuple[Step, tuple[SoftConstraint, ...]]:
     """Return the step, with penalties large enough for it to reduce violations.
 
-    The penalty of a constraint is raised while the planes predict that more than ``share`` of its violation
-    remains, and more than is allowed.
+    The penalty of a constraint is raised while the planes predict less than ``share`` of the reduction that
+    the largest penalties would bring. Where even that is less than ``least`` of all violations, the step is
+    `stuck`.
 
     References:
         R. H. Byrd, J. Nocedal, R. A. Waltz, Steering exact penalty methods for nonlinear programming, Optim.
         Methods Softw. 23 (2008) 197-213.
     """
-    step = solve_step(bundle, near, t, soft)
+    step, rounding = solve_step(bundle, near, t, soft), 0.1 * feasibility
+    if all(
+        _reduced(one, left, 0.0, share, rounding) for one, left in zip(soft, step.violations, strict=True)
+    ):
+        return step, tuple(soft)
+    possible = solve_step(bundle, near, t, [one.raised(np.inf) for one in soft]).violations
+    violations = [one.violation for one in soft]
+    stuck = max(violations) > feasibility and sum(possible) > (1.0 - least) * sum(violations)
     while True:
-        wanting = [
-            left > max(share * one.violation, 0.1 * feasibility) and not one.dearest
-            for one, left in zip(soft, step.violations, strict=True)
+        enough = [
+            _reduced(one, left, best, share, rounding) or one.dearest
+            for one, left, best in zip(soft, step.violations, possible, strict=True)
         ]
-        if not any(wanting):
-            return step, tuple(soft)
-        soft = [one.raised(factor) if more else one for one, more in zip(soft, wanting, strict=True)]
+        if all(enough):
+            return replace(step, stuck=stuck), tuple(soft)
+        soft = [one if done else one.raised(factor) for one, done in zip(soft, enough, strict=True)]
         step = solve_step(bundle, near, t, soft)
 
 
-def irreducible(step: Step, soft: Sequence[SoftConstraint], feasibility: float, share: float = 0.9) -> bool:
-    """Return whether the planes leave most of the violation at the largest penalties."""
-    violated = [k for k, one in enumerate(soft) if one.violation > feasibility]
-    if not violated or not any(soft[k].dearest for k in violated):
-        return False
-    before = sum(one.penalty * one.violation for one in soft)
-    after = sum(one.penalty * left for one, left in zip(soft, step.violations, strict=True))
-    return after > share * before
+def _reduced(one: SoftConstraint, left: float, best: float, share: float, rounding: float) -> bool:
+    """Return whether a step reduces a violation by a share of what is possible."""
+    return left <= max(one.violation - share * (one.violation - best), best) + rounding
 
 
 def multipliers(problem: PosedProblem, state: MethodState, step: Step) -> Array:

@@ -211,6 +211,8 @@ def _fingerprint(method: Method, problem: PosedProblem) -> dict[str, str]:
         f"{one.name} in [{one.lower!r}, {one.upper!r}], scale {one.size!r}" for one in problem.nonlinear
     ]
     descriptions["nonlinear constraints"] = "; ".join(limits) or "none"
+    for one in problem.nonlinear:
+        descriptions.update(getattr(one.fun, "fingerprint", dict)())
     descriptions.update(described(problem.scale, "scale"))
     descriptions.update(described(problem.start, "x0"))
     return descriptions

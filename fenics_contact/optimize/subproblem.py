@@ -45,6 +45,7 @@ class Step:
         soft_weights: Multipliers θ_ki of the planes of each nonlinear inequality in units of its penalty.
         violations: Predicted max(c_k, 0) after the move.
         equality_multipliers: Multipliers of the rows of E, shape (r,).
+        stuck: Whether no penalty makes a step reduce the violations.
     """
 
     move: Array
@@ -56,6 +57,7 @@ class Step:
     soft_weights: tuple[Array, ...] = ()
     violations: tuple[float, ...] = ()
     equality_multipliers: Array = field(default_factory=lambda: np.zeros(0))
+    stuck: bool = False
 
     @property
     def length(self) -> float:

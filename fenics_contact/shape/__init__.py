@@ -3,6 +3,7 @@
 from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
 from fenics_contact.shape.contact_forces import ContactForces
 from fenics_contact.shape.design import SurfaceDesign
+from fenics_contact.shape.design_function import DesignFunction
 from fenics_contact.shape.energies import StrainEnergy, TotalPotential
 from fenics_contact.shape.friction_work import FrictionWork
 from fenics_contact.shape.largest_stress import LargestStress
@@ -23,6 +24,7 @@ __all__ = [
     "Adjoint",
     "ContactArea",
     "ContactForces",
+    "DesignFunction",
     "DesignPoint",
     "FrictionWork",
     "HarmonicExtension",

@@ -44,7 +44,17 @@ class DesignGeometry:
         self._last: tuple[np.ndarray, dict[str, Body]] | None = None
 
     def points_of(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the coordinates of the designed bodies, see `ShapeProblem.points_of`. Collective."""
+        """Return the coordinates of the designed bodies. Collective.
+
+        Args:
+            alpha: Design variables, shape (size,), [length].
+
+        Returns:
+            Body name -> coordinates, shape (n_nodes, dim), [length].
+
+        Raises:
+            InvalidInputError: If alpha has another shape or is not finite.
+        """
         alpha = checked_variables(alpha, self.size, self._decomposition.comm)
         points: dict[str, np.ndarray] = {}
         parts = np.split(alpha, np.cumsum([design.size for design in self.designs])[:-1])

@@ -25,6 +25,7 @@ from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
 from fenics_contact.shape.beside import with_fewest_weak_points
 from fenics_contact.shape.contact_derivative import bound_sensitivity, contact_by_shape
 from fenics_contact.shape.design import SurfaceDesign
+from fenics_contact.shape.design_function import DesignFunction
 from fenics_contact.shape.forms import work_by_shape
 from fenics_contact.shape.geometry import DesignGeometry
 from fenics_contact.shape.linearised_face import WeakChoice, linearise_face
@@ -175,25 +176,11 @@ class ShapeProblem:
         return point.value, point.gradient
 
     def points_of(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the coordinates of the designed bodies. Collective.
-
-        Args:
-            alpha: Design variables, shape (size,), [length].
-
-        Returns:
-            Body name -> coordinates, shape (n_nodes, dim), [length].
-
-        Raises:
-            InvalidInputError: If alpha has another shape or is not finite.
-        """
+        """Return the coordinates of the designed bodies, see `DesignGeometry.points_of`. Collective."""
         return self.geometry.points_of(alpha)
 
     def scene_of(self, alpha: np.ndarray) -> Scene:
-        """Return the scene in the shape of a design. Collective.
-
-        Raises:
-            InvalidDesignError: If the design inverts a cell.
-        """
+        """Return the scene in the shape of a design; raises as `evaluate` does. Collective."""
         return self.geometry.scene_of(self.scene, alpha)
 
     @collectively("ShapeProblem.state_of", _comm)
@@ -234,6 +221,19 @@ class ShapeProblem:
             state: Equilibrium of the scene, with the subdomains of this problem (`ContactProblem.following`).
         """
         return self._point_at(np.zeros(self.size), state, self._tightest, None)
+
+    def function(self, objective: Objective, name: str | None = None) -> DesignFunction:
+        """Return another objective as a function α -> (value, subgradient), for a constraint.
+
+        At a design evaluated before it uses the state and costs one adjoint.
+        """
+        own = copy(self)
+        own.objective = objective
+        return DesignFunction(self, own, name or type(objective).__name__)
+
+    def known(self, alpha: np.ndarray) -> DesignPoint | None:
+        """Return the first, best or last design if it is exactly this one. Collective."""
+        return self._memory.of_design(alpha)
 
     @property
     def inexact(self) -> bool:

@@ -1,0 +1,167 @@
+"""Designs under nonlinear constraints: the volume itself and a bound on a contact force."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.contact import ContactProblem, ContactResult
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.optimize import BundleTrust, Checkpoint, NonlinearConstraint, Result, minimize
+from fenics_contact.qp import FaceNewton
+from fenics_contact.scene import Coulomb
+from fenics_contact.shape import (
+    AdaptiveTolerance,
+    ContactForces,
+    DesignFunction,
+    ShapeProblem,
+    TotalPotential,
+)
+from tests.contact.gallery import partitions
+from tests.shape.blocks import block_on_floor, designs_of
+from tests.shape.objectives import normal_forces
+
+BOUND = 0.02
+#: Largest normal force of a node relative to that of the reference shape, at most.
+FORCE = 0.9
+
+
+def largest_force(contact: ContactResult) -> tuple[float, np.ndarray, np.ndarray]:
+    """The largest normal force of a node."""
+    k = int(np.argmax(contact.normal_force))
+    by_normal = np.eye(len(contact.normal_force))[k]
+    return float(contact.normal_force[k]), by_normal, np.zeros((len(by_normal), 2))
+
+
+def posed(tolerance: AdaptiveTolerance | None = None) -> ShapeProblem:
+    scene = block_on_floor(Coulomb(0.3), load=(0.35, 0.1, -2.0))
+    contact = ContactProblem(
+        scene, MPI.COMM_SELF, partitions=partitions(scene), solver=FaceNewton(tolerance=1e-9)
+    )
+    return ShapeProblem(contact, designs_of(scene), TotalPotential(), tolerance=tolerance)
+
+
+def minimised(problem: ShapeProblem, share: float = FORCE, **more: Any) -> tuple[DesignFunction, Result]:
+    """Minimise the energy; the volume is kept and the largest force limited below that of the start."""
+    start = np.zeros(problem.size)
+    volume = problem.volume(start)[0]
+    force = problem.function(ContactForces(largest_force), "largest force")
+    limit = share * force(start)[0]
+    method = BundleTrust(**{"max_evaluations": 60, **more.pop("method", {})})
+    constraints = [
+        NonlinearConstraint(problem.volume, volume, volume, "volume"),
+        NonlinearConstraint(force, limit, name="force"),
+    ]
+    box = (np.full(problem.size, -BOUND), np.full(problem.size, BOUND))
+    return force, minimize(problem, start, method, bounds=box, constraints=constraints, restore=True, **more)
+
+
+@cache
+def solved() -> tuple[ShapeProblem, DesignFunction, Result]:
+    problem = posed()
+    return problem, *minimised(problem)
+
+
+def test_a_function_has_the_value_and_gradient_of_a_problem_with_that_objective() -> None:
+    problem, alone = posed(), posed()
+    alone.objective = ContactForces(normal_forces)
+    alpha = 0.005 * np.random.default_rng(1).standard_normal(problem.size)
+    function = problem.function(ContactForces(normal_forces))
+    problem(alpha)
+    value, gradient = function(alpha)
+    wanted, by_design = alone(alpha)
+    assert value == pytest.approx(wanted, rel=1e-7)
+    assert gradient == pytest.approx(by_design, rel=1e-5, abs=1e-5 * np.abs(by_design).max())
+    assert np.abs(gradient).max() > 0.0
+    assert problem.objective == TotalPotential()
+
+
+def test_a_function_costs_one_adjoint_at_a_design_that_is_known() -> None:
+    problem = posed()
+    alpha = np.full(problem.size, 0.004)
+    function = problem.function(ContactForces(normal_forces), "forces")
+    problem(alpha)
+    whole, states = problem.products, problem.seconds
+    state = problem.last.state if problem.last else None
+    assert state is not None
+    function(alpha)
+    spent = problem.products - whole
+    assert 0 < spent < 0.7 * whole
+    assert problem.evaluations == 1
+    function(alpha)
+    assert problem.products == whole + spent, "the same design is not differentiated twice"
+    assert problem.last is not None
+    assert problem.last.state is state
+    assert states["adjoint"] > 0.0
+    unknown = np.full(problem.size, 0.006)
+    assert function(unknown)[0] != function(alpha)[0]
+    assert problem.products > whole + 2 * spent
+    assert "forces" in repr(function)
+
+
+def test_the_volume_is_kept_and_the_force_meets_its_limit() -> None:
+    problem, force, result = solved()
+    assert result.reason.success
+    assert problem.volume(result.x)[0] == pytest.approx(problem.volume(np.zeros(problem.size))[0], rel=1e-6)
+    volume, bound = result.constraints
+    assert (volume.active, bound.active) == (True, True)
+    assert force(result.x)[0] <= bound.upper * (1 + 1e-6)
+    assert bound.value == pytest.approx(bound.upper, rel=1e-4)
+    assert bound.multiplier > 0.0
+    assert 3 < result.evaluations <= 60
+    assert np.abs(result.x).max() <= BOUND
+
+
+def test_the_multiplier_of_the_force_is_the_price_of_its_limit() -> None:
+    _, _, result = solved()
+    _, other = minimised(posed(), share=FORCE + 0.01)
+    raised = other.constraints[1].upper - result.constraints[1].upper
+    price = np.mean([one.constraints[1].multiplier for one in (result, other)])
+    assert other.value - result.value == pytest.approx(-price * raised, rel=0.2)
+    assert other.value < result.value
+
+
+def test_every_design_that_is_solved_has_the_volume() -> None:
+    problem, volumes = posed(), []
+    minimised(problem, callback=lambda record, x: volumes.append(problem.volume(x)[0]))
+    assert len(volumes) > 3
+    assert volumes == pytest.approx([volumes[0]] * len(volumes), rel=1e-6)
+
+
+def test_states_as_accurate_as_needed_lead_to_the_same_design() -> None:
+    _, _, exact = solved()
+    problem = posed(AdaptiveTolerance())
+    _, result = minimised(problem)
+    assert result.reason.success
+    assert result.value == pytest.approx(exact.value, rel=3e-4)
+    assert result.violation <= 1e-5
+    assert {record.error > 0.0 for record in result.history} == {True}
+
+
+def test_a_run_in_pieces_ends_at_the_same_design(tmp_path: Path) -> None:
+    _, _, whole = solved()
+    checkpoint = Checkpoint(tmp_path / "run.npz")
+    _, first = minimised(
+        posed(), checkpoint=checkpoint, method={"max_evaluations": 3, "raise_on_failure": False}
+    )
+    assert not first.reason.success
+    _, result = minimised(posed(), checkpoint=checkpoint)
+    assert result.evaluations == whole.evaluations
+    assert result.x == pytest.approx(whole.x, abs=1e-9)
+
+
+def test_a_start_with_too_large_a_force_is_an_error_that_says_by_how_much() -> None:
+    problem = posed()
+    start = np.zeros(problem.size)
+    force = problem.function(ContactForces(largest_force), "largest force")
+    value = force(start)[0]
+    limit = NonlinearConstraint(force, FORCE * value, name="force")
+    with pytest.raises(
+        InvalidInputError, match=rf"but force is {value:.6g}, to lie in \[-inf, .*restore=True"
+    ):
+        minimize(problem, start, bounds=(start - BOUND, start + BOUND), constraints=limit)
