@@ -113,7 +113,8 @@ def objects() -> dict[str, Any]:
     search.arguments("SLSQP")["fun"](np.zeros(60))
     weights = [BodyForce("block", (0, 0, float(k))) for k in range(50)]
     roots = [
-        shape, point, shape.function(TotalPotential()), state, scene, scene.plan(), state.errors, state.gather_fields("block"), partials,
+        shape.function(TotalPotential()),
+        shape, point, state, scene, scene.plan(), state.errors, state.gather_fields("block"), partials,
         state.balance(), state.resultants(), find_sites(state.torn),
         solve_adjoint(state, partials, linearise_face(state, WeakChoice.RELEASED)),
         certify(state.dual, state.dual_solution), solver_errors(state.system, state.solution),
