@@ -13,7 +13,7 @@ from fenics_contact.scene_file.part import Part, keys_of
 from fenics_contact.scene_file.values import MARK, Read, Vector, one_of, said
 from fenics_contact.shape import Objective
 
-_Exponent: TypeAlias = Annotated[float, Field(ge=2)]
+_Exponent: TypeAlias = Annotated[float, Field(ge=2, le=100)]
 _Pair: TypeAlias = Annotated[int, Field(ge=0)] | None
 
 

@@ -32,10 +32,10 @@ class LargestStress(Weighable):
 
     Attributes:
         body: Name of the body.
-        p: Exponent, at least 2: below, J has kinks where nothing is stressed.
+        p: Exponent from 2 to 100: below, J has kinks where nothing is stressed.
 
     Raises:
-        InvalidInputError: If p is below 2.
+        InvalidInputError: If p is out of its range.
 
     Example:
         >>> LargestStress("link 1", p=12.0).body
@@ -75,7 +75,8 @@ class LargestStress(Weighable):
     def _evaluated(self, state: State, forms: ShapeForms) -> tuple[float, float, float, tuple[float, float]]:
         """Return J, ∫ (σ/σ_r)^p dx, the volume, and the constants 1/σ_r² and p/2. Collective.
 
-        Any σ_r gives the same J. With the largest mean of a cell powers do not overflow, whatever the unit.
+        Any σ_r gives the same J. With the largest mean of a cell powers do not overflow, whatever the unit: a
+        stress within it is at most as many times larger as the cell has points of quadrature.
         """
         reference = self.largest(state)
         if reference == 0.0:

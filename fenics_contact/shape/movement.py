@@ -70,7 +70,7 @@ class Movement(Weighable):
             surface = surface_of(state.scene, Surface(self.body, self.at), "faceted")
             nodes = tearing.global_nodes(self.body, surface.nodes)
             return nodes, surface.areas / surface.areas.sum(), surface
-        if isinstance(self.at, int) and 0 <= self.at < mesh.n_nodes:
+        if not isinstance(self.at, str) and 0 <= self.at < mesh.n_nodes:
             return tearing.global_nodes(self.body, np.array([self.at])), np.ones(1), None
         raise InvalidInputError(
             f"Movement.at must be a surface of body {self.body!r}, one of {sorted(mesh.surfaces)}, or the "

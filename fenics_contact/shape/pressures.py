@@ -138,10 +138,10 @@ class PressureNorm(OfPressures):
     The larger p, the closer, and the more J behaves like the maximum with its kinks.
 
     Attributes:
-        p: Exponent, at least 2; the mean, p = 1, is given by the load, not by the shape.
+        p: Exponent from 2 to 100; the mean, p = 1, is given by the load, not by the shape.
 
     Raises:
-        InvalidInputError: If p is below 2.
+        InvalidInputError: If p is out of its range.
 
     Example:
         >>> PressureNorm(p=12.0).p
@@ -164,15 +164,15 @@ class PressureNorm(OfPressures):
 
 
 def require_exponent(what: str, p: float) -> None:
-    """Check the exponent of a smooth bound of a largest value.
+    """Check the exponent of a smooth bound of a largest value, of which powers must not overflow.
 
     Raises:
-        InvalidInputError: If it is not finite, or below 2.
+        InvalidInputError: If it is not from 2 to 100.
     """
-    if not (np.isfinite(p) and p >= 2.0):
+    if not 2.0 <= p <= 100.0:
         raise InvalidInputError(
-            f"{what}.p must be a finite number of at least 2, got {p!r}: the larger, the closer to the "
-            "largest value, try 8"
+            f"{what}.p must be a number from 2 to 100, got {p!r}: the larger, the closer to the largest "
+            "value, try 8"
         )
 
 

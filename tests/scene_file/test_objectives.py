@@ -89,6 +89,7 @@ def test_a_gradient_by_a_file_is_that_by_python() -> None:
         ({"p": 3}, "design.objective must have 'kind', one of 'total_potential', "),
         ({"kind": "stress"}, "design.objective.kind must be one of .*, got \"stress\""),
         ({"kind": "pressure_norm", "p": 1.5}, "design.objective.p must be a number of at least 2, got 1.5"),
+        ({"kind": "pressure_norm", "p": 101}, "design.objective.p must be a number of at most 100, got 101"),
         ({"kind": "largest_stress"}, "design.objective must have 'body', got only kind: name of the body"),
         ([{"kind": "largest_stress", "body": "uper"}], "design.objective.0.body must be a body, one of .*"),
         ({"kind": "friction_work", "pair": 1}, "design.objective.pair must be the number of a contact "),

@@ -131,14 +131,14 @@ def test_pressures_are_judged_with_all_points_of_the_slave() -> None:
     assert spread > 0.1
     assert value(PressureUnevenness(), mixed()) == pytest.approx(spread, rel=1e-12)
     assert value(ContactArea(), mixed()) == pytest.approx(total / (1 + spread), rel=1e-12)
-    for p in (2.0, 8.0, 200.0):
+    for p in (2.0, 8.0, 100.0):
         norm = value(PressureNorm(p=p), mixed())
         assert norm == pytest.approx(((area * pressure**p).sum() / total) ** (1 / p), rel=1e-12)
         bound = norm * (total / area[pressure.argmax()]) ** (1 / p)
         assert norm < pressure.max() < bound * (1 + 1e-12)
 
 
-@pytest.mark.parametrize("p", [2.0, 1e4])
+@pytest.mark.parametrize("p", [2.0, 100.0])
 def test_powers_of_pressures_neither_overflow_nor_vanish(p: float) -> None:
     force = np.array([1e300, 0.5e300, 0.0])
     found, by_force, by_area = PressureNorm(p=p).of_points(force, np.ones(3))
@@ -167,12 +167,12 @@ def test_stress_is_the_norm_of_that_of_the_cells() -> None:
     mesh, stress = state.scene.bodies["upper"].mesh, state.gather_von_mises("upper")
     corners = mesh.points[mesh.cells]
     volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
-    for p in (2.0, 8.0, 200.0):
+    for p in (2.0, 8.0, 100.0):
         judge = LargestStress("upper", p=p)
         expected = ((stress / stress.max()) ** p @ volume / volume.sum()) ** (1 / p) * stress.max()
         assert value(judge, state) == pytest.approx(expected, rel=1e-6)
         assert judge.largest(state) == pytest.approx(stress.max(), rel=1e-12)
-    assert expected > 0.9 * stress.max()
+    assert expected > 0.85 * stress.max()
 
 
 def test_the_work_of_friction_is_that_of_the_sliding_points() -> None:
@@ -209,6 +209,14 @@ def test_the_largest_is_the_largest_and_the_first_of_equals() -> None:
     assert np.count_nonzero(equal.by_multiplier) == 1
 
 
+def test_a_node_by_a_number_of_numpy_is_that_node() -> None:
+    moved = mixed().gather_displacement("block")
+    highest = np.argmax(moved[:, 0])
+    found = value(Movement("block", highest, (2.0, 0.0, 0.0)), mixed())  # type: ignore[arg-type]
+    assert found == pytest.approx(moved[highest, 0], rel=1e-9)
+    assert found > 1e-3
+
+
 def refused(objective: Objective, state: State) -> str:
     """What is said both when the value is asked for and when derivatives are."""
     forms, said = ShapeForms(state.torn.decomposition.comm), []
@@ -243,10 +251,10 @@ def test_bodies_surfaces_and_nodes_that_are_not_there_are_refused() -> None:
 
 
 @pytest.mark.parametrize("kind", [PressureNorm, LargestStress])
-@pytest.mark.parametrize("p", [0.5, 1.9, -8.0, np.nan, np.inf])
-def test_small_exponents_are_refused(kind: type, p: float) -> None:
+@pytest.mark.parametrize("p", [0.5, 1.9, -8.0, 101.0, np.nan, np.inf])
+def test_exponents_that_smooth_too_much_or_overflow_are_refused(kind: type, p: float) -> None:
     given = {"body": "block"} if kind is LargestStress else {}
-    with pytest.raises(InvalidInputError, match=f"{kind.__name__}.p must be a finite number of at least 2"):
+    with pytest.raises(InvalidInputError, match=f"{kind.__name__}.p must be a number from 2 to 100, got"):
         kind(**given, p=p)
 
 
