@@ -73,18 +73,21 @@ class LargestStress(Weighable):
         return Partials.of(state, value, **integral.derivatives(*numbers, by_powers, -by_volume))
 
     def _evaluated(self, state: State, forms: ShapeForms) -> tuple[float, float, float, tuple[float, float]]:
-        """Return J, ∫ (σ/σ_r)^p dx, the volume, and the constants 1/σ_r² and p/2. Collective.
+        """Return J, I = ∫ (σ/σ_r)^p dx, the volume, and the constants 1/σ_r² and p/2. Collective.
 
-        Any σ_r gives the same J. With the largest mean of a cell powers do not overflow, whatever the unit: a
-        stress within it is at most as many times larger as the cell has points of quadrature.
+        Any σ_r gives the same J. That of a smaller p is near enough to the largest stress, whatever the unit,
+        for powers not to overflow: first the root mean square, then that of 16.
         """
-        reference = self.largest(state)
-        if reference == 0.0:
-            return 0.0, 0.0, 0.0, (0.0, 0.0)
-        numbers = (reference**-2.0, 0.5 * self.p)
+        require_body(state, "LargestStress", self.body)
         integral = BodyIntegral(state, forms, _DENSITY, self.body)
-        stressed, volume = integral(*numbers, 1.0, 0.0), integral(*numbers, 0.0, 1.0)
-        return reference * (stressed / volume) ** (1.0 / self.p), stressed, volume, numbers
+        volume, value = integral(0.0, 1.0, 0.0, 1.0), 1.0
+        for p in (2.0, min(self.p, 16.0), self.p):
+            numbers = (value**-2.0, 0.5 * p)
+            stressed = integral(*numbers, 1.0, 0.0)
+            value *= (stressed / volume) ** (1.0 / p)
+            if value == 0.0:
+                break
+        return value, stressed, volume, numbers
 
 
 def _powers(u: Expr, x: Expr, stress: Expr, *numbers: Expr) -> Expr:
