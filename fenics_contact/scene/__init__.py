@@ -50,7 +50,7 @@ from fenics_contact.scene.scene import Scene
 from fenics_contact.scene.steps import LoadStep
 from fenics_contact.scene.supports import Support
 from fenics_contact.scene.true_surfaces import surface_of
-from fenics_contact.scene.values import OfPosition, ScalarValue, Ufl, VectorValue, evaluate
+from fenics_contact.scene.values import OfPosition, ScalarValue, Ufl, VectorValue, evaluate, gradients_of
 
 __all__ = [
     "RANK_TOLERANCE",
@@ -105,6 +105,7 @@ __all__ = [
     "can_expand",
     "choose_solver",
     "evaluate",
+    "gradients_of",
     "gravity",
     "held_components",
     "master_share",

@@ -181,15 +181,16 @@ class ContactPair:
     @property
     def has_friction(self) -> bool:
         """Whether tangential forces can be transmitted at all."""
-        return self.friction_varies or self._friction_value > 0
+        return self.friction_varies or self.friction_value > 0
 
     @property
     def friction_varies(self) -> bool:
         """Whether friction is given as a function of position."""
-        return callable(self._friction_value)
+        return callable(self.friction_value)
 
     @property
-    def _friction_value(self) -> Any:
+    def friction_value(self) -> Any:
+        """Friction coefficient, or Tresca's traction, as given; zero without friction."""
         match self.friction:
             case Coulomb(friction_coefficient=value) | Tresca(traction=value):
                 return value
@@ -201,7 +202,7 @@ class ContactPair:
         Raises:
             InvalidInputError: If a function returns something other than numbers of at least zero.
         """
-        return _not_negative(f"friction of {self.place}", self._friction_value, points)
+        return _not_negative(f"friction of {self.place}", self.friction_value, points)
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from fenics_contact.contact import State
 from fenics_contact.errors import together
 from fenics_contact.feti import TornSystem
 from fenics_contact.pairing import ContactPoints, CouplingDerivatives
-from fenics_contact.scene import ContactPair, RigidObstacle, Surface, Tresca, master_share, surface_of
+from fenics_contact.scene import ContactPair, RigidObstacle, Surface, master_share, surface_of
 from fenics_contact.shape.adjoint import Adjoint
-from fenics_contact.shape.linearised_face import LinearisedFace
+from fenics_contact.shape.friction_derivative import bounds_by_area, bounds_by_place
 from fenics_contact.shape.mortar_derivative import mortar_points_pulled_back
 from fenics_contact.shape.objective import Partials
 from fenics_contact.shape.point_motions import PointMotions, point_motions
@@ -57,7 +57,9 @@ def contact_by_shape(state: State, adjoint: Adjoint, partials: Partials, by_boun
     if points.count == 0:
         return result
     rows = _row_fields(state, adjoint.multiplier - partials.by_jump, adjoint.displacement)
-    by_area = _by_area(torn, partials, by_bound)
+    by_area = bounds_by_area(torn, by_bound) + partials.by_area
+    with together(torn.decomposition.comm):
+        np.add.at(result, points.slave, bounds_by_place(torn, rows.normal[0], by_bound))
     for index, pair in enumerate(torn.scene.contacts):
         mine = np.flatnonzero(points.pair == index)
         if isinstance(pair.master, Surface) and pair.discretisation == "mortar":
@@ -74,20 +76,6 @@ def contact_by_shape(state: State, adjoint: Adjoint, partials: Partials, by_boun
         else:
             _add_projected(result, torn, pair, rows, mine)
     return result
-
-
-def _by_area(torn: TornSystem, partials: Partials, by_bound: np.ndarray) -> np.ndarray:
-    """Return the derivative by the areas of the points, shape (n_points,).
-
-    Tresca's nodal bound is a traction times a nodal area, which moves with the nodes. Those of a function of
-    position do not move.
-    """
-    by_area = np.zeros(torn.points.count) + partials.by_area
-    pair = torn.points.pair[torn.frictional]
-    for index, contact in enumerate(torn.scene.contacts):
-        if isinstance(contact.friction, Tresca) and not callable(contact.friction.traction):
-            by_area[torn.frictional[pair == index]] += contact.friction.traction * by_bound[pair == index]
-    return by_area
 
 
 def _add_mortar(
@@ -149,18 +137,6 @@ def _add_projected(
 def _points(torn: TornSystem, nodes: np.ndarray) -> np.ndarray:
     """Return the coordinates of nodes of all bodies, shape (n, dim)."""
     return np.concatenate([body.mesh.points for body in torn.scene.bodies.values()])[nodes]
-
-
-def bound_sensitivity(
-    state: State, adjoint: Adjoint, partials: Partials, linearised: LinearisedFace
-) -> np.ndarray:
-    """Return dJ by each slip bound at fixed geometry, d·(∂J/∂τ − B_T w), replicated. Collective."""
-    system = state.dual
-    force = partials.by_multiplier - system.jump(adjoint.displacement)
-    mine = np.einsum("na,na->n", linearised.slip_direction, force[system.problem.layout.tangential])
-    result = np.zeros(len(system.torn.frictional))
-    result[system.owned_discs()] = mine
-    return np.asarray(system.problem.comm.allreduce(result))
 
 
 def _row_fields(state: State, multiplier: np.ndarray, displacement: np.ndarray) -> RowFields:

@@ -28,7 +28,7 @@ def checked_contact(contact: ContactProblem) -> ContactProblem:
 def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
     """Reject designs that move surfaces without derivatives.
 
-    Mortar ties and friction that varies have none.
+    Mortar ties have none.
 
     Args:
         scene: The scene.
@@ -37,10 +37,6 @@ def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
     Raises:
         InvalidInputError: Names the pair and the surface.
     """
-    for number, pair in enumerate(scene.contacts):
-        if pair.friction_varies:
-            remedy = "give its friction as a number, as the derivative of a function is not known"
-            _check(scene, moving, (pair.slave,), f"contact pair {number}, whose friction varies,", remedy)
     for number, tie in enumerate(scene.ties):
         if tie.discretisation == "mortar":
             remedy = "use discretisation='node' for it"

@@ -23,10 +23,11 @@ from fenics_contact.fingerprint import described
 from fenics_contact.scene import Scene
 from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
 from fenics_contact.shape.beside import with_fewest_weak_points
-from fenics_contact.shape.contact_derivative import bound_sensitivity, contact_by_shape
+from fenics_contact.shape.contact_derivative import contact_by_shape
 from fenics_contact.shape.design import SurfaceDesign
 from fenics_contact.shape.design_function import DesignFunction
 from fenics_contact.shape.forms import work_by_shape
+from fenics_contact.shape.friction_derivative import bound_sensitivity
 from fenics_contact.shape.geometry import DesignGeometry
 from fenics_contact.shape.linearised_face import WeakChoice, linearise_face
 from fenics_contact.shape.memory import DesignMemory, DesignPoint, Stored

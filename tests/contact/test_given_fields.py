@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, solve_scene
+from fenics_contact.contact import solve_scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.io import read_result, write_result
 from fenics_contact.scene import (
@@ -21,7 +21,6 @@ from fenics_contact.scene import (
     Support,
     Tresca,
 )
-from fenics_contact.shape import ShapeProblem, SurfaceDesign, TotalPotential
 from tests.contact.given_fields import MESH, NODES, forces, rising, shifted
 
 
@@ -54,13 +53,6 @@ def test_the_bound_of_given_friction_varies() -> None:
 def test_friction_must_not_be_negative_anywhere() -> None:
     with pytest.raises(InvalidInputError, match=r"zero or positive everywhere, got -3 at \(4, "):
         solve_scene(shifted(Coulomb(lambda x: 1.0 - x[:, 0])), MPI.COMM_SELF)
-
-
-def test_a_design_may_not_move_where_friction_varies() -> None:
-    scene = shifted(Coulomb(rising))
-    designs = [SurfaceDesign("block", "z0", net=(3, 3))]
-    with pytest.raises(InvalidInputError, match=r"whose friction varies, .* give its friction as a number"):
-        ShapeProblem(ContactProblem(scene, MPI.COMM_SELF), designs, TotalPotential())
 
 
 def test_a_pressure_known_only_on_its_surface_is_enough() -> None:
