@@ -12,7 +12,8 @@ from fenics_contact.feti import TornSystem
 from fenics_contact.pairing import ContactPoints, CouplingDerivatives
 from fenics_contact.scene import ContactPair, RigidObstacle, Surface, master_share, surface_of
 from fenics_contact.shape.adjoint import Adjoint
-from fenics_contact.shape.friction_derivative import bounds_by_area, bounds_by_place
+from fenics_contact.shape.friction_derivative import bound_sensitivity, bounds_by_area, bounds_by_place
+from fenics_contact.shape.linearised_face import LinearisedFace
 from fenics_contact.shape.mortar_derivative import mortar_points_pulled_back
 from fenics_contact.shape.objective import Partials
 from fenics_contact.shape.point_motions import PointMotions, point_motions
@@ -39,7 +40,9 @@ class RowFields(PointMotions):
     friction: np.ndarray
 
 
-def contact_by_shape(state: State, adjoint: Adjoint, partials: Partials, by_bound: np.ndarray) -> np.ndarray:
+def contact_by_shape(
+    state: State, adjoint: Adjoint, partials: Partials, linearised: LinearisedFace
+) -> np.ndarray:
     """Return the derivative by the geometry of the contact points, replicated, shape (n_nodes, dim).
 
     It is ∂/∂X of −λᵀ B w + (ζ − j)ᵀ(c − B u), with the objective's derivative j by B u − c, and the shares of
@@ -49,7 +52,7 @@ def contact_by_shape(state: State, adjoint: Adjoint, partials: Partials, by_boun
         state: The state.
         adjoint: Its adjoint.
         partials: Partial derivatives of the objective.
-        by_bound: Derivative by each frictional point's slip bound, replicated, shape (n_friction,).
+        linearised: Branch of the contact law.
     """
     torn = state.torn
     tearing, points = torn.decomposition.tearing, torn.points
@@ -57,6 +60,7 @@ def contact_by_shape(state: State, adjoint: Adjoint, partials: Partials, by_boun
     if points.count == 0:
         return result
     rows = _row_fields(state, adjoint.multiplier - partials.by_jump, adjoint.displacement)
+    by_bound = bound_sensitivity(state, adjoint, partials, linearised)
     by_area = bounds_by_area(torn, by_bound) + partials.by_area
     with together(torn.decomposition.comm):
         np.add.at(result, points.slave, bounds_by_place(torn, rows.normal[0], by_bound))

@@ -27,9 +27,8 @@ from fenics_contact.shape.contact_derivative import contact_by_shape
 from fenics_contact.shape.design import SurfaceDesign
 from fenics_contact.shape.design_function import DesignFunction
 from fenics_contact.shape.forms import work_by_shape
-from fenics_contact.shape.friction_derivative import bound_sensitivity
 from fenics_contact.shape.geometry import DesignGeometry
-from fenics_contact.shape.linearised_face import WeakChoice, linearise_face
+from fenics_contact.shape.linearised_face import LinearisedFace, WeakChoice, linearise_face
 from fenics_contact.shape.memory import DesignMemory, DesignPoint, Stored
 from fenics_contact.shape.objective import Objective, Partials, asking, finite, finite_partials, finite_value
 from fenics_contact.shape.pairs import check_case, check_pairs, checked_contact
@@ -335,8 +334,7 @@ class ShapeProblem:
             )  # fmt: skip
             error = state_error(state, partials, linearised, adjoint)
         with self._timer.phase("gradient"):
-            by_bound = bound_sensitivity(state, adjoint, partials, linearised)
-            gradient = self.geometry.pull_back(self._by_points(state, adjoint, partials, by_bound))
+            gradient = self.geometry.pull_back(self._by_points(state, adjoint, partials, linearised))
         self.products += state.dual.products
         value = partials.value + (error.correction if self.inexact else 0.0)
         # Ranks must take the same decisions, whatever the rounding in sums over ranks.
@@ -387,12 +385,13 @@ class ShapeProblem:
         return self.geometry.volume(self.scene_of(alpha))
 
     def _by_points(
-        self, state: State, adjoint: Adjoint, partials: Partials, by_bound: np.ndarray
+        self, state: State, adjoint: Adjoint, partials: Partials, linearised: LinearisedFace
     ) -> np.ndarray:
         """Sum the objective's own derivative, −wᵀ(δK u − δf) and the share of contacts and ties."""
         torn = state.torn
         work = work_by_shape(self.geometry.forms, torn, state.torn_displacement, adjoint.displacement)
-        rows = contact_by_shape(state, adjoint, partials, by_bound) + ties_by_shape(state, adjoint, partials)
+        rows = contact_by_shape(state, adjoint, partials, linearised)
+        rows = rows + ties_by_shape(state, adjoint, partials)
         return np.asarray(torn.decomposition.comm.allreduce(partials.by_shape - work)) + rows
 
     def _restored(self, alpha: np.ndarray, stored: Stored) -> State:

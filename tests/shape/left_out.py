@@ -55,8 +55,8 @@ def without_own(derivative: str) -> Callable[[Patch], None]:
     def drop(patch: Patch) -> None:
         whole = problem.ShapeProblem._by_points
 
-        def by_points(self: Any, state: Any, adjoint: Any, partials: Any, by_bound: np.ndarray) -> Any:
-            return whole(self, state, adjoint, replace(partials, **{derivative: 0.0}), by_bound)
+        def by_points(self: Any, state: Any, adjoint: Any, partials: Any, linearised: Any) -> Any:
+            return whole(self, state, adjoint, replace(partials, **{derivative: 0.0}), linearised)
 
         patch.setattr(problem.ShapeProblem, "_by_points", by_points)
 
