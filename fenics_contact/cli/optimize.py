@@ -109,6 +109,8 @@ def _facts(file: SceneFile, task: ShapeTask, result: Result) -> dict[str, str]:
         "work": f"{problem.products} products with F",
         "stopped because": result.reason.value,
     }
+    for one in result.constraints:
+        rows[f"constraint {one.name}"] = f"{one.value:.6g}{', active' if one.active else ''}"
     for name, point in (("before", before), ("after", after)):
         state = point.state
         for number, words in enumerate(pairs_in_words(state.scene, state.contact, units.force, units.stress)):

@@ -1,15 +1,16 @@
-"""Shape optimisation: moving surfaces, objective, constraints."""
+"""Shape optimisation: moving surfaces, what is minimised, and how."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated
 
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, NonPositiveFloat, PositiveFloat, PositiveInt
 
 from fenics_contact.optimize import BundleTrust
+from fenics_contact.scene_file.constraints import Constraint
 from fenics_contact.scene_file.objectives import AnyObjective, in_words
 from fenics_contact.scene_file.part import Part, keys_of
-from fenics_contact.scene_file.values import Net, Row, one_of
+from fenics_contact.scene_file.values import Net, Row
 
 
 class DesignSurfacePart(Part):
@@ -31,25 +32,6 @@ class DesignSurfacePart(Part):
     upper: NonNegativeFloat = Field(description="largest displacement of a control point, [length]")
 
 
-class VolumeConstraint(Part):
-    """The volume of the designed bodies, linearised at the start, relative to that of the start."""
-
-    kind: Literal["volume"]
-    at_least: PositiveFloat | None = Field(None, description="least volume relative to that of the start")
-    at_most: PositiveFloat | None = Field(None, description="largest volume relative to that of the start")
-
-
-class LinearConstraint(Part):
-    """A linear function of the design variables."""
-
-    kind: Literal["linear"]
-    coefficients: Row = Field(description="one for each design variable")
-    at_most: float = Field(description="largest value of the sum of coefficients times variables")
-
-
-Constraint: TypeAlias = Annotated[Any, one_of("kind", VolumeConstraint, LinearConstraint)]
-
-
 @keys_of(BundleTrust, only=["tolerance", "max_iterations", "max_evaluations"])
 class DesignPart(Part):
     """A shape optimisation of the scene."""
@@ -61,6 +43,7 @@ class DesignPart(Part):
     )
     surfaces: list[DesignSurfacePart] = Field(min_length=1, description="what moves")
     constraints: list[Constraint] = Field([], description="what must hold")
+    restore: bool = Field(False, description="start from a design that may violate limits of objectives")
     start: Row | None = Field(None, description="design variables at the start, [length]; zero by default")
     tolerance: Annotated[float, Field(gt=0, lt=1)] = 1e-4
     max_iterations: NonNegativeInt = 100

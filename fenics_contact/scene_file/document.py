@@ -16,7 +16,7 @@ from fenics_contact.scene_file.mistakes import Mistake
 from fenics_contact.scene_file.own_python import is_reference
 from fenics_contact.scene_file.part import Part
 from fenics_contact.scene_file.places import Path as Keys
-from fenics_contact.scene_file.places import as_toml, written
+from fenics_contact.scene_file.places import as_toml, branches, written
 from fenics_contact.scene_file.solver import SolverPart
 from fenics_contact.scene_file.source import Source
 from fenics_contact.scene_file.steps import StepPart
@@ -90,8 +90,10 @@ def references(document: Document) -> Iterator[tuple[Keys, str]]:
     for name, material in document.materials.items():
         if is_reference(material.model):
             yield ("materials", name, "model"), material.model
-    if document.design is not None and is_reference(document.design.objective):
-        yield ("design", "objective"), document.design.objective
+    for path, part in branches(document.design, ("design",)):
+        objective = getattr(part, "objective", None) if isinstance(part, Part) else None
+        if isinstance(objective, str) and is_reference(objective):
+            yield (*path, "objective"), objective
 
 
 def refused_python(source: Source, document: Document) -> list[Mistake]:

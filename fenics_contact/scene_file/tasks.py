@@ -11,11 +11,19 @@ import numpy as np
 from fenics_contact.checkpoint import Checkpoint
 from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError, running, together
-from fenics_contact.optimize import BundleTrust, Callback, LinearConstraints, Result, minimize
-from fenics_contact.scene_file.design import DesignPart, VolumeConstraint
+from fenics_contact.optimize import (
+    BundleTrust,
+    Callback,
+    LinearConstraints,
+    NonlinearConstraint,
+    Result,
+    minimize,
+)
+from fenics_contact.scene_file.constraints import ObjectiveConstraint, VolumeConstraint
+from fenics_contact.scene_file.design import DesignPart
 from fenics_contact.scene_file.design_surfaces import design_surface
 from fenics_contact.scene_file.document import Document
-from fenics_contact.scene_file.objectives import objective_of
+from fenics_contact.scene_file.objectives import in_words, objective_of
 from fenics_contact.scene_file.own_python import is_reference, load
 from fenics_contact.scene_file.placing import Shaped
 from fenics_contact.scene_file.source import Source
@@ -30,15 +38,17 @@ class ShapeTask:
         problem: J(α) with its subgradient.
         start: Design variables at the start, [length].
         bounds: Least and largest values of the variables, [length].
-        constraints: Linear constraints, None for none.
+        constraints: The linear ones in one, and limits of other objectives.
         method: The optimiser.
+        restore: Whether the start may violate limits of other objectives.
     """
 
     problem: ShapeProblem
     start: np.ndarray
     bounds: tuple[np.ndarray, np.ndarray]
-    constraints: LinearConstraints | None
+    constraints: tuple[LinearConstraints | NonlinearConstraint, ...]
     method: BundleTrust
+    restore: bool = False
 
     def minimize(self, *, callback: Callback | None = None, checkpoint: Checkpoint | None = None) -> Result:
         """Run it. Collective; a stop before the tolerance is met is reported by the result's reason.
@@ -53,6 +63,7 @@ class ShapeTask:
             self.method,
             bounds=self.bounds,
             constraints=self.constraints,
+            restore=self.restore,
             callback=callback,
             checkpoint=checkpoint,
         )
@@ -93,7 +104,8 @@ def shape_task(
     )
     start = np.zeros(problem.size) if design.start is None else _fitting("start", design.start, problem.size)
     method = design.made(raise_on_failure=False)
-    return ShapeTask(problem, start, (lower, upper), _constraints(design, problem, start), method)
+    constraints = _constraints(design, problem, start, source)
+    return ShapeTask(problem, start, (lower, upper), constraints, method, design.restore)
 
 
 def _paired(moving: tuple[SurfaceDesign, ...], design: DesignPart) -> Any:
@@ -115,9 +127,13 @@ def _objective(name: Any, source: Source) -> Objective:
     return objective
 
 
-def _constraints(design: DesignPart, problem: ShapeProblem, start: np.ndarray) -> LinearConstraints | None:
+def _constraints(
+    design: DesignPart, problem: ShapeProblem, start: np.ndarray, source: Source
+) -> tuple[LinearConstraints | NonlinearConstraint, ...]:
+    """Return the constraints of a design, all linear ones in one. Collective."""
     rows: list[np.ndarray] = []
     limits: list[float] = []
+    others: list[NonlinearConstraint] = []
     for part in design.constraints:
         if isinstance(part, VolumeConstraint):
             volume, gradient = problem.volume(start)
@@ -129,10 +145,22 @@ def _constraints(design: DesignPart, problem: ShapeProblem, start: np.ndarray) -
             if part.at_most is not None:
                 rows.append(gradient)
                 limits.append((part.at_most - 1.0) * volume + offset)
+        elif isinstance(part, ObjectiveConstraint):
+            others.append(_limited(part, problem, source))
         else:
             rows.append(_fitting("coefficients", part.coefficients, problem.size))
             limits.append(part.at_most)
-    return LinearConstraints(np.array(rows), np.array(limits)) if rows else None
+    return (*([LinearConstraints(np.array(rows), np.array(limits))] if rows else []), *others)
+
+
+def _limited(part: ObjectiveConstraint, problem: ShapeProblem, source: Source) -> NonlinearConstraint:
+    """Return the limits of an objective. Collective."""
+    with together(problem.comm):
+        objective = _objective(part.objective, source)
+    name = part.name or in_words(part.objective)
+    upper, lower = np.inf if part.at_most is None else part.at_most, part.at_least
+    function = problem.function(objective, name)
+    return NonlinearConstraint(function, upper, -np.inf if lower is None else lower, name)
 
 
 def _fitting(name: str, values: tuple[float, ...], size: int) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact.optimize import LinearConstraints
 from fenics_contact.scene_file import SceneFileError, read_scene_file
 from tests.conftest import ROOT
 from tests.scene_file.compared import compare_states, two_blocks
@@ -44,8 +45,9 @@ def test_a_side_of_a_block_can_be_designed() -> None:
     moved = task.problem.points_of(np.full(4, 0.01))["upper"]
     bottom = task.problem.designs[0].surface.nodes
     np.testing.assert_allclose(moved[bottom, 2], 1.0 - 0.01, atol=1e-12)  # added material: downwards
-    assert task.constraints is not None
-    matrix, limit = np.asarray(task.constraints.matrix), np.asarray(task.constraints.limit)
+    (linear,) = task.constraints
+    assert isinstance(linear, LinearConstraints)
+    matrix, limit = np.asarray(linear.matrix), np.asarray(linear.limit)
     volume, gradient = task.problem.volume(task.start)
     assert volume == pytest.approx(4.0)
     np.testing.assert_allclose(matrix, [-gradient, gradient, np.ones(4)])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fenics_contact.optimize import LinearConstraints, NonlinearConstraint
 from fenics_contact.scene_file import SceneFile, SceneFileError, read_scene_file
 from fenics_contact.shape import (
     ContactArea,
@@ -69,6 +70,69 @@ def test_an_objective_of_a_file_is_that_of_python(given: Any, expected: Objectiv
     assert file.document.design is not None
     assert file.document.design.objective_in_words == words
     assert file.shape_task().problem.objective == expected
+
+
+def constrained(*constraints: dict[str, Any], **more: Any) -> SceneFile:
+    design = {"surfaces": SURFACES, "constraints": list(constraints), **more}
+    return read_scene_file({**tomllib.loads(GOOD), "design": design}, MPI.COMM_SELF)
+
+
+def test_an_objective_may_be_limited() -> None:
+    stress = {"kind": "largest_stress", "body": "upper", "p": 12}
+    limited = {"kind": "objective", "objective": stress, "at_most": 1000, "at_least": 1, "name": "stress"}
+    kept = {"kind": "volume", "at_least": 0.9}
+    task = constrained(limited, kept, restore=True).shape_task()
+    linear, constraint = task.constraints
+    assert isinstance(linear, LinearConstraints)
+    assert isinstance(constraint, NonlinearConstraint)
+    assert (constraint.name, constraint.lower, constraint.upper) == ("stress", 1.0, 1000.0)
+    start = np.zeros(4)
+    value, gradient = constraint.fun(start)
+    task.problem.objective = STRESS
+    point = task.problem.evaluate(start)
+    assert value == pytest.approx(point.value, rel=1e-6)
+    np.testing.assert_allclose(gradient, point.gradient, rtol=1e-3, atol=1e-6 * np.abs(gradient).max())
+    assert task.restore
+
+
+def test_a_run_keeps_the_limit_of_an_objective() -> None:
+    start = float(constrained().shape_task().problem(np.zeros(4))[0])
+    push = {"kind": "movement", "body": "upper", "at": "z1", "direction": [0, 0, -1]}
+    free = constrained(max_iterations=5).shape_task()
+    moved = free.problem.function(PUSH)
+    limit = 0.5 * (moved(np.zeros(4))[0] + moved(free.minimize().x)[0])
+    limited = constrained({"kind": "objective", "objective": push, "at_most": limit}, max_iterations=20)
+    result = limited.shape_task().minimize()
+    assert result.value < start
+    (met,) = result.constraints
+    assert (met.name, met.active) == ("movement", True)
+    assert met.value == pytest.approx(limit, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("constraint", "said"),
+    [
+        ({"kind": "objective", "objective": "strain_energy"}, "a NonlinearConstraint needs a finite limit"),
+        (
+            {"kind": "objective", "objective": "strain_energy", "at_least": 2, "at_most": 1},
+            "a NonlinearConstraint must have lower <= upper, got 2.0 and 1.0",
+        ),
+        (
+            {"kind": "objective", "objective": {"kind": "largest_stress", "body": "uper"}, "at_most": 1},
+            "design.constraints.0.objective.body must be a body",
+        ),
+    ],
+)
+def test_a_mistake_in_a_limit_is_named(constraint: dict[str, Any], said: str) -> None:
+    with pytest.raises(SceneFileError, match=said):
+        constrained(constraint).shape_task()
+
+
+def test_python_in_a_limit_is_refused_where_it_may_not_run() -> None:
+    limited = {"kind": "objective", "objective": "own.py:J", "at_most": 1}
+    design = {"surfaces": SURFACES, "constraints": [limited]}
+    with pytest.raises(SceneFileError, match=r"design.constraints.0.objective must not be Python code"):
+        read_scene_file({**tomllib.loads(GOOD), "design": design}, MPI.COMM_SELF, python=False)
 
 
 def test_a_gradient_by_a_file_is_that_by_python() -> None:
