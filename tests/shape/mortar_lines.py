@@ -19,12 +19,14 @@ from fenics_contact.scene import (
     Scene,
     Tresca,
 )
-from fenics_contact.shape import TotalPotential
+from fenics_contact.shape import Objective, TotalPotential
 from tests.contact.gallery import crowned
+from tests.shape.aims import aims
 from tests.shape.blocks import PLASTIC, RUBBER, block_on_block, problem
 from tests.shape.chains import BOXES, SOLVER, chain, chain_designs
 from tests.shape.moved_blocks import DRAG
 from tests.shape.objectives import objectives
+from tests.shape.plane_blocks import line_of, on_block
 from tests.shape.quotients import Line, Remembering
 
 
@@ -53,10 +55,31 @@ BLOCKS: dict[str, Callable[[], Scene]] = {
     "facets": lambda: by_mortar(block_on_block(Coulomb(0.38), load=DRAG), geometry="faceted"),
     "Tresca": lambda: by_mortar(block_on_block(Tresca(0.8), load=DRAG)),
     "matching": lambda: by_mortar(matching(), geometry="faceted"),
+    "adjusted": lambda: by_mortar(block_on_block(Coulomb(0.38), load=DRAG), adjust=0.01),
     "given gap": lambda: by_mortar(block_on_block(Coulomb(0.38), load=DRAG), gap=bowl),
 }
-NAMES = (*BLOCKS, "chain")
-OBJECTIVES = {name: objectives("link1" if name == "chain" else "upper") for name in NAMES}
+PLANE: dict[str, Callable[[], Scene]] = {
+    "plane": lambda: by_mortar(on_block(Coulomb(0.38), "quadrilateral")),
+    "plane, Tresca": lambda: by_mortar(on_block(Tresca(0.8), "triangle")),
+    "plane, facets": lambda: by_mortar(on_block(Coulomb(0.38), "triangle"), geometry="faceted"),
+}
+NAMES = (*BLOCKS, *PLANE, "chain")
+#: The body that objectives are about, and its surface in contact.
+PLACE = {
+    **dict.fromkeys(BLOCKS, ("upper", "z0")), **dict.fromkeys(PLANE, ("block", "y0")),
+    "chain": ("link1", "contact"),
+}  # fmt: skip
+#: What depends on the areas of the nodes, too.
+PRESSURES = ("unevenness", "area")
+
+
+def judges(name: str) -> dict[str, Objective]:
+    """Functions of everything."""
+    more = aims(*PLACE[name], 2 if name in PLANE else 3)
+    return objectives(PLACE[name][0]) | {each: more[each] for each in PRESSURES}
+
+
+OBJECTIVES = {name: judges(name) for name in NAMES}
 
 
 def chain_problem_by_mortar(comm: MPI.Comm = MPI.COMM_SELF) -> Remembering:
@@ -76,6 +99,8 @@ def line(name: str) -> Line:
         return Line(
             links, 0.03 * rng(1).standard_normal(links.size), rng(5).standard_normal(links.size), 3e-4
         )
+    if name in PLANE:
+        return line_of(PLANE[name]())
     blocks = problem(BLOCKS[name]())
     alpha = 0.01 * rng(1).standard_normal(blocks.size)
     return Line(blocks, alpha, rng(6).standard_normal(blocks.size), 1e-5)
