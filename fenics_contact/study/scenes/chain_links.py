@@ -67,9 +67,7 @@ def build(parameters: Parameters, comm: MPI.Comm) -> Problem:
     links = graded_links((around, through, across), comm, parameters.cell)
     scene = chain(links)
     pairs = [replace(pair, discretisation=parameters.discretisation) for pair in scene.contacts]
-    # Shape derivatives support nodal contact only.
-    design = SurfaceDesign("link 1", links.first.crown) if parameters.discretisation == "node" else None
-    return Problem(replace(scene, contacts=pairs), design=design)
+    return Problem(replace(scene, contacts=pairs), design=SurfaceDesign("link 1", links.first.crown))
 
 
 def potential(outcome: Outcome) -> float:
