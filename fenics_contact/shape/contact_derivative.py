@@ -9,12 +9,12 @@ import numpy as np
 from fenics_contact.contact import State
 from fenics_contact.errors import together
 from fenics_contact.feti import TornSystem
-from fenics_contact.pairing import ContactPoints, CouplingDerivatives
-from fenics_contact.scene import ContactPair, RigidObstacle, Surface, master_share, surface_of
+from fenics_contact.pairing import ContactPoints
+from fenics_contact.scene import ContactPair, RigidObstacle, Surface, surface_of
 from fenics_contact.shape.adjoint import Adjoint
 from fenics_contact.shape.friction_derivative import bound_sensitivity, bounds_by_area, bounds_by_place
 from fenics_contact.shape.linearised_face import LinearisedFace
-from fenics_contact.shape.mortar_derivative import mortar_points_pulled_back
+from fenics_contact.shape.mortar_derivative import MortarDerivatives, mortar_by_shape
 from fenics_contact.shape.objective import Partials
 from fenics_contact.shape.point_motions import PointMotions, point_motions
 from fenics_contact.shape.projection_derivative import (
@@ -67,7 +67,7 @@ def contact_by_shape(
     for index, pair in enumerate(torn.scene.contacts):
         mine = np.flatnonzero(points.pair == index)
         if isinstance(pair.master, Surface) and pair.discretisation == "mortar":
-            _add_mortar(result, torn, pair, rows, mine, by_area[mine])
+            result += _by_mortar(torn, pair, rows, mine, by_area[mine])
             continue
         if by_area[mine].any():
             surface = surface_of(torn.scene, pair.slave, "faceted")
@@ -82,34 +82,15 @@ def contact_by_shape(
     return result
 
 
-def _add_mortar(
-    result: np.ndarray,
-    torn: TornSystem,
-    pair: ContactPair,
-    rows: RowFields,
-    mine: np.ndarray,
-    by_area: np.ndarray,
-) -> None:
-    """Add the derivative by slave and master nodes of points of mortar contact. Collective."""
-    points, scene, tearing = torn.points, torn.scene, torn.decomposition.tearing
-    assert isinstance(pair.master, Surface)
-    slave, master = (surface_of(scene, side, pair.geometry) for side in (pair.slave, pair.master))
-    nodes, opposite = (
-        tearing.global_nodes(side.body, surface.nodes)
-        for side, surface in ((pair.slave, slave), (pair.master, master))
-    )
-    by = _by_point(points, rows, mine)
-    pulled = _pulled_master(points, rows, mine)
-    by_coupling = CouplingDerivatives(
-        by_area, np.hstack(list(pulled)), np.hstack(list(rows.at(opposite))),
-        by.normal + frames_pulled_back(points.normal[mine], by.tangents, by.axes), by.gap,
-    )  # fmt: skip
-    by_slave, by_master = mortar_points_pulled_back(
-        slave, master, np.searchsorted(nodes, points.slave[mine]), master_share(scene, pair),
-        by_coupling, torn.decomposition.comm,
-    )  # fmt: skip
-    result[nodes] += by_slave
-    result[opposite] += by_master
+def _by_mortar(
+    torn: TornSystem, pair: ContactPair, rows: RowFields, mine: np.ndarray, by_area: np.ndarray
+) -> np.ndarray:
+    """Return the derivative by all nodes through points of mortar contact, (n_nodes, dim). Collective."""
+    by = _by_point(torn.points, rows, mine)
+    turned = frames_pulled_back(torn.points.normal[mine], by.tangents, by.axes)
+    pulled = _pulled_master(torn.points, rows, mine)
+    given = MortarDerivatives(pulled, by.normal + turned, by.gap, by_area)
+    return mortar_by_shape(torn, pair, torn.points.slave[mine], rows, given)
 
 
 def _by_obstacle(torn: TornSystem, obstacle: RigidObstacle, rows: RowFields, mine: np.ndarray) -> np.ndarray:

@@ -2,15 +2,72 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fenics_contact._libraries import MPI
+from fenics_contact.feti import TornSystem
 from fenics_contact.pairing import CouplingDerivatives, closable_gaps, mortar_coupling, mortar_pulled_back
+from fenics_contact.scene import ContactPair, Surface, Tie, master_share, surface_of
+from fenics_contact.shape.point_motions import PointMotions
 from fenics_contact.shape.projection_derivative import PointDerivatives, projection_pulled_back
 from fenics_contact.shape.surface_derivative import normals_pulled_back, slopes_pulled_back
 from fenics_contact.surfaces import FacetedSurface, Projection
+
+
+@dataclass(frozen=True)
+class MortarDerivatives:
+    """Derivatives of a scalar by mortar points.
+
+    Attributes:
+        pulled: Forces p on the master, in the equations of adjoint and state: that by the weight of node j is
+            the sum over both of p · v_j, shape (2, n, dim).
+        normal: By the normals, shape (n, dim).
+        gap: By the gaps, shape (n,).
+        area: By the areas, shape (n,).
+    """
+
+    pulled: np.ndarray
+    normal: np.ndarray
+    gap: np.ndarray
+    area: np.ndarray
+
+
+def mortar_by_shape(
+    torn: TornSystem,
+    pair: ContactPair | Tie,
+    points: np.ndarray,
+    motions: PointMotions,
+    by: MortarDerivatives,
+) -> np.ndarray:
+    """Return the derivative by the nodes of all bodies, replicated, shape (n_nodes, dim). Collective.
+
+    Args:
+        torn: The torn system.
+        pair: The pair, of contact or tied.
+        points: Slave nodes among those of all bodies, ascending, shape (n,).
+        motions: Displacements of state and adjoint at the nodes of the master.
+        by: Derivatives by the points.
+    """
+    tearing, scene = torn.decomposition.tearing, torn.scene
+    assert isinstance(pair.master, Surface)
+    geometry = pair.geometry if isinstance(pair, ContactPair) else "faceted"
+    slave, master = (surface_of(scene, side, geometry) for side in (pair.slave, pair.master))
+    nodes, opposite = (
+        tearing.global_nodes(side.body, surface.nodes)
+        for side, surface in ((pair.slave, slave), (pair.master, master))
+    )
+    left, right = (np.hstack(list(each)) for each in (by.pulled, motions.at(opposite)))
+    coupled = CouplingDerivatives(by.area, left, right, by.normal, by.gap)
+    by_slave, by_master = mortar_points_pulled_back(
+        slave, master, np.searchsorted(nodes, points), master_share(scene, pair),
+        coupled, torn.decomposition.comm,
+    )  # fmt: skip
+    result = np.zeros((tearing.n_nodes, torn.dim))
+    result[nodes] += by_slave
+    result[opposite] += by_master
+    return result
 
 
 def mortar_points_pulled_back(

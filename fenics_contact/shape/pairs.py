@@ -25,31 +25,13 @@ def checked_contact(contact: ContactProblem) -> ContactProblem:
     return contact
 
 
-def check_pairs(scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
-    """Reject designs that move surfaces without derivatives.
-
-    Mortar ties have none.
-
-    Args:
-        scene: The scene.
-        moving: Body name -> whether a design moves each node, shape (n_nodes,).
-
-    Raises:
-        InvalidInputError: Names the pair and the surface.
-    """
-    for number, tie in enumerate(scene.ties):
-        if tie.discretisation == "mortar":
-            remedy = "use discretisation='node' for it"
-            _check(scene, moving, (tie.slave, tie.master), f"mortar tie {number}", remedy)
-
-
 def check_case(first: Scene, scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
     """Check that a scene is a load case of the same designs.
 
     Args:
         first: The scene of which designs move the bodies.
         scene: The load case.
-        moving: As of `check_pairs`.
+        moving: Body name -> whether a design moves each node, shape (n_nodes,).
 
     Raises:
         InvalidInputError: Says what differs, or what has no derivative.
@@ -75,7 +57,6 @@ def check_case(first: Scene, scene: Scene, moving: Mapping[str, np.ndarray]) -> 
         if isinstance(load, SurfaceLoad):
             surface = Surface(load.body, load.surface)
             _check(scene, moving, (surface,), f"a {type(load).__name__}", "load another surface")
-    check_pairs(scene, moving)
 
 
 def _check(

@@ -31,7 +31,7 @@ from fenics_contact.shape.geometry import DesignGeometry
 from fenics_contact.shape.linearised_face import LinearisedFace, WeakChoice, linearise_face
 from fenics_contact.shape.memory import DesignMemory, DesignPoint, Stored
 from fenics_contact.shape.objective import Objective, Partials, asking, finite, finite_partials, finite_value
-from fenics_contact.shape.pairs import check_case, check_pairs, checked_contact
+from fenics_contact.shape.pairs import check_case, checked_contact
 from fenics_contact.shape.state_error import state_error
 from fenics_contact.shape.tied_derivative import ties_by_shape
 from fenics_contact.shape.tolerance import AdaptiveTolerance, tightest_of
@@ -100,7 +100,6 @@ class ShapeProblem:
         with self._timer.phase("mesh motion"):
             given = (designs,) if isinstance(designs, SurfaceDesign) else designs
             self.geometry = DesignGeometry(self.scene, contact.decomposition, given)
-        check_pairs(self.scene, self.geometry.moving)
 
     def _facts(self) -> dict[str, Any]:
         work = f"{self.evaluations} designs, {self.products} products with F"

@@ -8,6 +8,7 @@ from fenics_contact.contact import State
 from fenics_contact.feti import TornSystem
 from fenics_contact.scene import Tie, surface_of
 from fenics_contact.shape.adjoint import Adjoint
+from fenics_contact.shape.mortar_derivative import MortarDerivatives, mortar_by_shape
 from fenics_contact.shape.objective import Partials
 from fenics_contact.shape.point_motions import PointMotions, point_motions
 from fenics_contact.shape.projection_derivative import PointDerivatives, carriers, projection_pulled_back
@@ -18,7 +19,7 @@ def ties_by_shape(state: State, adjoint: Adjoint, partials: Partials) -> np.ndar
 
     It is ∂/∂X of −λᵀ B w − (ζ − j)ᵀ B u over the rows of ties, with the objective's derivative j by B u − c.
     Rows of bonded surfaces lie along the axes and change by the weights of the master alone, those of sliding
-    ones by its normals, too. Mortar ties must lie where no node moves.
+    ones by its normals, too.
 
     Args:
         state: The state.
@@ -34,8 +35,8 @@ def ties_by_shape(state: State, adjoint: Adjoint, partials: Partials) -> np.ndar
     forces = _forces(torn, (state.solution.multiplier, adjoint.multiplier - partials.by_jump))
     for index, tie in enumerate(torn.scene.ties):
         mine = np.flatnonzero(torn.ties.pair == index)
-        if tie.discretisation == "node":
-            _add_tie(result, torn, tie, motions, forces[:, mine], mine)
+        add = _add_tie if tie.discretisation == "node" else _add_mortar_tie
+        add(result, torn, tie, motions, forces[:, mine], mine)
     return result
 
 
@@ -57,10 +58,7 @@ def _add_tie(
     nodes = torn.decomposition.tearing.global_nodes(tie.master.body, surface.nodes)
     carrying, gradients = carriers(surface, points.facet[mine], points.local[mine])
     weight = np.einsum("knd,knjd->nj", force, motions.at(nodes[carrying]))
-    by_normal = np.zeros((len(mine), torn.dim))
-    if tie.sliding:  # d = −n, so that the multiplier is −force·n
-        along = -np.einsum("knd,nd->kn", force, points.normal[mine])
-        by_normal = np.einsum("kn,knd->nd", along, motions.relative[:, mine])
+    by_normal = _by_normal(torn, tie, motions, force, mine)
     tangents = np.zeros_like(points.tangents[mine])
     by = PointDerivatives(np.zeros(len(mine)), by_normal, tangents, weight, points.axes[mine], gradients)
     by_slave, by_master = projection_pulled_back(
@@ -68,3 +66,22 @@ def _add_tie(
     )
     result[points.slave[mine]] += by_slave
     result[nodes] += by_master
+
+
+def _add_mortar_tie(
+    result: np.ndarray, torn: TornSystem, tie: Tie, motions: PointMotions, force: np.ndarray, mine: np.ndarray
+) -> None:
+    """Add the derivative by slave and master nodes of one tie of weighted means. Collective."""
+    none = np.zeros(len(mine))
+    by = MortarDerivatives(force, _by_normal(torn, tie, motions, force, mine), none, none)
+    result += mortar_by_shape(torn, tie, torn.ties.slave[mine], motions, by)
+
+
+def _by_normal(
+    torn: TornSystem, tie: Tie, motions: PointMotions, force: np.ndarray, mine: np.ndarray
+) -> np.ndarray:
+    """Return the derivative by the normals, shape (n, dim): rows of sliding ties lie along −n."""
+    if not tie.sliding:
+        return np.zeros((len(mine), torn.dim))
+    along = -np.einsum("knd,nd->kn", force, torn.ties.normal[mine])
+    return np.einsum("kn,knd->nd", along, motions.relative[:, mine])

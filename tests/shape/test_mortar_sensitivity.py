@@ -11,7 +11,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, Status
-from fenics_contact.shape import ShapeProblem, TotalPotential, contact_derivative, mortar_derivative
+from fenics_contact.shape import ShapeProblem, TotalPotential, mortar_derivative
 from tests.shape.blocks import designs_of
 from tests.shape.mortar_lines import BLOCKS, NAMES, OBJECTIVES, line
 from tests.shape.quotients import Patch, miss_without
@@ -44,20 +44,20 @@ def without_mortar(patch: Patch) -> None:
     def none(slave: Any, master: Any, *rest: Any) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros_like(slave.points), np.zeros_like(master.points)
 
-    patch.setattr(contact_derivative, "mortar_points_pulled_back", none)
+    patch.setattr(mortar_derivative, "mortar_points_pulled_back", none)
 
 
 def without(term: str) -> Callable[[Patch], None]:
     """Leave out a derivative by the results of the coupling."""
 
     def drop(patch: Patch) -> None:
-        whole = contact_derivative.mortar_points_pulled_back  # type: ignore[attr-defined]
+        whole = mortar_derivative.mortar_points_pulled_back
 
         def part(slave: Any, master: Any, chosen: Any, share: float, by: Any, comm: Any) -> Any:
             none = replace(by, **{term: np.zeros_like(getattr(by, term))})
             return whole(slave, master, chosen, share, none, comm)
 
-        patch.setattr(contact_derivative, "mortar_points_pulled_back", part)
+        patch.setattr(mortar_derivative, "mortar_points_pulled_back", part)
 
     return drop
 

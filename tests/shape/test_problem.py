@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, ContactResult, State
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
-from fenics_contact.scene import Coulomb, Scene, Surface, Tie
+from fenics_contact.scene import Coulomb, Scene
 from fenics_contact.shape import (
     ContactForces,
     Partials,
@@ -177,19 +177,6 @@ def test_evaluations_and_products_are_counted_and_the_best_design_is_kept() -> N
     assert {"decompose", "mesh motion", "solve", "adjoint", "gradient"} <= set(blocks.seconds)
 
 
-def test_a_surface_of_a_mortar_tie_may_not_move() -> None:
-    tied = replace(scene(), contacts=[], ties=[Tie(Surface("upper", "z0"), Surface("lower", "z1"))])
-    with pytest.raises(
-        InvalidInputError, match=r"mortar tie 0 lies on 'z0' of body 'upper', of which \d+ nodes move: use d"
-    ):
-        ShapeProblem(
-            ContactProblem(tied, MPI.COMM_SELF, partitions=partitions(scene())),
-            designs_of(scene()),
-            TotalPotential(),
-        )
-
-
-@pytest.mark.parametrize("given", ["scene", None])
 def test_what_is_no_contact_problem_is_refused(given: object) -> None:
     what = scene() if given == "scene" else given
     message = (

@@ -17,16 +17,20 @@ from tests.shape.tied_blocks import OBJECTIVES, SCENES, line
 
 
 def without(term: str) -> Callable[[Patch], None]:
-    """Drop a derivative of the tied points' geometry."""
+    """Drop a derivative of the tied points' geometry: by the weights of the master, or by normals."""
 
     def drop(patch: Patch) -> None:
-        whole: Any = tied_derivative.projection_pulled_back  # type: ignore[attr-defined]
+        for name, weight in (("projection_pulled_back", "weight"), ("mortar_by_shape", "pulled")):
+            patch.setattr(tied_derivative, name, part_of(name, weight if term == "weight" else term))
+
+    def part_of(name: str, field: str) -> Any:
+        whole: Any = getattr(tied_derivative, name)
 
         def pulled_back(*given: Any) -> Any:
             *before, by = given
-            return whole(*before, replace(by, **{term: np.zeros_like(getattr(by, term))}))
+            return whole(*before, replace(by, **{field: np.zeros_like(getattr(by, field))}))
 
-        patch.setattr(tied_derivative, "projection_pulled_back", pulled_back)
+        return pulled_back
 
     return drop
 

@@ -14,6 +14,7 @@ from fenics_contact.scene import (
     BodyForce,
     ContactPair,
     Coulomb,
+    Discretisation,
     IsotropicElasticity,
     PlaneStrain,
     Scene,
@@ -38,7 +39,9 @@ def _boxes(cell: str) -> tuple[BodyMesh, BodyMesh]:
     return lower_block, block((0.12, 0.08, 1.0), (1.85, 0.91, 1.6), (4, 3, 1), cell)
 
 
-def capped(cell: str, *, sliding: bool = False, order: int = 1) -> Scene:
+def capped(
+    cell: str, *, sliding: bool = False, order: int = 1, discretisation: Discretisation = "node"
+) -> Scene:
     """A crowned block that a floor holds, and a cap on its rounded top that is pressed."""
     below, above = (quadratic(mesh) if order == 2 else mesh for mesh in _boxes(cell))
     below, dim = crowned(below, 0.02), below.dim
@@ -63,7 +66,7 @@ def capped(cell: str, *, sliding: bool = False, order: int = 1) -> Scene:
             BodyForce("block", (0.05, *(0.0,) * (dim - 1))),
         ],
         [ContactPair(Surface("block", bottom), floor, Coulomb(0.3))],
-        [Tie(Surface("cap", bottom), Surface("block", top), sliding, "node")],
+        [Tie(Surface("cap", bottom), Surface("block", top), sliding, discretisation)],
     )
 
 
@@ -73,6 +76,9 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "plane, quadratic": lambda: capped("triangle", order=2),
     "bonded": lambda: capped("hexahedron"),
     "sliding": lambda: capped("tetrahedron", sliding=True),
+    "bonded by mortar": lambda: capped("hexahedron", discretisation="mortar"),
+    "sliding by mortar": lambda: capped("hexahedron", sliding=True, discretisation="mortar"),
+    "plane, sliding by mortar": lambda: capped("triangle", sliding=True, discretisation="mortar"),
     "sliding, quadratic": lambda: capped("tetrahedron", sliding=True, order=2),
 }
 OBJECTIVES = objectives("cap")
@@ -82,5 +88,6 @@ OBJECTIVES = objectives("cap")
 def line(name: str) -> Line:
     scene = SCENES[name]()
     (tie,) = scene.ties
-    also = [tie.master] if "sliding" in name else [tie.slave, tie.master]
+    # Normals of sliding ties are the master's, by mortar the slave's.
+    also = [tie.master] if "sliding" in name and "mortar" not in name else [tie.slave, tie.master]
     return line_of(scene, 7, also)
