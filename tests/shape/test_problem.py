@@ -177,6 +177,7 @@ def test_evaluations_and_products_are_counted_and_the_best_design_is_kept() -> N
     assert {"decompose", "mesh motion", "solve", "adjoint", "gradient"} <= set(blocks.seconds)
 
 
+@pytest.mark.parametrize("given", ["scene", None])
 def test_what_is_no_contact_problem_is_refused(given: object) -> None:
     what = scene() if given == "scene" else given
     message = (
