@@ -7,6 +7,14 @@ from fenics_contact.errors import InvalidDesignError
 from fenics_contact.optimize.bundle_trust import BundleTrust
 from fenics_contact.optimize.constraints import Bounds, LinearConstraints, nearest_feasible
 from fenics_contact.optimize.for_scipy import ForScipy, Visit
+from fenics_contact.optimize.manufacture import (
+    convex,
+    fixed_rim,
+    joined,
+    monotone,
+    smallest_radius,
+    symmetric,
+)
 from fenics_contact.optimize.minimization import minimize
 from fenics_contact.optimize.nonlinear import ConstraintValue, NonlinearConstraint
 from fenics_contact.optimize.objective import Inexact, Kinked
@@ -37,7 +45,13 @@ __all__ = [
     "StepKind",
     "SubproblemError",
     "Visit",
+    "convex",
+    "fixed_rim",
+    "joined",
     "minimize",
+    "monotone",
     "nearest_feasible",
     "pose",
+    "smallest_radius",
+    "symmetric",
 ]

@@ -216,7 +216,9 @@ def _unit_rows(rows: Array, distance: Array) -> tuple[Array, Array]:
 
 def _residual(matrix: Array, limit: Array, x: Array) -> tuple[Array, Array]:
     size = np.abs(matrix) @ np.abs(x) + np.abs(limit)
-    return matrix @ x - limit, _FEASIBILITY * np.where(size > 0.0, size, 1.0)
+    # A variable that is to be 0 is met to the rounding of the others.
+    rounding = np.finfo(float).eps * np.abs(matrix).sum(axis=1) * np.abs(x).max(initial=0.0)
+    return matrix @ x - limit, _FEASIBILITY * np.where(size > 0.0, size, 1.0) + 10.0 * rounding
 
 
 def ranges(allowed: FeasibleSet) -> list[tuple[Array, Array, Array]]:

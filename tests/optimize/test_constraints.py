@@ -80,3 +80,12 @@ def test_variable_with_equal_bounds_is_an_equality() -> None:
 def test_nothing_asked_is_nothing_in_the_way() -> None:
     near = feasible_set(3).around(np.zeros(3), np.ones(3))
     assert near.rows.shape == near.equality_rows.shape == (0, 3)
+
+
+def test_a_projected_point_is_feasible_where_a_variable_must_vanish() -> None:
+    held = LinearConstraints(np.zeros((0, 3)), np.zeros(0), [[1.0, 0.0, 0.0], [0.0, 1.0, -1.0]], [0.0, 0.0])
+    for seed in range(20):
+        x = nearest_feasible(np.random.default_rng(seed).standard_normal(3), None, held)
+        assert feasible_set(3, None, held).violations(x) == []
+        assert abs(x[0]) < 1e-14
+    assert feasible_set(3, None, held).violations(np.array([1e-6, 1.0, 1.0]))
