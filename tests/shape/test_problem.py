@@ -200,7 +200,7 @@ class Broken:
         partials = TotalPotential().partials(state, forms)
         if self.place == "value":
             return replace(partials, value=self.number)
-        broken = np.array(getattr(partials, self.place))
+        broken = np.atleast_1d(np.array(getattr(partials, self.place)))
         broken[0] = self.number
         return replace(partials, **{self.place: broken})
 
@@ -212,6 +212,8 @@ class Broken:
         ("value", "value"),
         ("by_displacement", "derivative by displacements"),
         ("by_multiplier", "derivative by contact forces"),
+        ("by_area", "derivative by areas"),
+        ("by_jump", "derivative by slips and gaps"),
     ],
 )
 def test_an_objective_that_is_no_number_is_refused(place: str, told: str, number: float) -> None:
