@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.optimize.contradiction import contradicting
 from fenics_contact.optimize.from_scipy import rows_of
 from fenics_contact.optimize.nonlinear import NonlinearConstraint
 from fenics_contact.optimize.quadratic_program import QuadraticProgram, solve
@@ -180,8 +181,29 @@ class FeasibleSet:
             program = QuadraticProgram(
                 ones, 0.0 * ones, near.equality_rows, near.miss / reach, near.rows, near.room / reach
             )
-            x = x + reach * solve(program).point
+            try:
+                x = x + reach * solve(program).point
+            except InvalidInputError as error:
+                raise InvalidInputError(f"{error}{self._contradiction()}") from error
         return self.clip(x)
+
+    def _contradiction(self) -> str:
+        """Name rows and bounds that cannot be met together, if they are found."""
+        n = self.lower.size
+        sides = [
+            (self.matrix, self.limit, [f"row {k} of A x ≤ b" for k in range(len(self.limit))]),
+            (self.equality_matrix, self.equality_value,
+             [f"row {k} of E x = e" for k in range(len(self.equality_value))]),
+            (-np.eye(n), -self.lower, [f"the lower bound of x[{k}]" for k in range(n)]),
+            (np.eye(n), self.upper, [f"the upper bound of x[{k}]" for k in range(n)]),
+        ]  # fmt: skip
+        rows, limits = np.vstack([side[0] for side in sides]), np.concatenate([side[1] for side in sides])
+        names = [name for side in sides for name in side[2]]
+        given = np.flatnonzero(np.isfinite(limits))
+        start, count = len(self.limit), len(self.equality_value)
+        equal = (given >= start) & (given < start + count)
+        found = [names[given[k]] for k in contradicting(rows[given], limits[given], equal)]
+        return f": {', '.join(found)}" if found else ""
 
     def around(self, x: Array, scale: Array) -> Surroundings:
         """Return the constraints on a step y from x in scaled variables.

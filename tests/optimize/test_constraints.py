@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,6 +12,7 @@ from hypothesis import strategies as st
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.optimize import Bounds, LinearConstraints, nearest_feasible
 from fenics_contact.optimize.constraints import feasible_set
+from fenics_contact.optimize.contradiction import contradicting
 
 BOX = Bounds([-1.0, 0.0, -np.inf], [1.0, np.inf, 2.0])
 ROWS = LinearConstraints([[1.0, 1.0, 1.0], [2.0, -1.0, 0.0]], [1.0, 1.5], [[0.0, 1.0, -1.0]], [0.25])
@@ -41,6 +44,32 @@ def test_feasible_point_is_its_own_projection() -> None:
 def test_contradicting_constraints_have_no_nearest_point() -> None:
     with pytest.raises(InvalidInputError, match="must leave at least one point"):
         nearest_feasible([0.0], (0.0, 1.0), LinearConstraints([[1.0]], [-1.0]))
+
+
+def test_the_fewest_constraints_that_contradict_each_other_are_named() -> None:
+    rows = LinearConstraints(
+        [[1.0, 0.0, 2.0], [-1.0, -1.0, 0.0], [0.0, 1.0, 1.0]], [50.0, -3.0, 40.0], [[0.0, 0.0, 1.0]], [0.5]
+    )
+    message = "contradict each other: row 1 of A x ≤ b, the upper bound of x[0], the upper bound of x[1]"
+    with pytest.raises(InvalidInputError, match=f"{re.escape(message)}$"):
+        nearest_feasible(np.zeros(3), (-9.0, 1.0), rows)
+    both = [
+        LinearConstraints([[1.0, 1.0]], [0.0]),
+        LinearConstraints([[0.0, 9.0]], [1.0], [[3.0, 3.0]], [6.0]),
+    ]
+    with pytest.raises(InvalidInputError, match=r"each other: row 0 of A x ≤ b, row 0 of E x = e$"):
+        nearest_feasible(np.zeros(2), None, both)
+
+
+def test_of_three_that_contradict_each_other_none_can_be_left_out() -> None:
+    angles = 2 * np.pi * np.arange(3) / 3
+    rows = np.column_stack([np.cos(angles), np.sin(angles)])
+    extra = np.vstack([rows, [[1.0, 0.2], [0.3, -1.0]]])
+    limits, equal = np.array([-1.0, -1.0, -1.0, 5.0, 5.0]), np.zeros(5, dtype=bool)
+    assert contradicting(extra, limits, equal) == [0, 1, 2]
+    for k in range(3):
+        kept = np.delete(np.arange(5), k)
+        assert contradicting(extra[kept], limits[kept], equal[kept]) == []
 
 
 def test_violations_are_named_with_their_amount() -> None:
@@ -88,4 +117,5 @@ def test_a_projected_point_is_feasible_where_a_variable_must_vanish() -> None:
         x = nearest_feasible(np.random.default_rng(seed).standard_normal(3), None, held)
         assert feasible_set(3, None, held).violations(x) == []
         assert abs(x[0]) < 1e-14
+    assert feasible_set(3, None, held).violations(np.array([1e-17, 1.0, 1.0])) == []
     assert feasible_set(3, None, held).violations(np.array([1e-6, 1.0, 1.0]))
