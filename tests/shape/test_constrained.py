@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, ContactResult
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.optimize import BundleTrust, Checkpoint, NonlinearConstraint, Result, minimize
-from fenics_contact.qp import FaceNewton
-from fenics_contact.scene import Coulomb
+from fenics_contact.optimize import Checkpoint, NonlinearConstraint, Result, minimize
 from fenics_contact.shape import (
     AdaptiveTolerance,
     ContactForces,
@@ -22,43 +18,8 @@ from fenics_contact.shape import (
     ShapeProblem,
     TotalPotential,
 )
-from tests.contact.gallery import partitions
-from tests.shape.blocks import block_on_floor, designs_of
+from tests.shape.constrained_blocks import BOUND, FORCE, largest_force, minimised, posed
 from tests.shape.objectives import normal_forces
-
-BOUND = 0.02
-#: Largest normal force of a node relative to that of the reference shape, at most.
-FORCE = 0.9
-
-
-def largest_force(contact: ContactResult) -> tuple[float, np.ndarray, np.ndarray]:
-    """The largest normal force of a node."""
-    k = int(np.argmax(contact.normal_force))
-    by_normal = np.eye(len(contact.normal_force))[k]
-    return float(contact.normal_force[k]), by_normal, np.zeros((len(by_normal), 2))
-
-
-def posed(tolerance: AdaptiveTolerance | None = None) -> ShapeProblem:
-    scene = block_on_floor(Coulomb(0.3), load=(0.35, 0.1, -2.0))
-    contact = ContactProblem(
-        scene, MPI.COMM_SELF, partitions=partitions(scene), solver=FaceNewton(tolerance=1e-9)
-    )
-    return ShapeProblem(contact, designs_of(scene), TotalPotential(), tolerance=tolerance)
-
-
-def minimised(problem: ShapeProblem, share: float = FORCE, **more: Any) -> tuple[DesignFunction, Result]:
-    """Minimise the energy; the volume is kept and the largest force limited below that of the start."""
-    start = np.zeros(problem.size)
-    volume = problem.volume(start)[0]
-    force = problem.function(ContactForces(largest_force), "largest force")
-    limit = share * force(start)[0]
-    method = BundleTrust(**{"max_evaluations": 60, **more.pop("method", {})})
-    constraints = [
-        NonlinearConstraint(problem.volume, volume, volume, "volume"),
-        NonlinearConstraint(force, limit, name="force"),
-    ]
-    box = (np.full(problem.size, -BOUND), np.full(problem.size, BOUND))
-    return force, minimize(problem, start, method, bounds=box, constraints=constraints, restore=True, **more)
 
 
 @cache
@@ -141,6 +102,16 @@ def test_states_as_accurate_as_needed_lead_to_the_same_design() -> None:
     assert result.value == pytest.approx(exact.value, rel=3e-4)
     assert result.violation <= 1e-5
     assert {record.error > 0.0 for record in result.history} == {True}
+
+
+def test_two_and_four_ranks_take_the_same_steps(mpirun: Callable[..., str]) -> None:
+    script = Path(__file__).with_name("constrained_blocks.py")
+    _, _, whole = solved()
+    for ranks in (2, 4):
+        alike, evaluations, value, *x = (float(word) for word in mpirun(script, ranks).split())
+        assert (alike, evaluations) == (1, whole.evaluations)
+        assert value == pytest.approx(whole.value, rel=1e-7)
+        assert x == pytest.approx(whole.x.tolist(), abs=1e-6)
 
 
 def test_a_run_in_pieces_ends_at_the_same_design(tmp_path: Path) -> None:
