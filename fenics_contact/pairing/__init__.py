@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from fenics_contact.pairing.closable_gaps import closable_gaps
 from fenics_contact.pairing.contact_points import HELD, ContactPoints, join_points, movable, reference_axes
 from fenics_contact.pairing.contact_search import find_contact_points, find_tied_points
+from fenics_contact.pairing.coupling_derivatives import CouplingDerivatives
 from fenics_contact.pairing.friction import friction_data
-from fenics_contact.pairing.mortar import CouplingDerivatives, mortar_coupling, mortar_pulled_back
+from fenics_contact.pairing.mortar_points import MortarPoints
 from fenics_contact.pairing.node_numbers import NodeNumbers
 
 __all__ = [
     "HELD",
     "ContactPoints",
     "CouplingDerivatives",
+    "MortarPoints",
     "NodeNumbers",
-    "closable_gaps",
     "find_contact_points",
     "find_tied_points",
     "friction_data",
     "join_points",
-    "mortar_coupling",
-    "mortar_pulled_back",
     "movable",
     "reference_axes",
 ]

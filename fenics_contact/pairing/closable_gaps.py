@@ -9,13 +9,16 @@ that are partly beside the other surface keep that mean.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.pairing.mortar import MortarCoupling
 from fenics_contact.pairing.shared_projection import shared_projection
 from fenics_contact.surfaces import FacetedSurface, Projection
+
+if TYPE_CHECKING:
+    from fenics_contact.pairing.mortar import MortarCoupling
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ from fenics_contact._libraries import MPI
 from fenics_contact.errors import InvalidInputError, tell, together
 from fenics_contact.fingerprint import described, require_alike
 from fenics_contact.mesh import computed_rounding, coordinate_rounding
-from fenics_contact.pairing.closable_gaps import closable_gaps
 from fenics_contact.pairing.contact_points import (
     ContactPoints,
     in_free_frames,
@@ -22,7 +21,7 @@ from fenics_contact.pairing.contact_points import (
     tangent_frames,
 )
 from fenics_contact.pairing.given_gaps import with_given_gaps
-from fenics_contact.pairing.mortar import mortar_coupling
+from fenics_contact.pairing.mortar_points import MortarPoints
 from fenics_contact.pairing.node_numbers import NodeNumbers
 from fenics_contact.pairing.shared_projection import shared_projection
 from fenics_contact.pairing.surface_doubts import warn_of_surface
@@ -217,15 +216,11 @@ def _by_mortar(
         comm: Communicator of the ranks that share the work.
         share: The master's share of the motion that closes the gap.
     """
-    whole = mortar_coupling(slave.surface, master.surface, comm)
-    coupling = whole.part(np.flatnonzero(movable[whole.node]))
-    count = len(master.nodes)
+    met = MortarPoints.of(slave.surface, master.surface, movable, share, comm)
+    coupling, count = met.coupling, len(master.nodes)
     spread = sp.csr_matrix((np.ones(count), (np.arange(count), master.nodes)), shape=(count, master.n_nodes))
-    gap = coupling.gap
-    if slave.surface.relief is not None or master.surface.relief is not None:
-        gap = closable_gaps(slave.surface, master.surface, coupling, share, comm).value
     weight = (coupling.weight @ spread).tocsr()
-    points = _points(slave, coupling.node, coupling.normal, gap, weight)
+    points = _points(slave, coupling.node, coupling.normal, met.gap, weight)
     return replace(points, area=coupling.area)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from fenics_contact._libraries import MPI
 from fenics_contact.feti import TornSystem
-from fenics_contact.pairing import CouplingDerivatives, closable_gaps, mortar_coupling, mortar_pulled_back
+from fenics_contact.pairing import CouplingDerivatives, MortarPoints
 from fenics_contact.scene import ContactPair, Surface, Tie, master_share, surface_of
 from fenics_contact.shape.point_motions import PointMotions
 from fenics_contact.shape.projection_derivative import PointDerivatives, projection_pulled_back
@@ -58,12 +58,11 @@ def mortar_by_shape(
         tearing.global_nodes(side.body, surface.nodes)
         for side, surface in ((pair.slave, slave), (pair.master, master))
     )
+    bearing, comm = np.isin(nodes, points), torn.decomposition.comm
+    met = MortarPoints.of(slave, master, bearing, master_share(scene, pair), comm)
     left, right = (np.hstack(list(each)) for each in (by.pulled, motions.at(opposite)))
     coupled = CouplingDerivatives(by.area, left, right, by.normal, by.gap)
-    by_slave, by_master = mortar_points_pulled_back(
-        slave, master, np.searchsorted(nodes, points), master_share(scene, pair),
-        coupled, torn.decomposition.comm,
-    )  # fmt: skip
+    by_slave, by_master = mortar_points_pulled_back(met, coupled, comm)
     result = np.zeros((tearing.n_nodes, torn.dim))
     result[nodes] += by_slave
     result[opposite] += by_master
@@ -71,31 +70,21 @@ def mortar_by_shape(
 
 
 def mortar_points_pulled_back(
-    slave: FacetedSurface,
-    master: FacetedSurface,
-    chosen: np.ndarray,
-    share: float,
-    by: CouplingDerivatives,
-    comm: MPI.Comm,
+    points: MortarPoints, by: CouplingDerivatives, comm: MPI.Comm
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives by the nodes of both surfaces, shape (n_nodes, dim) each. Collective.
+    """Return the derivatives by the nodes of slave and master, shape (n_nodes, dim) each. Collective.
 
     Gaps between true surfaces are those that linear displacements can close: combinations of gaps at the
     nodes of both, each of which is a projection.
 
     Args:
-        slave: The slave surface.
-        master: The master surface.
-        chosen: Positions of the contact points in ``slave.nodes``, ascending, shape (n,).
-        share: The master's share of the motion that closes the gap.
+        points: The contact points.
         by: Derivatives by the results of their coupling.
         comm: Communicator of the ranks that share the work, all with the same arguments.
     """
-    whole = mortar_coupling(slave, master, comm)
-    coupling = whole.part(np.searchsorted(whole.node, chosen))
+    slave, master, coupling, gaps = points.slave, points.master, points.coupling, points.closable
     by_slave, by_master = np.zeros_like(slave.points), np.zeros_like(master.points)
-    if slave.relief is not None or master.relief is not None:
-        gaps = closable_gaps(slave, master, coupling, share, comm)
+    if gaps is not None:
         across = gaps.share * by.gap
         by_own = np.where(gaps.kept, 0.0, by.gap) - across
         here, there = gaps.here, gaps.there
@@ -111,7 +100,7 @@ def mortar_points_pulled_back(
             left=np.column_stack([by.left, across]),
             right=np.column_stack([by.right, gaps.opposite]),
         )
-    parts = mortar_pulled_back(slave, master, coupling, by, comm)
+    parts = points.pulled_back(by, comm)
     for surface, part, result in zip((slave, master), parts, (by_slave, by_master), strict=True):
         every = np.arange(len(surface.facets))
         by_points, by_normals, by_averaged = slopes_pulled_back(surface, every, part.slopes)

@@ -8,7 +8,8 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.pairing.mortar import CouplingDerivatives, mortar_coupling, mortar_pulled_back
+from fenics_contact.pairing import CouplingDerivatives
+from fenics_contact.pairing.mortar import mortar_coupling, mortar_pulled_back
 from fenics_contact.surfaces.facets import FacetedSurface, faceted_surface
 from tests.pairing.mortar_surfaces import plate
 

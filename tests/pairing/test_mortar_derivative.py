@@ -9,8 +9,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from fenics_contact.pairing import CouplingDerivatives
 from fenics_contact.pairing.mortar import (
-    CouplingDerivatives,
     MortarCoupling,
     coupling_derivative,
     mortar_coupling,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.pairing import CouplingDerivatives, closable_gaps, mortar_coupling
+from fenics_contact.pairing import CouplingDerivatives, MortarPoints
 from fenics_contact.shape.mortar_derivative import mortar_points_pulled_back
 from fenics_contact.surfaces import FacetedSurface
 from fenics_contact.surfaces.facets import faceted_surface
@@ -38,6 +38,10 @@ def moved(surface: FacetedSurface, by: np.ndarray) -> FacetedSurface:
     return replace(plain, relief=surface.relief)
 
 
+def couple(slave: FacetedSurface, master: FacetedSurface) -> MortarPoints:
+    return MortarPoints.of(slave, master, np.ones(len(slave.nodes), dtype=bool), SHARE)
+
+
 @dataclass(frozen=True)
 class Setting:
     """Two surfaces, the nodes with multipliers, and random derivatives by the points there."""
@@ -48,17 +52,17 @@ class Setting:
     by: CouplingDerivatives
 
     def scalar(self, slave: FacetedSurface, master: FacetedSurface) -> float:
-        found, by = mortar_coupling(slave, master), self.by
+        met, by = couple(slave, master), self.by
+        found = met.coupling
         assert np.array_equal(found.node, self.chosen)
-        gaps = closable_gaps(slave, master, found, SHARE, MPI.COMM_SELF)
         weights = np.einsum("nr,nr->", by.left, found.weight @ by.right)
-        return float(by.area @ found.area + weights + np.sum(by.normal * found.normal) + by.gap @ gaps.value)
+        return float(by.area @ found.area + weights + np.sum(by.normal * found.normal) + by.gap @ met.gap)
 
 
 @cache
 def setting(kinds: tuple[str, str]) -> Setting:
     slave, master = in_touch(kinds[0], 6, 1.0, convex=True), in_touch(kinds[1], 8, 1.05, convex=False)
-    chosen, rng = mortar_coupling(slave, master).node, np.random.default_rng(3)
+    chosen, rng = couple(slave, master).coupling.node, np.random.default_rng(3)
     by = CouplingDerivatives(
         rng.standard_normal(len(chosen)), rng.standard_normal((len(chosen), 2)),
         rng.standard_normal((len(master.nodes), 2)), rng.standard_normal((len(chosen), 3)),
@@ -70,9 +74,8 @@ def setting(kinds: tuple[str, str]) -> Setting:
 @pytest.mark.parametrize("kinds", SOLID, ids="-".join)
 def test_gaps_are_closable_from_both_sides_and_at_the_rim_means(kinds: tuple[str, str]) -> None:
     here = setting(kinds)
-    gaps = closable_gaps(
-        here.slave, here.master, mortar_coupling(here.slave, here.master), SHARE, MPI.COMM_SELF
-    )
+    gaps = couple(here.slave, here.master).closable
+    assert gaps is not None
     assert gaps.kept.any()
     assert {0.0, SHARE} == set(gaps.share)
     assert here.slave.mirrored.any()
@@ -85,7 +88,7 @@ def test_the_derivative_by_nodes_agrees_with_central_differences(kinds: tuple[st
     here, rng = setting(kinds), np.random.default_rng(11)
     ways = [rng.standard_normal(each.points.shape) for each in (here.slave, here.master)]
     ways[which == "slave"] *= 0.0
-    by = mortar_points_pulled_back(here.slave, here.master, here.chosen, SHARE, here.by, MPI.COMM_SELF)
+    by = mortar_points_pulled_back(couple(here.slave, here.master), here.by, MPI.COMM_SELF)
     terms = [
         np.where(surface.mirrored, 0.0, part * way)
         for surface, part, way in zip((here.slave, here.master), by, ways, strict=True)

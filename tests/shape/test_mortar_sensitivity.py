@@ -41,8 +41,8 @@ def test_taylor_remainders_are_quadratic(name: str, objective: str) -> None:
 
 
 def without_mortar(patch: Patch) -> None:
-    def none(slave: Any, master: Any, *rest: Any) -> tuple[np.ndarray, np.ndarray]:
-        return np.zeros_like(slave.points), np.zeros_like(master.points)
+    def none(points: Any, *rest: Any) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros_like(points.slave.points), np.zeros_like(points.master.points)
 
     patch.setattr(mortar_derivative, "mortar_points_pulled_back", none)
 
@@ -53,9 +53,8 @@ def without(term: str) -> Callable[[Patch], None]:
     def drop(patch: Patch) -> None:
         whole = mortar_derivative.mortar_points_pulled_back
 
-        def part(slave: Any, master: Any, chosen: Any, share: float, by: Any, comm: Any) -> Any:
-            none = replace(by, **{term: np.zeros_like(getattr(by, term))})
-            return whole(slave, master, chosen, share, none, comm)
+        def part(points: Any, by: Any, comm: Any) -> Any:
+            return whole(points, replace(by, **{term: np.zeros_like(getattr(by, term))}), comm)
 
         patch.setattr(mortar_derivative, "mortar_points_pulled_back", part)
 

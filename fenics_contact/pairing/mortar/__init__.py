@@ -1,11 +1,10 @@
 """Mortar coupling: surfaces with non-matching meshes, coupled in weighted means by dual multipliers."""
 
 from fenics_contact.pairing.mortar.coupling import MortarCoupling, mortar_coupling
-from fenics_contact.pairing.mortar.coupling_derivative import CouplingDerivatives, mortar_pulled_back
+from fenics_contact.pairing.mortar.coupling_derivative import mortar_pulled_back
 from fenics_contact.pairing.mortar.relief_derivative import SurfaceDerivatives
 
 __all__ = [
-    "CouplingDerivatives",
     "MortarCoupling",
     "SurfaceDerivatives",
     "mortar_coupling",

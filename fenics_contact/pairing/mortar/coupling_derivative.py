@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fenics_contact._libraries import MPI
-from fenics_contact.display import displayed
 from fenics_contact.errors import together
 from fenics_contact.mesh import computed_rounding
+from fenics_contact.pairing.coupling_derivatives import CouplingDerivatives
 from fenics_contact.pairing.mortar.candidates import candidate_pairs
 from fenics_contact.pairing.mortar.cells import (
     CellDerivatives,
@@ -27,28 +27,6 @@ from fenics_contact.pairing.mortar.relief import relief_of_cells
 from fenics_contact.pairing.mortar.relief_derivative import SurfaceDerivatives, relief_pulled_back
 from fenics_contact.pairing.mortar.sums import SumsBy
 from fenics_contact.surfaces import FacetedSurface
-
-
-@displayed
-@dataclass(frozen=True)
-class CouplingDerivatives:
-    """Derivatives of a scalar by the results of a mortar coupling.
-
-    The derivative by the weight of master node j at slave node i is left_i · right_j.
-
-    Attributes:
-        area: By the areas, shape (n,).
-        left: Factors of the derivatives by the weights at each slave node, shape (n, r).
-        right: Factors at each node of the master, shape (len(master.nodes), r).
-        normal: By the normals, shape (n, dim).
-        gap: By the gaps, shape (n,).
-    """
-
-    area: np.ndarray
-    left: np.ndarray
-    right: np.ndarray
-    normal: np.ndarray
-    gap: np.ndarray
 
 
 def mortar_pulled_back(
