@@ -97,9 +97,8 @@ def _minimised(desk: Desk, file: SceneFile, task: ShapeTask, resume: bool | None
 
 def _facts(file: SceneFile, task: ShapeTask, result: Result) -> dict[str, str]:
     problem = task.problem
-    before, after, units = problem.first, problem.best, file.document.units
+    before, after, units = problem.first, problem.at(result.x), file.document.units
     assert before is not None
-    assert after is not None
     drop = (before.value - after.value) / abs(before.value) * 100 if before.value else 0.0
     rows = {
         "objective before": f"{before.value:.9g}",
@@ -126,7 +125,7 @@ def _draw(desk: Desk, file: SceneFile, task: ShapeTask, result: Result, gallery:
     from fenics_contact.viz import plot_control_net, plot_convergence
 
     problem = task.problem
-    for name, point in (("before", problem.first), ("after", problem.best)):
+    for name, point in (("before", problem.first), ("after", problem.at(result.x))):
         assert point is not None
         draw_state(desk, file, {name: point.state}, gallery, f"_{name}")
     moved, at = problem.points_of(result.x), 0

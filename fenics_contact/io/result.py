@@ -128,6 +128,8 @@ def write_optimisation_result(
     | ``optimisation.objective`` | ``type``, ``initial``, ``final``, ``drop_percent`` |
     | ``optimisation.design`` | ``variables``, ``bodies``, ``values`` at the best point |
     | ``optimisation.stop`` | ``converged``, ``reason``, ``iterations``, ``evaluations``, ``f_products`` |
+    | ``optimisation.constraints`` | of each nonlinear one ``name``, ``value``, ``lower``, ``upper``, \
+``violation``, ``multiplier``; None for no limit |
     | ``optimisation.history`` | one list for each attribute of `fenics_contact.optimize.Record`, one entry \
 an evaluation; None where a trial point was rejected as invalid |
 
@@ -144,7 +146,8 @@ an evaluation; None where a trial point was rejected as invalid |
     Raises:
         InvalidInputError: As `write_result` does, or if the problem has not been evaluated.
     """
-    first, best, comm = problem.first, problem.best, problem.comm
+    first, comm = problem.first, problem.comm
+    best = None if first is None else problem.at(result.x)
     unheld = () if best is None else best.state.unheld
     read_off = {} if best is None else _read_off(best.state)
     with together(comm):
@@ -171,10 +174,19 @@ an evaluation; None where a trial point was rejected as invalid |
                 "evaluations": result.evaluations,
                 "f_products": problem.products,
             },
+            "constraints": [_finite(vars(one)) for one in result.constraints],
             "history": _history(result),
         }
     record["errors"] = _errors(best.state) if _knows_errors(best.state) else None
     return write_json(target, {**record, "more": dict(more or {})}, comm=comm)
+
+
+def _finite(numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a mapping with None for limits that are infinite."""
+    return {
+        name: None if isinstance(value, float) and np.isinf(value) else value
+        for name, value in numbers.items()
+    }
 
 
 def _head(kind: str, comm: MPI.Comm) -> dict[str, Any]:

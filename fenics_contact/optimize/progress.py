@@ -103,6 +103,7 @@ class Progress:
             target=method.tolerance,
             measured="decrease",
         )
+        self._constrained = bool(problem.nonlinear)
         self._fun = problem.fun if isinstance(problem.fun, Resumable) else None
         self.comm = None if checkpoint is None else checkpoint.comm
         if self.comm is None and self._fun is not None:
@@ -158,7 +159,9 @@ class Progress:
     def _tell(self, state: MethodState, *, timed: bool = True) -> None:
         self._state, record = state, state.history[-1]
         predicted = record.predicted_decrease / (self._method.value_scale + abs(record.best))
-        self._task.step(record.evaluations, measure=predicted or None, value=record.best, timed=timed)
+        words = f"violation {record.violation:.1e}" if self._constrained else ""
+        measure = predicted or None
+        self._task.step(record.evaluations, measure=measure, value=record.best, words=words, timed=timed)
 
     def keep(self, state: MethodState, *, last: bool = False) -> None:
         """Write the state if that is due. Collective.

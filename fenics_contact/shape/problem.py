@@ -128,7 +128,7 @@ class ShapeProblem:
 
     @property
     def best(self) -> DesignPoint | None:
-        """The design with the smallest objective so far. Collective after a run was resumed."""
+        """The design with the smallest objective so far, feasible or not. Collective after a run resumed."""
         return self._memory.point("best")
 
     @property
@@ -166,11 +166,7 @@ class ShapeProblem:
         return self._timer.seconds
 
     def __call__(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return J(α) and a subgradient, see the class. Collective.
-
-        Raises:
-            InvalidDesignError: If the design inverts a cell.
-        """
+        """Return J(α) and a subgradient, see the class; raises as `evaluate` does. Collective."""
         point = self.evaluate(alpha)
         return point.value, point.gradient
 
@@ -233,6 +229,10 @@ class ShapeProblem:
     def known(self, alpha: np.ndarray) -> DesignPoint | None:
         """Return the first, best or last design if it is exactly this one. Collective."""
         return self._memory.of_design(alpha)
+
+    def at(self, alpha: np.ndarray) -> DesignPoint:
+        """Return a design as evaluated, again unless it is `known`, such as the x of a result. Collective."""
+        return self.known(alpha) or self.evaluate(alpha)
 
     @property
     def inexact(self) -> bool:

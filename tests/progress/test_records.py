@@ -19,6 +19,7 @@ from fenics_contact.qp import FaceNewton, Smalse
 from fenics_contact.timing import PhaseTimer
 from tests.contact.step_cases import sheared_block, shears
 from tests.optimize.cases import BY_NAME
+from tests.optimize.nonlinear_cases import NONLINEAR
 
 
 class Collector(logging.Handler):
@@ -155,6 +156,15 @@ def test_a_minimisation_tells_evaluations_best_value_and_predicted_decrease() ->
     predicted = seen[-1].predicted_decrease / (1.0 + abs(seen[-1].best))
     assert steps[-1].measure == pytest.approx(predicted)
     assert events[-1].words == result.reason.name.lower()
+
+
+def test_a_constrained_minimisation_tells_its_violation() -> None:
+    case = NONLINEAR["Rosen-Suzuki"]
+    with heard() as collector:
+        result = minimize(case.fun, case.start, constraints=list(case.constraints))
+    steps = [event for event in collector.events if event.kind is Kind.STEP]
+    assert [step.words for step in steps] == [f"violation {each.violation:.1e}" for each in result.history]
+    assert "violation" in steps[-1].details
 
 
 def test_nobody_listening_costs_a_few_calls_a_product_and_no_event(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.io import read_result, write_optimisation_result
 from fenics_contact.optimize import Checkpoint, NonlinearConstraint, Result, minimize
 from fenics_contact.shape import (
     AdaptiveTolerance,
@@ -102,6 +103,20 @@ def test_states_as_accurate_as_needed_lead_to_the_same_design() -> None:
     assert result.value == pytest.approx(exact.value, rel=3e-4)
     assert result.violation <= 1e-5
     assert {record.error > 0.0 for record in result.history} == {True}
+
+
+def test_the_file_of_a_result_has_the_design_that_meets_the_constraints(tmp_path: Path) -> None:
+    problem = posed()
+    _, result = minimised(problem)
+    problem(np.full(problem.size, BOUND))  # lower, and neither has the volume
+    assert problem.best is not None
+    assert problem.best.value < result.value
+    told = read_result(write_optimisation_result(result, problem, tmp_path))["optimisation"]
+    assert told["objective"]["final"] == pytest.approx(result.value, rel=1e-7)
+    assert [one["name"] for one in told["constraints"]] == ["volume", "force"]
+    assert told["constraints"][1]["lower"] is None
+    assert told["constraints"][1]["multiplier"] == result.constraints[1].multiplier
+    assert told["history"]["violation"][-1] == result.history[-1].violation
 
 
 def test_two_and_four_ranks_take_the_same_steps(mpirun: Callable[..., str]) -> None:
