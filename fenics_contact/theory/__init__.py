@@ -15,6 +15,7 @@ from fenics_contact.theory.hertz import (
     relative_curvatures,
 )
 from fenics_contact.theory.pin_in_hole import PinContact, pin_in_hole
+from fenics_contact.theory.roller import roller_relief
 
 __all__ = [
     "LineContact",
@@ -25,4 +26,5 @@ __all__ = [
     "hertz_point",
     "pin_in_hole",
     "relative_curvatures",
+    "roller_relief",
 ]
