@@ -4,6 +4,7 @@
 DEMO ?= chain_links
 NOTEBOOKS ?=
 SIZE ?=
+OBJECTIVE ?=
 NP ?= 1
 BENCH ?= full
 STUDIES ?= hertz cattaneo_mindlin chain_links
@@ -30,6 +31,7 @@ help: ## Show this list
 	@echo "  DEMO=hertz_sphere    which demo (chain_links); all are in demos/"
 	@echo "  NOTEBOOKS=\"01 04\"    which notebooks (all)"
 	@echo "  SIZE=small|paper     size of the chain links (paper)"
+	@echo "  OBJECTIVE=pressure   what the shape of the chain links lowers: potential|energy|pressure (potential)"
 	@echo "  NP=2                 MPI ranks of a demo (1)"
 	@echo "  STUDIES=hertz        which studies (all three); NP ranks each"
 	@echo "  BENCH=quick|full     small cases once, or all of them (full)"
@@ -37,7 +39,7 @@ help: ## Show this list
 	@echo "  PYTHON=/some/python  use this Python and its FEniCSx instead of setting up .venv"
 
 demo: $(prepare) ## Optimise the contact shape of two chain links, or run DEMO=...; results in output/
-	$(launch) $(NP) $(python) demos/demo_$(DEMO).py $(if $(SIZE),--size $(SIZE))
+	$(launch) $(NP) $(python) demos/demo_$(DEMO).py $(if $(SIZE),--size $(SIZE)) $(if $(OBJECTIVE),--objective $(OBJECTIVE))
 
 demos: $(prepare) ## Run every demo
 	for demo in demos/demo_*.py; do $(launch) $(NP) $(python) $$demo || exit 1; done

@@ -15,6 +15,11 @@
 #
 # Run it with `make demo` (66 528 unknowns in 32 subdomains, the size of the published experiment),
 # `make demo NP=2` (two MPI ranks), or `make demo SIZE=small` (less than half of the unknowns).
+#
+# That is the published objective. For it the seat gives way, which no designer wants. With
+# `make demo OBJECTIVE=pressure` the largest contact pressure is lowered instead, with `OBJECTIVE=energy` the
+# strain energy $\tfrac12 u^T K u$, the compliance of the links, of which no retreat is a part; both keep the
+# volume of the link.
 
 import sys
 from pathlib import Path
@@ -25,7 +30,7 @@ from mpi4py import MPI
 from fenics_contact.contact import ContactProblem, Status, contact_area
 from fenics_contact.gallery import LinkShape, two_links
 from fenics_contact.io import ResultSeries, write_optimisation_result, write_vtu, write_xdmf
-from fenics_contact.optimize import BundleTrust, LinearConstraints, minimize
+from fenics_contact.optimize import BundleTrust, LinearConstraints, NonlinearConstraint, minimize
 from fenics_contact.partition import box_partition
 from fenics_contact.progress import show_progress
 from fenics_contact.scene import (
@@ -38,7 +43,13 @@ from fenics_contact.scene import (
     Surface,
     TotalForce,
 )
-from fenics_contact.shape import ShapeProblem, SurfaceDesign, TotalPotential
+from fenics_contact.shape import (
+    LargestPressure,
+    ShapeProblem,
+    StrainEnergy,
+    SurfaceDesign,
+    TotalPotential,
+)
 from fenics_contact.theory import contact_modulus, hertz_point, relative_curvatures
 from fenics_contact.timing import PhaseTimer
 from fenics_contact.viz import (
@@ -52,7 +63,6 @@ from fenics_contact.viz import (
 )
 
 comm = MPI.COMM_WORLD
-output = Path("output/chain_links")
 
 # ## Size
 #
@@ -64,9 +74,25 @@ SIZES = {
     "small": LinkShape(n_around=36, n_a=6, n_b=14, grading=2.5),
     "paper": LinkShape(n_around=48, n_a=8, n_b=20, grading=2.5),
 }
-size = sys.argv[sys.argv.index("--size") + 1] if "--size" in sys.argv[:-1] else "paper"
-if size not in SIZES:
-    sys.exit(f"--size must be one of {sorted(SIZES)}, got {size!r}")
+OBJECTIVES = {
+    "potential": (TotalPotential(), "total potential (N mm)"),
+    "energy": (StrainEnergy(), "strain energy (N mm)"),
+    "pressure": (LargestPressure(), "largest pressure (N/mm²)"),
+}
+
+
+def chosen(option, known, default):
+    found = sys.argv[sys.argv.index(option) + 1] if option in sys.argv[:-1] else default
+    if found not in known:
+        sys.exit(f"{option} must be one of {sorted(known)}, got {found!r}")
+    return found
+
+
+size = chosen("--size", SIZES, "paper")
+aim = chosen("--objective", OBJECTIVES, "potential")
+objective, label = OBJECTIVES[aim]
+published = aim == "potential"
+output = Path("output") / ("chain_links" if published else f"chain_links_{aim}")
 
 # ## Scene
 #
@@ -111,14 +137,18 @@ partitions = {name: box_partition(body.mesh, (8, 1, 2)) for name, body in scene.
 # The rest of the mesh follows smoothly; away from the crown it stays.
 
 design = SurfaceDesign("link 1", links.first.crown, net=(7, 4))
-problem = ShapeProblem(ContactProblem(scene, comm, partitions=partitions), design, TotalPotential())
+problem = ShapeProblem(ContactProblem(scene, comm, partitions=partitions), design, objective)
 start = np.zeros(problem.size)
 
-# The link may not lose volume. The volume is almost linear in the design, so its linearisation bounds it:
-# $V'(0)\,\alpha \ge 0$.
+# The link may not lose volume. The published experiment bounds the volume's linearisation, which is almost
+# the volume: $V'(0)\,\alpha \ge 0$. The other objectives keep the volume itself.
 
 volume, volume_gradient = problem.volume(start)
-keep_volume = LinearConstraints(-volume_gradient[None, :], [0.0])
+keep_volume = (
+    LinearConstraints(-volume_gradient[None, :], [0.0])
+    if published
+    else NonlinearConstraint(problem.volume, lower=volume, upper=volume, name="volume")
+)
 
 # ## Optimisation
 #
@@ -162,9 +192,9 @@ values = [record.value for record in result.history]
 kinds = [record.kind.value for record in result.history]
 with show_progress(comm), timer.phase("pictures"):
     plot_control_net(links.first.crown, (mesh.points, moved), nets, output / "control_net.png", comm=comm)
-    plot_convergence(values, kinds, output / "convergence.png", label="total potential (N mm)", comm=comm)
+    plot_convergence(values, kinds, output / "convergence.png", label=label, comm=comm)
     plot_residuals(before.state.solution.history, output / "residuals.png", title="First state", comm=comm)
-    plot_before_after(before, after, output / "before_after.png", label="total potential (N mm)")
+    plot_before_after(before, after, output / "before_after.png", label=label)
 
 # ## Files for ParaView
 
@@ -175,31 +205,35 @@ with timer.phase("files"):
 
 # ## Result
 #
-# The drop is printed beside the published one, which belongs to other dimensions, load and bounds: $J$
-# contains the potential of the dead force, which gains 80 kN × 0.25 mm when the seat of link 2 gives way by
-# as much as the bounds allow. The file tells the scene, the history, the best design and its state; what is
+# A lower total potential is not yet a better shape: where the seat gives way, link 2 sinks in and its dead
+# force gains force × way, whatever the shape. How far it may travel unloaded until it touches is that
+# retreat; the rest of the drop is the better shape's. It is negative for the published objective: the seat is
+# 0.25 mm deeper, as much as the bounds allow, and a little softer. The drop is printed beside the published
+# one, which belongs to other dimensions, load and bounds. For less pressure the crown becomes a groove that
+# fits link 2 more closely. The file tells the scene, the history, the best design and its state; what is
 # added here stands under `more`.
 
-# A lower $J$ is not yet a better shape: where the seat gives way, link 2 sinks in and its dead force gains
-# force × way, whatever the shape. How far it may travel unloaded until it touches is that retreat; the rest
-# of the drop is the better shape's. It is negative here: the seat that gave way is a little softer.
-
 drop = (before.value - after.value) / abs(before.value) * 100
+volume_final = problem.volume(result.x)[0]
 pull = np.array([1.0, 0.0, 0.0])
-retreat, peak_pressure, area = (
+retreat, peak_pressure, area, strain_energy, potential = (
     {name: measure(point.state) for name, point in points.items()}
     for measure in (
         lambda state: state.contact.travel(pull),
         lambda state: float(state.contact.pressure.max()),
         contact_area,
+        lambda state: state.energies.strain,
+        lambda state: state.energies.total_potential,
     )
 )
 by_retreat = force * (retreat["after"] - retreat["before"])
-by_shape = before.value - after.value - by_retreat
+by_shape = potential["before"] - potential["after"] - by_retreat
 seconds = {**timer.seconds, **problem.seconds}
 counts = after.state.counts
 record = {
     "size": size,
+    "strain_energy_initial": strain_energy["before"],
+    "strain_energy_final": strain_energy["after"],
     "f_products_first_state": before.state.solution.products,
     "peak_pressure_initial": peak_pressure["before"],
     "peak_pressure_final": peak_pressure["after"],
@@ -212,7 +246,7 @@ record = {
     "drop_by_retreat": by_retreat,
     "drop_by_shape": by_shape,
     "volume_initial": volume,
-    "volume_final": problem.volume(result.x)[0],
+    "volume_final": volume_final,
     "weak_contacts": after.weak.contacts,
     "weak_discs": after.weak.discs,
     "points_on_facet_edges": after.weak.edges,
@@ -230,17 +264,21 @@ if comm.rank == 0:
     ranks = "1 rank" if comm.size == 1 else f"{comm.size} ranks"
     print(f"two chain links: {counts['torn_unknowns']} unknowns in {counts['subdomains']} subdomains,")
     print(f"{problem.size} design variables, {ranks}")
-    print(f"  J before        {before.value:14.6e} N mm")
-    print(f"  J after         {after.value:14.6e} N mm")
-    print(f"  drop            {drop:14.2f} %     published experiment: 12.39 %")
-    print(f"    by retreat    {by_retreat:14.6e} N mm, the seat gives way by {retreat['after']:.4f} mm")
-    print(f"    by shape      {by_shape:14.6e} N mm, {100 * by_shape / abs(before.value):.2f} % of J")
-    print("                          before          after          Hertz (before)")
-    for word, unit, found, known in (
-        ("peak pressure", "MPa", peak_pressure, hertz.peak_pressure),
-        ("contact area", "mm²", area, hertz.area),
+    print("                          before          after         change")
+    for word, unit, found in (
+        ("strain energy", "N mm", strain_energy),
+        ("potential", "N mm", potential),
+        ("peak pressure", "MPa", peak_pressure),
+        ("contact area", "mm²", area),
     ):
-        print(f"  {word:14s}{found['before']:14.1f} {found['after']:14.1f} {known:14.1f} {unit}")
+        change = found["after"] / found["before"] - 1
+        print(f"  {word:14s}{found['before']:14.1f} {found['after']:14.1f} {change:+14.1%} {unit}")
+    print(f"  Hertz (before): {hertz.peak_pressure:.1f} MPa on {hertz.area:.1f} mm²")
+    print(f"  objective       {aim:>14s}       lower by {drop:.2f} %" + " (published: 12.39 %)" * published)
+    print(f"  retreat         {retreat['after']:14.4f} mm    gains {by_retreat:.5e} N mm of potential")
+    if published:
+        print(f"  by shape        {by_shape:14.5e} N mm, {by_shape / abs(potential['before']):.2%} of it")
+    print(f"  volume          {volume_final / volume - 1:+14.1e}")
     print(f"  Hertz' radius                                 {hertz.semi_axes[0]:14.3f} mm")
     print(f"  iterations      {result.iterations:14d}       {result.evaluations} evaluations")
     print(f"  F-products      {problem.products:14d}       first state: {before.state.solution.products}")
@@ -251,18 +289,20 @@ if comm.rank == 0:
     print(f"  {'all phases':15s} {sum(seconds.values()):14.2f} s")
     print(f"pictures and files in {output}/")
 
-# The energy must fall, and the link must not have lost volume beyond the linearisation. The grip of link 1
-# holds what pulls link 2, forces and moments, to rounding.
+# The objective must fall, and the link must not have lost volume (beyond the linearisation, where that bounds
+# it). A shape for less pressure has a peak lower by a third at least. The grip of link 1 holds what pulls
+# link 2, forces and moments, to rounding.
 
 assert after.value < before.value
-assert record["volume_final"] > volume * (1 - 1e-4)
+assert volume_final > volume * (1 - (1e-4 if published else 1e-6))
+assert aim != "pressure" or peak_pressure["after"] < 2 / 3 * peak_pressure["before"]
 assert imbalance < 1e-9
 
 # ## What to try next
 #
 # - `Coulomb(0.1)`: most of the contact slips.
-# - Another objective, for example `StrainEnergy()`, which rewards no retreat, or `PressureNorm()` (both from
-#   `fenics_contact.shape`).
+# - Another objective, for example `LargestStress("link 1")` or a sum of several, from
+#   `fenics_contact.shape`.
 # - `checkpoint=Checkpoint(output / "run.npz")` in `minimize` (from `fenics_contact.optimize`): a run that is
 #   interrupted goes on from there when it is started again. Within `with interruptible(comm):` (from
 #   `fenics_contact.checkpoint`) Ctrl-C lets the evaluation under way come to its end first.

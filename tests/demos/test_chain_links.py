@@ -48,6 +48,24 @@ def test_the_small_demo_lowers_the_energy_and_leaves_pictures_files_and_result(
     assert suffixes == {".png", ".json", ".vtm", ".vtu", ".xdmf", ".h5", ".pvd"}
 
 
+@pytest.mark.slow
+@pytest.mark.claim
+@pytest.mark.parametrize("objective", ["energy", "pressure"])
+def test_shapes_that_fit_lower_pressure_and_energy_and_keep_the_volume(
+    objective: str, mpirun: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    demo = ROOT / "demos" / "demo_chain_links.py"
+    mpirun(demo, 2, "--size", "small", "--objective", objective, timeout=300.0)
+    result = read_result(tmp_path / "output" / f"chain_links_{objective}")
+    more = result["more"]
+    assert more["volume_final"] == pytest.approx(more["volume_initial"], rel=1e-8)
+    assert more["peak_pressure_final"] == pytest.approx(2546.0, rel=5e-3)
+    assert more["strain_energy_final"] == pytest.approx(14422.0, rel=1e-3)
+    assert more["strain_energy_initial"] == pytest.approx(16036.7, rel=1e-4)
+    assert result["optimisation"]["stop"]["evaluations"] <= 25
+
+
 def test_an_unknown_size_is_refused(mpirun: Callable[..., str]) -> None:
     with pytest.raises(pytest.fail.Exception, match=r"--size must be one of .*got 'huge'"):
         mpirun(ROOT / "demos" / "demo_chain_links.py", 1, "--size", "huge")
