@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from fenics_contact.fem.composition import Composition, composition, integrate, material_sets
 from fenics_contact.fem.forms import FormLibrary, Template, volume_measure
-from fenics_contact.fem.load_forms import Symbol, is_scalar, load_key, load_name, load_parameters, load_work
+from fenics_contact.fem.load_forms import (
+    Symbol,
+    is_scalar,
+    load_fields,
+    load_key,
+    load_name,
+    load_parameters,
+    load_work,
+)
 from fenics_contact.fem.model_checks import check_kernel, kernel_of, stiffness_of_cell
 from fenics_contact.fem.nodal_stiffness import cell_stiffness
-from fenics_contact.fem.spread_force import as_tractions
+from fenics_contact.fem.spread_force import LinearTraction, as_tractions, spread_traction
 from fenics_contact.fem.temperature import Temperature, stress_in_space, stress_left, temperature_of
 from fenics_contact.fem.templates import Constants, Templates, Written, scalar_constants
 
@@ -15,6 +23,7 @@ __all__ = [
     "Composition",
     "Constants",
     "FormLibrary",
+    "LinearTraction",
     "Symbol",
     "Temperature",
     "Template",
@@ -27,12 +36,14 @@ __all__ = [
     "integrate",
     "is_scalar",
     "kernel_of",
+    "load_fields",
     "load_key",
     "load_name",
     "load_parameters",
     "load_work",
     "material_sets",
     "scalar_constants",
+    "spread_traction",
     "stiffness_of_cell",
     "stress_in_space",
     "stress_left",

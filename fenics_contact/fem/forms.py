@@ -9,7 +9,7 @@ from fenics_contact import _dolfinx
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import together
 from fenics_contact.fem.composition import Composition, integrate, material_sets
-from fenics_contact.fem.load_forms import Symbol, fields_of, load_key, load_name, load_parameters, load_work
+from fenics_contact.fem.load_forms import Symbol, load_fields, load_key, load_name, load_parameters, load_work
 from fenics_contact.fem.model_checks import check_model, unit_cell_stiffness
 from fenics_contact.fem.spread_force import as_tractions
 from fenics_contact.fem.templates import (
@@ -104,7 +104,7 @@ class FormLibrary:
         """
         template = self._templates[load_key(load, parts.materials, cell_type)]
         cells = parts.cells if isinstance(load, ThermalStrain) else None
-        functions = fields_of(load, space, points, acted)
+        functions = load_fields(load, space, points, acted)
         return template.bind([space], load_parameters(load, parts), functions, facets, cells=cells)
 
     def varies(self, material: Material, cell_type: str) -> bool:

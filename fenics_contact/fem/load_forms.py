@@ -78,7 +78,7 @@ def numbers_of(load: Load) -> tuple[float, ...]:
     return tuple(load.value) if isinstance(load.value, Sequence) else (float(load.value),)
 
 
-def fields_of(
+def load_fields(
     load: Load, space: _dolfinx.fem.FunctionSpace, points: np.ndarray, acted: np.ndarray | None = None
 ) -> tuple[_dolfinx.fem.Function, ...]:
     """Return the Functions for a symbol's coefficients.

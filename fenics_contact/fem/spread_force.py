@@ -40,10 +40,12 @@ class LinearTraction:
 
 def as_tractions(scene: Scene) -> tuple[Load, ...]:
     """Return the scene's loads with every resultant spread over the present shape of its surface."""
-    return tuple(_spread(scene, load) if isinstance(load, TotalForce) else load for load in scene.loads)
+    return tuple(
+        spread_traction(scene, load) if isinstance(load, TotalForce) else load for load in scene.loads
+    )
 
 
-def _spread(scene: Scene, load: TotalForce) -> Traction:
+def spread_traction(scene: Scene, load: TotalForce) -> Traction:
     """Return the traction a + b × (x − c), c the centroid, that has the resultant of a load.
 
     With the area A and J b = ∫ (x − c) × (b × (x − c)): a = F / A and J b = M + (p − c) × F.

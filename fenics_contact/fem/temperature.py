@@ -29,7 +29,7 @@ class Temperature:
     @property
     def key(self) -> tuple[bool, bool, tuple[Ufl, ...]]:
         """The key of everything on which a form depends."""
-        return bool(self._numbers), bool(self._of_position), tuple(load.value for load in self._ufl)
+        return bool(self._numbers), bool(self.of_position), tuple(load.value for load in self._ufl)
 
     @property
     def numbers(self) -> tuple[float, ...]:
@@ -40,7 +40,7 @@ class Temperature:
         """Return ΔT (UFL, None without loads), its constants and its coefficients."""
         constants = scalar_constants(cell_type, 1) if self._numbers else ()
         coefficients: tuple[ufl.Coefficient, ...] = ()
-        if self._of_position:
+        if self.of_position:
             coefficients = (ufl.Coefficient(_dolfinx.nodal_space(cell_type), count=FIRST_COUNT),)
         terms = [*constants, *coefficients, *(from_ufl(load, load.value, cell_type) for load in self._ufl)]
         return (sum(terms[1:], terms[0]) if terms else None), constants, coefficients
@@ -52,12 +52,12 @@ class Temperature:
             mesh: The mesh.
             points: Coordinates by input node, shape (n, dim), [length].
         """
-        if not self._of_position:
+        if not self.of_position:
             return ()
         space = _dolfinx.scalar_space(mesh, 1)
         nodes, dofs = _dolfinx.node_dofs(space)
         field = _dolfinx.fem.Function(space, name="temperature")
-        for load in self._of_position:
+        for load in self.of_position:
             field.x.array[dofs] += evaluate("temperature_change", load.value, points[nodes], ())
         return (field,)
 
@@ -70,7 +70,8 @@ class Temperature:
         return [load for load in self.loads if isinstance(load.value, Ufl)]
 
     @property
-    def _of_position(self) -> list[Any]:
+    def of_position(self) -> list[Any]:
+        """The changes given as functions of position."""
         return [load for load in self.loads if not isinstance(load.value, float | Ufl)]
 
 

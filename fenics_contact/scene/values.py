@@ -22,8 +22,8 @@ class Ufl:
     """A value written in UFL: compiled into the form and evaluated at its quadrature points.
 
     Numbers in it are compiled in, too: for a load that changes from step to step a function of position,
-    which needs no compiler, is cheaper. Only numbers and UFL can be differentiated with respect to the shape
-    of a body.
+    which needs no compiler, is cheaper. Derivatives by the shape of a body are exact for numbers and UFL;
+    gradients of functions of position are central differences, see `gradients_of`.
 
     Attributes:
         function: Takes the spatial coordinate (UFL), returns a UFL vector or scalar.

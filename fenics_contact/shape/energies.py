@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene import ThermalStrain
-from fenics_contact.shape.forms import ShapeForms, strain_work_by_shape, work_by_shape
+from fenics_contact.shape.forms import ShapeForms
 from fenics_contact.shape.objective import Partials
 from fenics_contact.shape.sums import Weighable
+from fenics_contact.shape.work_derivative import strain_work_by_shape, work_by_shape
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
 from fenics_contact._libraries import MPI
-from fenics_contact.errors import InvalidInputError, calling
+from fenics_contact.errors import calling
 from fenics_contact.fem import (
     Constants,
     Symbol,
@@ -22,16 +22,14 @@ from fenics_contact.fem import (
     integrate,
     load_key,
     load_name,
-    load_parameters,
     load_work,
-    material_sets,
     scalar_constants,
     stress_in_space,
     stress_left,
     volume_measure,
 )
 from fenics_contact.feti import Subdomain, TornSystem
-from fenics_contact.scene import Load, Material, ThermalStrain, VolumeLoad
+from fenics_contact.scene import Load, Material
 
 #: Builds an integrand (UFL) from a displacement u, the coordinate x, the stress σ(u) and constants.
 Integrand = Callable[..., Expr]
@@ -89,16 +87,34 @@ class ShapeForms:
         return self._templates.get(("work by shape", materials, cell_type), name, write)
 
     def load_by_shape(self, load: Load, materials: Materials, cell_type: str) -> Template:
-        """∂/∂x of the work of a load on the volume along the coefficient w."""
+        """∂/∂x of the work of a load along w at fixed nodal values of its field; coefficients (w, field)."""
+        return self._of_load("by shape", load, materials, cell_type, _by_shape)
 
+    def load_by_field(self, load: Load, materials: Materials, cell_type: str) -> Template:
+        """Derivative of the work of a load along w by the values of its field; the same coefficients."""
+
+        def by_field(form: ufl.Form, cell_type: str) -> ufl.Form:
+            return ufl.derivative(form, Symbol(load, cell_type).expression)
+
+        return self._of_load("by field", load, materials, cell_type, by_field)
+
+    def _of_load(
+        self,
+        what: str,
+        load: Load,
+        materials: Materials,
+        cell_type: str,
+        differentiate: Callable[[ufl.Form, str], ufl.Form],
+    ) -> Template:
         def write() -> Written:
             (w,) = _dolfinx.field_symbols(cell_type, 1)
             symbol = Symbol(load, cell_type)
             form, constants = load_work(load, materials, cell_type, symbol.expression, w)
-            return _by_shape(form, cell_type), (*symbol.constants, *constants), [w]
+            coefficients = [w, *symbol.coefficients]
+            return differentiate(form, cell_type), (*symbol.constants, *constants), coefficients
 
-        key = ("load by shape", *load_key(load, materials, cell_type))
-        return self._templates.get(key, ("by shape", *load_name(load, cell_type)), write)
+        key = (f"load {what}", *load_key(load, materials, cell_type))
+        return self._templates.get(key, (what, *load_name(load, cell_type)), write)
 
     def functional(
         self,
@@ -108,7 +124,10 @@ class ShapeForms:
         by: str,
         temperature: Temperature = Temperature(),
     ) -> Template:
-        """∫ density dx itself (by="value"), or its derivative by="displacement" or by="shape".
+        """∫ density dx itself (by="value"), or its derivative by="displacement", "shape" or "temperature".
+
+        The derivative by the shape is that at fixed nodal values of a temperature that is a function of
+        position, that by the temperature is by these values.
 
         Its constants are those of the density, of the temperature and of the materials; its coefficients are
         u and those of the temperature.
@@ -130,6 +149,8 @@ class ShapeForms:
                 form = ufl.derivative(form, u, ufl.TestFunction(_dolfinx.displacement_space(cell_type)))
             elif by == "shape":
                 form = _by_shape(form, cell_type)
+            elif by == "temperature":
+                form = ufl.derivative(form, fields[0])
             return form, (*own, *numbers, *constants), [u, *fields]
 
         types = tuple(type(material) for material in materials)
@@ -140,104 +161,6 @@ class ShapeForms:
 def _by_shape(form: ufl.Form, cell_type: str) -> ufl.Form:
     velocity = ufl.TestFunction(_dolfinx.displacement_space(cell_type))
     return ufl.derivative(form, ufl.SpatialCoordinate(_dolfinx.template(cell_type)), velocity)
-
-
-def work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Return ∂/∂X of a(u, w) − L(w), this rank's share, at the nodes of all bodies, shape (n_nodes, dim)."""
-    return strain_work_by_shape(forms, torn, u, w) - load_work_by_shape(forms, torn, w)
-
-
-def strain_work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Return ∂/∂X of a(u, w), this rank's share, at the nodes of all bodies, shape (n_nodes, dim).
-
-    Args:
-        forms: Compiled derivatives.
-        torn: The torn system.
-        u: Torn displacement of this rank, [length].
-        w: Torn field used as the test function.
-    """
-    for body in torn.scene.bodies.values():  # all ranks compile, also for bodies without a part on them
-        for materials in material_sets(body):
-            forms.virtual_work_by_shape(materials, body.mesh.cell_type)
-
-    def on_subdomain(subdomain: Subdomain, functions: Sequence[_dolfinx.fem.Function]) -> np.ndarray:
-        parts, cell_type = subdomain.material, torn.scene.bodies[subdomain.mesh.body].mesh.cell_type
-        template = forms.virtual_work_by_shape(parts.materials, cell_type)
-        form = template.bind([subdomain.mesh.space], parts.parameters, functions, cells=parts.cells)
-        return _dolfinx.assemble_vector(form)
-
-    return sum_over_subdomains(torn, [u, w], on_subdomain, forms.moving)
-
-
-def load_work_by_shape(forms: ShapeForms, torn: TornSystem, w: np.ndarray) -> np.ndarray:
-    """Return ∂/∂X of L(w), this rank's share, at the nodes of all bodies, shape (n_nodes, dim).
-
-    Loads on surfaces are left out: loaded surfaces do not move with a design.
-
-    Args:
-        forms: Compiled derivatives.
-        torn: The torn system.
-        w: Torn field used as the test function.
-
-    Raises:
-        InvalidInputError: If a load on a body that moves is a function of position without a derivative.
-    """
-    loads = moving_loads(torn, forms.moving)
-    for load in loads:  # all ranks compile
-        body = torn.scene.bodies[load.body]
-        for materials in material_sets(body):
-            forms.load_by_shape(load, materials, body.mesh.cell_type)
-
-    def on_subdomain(subdomain: Subdomain, functions: Sequence[_dolfinx.fem.Function]) -> np.ndarray:
-        parts, result = subdomain.material, np.zeros(subdomain.mesh.size)
-        for load in loads:
-            if load.body == subdomain.mesh.body:
-                cell_type = torn.scene.bodies[load.body].mesh.cell_type
-                template = forms.load_by_shape(load, parts.materials, cell_type)
-                cells = parts.cells if isinstance(load, ThermalStrain) else None
-                values = load_parameters(load, parts)
-                form = template.bind([subdomain.mesh.space], values, functions, cells=cells)
-                result += _dolfinx.assemble_vector(form)
-        return result
-
-    return sum_over_subdomains(torn, [w], on_subdomain, forms.moving)
-
-
-def moving_loads(torn: TornSystem, moving: np.ndarray | None) -> list[Load]:
-    """Return the loads that act on moving volumes.
-
-    Args:
-        torn: The torn system.
-        moving: Marks of nodes of all bodies, or None for all.
-
-    Raises:
-        InvalidInputError: If one of them has no derivative.
-    """
-    tearing = torn.decomposition.tearing
-
-    def moves(body: str) -> bool:
-        nodes = np.arange(torn.scene.bodies[body].mesh.n_nodes)
-        return moving is None or bool(moving[tearing.global_nodes(body, nodes)].any())
-
-    loads: list[Load] = [
-        load for load in torn.scene.loads if isinstance(load, VolumeLoad) and moves(load.body)
-    ]
-    check_differentiable(loads)
-    return loads
-
-
-def check_differentiable(loads: Sequence[Load]) -> None:
-    """Reject loads whose derivative by the nodal positions is unknown.
-
-    Raises:
-        InvalidInputError: If a load is a plain function of position.
-    """
-    for load in loads:
-        if callable(load.value):
-            raise InvalidInputError(
-                f"a {type(load).__name__} on body {load.body!r}, whose shape changes, must be numbers or "
-                "Ufl, got a function of position, which has no derivative: write it as Ufl(lambda x: ...)"
-            )
 
 
 def sum_over_subdomains(

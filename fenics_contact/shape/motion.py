@@ -15,7 +15,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.fem import Template, volume_measure
 from fenics_contact.feti import Decomposition
 from fenics_contact.linalg import dispose_with
-from fenics_contact.scene import Body, Scene, SurfaceLoad, mirrored
+from fenics_contact.scene import Body, Scene, mirrored
 from fenics_contact.shape.design import SurfaceDesign
 
 
@@ -53,7 +53,7 @@ class HarmonicExtension:
         both = int(np.count_nonzero(held[moving].all(axis=1)))
         if both:
             raise InvalidInputError(
-                f"the design surface must keep away from supports and loads, but {both} nodes of "
+                f"the design surface must keep away from supports, but {both} nodes of "
                 f"body {name!r} "
                 "lie on both: choose another surface"
             )
@@ -150,7 +150,7 @@ def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign)
     """Return the extension that moves the mesh of a body with its design. Collective.
 
     Raises:
-        InvalidInputError: If a moving surface is held or loaded.
+        InvalidInputError: If a moving surface is held.
     """
     name = design.body
     body = scene.bodies[name]
@@ -160,9 +160,6 @@ def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign)
         if support.body == name:
             facets = body.mesh.surfaces[support.surface]
             held[facets[~cut[facets].all(axis=1).any(axis=1)]] = True
-    for load in scene.loads:
-        if load.body == name and isinstance(load, SurfaceLoad):
-            held[body.mesh.surfaces[load.surface]] = True
     held[design.nodes_beyond_transition(body.mesh, cut)] = True
     return HarmonicExtension(decomposition, name, body, design.lattice.nodes, held)
 

@@ -26,15 +26,15 @@ from fenics_contact.shape.beside import with_fewest_weak_points
 from fenics_contact.shape.contact_derivative import contact_by_shape
 from fenics_contact.shape.design import SurfaceDesign
 from fenics_contact.shape.design_function import DesignFunction
-from fenics_contact.shape.forms import work_by_shape
 from fenics_contact.shape.geometry import DesignGeometry
 from fenics_contact.shape.linearised_face import LinearisedFace, WeakChoice, linearise_face
 from fenics_contact.shape.memory import DesignMemory, DesignPoint, Stored
 from fenics_contact.shape.objective import Objective, Partials, asking, finite, finite_partials, finite_value
-from fenics_contact.shape.pairs import check_case, checked_contact
+from fenics_contact.shape.scenes import check_case, checked_contact
 from fenics_contact.shape.state_error import state_error
 from fenics_contact.shape.tied_derivative import ties_by_shape
 from fenics_contact.shape.tolerance import AdaptiveTolerance, tightest_of
+from fenics_contact.shape.work_derivative import work_by_shape
 
 #: Tolerance of the adjoint relative to that of its state, and the smallest: no looser than the state's.
 ADJOINT_SHARE, ADJOINT_FLOOR = 1e-1, 1e-11
@@ -367,7 +367,7 @@ class ShapeProblem:
             InvalidInputError: If it has other bodies, its supports hold other components, or its pairs or
                 loads have no derivative by the designs.
         """
-        check_case(self.scene, scene, self.geometry.moving)
+        check_case(self.scene, scene)
         other = copy(self)
         other.scene, other.objective, other._beside = scene, objective or self.objective, self
         other.evaluations, other.products = 0, 0

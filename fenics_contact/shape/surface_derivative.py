@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from fenics_contact.surfaces import (
     FacetedSurface,
+    GaussPoint,
     bearing_pulled_back,
     corner_normals,
     corner_products,
@@ -95,16 +98,33 @@ def areas_pulled_back(surface: FacetedSurface, by_areas: np.ndarray) -> np.ndarr
 
 def _nodal_areas_pulled_back(points: np.ndarray, facets: np.ndarray, by_areas: np.ndarray) -> np.ndarray:
     """Reverse of `nodal_areas`: from derivatives by the area of each node of each facet, facets' shape."""
+    return integral_pulled_back(points, facets, lambda at: (by_areas @ at.values, np.zeros((1, 1))))
+
+
+#: Returns an integrand at a Gauss point of every facet, shape (n_facets,), and its derivative by the place.
+SurfaceDensity = Callable[[GaussPoint], tuple[np.ndarray, np.ndarray]]
+
+
+def integral_pulled_back(points: np.ndarray, facets: np.ndarray, density: SurfaceDensity) -> np.ndarray:
+    """Return the derivative of an integral over facets by the nodes, shape (n_nodes, dim).
+
+    Args:
+        points: Coordinates, shape (n_nodes, dim), [length].
+        facets: Node numbers of linear or quadratic facets.
+        density: The integrand.
+    """
     result = np.zeros_like(points)
     for at in gauss_points(points, facets):
-        by_area = at.weight * (by_areas @ at.values)[:, None]
+        value, by_place = density(at)
         unit = at.normals / at.areas[:, None]
         if points.shape[1] == 3:
             first, second = at.tangents[:, 0], at.tangents[:, 1]
             by_tangents = np.stack([np.cross(second, unit), np.cross(unit, first)], axis=1)
         else:
             by_tangents = rotated_back(unit)[:, None]
-        np.add.at(result, facets, np.einsum("ka,nad->nkd", at.gradients, by_area[:, None] * by_tangents))
+        by_tangents = at.weight * value[:, None, None] * by_tangents
+        by_corners = np.einsum("ka,nad->nkd", at.gradients, by_tangents)
+        np.add.at(result, facets, by_corners + at.values[:, None] * (at.areas[:, None] * by_place)[:, None])
     return result
 
 

@@ -10,17 +10,17 @@ import numpy as np
 
 from fenics_contact import _dolfinx
 from fenics_contact.contact import State
-from fenics_contact.errors import InvalidInputError
+from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.fem import material_sets, temperature_of
 from fenics_contact.feti import Subdomain
 from fenics_contact.shape.forms import (
     Density,
     Integrand,
     ShapeForms,
-    check_differentiable,
     subdomain_fields,
     sum_over_subdomains,
 )
+from fenics_contact.shape.nodal_fields import field_by_places
 from fenics_contact.shape.objective import Partials
 from fenics_contact.shape.sums import Weighable
 
@@ -58,7 +58,6 @@ class BodyIntegral:
     def derivatives(self, *numbers: float) -> dict[str, np.ndarray]:
         """Return the derivatives by displacements and shape, by UFL. Collective."""
         torn, u = self.state.torn, self.state.torn_displacement
-        check_differentiable(temperature_of(torn.scene.loads, self.body).loads)
         by_shape, by_displacement = (self._prepare(by, numbers) for by in ("shape", "displacement"))
 
         def assemble(bind: Bind, subdomain: Subdomain, functions: Functions) -> np.ndarray:
@@ -68,7 +67,25 @@ class BodyIntegral:
 
         gradient = [assemble(by_displacement, *each) for each in subdomain_fields(torn, [u])]
         moving = sum_over_subdomains(torn, [u], partial(assemble, by_shape), self.forms.moving)
-        return {"by_displacement": np.concatenate(gradient), "by_shape": moving}
+        return {"by_displacement": np.concatenate(gradient), "by_shape": moving + self._by_heat(numbers)}
+
+    def _by_heat(self, numbers: tuple[float, ...]) -> np.ndarray | float:
+        """Return the derivative by the places at which temperatures are evaluated. Collective."""
+        torn, heated = self.state.torn, temperature_of(self.state.scene.loads, self.body).of_position
+        if not heated:
+            return 0.0
+        by_temperature, moving = self._prepare("temperature", numbers), self.forms.moving
+
+        def assemble(subdomain: Subdomain, functions: Functions) -> np.ndarray:
+            if subdomain.mesh.body != self.body:
+                return np.zeros(subdomain.mesh.size)
+            space = _dolfinx.scalar_space(subdomain.mesh.space.mesh, 1)
+            by_values = _dolfinx.assemble_vector(by_temperature(subdomain, functions, [space]))
+            parts = [field_by_places(torn, subdomain, load, space, by_values, moving) for load in heated]
+            return np.sum(parts, axis=0)
+
+        with together(torn.decomposition.comm):
+            return sum_over_subdomains(torn, [self.state.torn_displacement], assemble, moving)
 
     def _prepare(self, by: str, numbers: tuple[float, ...]) -> Bind:
         """Compile the integral or a derivative, return a function that binds it to subdomains. Collective."""

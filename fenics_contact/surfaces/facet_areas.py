@@ -88,6 +88,10 @@ class GaussPoint:
         along = self.tangents[:, 0]
         return np.asarray(self.weight * np.stack([along[:, 1], -along[:, 0]], axis=1))
 
+    def of(self, nodal: np.ndarray, facets: np.ndarray) -> np.ndarray:
+        """Return nodal vectors, or the coordinates, at the point in every facet, shape (n_facets, dim)."""
+        return np.asarray(np.einsum("k,nkd->nd", self.values, nodal[facets]))
+
     @property
     def areas(self) -> np.ndarray:
         """The area that belongs to the point, shape (n_facets,), [length²] or [length]."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.shape import contact_derivative, forms, problem, projection_derivative
+from fenics_contact.shape import contact_derivative, problem, projection_derivative, work_derivative
 from fenics_contact.shape.linearised_face import LinearisedFace
 from tests.shape.quotients import Patch
 
@@ -71,7 +71,7 @@ def without_areas(patch: Patch) -> None:
 
 
 def without_weight(patch: Patch) -> None:
-    patch.setattr(forms, "moving_loads", lambda torn, moving: [])
+    patch.setattr(work_derivative, "moving_loads", lambda torn, moving: [])
 
 
 def without_slopes(patch: Patch) -> None:

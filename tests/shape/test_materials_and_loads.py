@@ -8,7 +8,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.scene import (
     Body,
@@ -24,7 +23,7 @@ from fenics_contact.scene import (
     Tresca,
     Ufl,
 )
-from fenics_contact.shape import Objective, forms
+from fenics_contact.shape import Objective, work_derivative
 from tests.contact.gallery import FLOOR, crowned
 from tests.shape.aims import aims
 from tests.shape.blocks import problem
@@ -75,16 +74,7 @@ def test_heat_and_the_force_count() -> None:
     """Without their derivatives the adjoint misses."""
 
     def left_out(patch: pytest.MonkeyPatch) -> None:
-        patch.setattr(forms, "moving_loads", lambda torn, moving: [])
+        patch.setattr(work_derivative, "moving_loads", lambda torn, moving: [])
 
     judge: Objective = JUDGES["energy"]
     assert miss_without(left_out, line(), judge) > 1e-3
-
-
-def test_a_function_of_position_has_no_derivative() -> None:
-    scene = two_materials()
-    heated = replace(scene, loads=[*scene.loads, ThermalStrain("block", lambda points: points[:, 0])])
-    blocks = problem(heated)
-    message = r"a ThermalStrain on body 'block', whose shape changes, must be numbers or Ufl, got a function"
-    with pytest.raises(InvalidInputError, match=message):
-        blocks.evaluate(np.zeros(blocks.size))

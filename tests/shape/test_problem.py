@@ -65,11 +65,10 @@ def test_a_design_of_an_unknown_body_is_refused() -> None:
         )
 
 
-@pytest.mark.parametrize(("body", "face"), [("lower", "z0"), ("upper", "z1")])
-def test_a_surface_that_is_held_or_loaded_may_not_move(body: str, face: str) -> None:
-    design = SurfaceDesign(body, side(scene().bodies[body].mesh, face), (2, 2))
+def test_a_surface_that_is_held_may_not_move() -> None:
+    design = SurfaceDesign("lower", side(scene().bodies["lower"].mesh, "z0"), (2, 2))
     with pytest.raises(
-        InvalidInputError, match=f"keep away from supports and loads, but .* of body '{body}'"
+        InvalidInputError, match=r"keep away from supports, but .* of body 'lower' lie on both"
     ):
         ShapeProblem(
             ContactProblem(scene(), MPI.COMM_SELF, partitions=partitions(scene())), design, TotalPotential()

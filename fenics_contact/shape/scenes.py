@@ -1,14 +1,12 @@
-"""Which scenes and pairs of surfaces a design may move: those whose rows have shape derivatives."""
+"""Which scenes can be designed, and which are load cases of one design."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene import Scene, Surface, SurfaceLoad
+from fenics_contact.scene import Scene
 
 
 def checked_contact(contact: ContactProblem) -> ContactProblem:
@@ -25,16 +23,15 @@ def checked_contact(contact: ContactProblem) -> ContactProblem:
     return contact
 
 
-def check_case(first: Scene, scene: Scene, moving: Mapping[str, np.ndarray]) -> None:
+def check_case(first: Scene, scene: Scene) -> None:
     """Check that a scene is a load case of the same designs.
 
     Args:
         first: The scene of which designs move the bodies.
         scene: The load case.
-        moving: Body name -> whether a design moves each node, shape (n_nodes,).
 
     Raises:
-        InvalidInputError: Says what differs, or what has no derivative.
+        InvalidInputError: Says what differs.
     """
     if set(scene.bodies) != set(first.bodies):
         raise InvalidInputError(
@@ -52,20 +49,4 @@ def check_case(first: Scene, scene: Scene, moving: Mapping[str, np.ndarray]) -> 
             raise InvalidInputError(
                 f"load cases must hold the same components, their supports of {name!r} differ: give other "
                 "values, or hold by RigidSurface what only some cases move"
-            )
-    for load in scene.loads:
-        if isinstance(load, SurfaceLoad):
-            surface = Surface(load.body, load.surface)
-            _check(scene, moving, (surface,), f"a {type(load).__name__}", "load another surface")
-
-
-def _check(
-    scene: Scene, moving: Mapping[str, np.ndarray], surfaces: Sequence[Surface], what: str, remedy: str
-) -> None:
-    for surface in surfaces:
-        count = int(np.count_nonzero(moving[surface.body][np.unique(scene.facets(surface))]))
-        if count:
-            raise InvalidInputError(
-                f"a design may move only surfaces whose rows have derivatives by the shape, but {what} lies "
-                f"on {surface.name!r} of body {surface.body!r}, of which {count} nodes move: {remedy}"
             )
