@@ -125,7 +125,7 @@ def gradients_of(name: str, function: OfPosition, points: np.ndarray, shape: tup
         shape: Shape of one value: () or (dim,).
 
     Returns:
-        Shape (n, *shape, dim), the derivatives last.
+        Shape ``(n, *shape, dim)``, the derivatives last.
 
     Raises:
         InvalidInputError: If it returns another shape or something other than finite numbers.

@@ -171,7 +171,7 @@ class SurfaceDesign:
         return np.flatnonzero(far)
 
     def control_points(self, points: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-        """Return positions for drawing the control points, shape (*counts, dim), [length].
+        """Return positions for drawing the control points, shape ``(*counts, dim)``, [length].
 
         Each is drawn at its Greville abscissa on the reference surface, moved by its own variable.
 

@@ -21,7 +21,7 @@ def roller_relief(position: np.ndarray, length: float, half_width: float | None 
     pressure of Hertz over ±b, of constant width, at the ends by about A (1.1932 + ln l/(2b)).
 
     Args:
-        position: y from the middle of the roller, |y| ≤ l/2, any shape, [length].
+        position: y from the middle of the roller, between −l/2 and l/2, any shape, [length].
         length: Length l of the roller, [length].
         half_width: Hertz's half width b, [length]; None for a line.
 
