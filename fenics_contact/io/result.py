@@ -174,19 +174,11 @@ an evaluation; None where a trial point was rejected as invalid |
                 "evaluations": result.evaluations,
                 "f_products": problem.products,
             },
-            "constraints": [_finite(vars(one)) for one in result.constraints],
+            "constraints": readable(result.constraints),
             "history": _history(result),
         }
     record["errors"] = _errors(best.state) if _knows_errors(best.state) else None
     return write_json(target, {**record, "more": dict(more or {})}, comm=comm)
-
-
-def _finite(numbers: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a mapping with None for limits that are infinite."""
-    return {
-        name: None if isinstance(value, float) and np.isinf(value) else value
-        for name, value in numbers.items()
-    }
 
 
 def _head(kind: str, comm: MPI.Comm) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from fenics_contact.optimize.evaluation import Known, evaluate_problem
 from fenics_contact.optimize.first_centre import first_centre
 from fenics_contact.optimize.inexactness import Demand, again, demand
 from fenics_contact.optimize.merit import (
+    correcting_step,
     first_soft,
     merit_planes,
     multipliers,
@@ -227,6 +228,10 @@ def _iterated(
         return _reconsidered(method, problem, state, step)
     if reason is not None:
         return state, reason
+    if step.decrease <= max(test.limit, test.rounding) and _violated(method, problem, state):
+        step = correcting_step(state.bundle, surroundings(problem, state.centre), state.soft, step)
+        if step.decrease <= test.rounding:
+            return state, Reason.INFEASIBLE
     return _advanced(method, problem, state, step, _demand(method, state, step, test)), None
 
 
@@ -316,7 +321,7 @@ def _reason_to_stop(
     """Return why the method must stop before trying the step, or None."""
     near = surroundings(problem, state.centre)
     solved = test.reason(step, lambda t: solve_step(state.bundle, near, t, state.soft))
-    if problem.constraints_at(state.centre).violation > method.feasibility:
+    if _violated(method, problem, state):
         solved = None
         if state.trust.exhausted or step.stuck:
             return Reason.INFEASIBLE
@@ -329,6 +334,10 @@ def _reason_to_stop(
     if state.iterations >= method.max_iterations:
         return Reason.ITERATION_LIMIT
     return Reason.EVALUATION_LIMIT if state.evaluations >= method.max_evaluations else None
+
+
+def _violated(method: BundleTrust, problem: PosedProblem, state: MethodState) -> bool:
+    return problem.constraints_at(state.centre).violation > method.feasibility
 
 
 def _advanced(

@@ -8,11 +8,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.optimize.bundle import Bundle
 from fenics_contact.optimize.constraints import Surroundings
 from fenics_contact.optimize.nonlinear import Scaled
 from fenics_contact.optimize.objective import Evaluation
 from fenics_contact.optimize.problem import PosedProblem
+from fenics_contact.optimize.quadratic_program import QuadraticProgram, SubproblemError, solve
 from fenics_contact.optimize.soft_constraint import Plane, SoftConstraint
 from fenics_contact.optimize.state import MethodState
 from fenics_contact.optimize.subproblem import Step, solve_step
@@ -128,6 +130,32 @@ def priced_step(
             return replace(step, stuck=stuck), tuple(soft)
         soft = [one if done else one.raised(factor) for one, done in zip(soft, enough, strict=True)]
         step = solve_step(bundle, near, t, soft)
+
+
+def correcting_step(bundle: Bundle, near: Surroundings, soft: Sequence[SoftConstraint], step: Step) -> Step:
+    """Return the shortest step to where the planes of the inequalities predict no violation.
+
+    Near a minimum what the last small violations cost is lost in the tolerance of the step's programme; this
+    one has their size. The step itself is returned where there is no such point.
+    """
+    reach = max(one.violation / (float(np.linalg.norm(one.bundle.gradients[0])) or 1.0) for one in soft)
+    n = near.rows.shape[1]
+    program = QuadraticProgram(
+        curvature=np.ones(n),
+        slope=np.zeros(n),
+        equality_rows=near.equality_rows,
+        equality_values=np.zeros(near.miss.size),
+        rows=np.vstack([near.rows, *(one.gradients for one in soft)]),
+        limits=np.concatenate([np.maximum(near.room, 0.0), *(one.depths for one in soft)]) / reach,
+    )
+    try:
+        move = reach * solve(program).point
+    except (InvalidInputError, SubproblemError):
+        return step
+    violations = tuple(one.predicted(move) for one in soft)
+    gained = sum(one.penalty * (one.violation - left) for one, left in zip(soft, violations, strict=True))
+    decrease = max(gained - bundle.model(move), 0.0)
+    return replace(step, move=move, decrease=decrease, violations=violations)
 
 
 def _reduced(one: SoftConstraint, left: float, best: float, share: float, rounding: float) -> bool:
