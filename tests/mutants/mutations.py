@@ -122,8 +122,8 @@ MUTATIONS = (
     Mutation(
         "loads at points of rigid surfaces are forgotten",
         "feti/dual.py",
-        "resultants += self._points.T @ self.torn.free.load",
-        "resultants += 0.0 * (self._points.T @ self.torn.free.load)",
+        "resultants += self.points.T @ self.torn.free.load",
+        "resultants += 0.0 * (self.points.T @ self.torn.free.load)",
         (f"{RIGID}::test_a_force_at_a_point_is_that_of_a_spread_force",),
     ),
     Mutation(
