@@ -105,7 +105,8 @@ class BundleTrust:
         descent: Fraction of the predicted decrease that makes a step serious, in (0, 1).
         inexactness: Errors of J requested from an inexact function, as a fraction of the predicted decrease,
             less than half of ``descent``.
-        value_scale: Absolute part of the stopping test, for an objective whose minimum is about 0.
+        value_scale: Absolute part of the stopping test, for an objective whose minimum is about 0; None for
+            the size of J at the start, but at most 1.
         feasibility: Largest violation of a nonlinear constraint at the stop, relative to its size.
         raise_on_failure: Whether a stop for any other reason than CONVERGED or STATIONARY raises.
 
@@ -126,14 +127,15 @@ class BundleTrust:
     locality: float = 0.1
     descent: float = 0.05
     inexactness: float = 0.02
-    value_scale: float = 1.0
+    value_scale: float | None = None
     feasibility: float = 1e-6
     raise_on_failure: bool = True
 
     def __post_init__(self) -> None:
         """Reject parameters with which the method cannot work."""
         for name in ("tolerance", "first_step", "value_scale", "feasibility"):
-            if not 0.0 < getattr(self, name) < np.inf:
+            given = getattr(self, name)
+            if given is not None and not 0.0 < given < np.inf:
                 raise InvalidInputError(f"{name} must be positive and finite, got {getattr(self, name)}")
         for name, least in (("max_iterations", 0), ("max_evaluations", 1), ("max_bundle", 3)):
             if getattr(self, name) < least:
@@ -147,6 +149,10 @@ class BundleTrust:
             )
         if not 0.0 <= self.locality < np.inf:
             raise InvalidInputError(f"locality must not be negative (0 for a convex J), got {self.locality}")
+
+    def size_of(self, first: float) -> float:
+        """Return s of the stopping test for an objective with a first value."""
+        return self.value_scale or min(1.0, abs(first)) or 1.0
 
     def minimize(
         self, problem: PosedProblem, callback: Callback | None = None, checkpoint: Checkpoint | None = None
@@ -216,7 +222,7 @@ def _iterated(
     test = stopping_test(
         state.centre.value,
         tolerance=method.tolerance,
-        value_scale=method.value_scale,
+        value_scale=method.size_of(state.history[0].value),
         reach=method.first_step * problem.length,
         first_t=state.first_t,
     )

@@ -70,9 +70,8 @@ class Method(Protocol):
     def tolerance(self) -> float:
         """Predicted decrease at which it stops."""
 
-    @property
-    def value_scale(self) -> float:
-        """Size of values below which they count as zero."""
+    def size_of(self, first: float) -> float:
+        """Return the size below which values count as zero, from the first one."""
 
 
 class Progress:
@@ -158,7 +157,8 @@ class Progress:
 
     def _tell(self, state: MethodState, *, timed: bool = True) -> None:
         self._state, record = state, state.history[-1]
-        predicted = record.predicted_decrease / (self._method.value_scale + abs(record.best))
+        size = self._method.size_of(state.history[0].value) + abs(record.best)
+        predicted = record.predicted_decrease / size
         words = f"violation {record.violation:.1e}" if self._constrained else ""
         measure = predicted or None
         self._task.step(record.evaluations, measure=measure, value=record.best, words=words, timed=timed)

@@ -61,6 +61,15 @@ def test_objective_of_any_size_is_minimised(factor: float) -> None:
     assert result.value == pytest.approx(factor * case.minimum, rel=2e-6)
 
 
+def test_a_small_objective_is_minimised_as_a_large_one_is_by_default() -> None:
+    case = BY_NAME["Shor"]
+    start = minimize(lambda x: (case.fun(x)[0], case.fun(x)[1]), case.start, FINE)
+    small = minimize(lambda x: (1e-9 * case.fun(x)[0], 1e-9 * case.fun(x)[1]), case.start, FINE)
+    assert small.evaluations > 10
+    first = case.fun(case.start)[0]
+    assert 1e9 * small.value == pytest.approx(start.value, abs=FINE.tolerance * first)
+
+
 def test_variables_of_very_different_size_take_the_same_steps_when_scale_names_them() -> None:
     case, size = BY_NAME["Shor"], 10.0 ** np.array([-6, -3, 0, 3, 6])
 
