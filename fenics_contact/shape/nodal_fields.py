@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import cast
 
 import numpy as np
 
 from fenics_contact import _dolfinx
 from fenics_contact.fem import is_scalar
 from fenics_contact.feti import Subdomain, TornSystem
-from fenics_contact.scene import Load, SurfaceLoad, gradients_of
+from fenics_contact.scene import Load, OfPosition, SurfaceLoad, gradients_of
 
 
 def field_by_places(
@@ -42,11 +42,11 @@ def field_by_places(
         chosen &= np.isin(nodes, mesh_of_body.surfaces[load.surface])
     inputs, dofs = _dolfinx.node_dofs(space)
     _, own_dofs = _dolfinx.node_dofs(mesh.space)
-    here, value = chosen[inputs], load.value
+    here = chosen[inputs]
     shape = () if is_scalar(load) else (dim,)
     places = mesh_of_body.points[nodes[inputs[here]]]
-    function: Any = value
-    slope = gradients_of(f"{type(load).__name__} on body {load.body!r}", function, places, shape)
+    function, name = cast(OfPosition, load.value), f"{type(load).__name__} on body {load.body!r}"
+    slope = gradients_of(name, function, places, shape)
     weight = by_values.reshape(len(nodes), -1)[dofs[here]]
     result = np.zeros((len(nodes), dim))
     result[own_dofs[here]] = np.einsum("nc,ncd->nd", weight, slope.reshape(*weight.shape, dim))
