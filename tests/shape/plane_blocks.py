@@ -81,12 +81,14 @@ SCENES: dict[str, Callable[[], Scene]] = {
 OBJECTIVES = {**objectives("block"), **aims("block", "y0", 2)}
 
 
-def plane_problem(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF, also: Sequence[Surface] = ()) -> Remembering:
+def plane_problem(
+    scene: Scene, comm: MPI.Comm = MPI.COMM_SELF, also: Sequence[Surface] = (), cuts: int = 2
+) -> Remembering:
     """All contact curves, or surfaces, of a scene move, and others."""
     surfaces = [s for pair in scene.contacts for s in (pair.slave, pair.master) if isinstance(s, Surface)]
     net = 5 if scene.dim == 2 else (3, 2)
     designs = tuple(SurfaceDesign(s.body, s.name, net) for s in (*surfaces, *also))
-    contact = ContactProblem(scene, comm, partitions=partitions(scene), solver=SOLVER)
+    contact = ContactProblem(scene, comm, partitions=partitions(scene, (cuts, 1, 1)), solver=SOLVER)
     return Remembering(contact, designs, TotalPotential())
 
 

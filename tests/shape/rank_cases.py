@@ -11,11 +11,12 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
-from fenics_contact.scene import Coulomb, Surface, Tresca
+from fenics_contact.scene import BodyForce, Coulomb, Surface, ThermalStrain, TotalForce, Tresca
 from fenics_contact.shape import HarmonicExtension
 from tests.shape.aims import aims
 from tests.shape.blocks import block_on_block, problem
 from tests.shape.chains import chain_problem
+from tests.shape.loaded_blocks import loaded, warm
 from tests.shape.mortar_lines import chain_problem_by_mortar
 from tests.shape.objectives import objectives
 from tests.shape.plane_blocks import on_block, plane_problem
@@ -31,6 +32,19 @@ PROBLEMS: dict[str, Callable[[MPI.Comm], Remembering]] = {
     "chain": lambda comm: chain_problem(Coulomb(0.3), comm),
     "plane, quadratic": lambda comm: plane_problem(on_block(Coulomb(0.38), "quadrilateral", 2), comm),
     "chain by mortar": chain_problem_by_mortar,
+    "loaded": lambda comm: plane_problem(
+        loaded(
+            "triangle",
+            [
+                TotalForce("block", "y1", (0.6, -4.0), moment=0.2, at=(1.1, 1.2)),
+                BodyForce("block", lambda points: 0.2 * np.sin(points)),
+                ThermalStrain("block", warm),
+            ],
+        ),
+        comm,
+        also=[Surface("block", "y1")],
+        cuts=4,
+    ),
     "tied": lambda comm: plane_problem(capped("triangle", sliding=True), comm, also=[Surface("block", "y1")]),
 }
 #: Who judges: between them they ask everything of a state.
@@ -41,10 +55,23 @@ JUDGES = {
     "plane, quadratic": ("displacement", "friction forces", "largest stress"),
     "chain by mortar": ("energy", "stress", "unevenness"),
     "tied": ("stress", "normal forces"),
+    "loaded": ("energy", "stress"),
 }
-BODY = {"chain": "link2", "plane, quadratic": "block", "chain by mortar": "link2", "tied": "cap"}
-SURFACE = {"chain": "contact", "plane, quadratic": "y0", "chain by mortar": "contact", "tied": "y0"}
-SIZE = {"chain": 0.03, "plane, quadratic": 0.004, "chain by mortar": 0.03, "tied": 0.004}
+BODY = {
+    "chain": "link2",
+    "plane, quadratic": "block",
+    "chain by mortar": "link2",
+    "tied": "cap",
+    "loaded": "block",
+}
+SURFACE = {
+    "chain": "contact",
+    "plane, quadratic": "y0",
+    "chain by mortar": "contact",
+    "tied": "y0",
+    "loaded": "y0",
+}
+SIZE = {"chain": 0.03, "plane, quadratic": 0.004, "chain by mortar": 0.03, "tied": 0.004, "loaded": 0.004}
 
 
 def same_bits(comm: MPI.Comm, *arrays: np.ndarray | float) -> bool:
