@@ -98,7 +98,9 @@ output = Path("output") / ("chain_links" if published else f"chain_links_{aim}")
 #
 # Steel links of 16 mm wire and 48 mm pitch, pulled with 80 kN. Dimensions, material, load and friction
 # coefficient of the published experiment are not known; these are those of a real chain at its working load.
-# Nothing numerical happens here: a scene only says what there is.
+# Nothing numerical happens here: a scene only says what there is. Contact is by nodes, as in the published
+# experiment. Where pressure counts it is by mortar: an optimiser finds designs of which single nodes do not
+# see the peak. The one for less pressure at nodes lowers it by 39 % there, by 22 % as mortar measures it.
 
 force = 80e3  # N
 timer = PhaseTimer()
@@ -116,6 +118,7 @@ scene = Scene(
             slave=Surface("link 2", "contact"),
             master=Surface("link 1", "contact"),
             friction=Coulomb(friction_coefficient),
+            discretisation="node" if published else "mortar",
         )
     ],
 )
@@ -159,7 +162,7 @@ with show_progress(comm):
     result = minimize(
         problem,
         start,
-        BundleTrust(tolerance=1e-4),
+        BundleTrust(tolerance=1e-4 if published else 1e-3),
         bounds=(np.full(problem.size, -0.25), np.full(problem.size, 0.25)),
         constraints=keep_volume,
         callback=series.follow(problem),
