@@ -15,7 +15,7 @@ from fenics_contact.shape.forms import ShapeForms, sum_over_subdomains
 from fenics_contact.shape.nodal_fields import field_by_places
 from fenics_contact.shape.resultant_derivative import resultant_by_shape
 
-Functions = Sequence[_dolfinx.fem.Function]
+Functions = Sequence["_dolfinx.fem.Function"]
 
 
 def work_by_shape(forms: ShapeForms, torn: TornSystem, u: np.ndarray, w: np.ndarray) -> np.ndarray:
