@@ -17,7 +17,7 @@ from fenics_contact.optimize.manufacture import (
 )
 from fenics_contact.optimize.minimization import minimize
 from fenics_contact.optimize.nonlinear import ConstraintValue, NonlinearConstraint
-from fenics_contact.optimize.objective import Inexact, Kinked
+from fenics_contact.optimize.objective import Inexact, Kinked, Pieced
 from fenics_contact.optimize.problem import PosedProblem, pose
 from fenics_contact.optimize.progress import Callback, Resumable
 from fenics_contact.optimize.quadratic_program import SubproblemError
@@ -37,6 +37,7 @@ __all__ = [
     "LinearConstraints",
     "NonlinearConstraint",
     "NotConvergedError",
+    "Pieced",
     "PosedProblem",
     "Reason",
     "Record",

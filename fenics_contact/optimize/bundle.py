@@ -113,20 +113,21 @@ class Bundle:
         gradients[0], errors[0], noises[0], doubts[0], more[0] = gradient, 0.0, noise, doubtful, pushes
         return Bundle(gradients, errors, self.distances, self.locality, noises, doubts, more)
 
-    def moved(self, step: Array, change: float, locality: float) -> Bundle:
+    def moved(self, step: Array, change: float, locality: float, own: int = 1) -> Bundle:
         """Return the bundle seen from a new centre, whose own plane is the last one.
 
         Args:
             step: Move of the centre, shape (n,), scaled variables.
             change: Change of J.
             locality: c at the new centre.
+            own: Number of planes at the end that were found at the new centre.
 
         Returns:
             The same planes with new errors and longer distances, the centre's plane first.
         """
         errors = self.errors + change - self.gradients @ step
         distances = self.distances + np.linalg.norm(step)
-        errors[-1] = distances[-1] = 0.0
+        errors[-1] = distances[-own:] = 0.0
         order = np.roll(np.arange(self.size), 1)
         return replace(
             self.chosen(order), errors=errors[order], distances=distances[order], locality=locality

@@ -23,6 +23,7 @@ from fenics_contact.optimize.merit import (
     multipliers,
     priced_step,
     surroundings,
+    with_pieces,
 )
 from fenics_contact.optimize.objective import Accuracy, Evaluation, can_be_inexact
 from fenics_contact.optimize.problem import PosedProblem
@@ -204,6 +205,7 @@ def _start(method: BundleTrust, problem: PosedProblem) -> MethodState:
     t = method.first_step * problem.length / (norm or 1.0)
     locality, first = method.locality * norm / problem.length, planes[0]
     bundle = Bundle.of_centre(first.gradient, locality, centre.error, centre.doubtful, first.pushes)
+    bundle = with_pieces(bundle, problem, centre, centre.value, np.zeros(problem.start.size))
     radius = _RADIUS * problem.length
     trust = Trust(t, radius, _T_LEAST * t, _T_MOST * t, _RADIUS_LEAST * problem.length)
     violation = problem.constraints_at(centre).violation
@@ -211,8 +213,7 @@ def _start(method: BundleTrust, problem: PosedProblem) -> MethodState:
         0, StepKind.START, centre.value, centre.value, 0.0, t, 0.0, norm, 0.0, 1, 1, centre.error, violation
     )
     soft = first_soft(planes, method.locality / problem.length, centre.doubtful)
-    pushes = np.zeros(len(problem.nonlinear))
-    return MethodState(centre, bundle, trust, t, (record,), soft=soft, multipliers=pushes)
+    return MethodState(centre, bundle, trust, t, (record,), False, soft, np.zeros(len(problem.nonlinear)))
 
 
 def _iterated(
@@ -372,8 +373,9 @@ def _judged(
     first, *others = merit_planes(problem, evaluation)
     change, slope = evaluation.value - state.centre.value, float(first.gradient @ step.move)
     error, doubtful, room = slope - change, evaluation.doubtful, method.max_bundle - 1
-    # Reduced before the cut is added: the weights belong to the old planes, and the new one must stay.
-    bundle = state.bundle.reduced(step.weights, room)
+    # Reduced before the cuts are added: the weights belong to the old planes, and the new ones must stay.
+    bundle = state.bundle.reduced(step.weights, max(2, room - evaluation.pieces.size))
+    bundle = with_pieces(bundle, problem, evaluation, state.centre.value, step.move)
     bundle = bundle.with_cut(first.gradient, error, step.length, first.noise, doubtful, first.pushes)
     cuts = [
         one.reduced(weights, room).with_cut(plane, step.move, doubtful)
@@ -387,11 +389,11 @@ def _judged(
         history = recorded(problem, state, step, StepKind.NULL, evaluation)
         trust = state.trust.after_null(trial)
         return replace(state, bundle=bundle, soft=soft, trust=trust, history=history)
-    locality = method.locality / problem.length
+    locality, nearness = method.locality / problem.length, method.locality * first.length / problem.length
     return replace(
         state,
         centre=evaluation,
-        bundle=bundle.moved(step.move, change, method.locality * first.length / problem.length),
+        bundle=bundle.moved(step.move, change, nearness, 1 + evaluation.pieces.size),
         soft=tuple(one.moved(plane, step.move, locality) for one, plane in zip(soft, others, strict=True)),
         trust=state.trust.after_serious(trial),
         history=recorded(problem, state, step, StepKind.SERIOUS, evaluation),

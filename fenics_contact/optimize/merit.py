@@ -64,6 +64,27 @@ def merit_planes(problem: PosedProblem, evaluation: Evaluation) -> list[Plane]:
     return [Plane(*each) for each in zip(values, along, noises, pushes, steep, strict=True)]
 
 
+def with_pieces(
+    bundle: Bundle, problem: PosedProblem, evaluation: Evaluation, centre: float, move: Array
+) -> Bundle:
+    """Return the bundle with the planes of other functions of which J is the largest, see `Pieced`.
+
+    Args:
+        bundle: The bundle.
+        problem: The problem.
+        evaluation: Evaluation of a trial point.
+        centre: J at the centre.
+        move: The step from there to the trial point, shape (n,), scaled variables.
+    """
+    for value, slope in zip(evaluation.pieces.tolist(), evaluation.piece_slopes, strict=True):
+        plane = merit_planes(problem, replace(evaluation, value=value, subgradient=slope))[0]
+        error, length = float(plane.gradient @ move) - (value - centre), float(np.linalg.norm(move))
+        bundle = bundle.with_cut(
+            plane.gradient, error, length, plane.noise, evaluation.doubtful, plane.pushes
+        )
+    return bundle
+
+
 def _slopes(problem: PosedProblem, evaluation: Evaluation) -> tuple[Scaled, Array]:
     """Return the constraints of an evaluation and their gradients in scaled variables, over their sizes."""
     here = problem.constraints_at(evaluation)

@@ -65,6 +65,27 @@ class Kinked(Protocol):
         """
 
 
+@runtime_checkable
+class Pieced(Protocol):
+    """A maximum J = max J_k of functions, several of which an evaluation knows, such as of load cases.
+
+    The planes of all of them enter the model: fewer evaluations are needed to find where they are equal.
+    """
+
+    def __call__(self, x: Array) -> tuple[float, ArrayLike]:
+        """Return J(x) and a subgradient, those of the largest."""
+
+    def pieces(self, x: Array) -> tuple[ArrayLike, ArrayLike]:
+        """Return what the evaluation at x, the last one, knows of the other functions.
+
+        Args:
+            x: Point, shape (n,).
+
+        Returns:
+            J_k(x), not above J(x), shape (k,), and a subgradient of each, shape (k, n).
+        """
+
+
 @dataclass(frozen=True)
 class Accuracy:
     """Requested accuracy of an evaluation: 0 for the best possible, inf for any.
@@ -95,6 +116,8 @@ class Evaluation:
         constraints: Values c(x) of the nonlinear constraints, shape (k,).
         slopes: Their subgradients, shape (k, n), in the caller's variables.
         constraint_errors: Estimated errors of their values, shape (k,).
+        pieces: Values at x of other functions of which J is the largest, see `Pieced`, shape (p,).
+        piece_slopes: Their subgradients, shape (p, n), in the caller's variables.
     """
 
     x: Array
@@ -108,6 +131,8 @@ class Evaluation:
     constraints: Array = field(default_factory=lambda: np.zeros(0))
     slopes: Array = field(default_factory=lambda: np.zeros((0, 0)))
     constraint_errors: Array = field(default_factory=lambda: np.zeros(0))
+    pieces: Array = field(default_factory=lambda: np.zeros(0))
+    piece_slopes: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 def can_be_inexact(fun: Fun) -> bool:
@@ -145,7 +170,22 @@ def evaluate(
             asked_subgradient=accuracy.subgradient,
             turned=float(np.inf),
         )
-    return replace(evaluation, doubtful=isinstance(fun, Kinked) and bool(fun.doubtful(x.copy())))
+    evaluation = replace(evaluation, doubtful=isinstance(fun, Kinked) and bool(fun.doubtful(x.copy())))
+    return _with_pieces(fun, evaluation, f"at evaluation {number}") if isinstance(fun, Pieced) else evaluation
+
+
+def _with_pieces(fun: Pieced, evaluation: Evaluation, where: str) -> Evaluation:
+    """Return the evaluation with those of other functions of which J is the largest."""
+    given = fun.pieces(evaluation.x.copy())
+    values, slopes = (np.array(part, dtype=float) for part in given)
+    if values.ndim != 1 or slopes.shape != (values.size, evaluation.x.size):
+        raise InvalidInputError(
+            f"pieces must return values (k,) and subgradients (k, {evaluation.x.size}), got shapes "
+            f"{values.shape} and {slopes.shape} {where}"
+        )
+    require_finite("pieces must return finite values", values, where)
+    require_finite("pieces must return finite subgradients", slopes, where)
+    return replace(evaluation, pieces=np.minimum(values, evaluation.value), piece_slopes=slopes)
 
 
 def beside(fun: Fun, evaluation: Evaluation, end: Array, number: int, name: str = "fun") -> Evaluation:

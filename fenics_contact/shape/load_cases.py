@@ -20,8 +20,8 @@ class LoadCases:
 
     Each case is a `ShapeProblem`; the others are made of the first by `ShapeProblem.case`. One design costs a
     state and an adjoint for each case, but only one mesh motion, and one assembly and factorisation of what
-    moved. The subgradient of a maximum is that of the largest case. Samples of an uncertain friction
-    coefficient are load cases, too.
+    moved. The subgradient of a maximum is that of the largest case; `minimize` uses the gradients of the
+    others as well. Samples of an uncertain friction coefficient are load cases, too.
 
     Attributes:
         problems: Name of the case -> its problem.
@@ -111,6 +111,20 @@ class LoadCases:
     def __call__(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
         """Return J(α) and a subgradient. Collective; raises as `ShapeProblem` does."""
         return self._joined({name: problem(alpha) for name, problem in self.problems.items()})
+
+    def pieces(self, alpha: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return J_k and gradients of the cases beside the largest, for `optimize`. Collective.
+
+        Args:
+            alpha: The design evaluated last, shape (size,), [length].
+
+        Returns:
+            Values, shape (k,), and gradients, shape (k, size); none of a weighted sum.
+        """
+        known = [] if self.weights is not None else [each.known(alpha) for each in self.problems.values()]
+        points = sorted((each for each in known if each is not None), key=lambda each: -each.value)[1:]
+        gradients = np.array([each.gradient for each in points]).reshape(len(points), self.size)
+        return np.array([each.value for each in points]), gradients
 
     def within(self, alpha: np.ndarray, value: float, subgradient: float) -> tuple[float, np.ndarray, float]:
         """Return J(α), a subgradient and the estimated error of J, see `ShapeProblem.within`. Collective."""

@@ -90,8 +90,8 @@ FACES = ("scene", "mesh", "contact", "shape", "optimize", "accuracy")
 MOST_PRINTED = 25
 #: Protocols, and classes to derive from.
 NO_OBJECTS = {
-    "Elasticity", "EnergyModel", "Inexact", "Kinked", "Material", "Objective", "Resumable", "RigidObstacle",
-    "SurfaceShape", "Thermoelastic", "Transverse", "Weighable",
+    "Elasticity", "EnergyModel", "Inexact", "Kinked", "Material", "Objective", "Pieced", "Resumable",
+    "RigidObstacle", "SurfaceShape", "Thermoelastic", "Transverse", "Weighable",
 }  # fmt: skip
 
 

@@ -54,6 +54,18 @@ def test_the_cases_of_a_design_share_meshes_matrices_and_factors() -> None:
     assert any(mine is not theirs for mine, theirs in zip(pieces[0], moved, strict=True))
 
 
+def test_the_other_cases_are_told_with_their_gradients() -> None:
+    both, alpha = cases(False), design(6, 0.002)
+    value, _ = both(alpha)
+    values, gradients = both.pieces(alpha)
+    alone = sorted(both.values_of(alpha).values())
+    assert [*sorted(values), value] == pytest.approx(alone, rel=1e-9)
+    first = both.problems["pressed"].known(alpha)
+    assert first is not None
+    assert any(np.array_equal(first.gradient, each) for each in gradients) or first.value == value
+    assert cases(True).pieces(alpha)[0].size == 0
+
+
 def test_a_minimum_of_the_largest_case_lies_above_each_case_alone() -> None:
     both, bounds = cases(False), (-0.004, 0.004)
     start = both(np.zeros(both.size))[0]
