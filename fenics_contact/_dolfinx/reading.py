@@ -167,7 +167,7 @@ def tag_arrays(mesh: dolfinx.mesh.Mesh, arrays: MeshArrays, tags: dolfinx.mesh.M
     topology.create_connectivity(arrays.dim, tags.dim)
     core = mesh._mesh if old() else mesh._cpp_object
     corners = len(facet_vertices(arrays.cell_type)[0])  # before the other nodes of quadratic facets
-    facets = np.empty((0, corners), dtype=np.int64)
+    facets: np.ndarray = np.empty((0, corners), dtype=np.int64)
     if len(indices):  # of no facets dolfinx 0.9 divides by their number
         rows = np.asarray(cpp.mesh.entities_to_geometry(core, tags.dim, indices, False))
         facets = arrays.node[rows.reshape(len(indices), -1)][:, :corners]

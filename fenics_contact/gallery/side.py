@@ -72,7 +72,7 @@ def _grid(mesh: BodyMesh, facets: np.ndarray) -> DesignSurface | None:
 
 def _curve(mesh: BodyMesh, facets: np.ndarray) -> DesignSurface | None:
     """Return the nodes of edges in the order of a line; None if they are not one line with two ends."""
-    after = dict(facets.tolist())
+    after = {int(start): int(end) for start, end in facets}
     starts = set(after) - set(after.values())
     if len(after) != len(facets) or len(starts) != 1:
         return None

@@ -41,7 +41,7 @@ def first_centre(problem: PosedProblem, subgradient: float, feasibility: float) 
         raise InvalidDesignError(f"the starting design must be valid: {error}") from error
     here = problem.constraints_at(centre)
     if not problem.restore and here.violation > feasibility:
-        _refuse(problem.nonlinear, centre.constraints.tolist(), feasibility)
+        _refuse(problem.nonlinear, [float(value) for value in centre.constraints], feasibility)
     return centre
 
 

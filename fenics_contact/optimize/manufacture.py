@@ -201,7 +201,8 @@ def _bending(design: Net, axis: int, points: Array | None, what: str) -> tuple[A
     """Return rows of w'' + κ² w at every second difference along the axis, and κ there."""
     net = _lines(design, axis, 3, what)
     count, lines = net.shape
-    lengths, curvature = np.ones(lines), np.zeros((count - 2, lines))
+    lengths: Array = np.ones(lines)
+    curvature: Array = np.zeros((count - 2, lines))
     if points is not None:
         lengths, curvature = _reference(design, axis, np.asarray(points, dtype=float))
     factor = (count - 1) * (count - 2) / np.broadcast_to(lengths, curvature.shape).ravel()[:, None] ** 2

@@ -52,16 +52,18 @@ def merit_planes(problem: PosedProblem, evaluation: Evaluation) -> list[Plane]:
         return [Plane(evaluation.value, gradient, evaluation.error, np.zeros(0), steepness)]
     here, slopes = _slopes(problem, evaluation)
     gradients, normals = np.vstack([gradient, slopes[~here.equal]]), slopes[here.equal]
-    pushes = np.zeros((len(gradients), len(normals)))
+    pushes: Array = np.zeros((len(gradients), len(normals)))
     if len(normals):
         near = problem.allowed.around(evaluation.x, problem.scale)
         every = np.vstack([normals, near.rows[near.room <= 1e-9], near.equality_rows])
         pushes = np.linalg.lstsq(every.T, -gradients.T, rcond=None)[0][: len(normals)].T
-    values = [evaluation.value, *here.excess[~here.equal].tolist()]
-    noises = [evaluation.error, *(np.abs(here.factors) * evaluation.constraint_errors)[~here.equal].tolist()]
-    steep = np.linalg.norm(gradients, axis=1).tolist()
-    along = gradients + pushes @ normals
-    return [Plane(*each) for each in zip(values, along, noises, pushes, steep, strict=True)]
+    values = np.append(evaluation.value, here.excess[~here.equal])
+    noises = np.append(evaluation.error, (np.abs(here.factors) * evaluation.constraint_errors)[~here.equal])
+    steep, along = np.linalg.norm(gradients, axis=1), gradients + pushes @ normals
+    return [
+        Plane(float(values[k]), along[k], float(noises[k]), pushes[k], float(steep[k]))
+        for k in range(len(values))
+    ]
 
 
 def with_pieces(
@@ -76,7 +78,7 @@ def with_pieces(
         centre: J at the centre.
         move: The step from there to the trial point, shape (n,), scaled variables.
     """
-    for value, slope in zip(evaluation.pieces.tolist(), evaluation.piece_slopes, strict=True):
+    for value, slope in zip(map(float, evaluation.pieces), evaluation.piece_slopes, strict=True):
         plane = merit_planes(problem, replace(evaluation, value=value, subgradient=slope))[0]
         error, length = float(plane.gradient @ move) - (value - centre), float(np.linalg.norm(move))
         bundle = bundle.with_cut(

@@ -120,7 +120,8 @@ class SoftConstraint:
     def reduced(self, weights: Array, room: int) -> SoftConstraint:
         """Return the constraint with at most ``room`` planes, see `Bundle.reduced`."""
         total = float(weights.sum())
-        return replace(self, bundle=self.bundle.reduced(weights / total if total > 0.0 else weights, room))
+        shares: Array = weights / (total if total > 0.0 else 1.0)
+        return replace(self, bundle=self.bundle.reduced(shares, room))
 
     def refined(self, plane: Plane, doubtful: bool) -> SoftConstraint:
         """Return the constraint after its centre was re-evaluated."""

@@ -11,6 +11,9 @@ from tests.shape import chains, mortar_lines, moved_blocks, quadratic_blocks
 from tests.shape.aims import aims
 from tests.shape.quotients import Line
 
+#: Many states: what claims rest on.
+pytestmark = [pytest.mark.slow, pytest.mark.claim]
+
 AIMS = {
     "floor": aims("block", "z0"),
     "floor, Tresca": aims("block", "z1"),

@@ -18,6 +18,9 @@ from tests.shape.loaded_blocks import OBJECTIVES, PLANE_PUSH, SCENES, line, load
 from tests.shape.plane_blocks import plane_problem
 from tests.shape.quotients import Patch, miss_without
 
+#: Many states: what claims rest on.
+pytestmark = [pytest.mark.slow, pytest.mark.claim]
+
 
 def without_loads(patch: Patch) -> None:
     patch.setattr(work_derivative, "moving_loads", lambda torn, moving: [])

@@ -16,6 +16,9 @@ from tests.shape.blocks import designs_of
 from tests.shape.mortar_lines import BLOCKS, NAMES, OBJECTIVES, line
 from tests.shape.quotients import Patch, miss_without
 
+#: Many states: what claims rest on.
+pytestmark = [pytest.mark.slow, pytest.mark.claim]
+
 CASES = [(name, objective) for name in NAMES for objective in OBJECTIVES[name]]
 
 

@@ -78,7 +78,7 @@ def _half(
     keep = np.stack([used & inside, crossing], axis=2).reshape(len(vertices), places)
     offered = np.stack([vertices, cut], axis=2).reshape(len(vertices), places, 2)
     left_over = keep.sum(axis=1)
-    clipped = np.zeros((len(vertices), int(left_over.max(initial=0)), 2))
+    clipped: np.ndarray = np.zeros((len(vertices), int(left_over.max(initial=0)), 2))
     row, column = np.nonzero(keep)
     place = (np.cumsum(keep, axis=1) - 1)[row, column]
     clipped[row, place] = offered[row, column]
