@@ -56,7 +56,8 @@ def merit_planes(problem: PosedProblem, evaluation: Evaluation) -> list[Plane]:
     if len(normals):
         near = problem.allowed.around(evaluation.x, problem.scale)
         every = np.vstack([normals, near.rows[near.room <= 1e-9], near.equality_rows])
-        pushes = np.linalg.lstsq(every.T, -gradients.T, rcond=None)[0][: len(normals)].T
+        found = np.linalg.lstsq(every.T, -gradients.T, rcond=None)[0][: len(normals)].T
+        pushes = np.asarray(found, dtype=np.float64)
     values = np.append(evaluation.value, here.excess[~here.equal])
     noises = np.append(evaluation.error, (np.abs(here.factors) * evaluation.constraint_errors)[~here.equal])
     steep, along = np.linalg.norm(gradients, axis=1), gradients + pushes @ normals

@@ -120,7 +120,7 @@ class SoftConstraint:
     def reduced(self, weights: Array, room: int) -> SoftConstraint:
         """Return the constraint with at most ``room`` planes, see `Bundle.reduced`."""
         total = float(weights.sum())
-        shares: Array = weights / (total if total > 0.0 else 1.0)
+        shares = np.asarray(weights / (total if total > 0.0 else 1.0), dtype=np.float64)
         return replace(self, bundle=self.bundle.reduced(shares, room))
 
     def refined(self, plane: Plane, doubtful: bool) -> SoftConstraint:
