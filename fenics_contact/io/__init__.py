@@ -3,6 +3,7 @@
 On several ranks rank 0 writes (XDMF: all ranks together), and all raise if one fails.
 """
 
+from fenics_contact.io.design_table import write_design_table
 from fenics_contact.io.field_files import FIELD_FILES, StoredFields, fields_of_result, stored_fields
 from fenics_contact.io.forces_record import forces_record, listed_forces, scales_of
 from fenics_contact.io.json_file import json_text, write_json
@@ -12,6 +13,7 @@ from fenics_contact.io.reading import read_result
 from fenics_contact.io.replacing import OutputError, write_text
 from fenics_contact.io.result import result_record, write_optimisation_result, write_result
 from fenics_contact.io.series import ResultSeries
+from fenics_contact.io.stl import write_stl
 from fenics_contact.io.vtu import write_vtu
 from fenics_contact.io.vtx import write_vtx
 from fenics_contact.io.xdmf import write_xdmf
@@ -31,9 +33,11 @@ __all__ = [
     "scales_of",
     "stored_fields",
     "versions",
+    "write_design_table",
     "write_json",
     "write_optimisation_result",
     "write_result",
+    "write_stl",
     "write_text",
     "write_vtu",
     "write_vtx",

@@ -37,8 +37,9 @@ def read_field(
 
     Args:
         path: A table (.csv, .txt, .dat, .tsv) with one row a point, whose first line names the columns x, y,
-            z (z may be missing) and others, separated by commas, semicolons, tabs or blanks; or a mesh of any
-            format that meshio reads, with fields at its nodes or its cells, which count at their centres.
+            z (z may be missing) and others, separated by commas, semicolons, tabs or blanks, after remarks
+            that begin with "#"; or a mesh of any format that meshio reads, with fields at its nodes or its
+            cells, which count at their centres.
         field: Name of the column or field; several, one for each axis, for a vector made of numbers. Needed
             if there is more than one.
         reach: See `Sampled`.
@@ -80,6 +81,8 @@ def _table(path: Path) -> dict[str, np.ndarray]:
         lines = [line for line in path.read_text(encoding="utf-8-sig").splitlines() if line.strip()]
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidInputError(f"the field '{path}' must be readable text: {error}") from error
+    while len(lines) > 1 and lines[0].startswith("#") and not _is_number(lines[1]):
+        del lines[0]  # a remark before the line of names
     mark = next((mark for mark in ",;\t" if lines and mark in lines[0]), None)
     rows = [line.split() for line in lines] if mark is None else list(csv.reader(lines, delimiter=mark))
     names = [name.strip().lstrip("#").strip() for name in rows[0]] if rows else []
@@ -90,6 +93,10 @@ def _table(path: Path) -> dict[str, np.ndarray]:
             f"{', '.join(names) or 'nothing'}: write a line such as x, y, z, pressure"
         )
     return dict(zip(named, _numbers(path, rows[1:], len(named)).T, strict=True))
+
+
+def _is_number(line: str) -> bool:
+    return line.lstrip()[0] in "+-.0123456789"
 
 
 def _numbers(path: Path, rows: Sequence[Sequence[str]], count: int) -> np.ndarray:

@@ -11,6 +11,7 @@ from fenics_contact.shape.linearised_face import WeakChoice, WeakPoints, lineari
 from fenics_contact.shape.load_cases import LoadCases
 from fenics_contact.shape.memory import DesignPoint
 from fenics_contact.shape.motion import HarmonicExtension
+from fenics_contact.shape.moved_surface import MovedSurface
 from fenics_contact.shape.movement import Movement
 from fenics_contact.shape.objective import Objective, Partials
 from fenics_contact.shape.pressures import ContactArea, LargestPressure, PressureNorm, PressureUnevenness
@@ -32,6 +33,7 @@ __all__ = [
     "LargestPressure",
     "LargestStress",
     "LoadCases",
+    "MovedSurface",
     "Movement",
     "Objective",
     "Partials",

@@ -27,7 +27,7 @@ from fenics_contact.surfaces.midpoints import (
 )
 from fenics_contact.surfaces.projection import Projection, interpolated_normal, join, newton_matrix, project
 from fenics_contact.surfaces.relief import corner_normals, edges_at_corners, heights, slopes
-from fenics_contact.surfaces.true_surface import Geometry, true_surface
+from fenics_contact.surfaces.true_surface import Geometry, height_over, true_surface
 
 __all__ = [
     "FacetedSurface",
@@ -46,6 +46,7 @@ __all__ = [
     "faceted_surface",
     "filled_at_corners",
     "gauss_points",
+    "height_over",
     "heights",
     "interpolated_normal",
     "join",

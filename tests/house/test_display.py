@@ -72,6 +72,7 @@ from fenics_contact.shape import (
     LargestPressure,
     LargestStress,
     LoadCases,
+    MovedSurface,
     Movement,
     PressureNorm,
     PressureUnevenness,
@@ -138,6 +139,7 @@ def objects() -> dict[str, Any]:
         TotalPotential() + 2.0 * VolumeIntegral("motion", lambda u, x, stress: u[0], "block"),
         StrainEnergy(), PressureNorm(), PressureUnevenness(), ContactArea(), FrictionWork(),
         LargestStress("block"), Movement("block", "z1", (1, 0, 0)), Largest((LargestPressure(),)),
+        MovedSurface(shape.designs[0], scene.bodies["block"].mesh, np.zeros(shape.size)),
     ]  # fmt: skip
     found: dict[str, Any] = {}
     for root in roots:
