@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import typer
 
+from fenics_contact.cli.design_files import check_design_files, write_design_files
 from fenics_contact.cli.desk import Desk, desk_of, facts
 from fenics_contact.cli.endings import Ending
 from fenics_contact.cli.options import (
@@ -53,6 +54,7 @@ def optimize(
     with show_progress(desk.comm):
         file = read(desk, scene, output, tolerance, settings, python)
         file.require_design()
+        check_design_files(file)
         show_plan(desk, file, sensitivity=True)
         desk.say()
         if dry_run:
@@ -62,12 +64,12 @@ def optimize(
         words = file.document.design.objective_in_words  # type: ignore[union-attr]
         desk.say(f"{task.problem.size} design variables, objective {words}")
         with only_run_in(file.folder, desk.comm):
-            result = _minimised(desk, file, task, resume)
+            result, written = _minimised(desk, file, task, resume)
             desk.show(facts(_facts(file, task, result)))
             gallery = Gallery()
             if pictures and can_draw(desk, file, gallery):
                 _draw(desk, file, task, result, gallery)
-    names = ", ".join(["result.json", *_films(file), *(path.name for path in gallery.drawn)])
+    names = ", ".join(["result.json", *(path.name for path in (*written, *gallery.drawn))])
     desk.say(f"results in {file.folder}/: {names}")
     if not result.reason.success:
         desk.say(f"not converged: {result.reason.value}")
@@ -75,12 +77,10 @@ def optimize(
     gallery.require_all()
 
 
-def _films(file: SceneFile) -> list[str]:
-    return ["designs.pvd"] if file.document.output.files else []
-
-
-def _minimised(desk: Desk, file: SceneFile, task: ShapeTask, resume: bool | None) -> Result:
-    """Run the optimisation and write its files. Collective."""
+def _minimised(
+    desk: Desk, file: SceneFile, task: ShapeTask, resume: bool | None
+) -> tuple[Result, list[Path]]:
+    """Run the optimisation and write its files; return these, too. Collective."""
     checkpoint = checkpoint_of(file, resume)
     kinds = file.document.output.files
     series = ResultSeries(file.folder, "designs", desk.comm, formats=kinds) if kinds else None
@@ -89,10 +89,12 @@ def _minimised(desk: Desk, file: SceneFile, task: ShapeTask, resume: bool | None
         result = task.minimize(callback=follow, checkpoint=checkpoint)
     more = {"scene_file": file.source.name, "title": file.title}
     write_optimisation_result(result, task.problem, file.folder, more=more)
+    written = [] if series is None else [series.path]
+    written += write_design_files(desk, file, task.problem, result.x)
     # A run that stopped at a limit can continue from its checkpoint with a larger one.
     if checkpoint is not None and result.reason.success and desk.comm.rank == 0:
         Path(checkpoint.path).unlink(missing_ok=True)
-    return result
+    return result, written
 
 
 def _facts(file: SceneFile, task: ShapeTask, result: Result) -> dict[str, str]:

@@ -21,5 +21,8 @@ def show_outputs(desk: Desk, file: SceneFile, *, draws: bool) -> None:
     output = file.document.output
     pictures = f", pictures of {', '.join(output.pictures)}" if draws and output.pictures else ""
     kinds = f", {', '.join(output.files)} files" if output.files else ""
-    desk.say(f"would write to {file.folder}/: result.json{kinds}{pictures}")
+    shapes = (
+        f", {', '.join(output.design)} files of the design" if file.document.design and output.design else ""
+    )
+    desk.say(f"would write to {file.folder}/: result.json{kinds}{shapes}{pictures}")
     desk.say("nothing was solved (--dry-run)")

@@ -9,7 +9,7 @@ from fenics_contact.mesh_io.cad_shapes import cad_shapes
 from fenics_contact.mesh_io.dolfinx_bodies import DolfinxBodies
 from fenics_contact.mesh_io.dolfinx_import import from_dolfinx, read_xdmf
 from fenics_contact.mesh_io.gmsh_import import from_gmsh_model, read_msh
-from fenics_contact.mesh_io.gmsh_session import gmsh_model
+from fenics_contact.mesh_io.gmsh_session import gmsh_model, silenced
 from fenics_contact.mesh_io.meshio_import import from_meshio, read_mesh, read_with_meshio
 
 __all__ = [
@@ -28,4 +28,5 @@ __all__ = [
     "read_msh",
     "read_with_meshio",
     "read_xdmf",
+    "silenced",
 ]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib
 import inspect
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -107,7 +109,7 @@ def _is_initialised(gmsh: ModuleType) -> bool:
     if hasattr(gmsh, "isInitialized"):
         return bool(gmsh.isInitialized())
     # Older versions have no query: a call fails once gmsh is finalised, with a message on the terminal.
-    with _standard_error_closed():
+    with silenced(2):
         try:
             return len(gmsh.model.list()) > 0
         except Exception:
@@ -115,13 +117,19 @@ def _is_initialised(gmsh: ModuleType) -> bool:
 
 
 @contextmanager
-def _standard_error_closed() -> Iterator[None]:
-    duplicate = os.dup(2)
+def silenced(descriptor: int) -> Iterator[None]:
+    """Discard what libraries write to standard output, 1, or to standard error, 2.
+
+    OpenCASCADE prints a page of statistics for every STEP file.
+    """
+    (sys.stdout if descriptor == 1 else sys.stderr).flush()
+    duplicate = os.dup(descriptor)
     sink = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(sink, 2)
+        os.dup2(sink, descriptor)
         yield
     finally:
-        os.dup2(duplicate, 2)
+        ctypes.CDLL(None).fflush(None)  # what C still keeps would be written later
+        os.dup2(duplicate, descriptor)
         os.close(sink)
         os.close(duplicate)

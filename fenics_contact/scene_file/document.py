@@ -23,6 +23,7 @@ from fenics_contact.scene_file.steps import StepPart
 from fenics_contact.scene_file.values import PlaceOfFile, Read, said
 
 FileKind: TypeAlias = Literal["vtu", "vtx", "xdmf"]
+DesignFileKind: TypeAlias = Literal["csv", "stl", "step"]
 PictureKind: TypeAlias = Literal["stress", "pressure", "status", "decomposition", "error"]
 _ByRegion = Annotated[dict[str, str], Field(min_length=1)]
 Materials: TypeAlias = Annotated[
@@ -60,6 +61,10 @@ class OutputPart(Part):
     )
     files: list[FileKind] = Field(
         default=["vtu"], description="files of fields, for ParaView; vtx needs ADIOS2"
+    )
+    design: list[DesignFileKind] = Field(
+        default=["csv"],
+        description="files of an optimised surface: a table, the body as triangles, for CAD programs",
     )
     pictures: list[PictureKind] = Field(default=["stress"], description="pictures as PNG files")
     checkpoint: bool = Field(

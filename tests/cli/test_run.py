@@ -259,7 +259,7 @@ def test_an_optimisation_writes_its_designs_and_says_when_it_stopped_early(
     small = (
         "meshes.links.n_around=36", "meshes.links.n_a=4", "meshes.links.n_b=10",
         "solver.subdomains=[4, 1, 1]", "design.surfaces.0.net=[5, 3]", "output.pictures=[]",
-        "design.tolerance=1e-8",
+        "design.tolerance=1e-8", "output.design=['csv', 'step']",
     )  # fmt: skip
     settings = [part for value in small for part in ("--set", value)]
     arguments = ("optimize", SCENES / "chain_links.toml", "-o", tmp_path, *settings)
@@ -269,7 +269,9 @@ def test_an_optimisation_writes_its_designs_and_says_when_it_stopped_early(
     assert run(*arguments, "--set", "design.max_iterations=2") == 3
     printed = capsys.readouterr().out
     assert "going on from" in printed
-    assert "control_net.png, convergence.png" in printed
+    assert "design.csv, design_link_1.step, control_net.png, convergence.png" in printed
+    assert "design_link_1.step has the designed surface alone: a body in a CAD file needs few flat" in printed
+    assert (tmp_path / "design_link_1.step").exists()
     record = read_result(tmp_path)
     assert record["optimisation"]["stop"]["iterations"] == 2
     assert record["optimisation"]["objective"]["final"] < record["optimisation"]["objective"]["initial"]

@@ -14,12 +14,13 @@ from fenics_contact.shape import ShapeProblem, StrainEnergy, SurfaceDesign
 
 
 @cache
-def lid(dim: int = 3, cell: str = "hexahedron", comm: MPI.Comm = MPI.COMM_SELF) -> ShapeProblem:
+def lid(dim: int = 3, cell: str = "hexahedron", *, on_all_ranks: bool = False) -> ShapeProblem:
     """The upper side of a block of 4 × 2 × 1, or of 4 × 1, moves by 4 × 3 control points, or by 4."""
     if dim == 3:
         mesh, material = block((0, 0, 0), (4, 2, 1), (8, 4, 2), cell), IsotropicElasticity(100.0, 0.3)
     else:
         mesh, material = rectangle((0, 0), (4, 1), (8, 2)), PlaneStrain(100.0, 0.3)
+    comm = MPI.COMM_WORLD if on_all_ranks else MPI.COMM_SELF
     low, top = ("z0", "z1") if dim == 3 else ("y0", "y1")
     load = [0.0] * (dim - 1) + [-1.0]
     scene = Scene({"pad": Body(mesh, material)}, [Support("pad", low)], [Traction("pad", top, tuple(load))])

@@ -1,0 +1,222 @@
+"""Designed surfaces and bodies as STEP files for CAD programs, through gmsh's OpenCASCADE."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fenics_contact.display import displayed
+from fenics_contact.errors import InvalidInputError, collectively, together
+from fenics_contact.io.flat_sides import Edge, FlatSide, flat_sides
+from fenics_contact.io.moved_bodies import moved_body, moved_surfaces
+from fenics_contact.io.replacing import replacing
+from fenics_contact.io.spline_fit import DEGREE, CadError, SplineFit, fitted
+from fenics_contact.mesh_io import gmsh_model, silenced
+
+if TYPE_CHECKING:
+    from fenics_contact.shape import ShapeProblem
+
+
+@displayed
+@dataclass(frozen=True)
+class StepFile:
+    """A STEP file that was written.
+
+    Attributes:
+        path: The file.
+        deviation: Largest distance of its B-splines from the designed surfaces, [length].
+        points: Number of control points of each B-spline along a parameter.
+        volume: Volume of the body in it, in the plane its area; None for surfaces alone, [length³].
+        sides: Largest distance of the mesh's other boundary nodes from the flat sides of the body, [length].
+    """
+
+    path: Path
+    deviation: float
+    points: tuple[int, ...]
+    volume: float | None
+    sides: float
+
+
+@collectively("write_step", lambda problem, *_, **__: problem.comm)
+def write_step(
+    problem: ShapeProblem,
+    alpha: np.ndarray,
+    path: str | Path,
+    *,
+    body: str | None = None,
+    solid: bool = True,
+    tolerance: float = 1e-6,
+    scale: float = 1.0,
+) -> StepFile:
+    """Write a designed body, or its designed surfaces alone, as a STEP file. Collective.
+
+    The designed surfaces are B-splines of degree five through points of `shape.MovedSurface`. The body is
+    closed by the flat sides of the reference shape; where these are not flat, as beside the crown of a chain
+    link, only the surfaces can be written. A plane body is a plane face, its other edges are straight lines
+    from node to node.
+
+    Args:
+        problem: The problem with the design.
+        alpha: Design variables of all its designs, shape (size,), [length]: ``result.x``.
+        path: File to write, .step or .stp; its folder is created.
+        body: Name of the body; needed if designs move several.
+        solid: Whether to write the body, or the designed surfaces alone.
+        tolerance: Largest deviation of the B-splines, relative to the extent of their surface.
+        scale: Millimetres in the scene's unit of length: coordinates in the file are in millimetres.
+
+    Returns:
+        The file, how far its surfaces deviate, and the volume of its body; `mesh_io.read_cad` reads it.
+
+    Raises:
+        InvalidInputError: If the body is not designed, alpha does not fit, or the file has another suffix.
+        CadError: If a surface folds or cannot be fitted, or the body has other sides than flat ones.
+        MissingRequirementError: If gmsh is missing, too old or cannot be loaded.
+
+    Example:
+        >>> write_step(problem, result.x, "output/pad.step").deviation  # doctest: +SKIP
+        3.1e-07
+    """
+    target = Path(path)
+    with together(problem.comm):
+        if target.suffix.lower() not in (".step", ".stp") or not 0.0 < scale < np.inf:
+            raise InvalidInputError(
+                f"write_step needs a file .step or .stp and a scale above zero, got {target.name!r} and "
+                f"{scale}: give millimetres in the scene's unit of length"
+            )
+    name, mesh = moved_body(problem, alpha, body)
+    surfaces = [one for one in moved_surfaces(problem, alpha) if one.design.body == name]
+    written: StepFile | None = None
+    with together(problem.comm):
+        if problem.comm.rank == 0:
+            fits = [fitted(surface, tolerance) for surface in surfaces]
+            lattices = [one.design.lattice for one in surfaces]
+            sides = flat_sides(problem.scene.bodies[name].mesh, mesh.points, lattices) if solid else []
+            with replacing(target) as (temporary,), gmsh_model("fenics_contact STEP") as gmsh:
+                drawing = _Drawing(gmsh, fits, mesh.points, scale)
+                volume: float | None = None
+                with _reasons():
+                    if solid:
+                        volume = drawing.body(sides)
+                    else:
+                        drawing.surfaces()
+                    with silenced(1):
+                        gmsh.write(str(temporary))
+            counts = tuple(len(fit.points) for fit in fits)
+            off = max((side.off for side in sides), default=0.0)
+            written = StepFile(target, max(fit.deviation for fit in fits), counts, volume, off)
+    return problem.comm.bcast(written)
+
+
+@contextmanager
+def _reasons() -> Iterator[None]:
+    """Say what gmsh says."""
+    try:
+        yield
+    except CadError:
+        raise
+    except Exception as reason:  # gmsh raises no other class
+        raise CadError(
+            f"OpenCASCADE must be able to build the sides of a body, it says: {reason}: write the surfaces "
+            "alone with solid=False"
+        ) from reason
+
+
+class _Drawing:
+    """Surfaces and sides in gmsh's current model, in millimetres."""
+
+    def __init__(self, gmsh: ModuleType, fits: Sequence[SplineFit], points: np.ndarray, scale: float) -> None:
+        self._gmsh, self._occ = gmsh, gmsh.model.occ
+        self._fits, self._points, self._scale = fits, points, scale
+
+    def surfaces(self) -> None:
+        """Draw the designed surfaces alone."""
+        self._keep([self._spline(fit) for fit in self._fits])
+
+    def body(self, sides: Sequence[FlatSide]) -> float:
+        """Draw the body that surfaces and flat sides enclose; return its volume in the scene's units."""
+        faces = [(2, self._face(side)) for side in sides]
+        if self._points.shape[1] == 3:
+            faces += [self._spline(fit) for fit in self._fits]
+            # Sides meet surfaces along splines through the same points: to rounding of a larger model.
+            gap = 1e-6 * self._scale * float(np.ptp(self._points, axis=0).max())
+            sewn = self._occ.healShapes(faces, tolerance=gap, fixSmallEdges=False, fixSmallFaces=False)
+            bodies = [entity for entity in sewn if entity[0] == 3]
+        else:
+            bodies = faces
+        self._occ.synchronize()
+        edges = self._gmsh.model.getBoundary(self._gmsh.model.getBoundary(bodies), combined=True)
+        size = self._occ.getMass(*bodies[0]) if len(bodies) == 1 else 0.0
+        if len(bodies) != 1 or edges or size <= 0.0:
+            raise CadError(
+                f"the sides of a body in a CAD file must enclose it, {len(faces)} sides gave {len(bodies)} "
+                f"bodies with {len(edges)} open edges: hold the rims of designed surfaces that leave flat "
+                "sides with optimize.fixed_rim, or write the surfaces alone with solid=False"
+            )
+        self._keep(bodies)
+        return float(size / self._scale ** bodies[0][0])
+
+    def _keep(self, wanted: list[tuple[int, int]]) -> None:
+        """Remove everything but some entities and what they consist of."""
+        self._occ.synchronize()
+        model = self._gmsh.model
+        parts = {(dim, abs(tag)) for dim, tag in wanted}
+        level = list(parts)
+        while level and level[0][0] > 0:
+            level = [(dim, abs(tag)) for dim, tag in model.getBoundary(level, combined=False)]
+            parts |= set(level)
+        for dim in (2, 1, 0):
+            self._occ.remove([entity for entity in model.getEntities(dim) if entity not in parts])
+        self._occ.synchronize()
+
+    def _spline(self, fit: SplineFit) -> tuple[int, int]:
+        """Draw a designed surface or curve."""
+        if fit.points.ndim == 2:
+            return 1, self._curve(fit.points, fit.knots)
+        tags = [self._point(point) for point in np.swapaxes(fit.points, 0, 1).reshape(-1, 3)]
+        knots, times = _counted(fit.knots)
+        return 2, self._occ.addBSplineSurface(
+            tags, len(fit.points), degreeU=DEGREE, degreeV=DEGREE, knotsU=knots, knotsV=knots,
+            multiplicitiesU=times, multiplicitiesV=times,
+        )  # fmt: skip
+
+    def _face(self, side: FlatSide) -> int:
+        """Draw a flat side."""
+        wires = [
+            self._occ.addWire([self._edge(edge, side) for edge in loop], checkClosed=True)
+            for loop in side.loops
+        ]
+        return int(self._occ.addPlaneSurface(wires))
+
+    def _edge(self, edge: Edge, side: FlatSide) -> int:
+        if edge.surface is None:
+            ends = self._in_plane(self._points[edge.nodes[[0, -1]]], side)
+            return int(self._occ.addLine(*[self._point(end) for end in ends]))
+        fit = self._fits[edge.surface]
+        points = fit.sides[edge.side]
+        return self._curve(self._in_plane(points[::-1] if edge.reversed else points, side), fit.knots)
+
+    def _in_plane(self, points: np.ndarray, side: FlatSide) -> np.ndarray:
+        if side.normal is None:
+            return points
+        return np.asarray(points - np.outer(points @ side.normal - side.level, side.normal))
+
+    def _curve(self, points: np.ndarray, knots: np.ndarray) -> int:
+        distinct, times = _counted(knots)
+        tags = [self._point(point) for point in points]
+        return int(self._occ.addBSpline(tags, degree=DEGREE, knots=distinct, multiplicities=times))
+
+    def _point(self, point: np.ndarray) -> int:
+        x, y, *z = self._scale * point
+        return int(self._occ.addPoint(x, y, *(z or [0.0])))
+
+
+def _counted(knots: np.ndarray) -> tuple[Any, Any]:
+    """Return the distinct knots, and how often each counts."""
+    distinct, times = np.unique(knots, return_counts=True)
+    return distinct.tolist(), times.tolist()
