@@ -9,6 +9,7 @@ from fenics_contact.shape.friction_work import FrictionWork
 from fenics_contact.shape.largest_stress import LargestStress
 from fenics_contact.shape.linearised_face import WeakChoice, WeakPoints, linearise_face
 from fenics_contact.shape.load_cases import LoadCases
+from fenics_contact.shape.load_path import LoadPath, PathPoint
 from fenics_contact.shape.memory import DesignPoint
 from fenics_contact.shape.motion import HarmonicExtension
 from fenics_contact.shape.moved_surface import MovedSurface
@@ -33,10 +34,12 @@ __all__ = [
     "LargestPressure",
     "LargestStress",
     "LoadCases",
+    "LoadPath",
     "MovedSurface",
     "Movement",
     "Objective",
     "Partials",
+    "PathPoint",
     "PressureNorm",
     "PressureUnevenness",
     "ShapeProblem",

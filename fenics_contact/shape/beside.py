@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from fenics_contact.errors import InvalidDesignError
-from fenics_contact.shape.memory import DesignPoint
+from fenics_contact.shape.linearised_face import WeakPoints
 
 #: Fractions of the way to a neighbour at which designs are evaluated, nearest first.
 PARTS = (1e-2, 1.0)
 
 
+class Evaluated(Protocol):
+    """A design with its gradient, of one state or of several."""
+
+    @property
+    def weak(self) -> WeakPoints:
+        """Its weak points."""
+
+
+Point = TypeVar("Point", bound=Evaluated)
+
+
 def with_fewest_weak_points(
-    alpha: np.ndarray, end: np.ndarray, evaluate: Callable[[np.ndarray], DesignPoint]
-) -> DesignPoint:
+    alpha: np.ndarray, end: np.ndarray, evaluate: Callable[[np.ndarray], Point]
+) -> Point:
     """Return the design with the fewest weak points of a few on the way from one to another. Collective.
 
     In a generic direction, points leave their switches, and their branches together are those of an actual
@@ -30,7 +42,8 @@ def with_fewest_weak_points(
     Raises:
         InvalidDesignError: If none of them has an equilibrium.
     """
-    best, refused = None, None
+    best: Point | None = None
+    refused: InvalidDesignError | None = None
     for part in PARTS:
         try:
             point = evaluate(alpha + part * (end - alpha))

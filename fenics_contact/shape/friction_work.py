@@ -19,11 +19,12 @@ from fenics_contact.shape.sums import Weighable
 @dataclass(frozen=True)
 @checked()
 class FrictionWork(Weighable):
-    """J = Σ τ_i · s_i, the work dissipated by friction in one load step from rest, [force · length].
+    """J = Σ τ_i · s_i, the work dissipated by friction in one load step, [force · length].
 
-    Friction acts along the slip, so that each point's work is the product of its force and the length of its
-    slip, and zero where it sticks. By Archard's law the volume worn off is proportional to it. The whole load
-    acts at once; the work of a sequence of load steps depends on the states of all of them.
+    Friction acts along the slip since the step before, so that each point's work is the product of its force
+    and the length of its slip, and zero where it sticks. By Archard's law the volume worn off is proportional
+    to it. The force is that at the end of the step. `ShapeProblem` applies the whole load in one step from
+    rest; `LoadPath` adds up the work of several steps.
 
     Attributes:
         pair: Number of the contact pair in the scene; None for all.
@@ -35,8 +36,7 @@ class FrictionWork(Weighable):
         """Return the work.
 
         Raises:
-            InvalidInputError: If there is no such pair or it has no friction, or the state is a later load
-                step.
+            InvalidInputError: If there is no such pair or it has no friction.
         """
         force, slip = self._vectors(state)
         return float((force * slip).sum())
@@ -64,11 +64,6 @@ class FrictionWork(Weighable):
             raise InvalidInputError(
                 f"FrictionWork needs friction, but the scene's {where} none: give a ContactPair Coulomb or "
                 "Tresca friction"
-            )
-        if contact.slip_before[mine].any():
-            raise InvalidInputError(
-                "FrictionWork needs a single load step from rest, got a state with slip of earlier steps, "
-                "whose derivative is not known: let the whole load act at once"
             )
         chosen = np.zeros((contact.points.count, 1))
         chosen[mine] = 1.0

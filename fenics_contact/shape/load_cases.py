@@ -11,6 +11,7 @@ from fenics_contact._libraries import MPI
 from fenics_contact.contact import State
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.shape.memory import joined_memory, parted_memory
 from fenics_contact.shape.problem import ShapeProblem
 
 
@@ -166,18 +167,11 @@ class LoadCases:
 
     def memory(self) -> dict[str, np.ndarray]:
         """Return what the next states depend on. Collective."""
-        return {
-            f"{number}/{key}": values
-            for number, problem in enumerate(self.problems.values())
-            for key, values in problem.memory().items()
-        }
+        return joined_memory(self.problems.values())
 
     def recall(self, memory: Mapping[str, np.ndarray]) -> None:
         """Continue from what `memory` returned, also on another number of ranks. Collective."""
-        parts: list[dict[str, np.ndarray]] = [{} for _ in self.problems]
-        for key, values in memory.items():
-            number, _, name = key.partition("/")
-            parts[int(number)][name] = values
+        parts = parted_memory(memory, len(self.problems))
         for problem, part in zip(self.problems.values(), parts, strict=True):
             problem.recall(part)
 

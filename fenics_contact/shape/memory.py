@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -148,6 +149,31 @@ class DesignMemory:
             error=float(stored["error"]),
             adjoint_multiplier=stored["adjoint"][state.torn.numbering.owned],
         )
+
+
+class Remembers(Protocol):
+    """What has a memory, such as a `ShapeProblem`."""
+
+    def memory(self) -> Stored:
+        """Return it. Collective."""
+
+
+def joined_memory(problems: Iterable[Remembers]) -> Stored:
+    """Return what several problems remember under keys that begin with their numbers. Collective."""
+    return {
+        f"{number}/{key}": values
+        for number, problem in enumerate(problems)
+        for key, values in problem.memory().items()
+    }
+
+
+def parted_memory(memory: Mapping[str, np.ndarray], count: int) -> list[Stored]:
+    """Return the memory of each of several problems from what `joined_memory` returned."""
+    parts: list[Stored] = [{} for _ in range(count)]
+    for key, values in memory.items():
+        number, _, name = key.partition("/")
+        parts[int(number)][name] = values
+    return parts
 
 
 def _stored_point(point: DesignPoint) -> Stored:

@@ -12,13 +12,7 @@ import numpy as np
 from fenics_contact._libraries import MPI
 from fenics_contact.contact import ContactProblem, State
 from fenics_contact.display import displayed
-from fenics_contact.errors import (
-    ConvergenceError,
-    InfeasibleError,
-    InvalidDesignError,
-    collectively,
-    tell,
-)
+from fenics_contact.errors import collectively, tell
 from fenics_contact.fingerprint import described
 from fenics_contact.scene import Scene
 from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
@@ -26,11 +20,13 @@ from fenics_contact.shape.beside import with_fewest_weak_points
 from fenics_contact.shape.contact_derivative import contact_by_shape
 from fenics_contact.shape.design import SurfaceDesign
 from fenics_contact.shape.design_function import DesignFunction
+from fenics_contact.shape.design_state import design_state
 from fenics_contact.shape.geometry import DesignGeometry
 from fenics_contact.shape.linearised_face import LinearisedFace, WeakChoice, linearise_face
 from fenics_contact.shape.memory import DesignMemory, DesignPoint, Stored
 from fenics_contact.shape.objective import Objective, Partials, asking, finite, finite_partials, finite_value
 from fenics_contact.shape.scenes import check_case, checked_contact
+from fenics_contact.shape.slip_history import require_from_rest
 from fenics_contact.shape.state_error import state_error
 from fenics_contact.shape.tied_derivative import ties_by_shape
 from fenics_contact.shape.tolerance import AdaptiveTolerance, tightest_of
@@ -179,13 +175,17 @@ class ShapeProblem:
         return self.geometry.scene_of(self.scene, alpha)
 
     @collectively("ShapeProblem.state_of", _comm)
-    def state_of(self, alpha: np.ndarray) -> State:
+    def state_of(self, alpha: np.ndarray, after: State | None = None) -> State:
         """Return the equilibrium of a design, started from the one before. Collective.
+
+        Args:
+            alpha: Design variables, shape (size,), [length].
+            after: State of the same design after the last load step, from which slip is measured, or None.
 
         Raises:
             InvalidDesignError: If the design inverts a cell or has no equilibrium.
         """
-        return self._solved(alpha, self._tightest)
+        return self._solved(alpha, self._tightest, after=after)
 
     @collectively("ShapeProblem.value_of", _comm)
     def value_of(self, alpha: np.ndarray) -> float:
@@ -209,13 +209,24 @@ class ShapeProblem:
         return point
 
     @collectively("ShapeProblem.differentiate", _comm)
-    def differentiate(self, state: State) -> DesignPoint:
+    def differentiate(self, state: State, partials: Partials | None = None) -> DesignPoint:
         """Return value and subgradient at a known state of the reference shape, for one adjoint. Collective.
 
         Args:
             state: Equilibrium of the scene, with the subdomains of this problem (`ContactProblem.following`).
+            partials: Derivatives by the state of what is differentiated, by default of the objective.
+
+        Raises:
+            InvalidInputError: If only the state is given and it follows another load step.
         """
-        return self._point_at(np.zeros(self.size), state, self._tightest, None)
+        if partials is None:
+            require_from_rest(state)
+        return self._point_at(np.zeros(self.size), state, self._tightest, None, partials)
+
+    def partials_of(self, objective: Objective, state: State) -> Partials:
+        """Return an objective and its partial derivatives at a state, checked. Collective."""
+        with self._timer.phase("objective"), asking(self.comm):
+            return finite_partials(objective.partials(state, self.geometry.forms))
 
     def function(self, objective: Objective, name: str | None = None) -> DesignFunction:
         """Return another objective as a function α -> (value, subgradient), for a constraint.
@@ -290,40 +301,35 @@ class ShapeProblem:
 
         return with_fewest_weak_points(alpha, end, evaluate).gradient
 
-    def _solved(self, alpha: np.ndarray, tolerance: float, known: DesignPoint | None = None) -> State:
+    def _solved(
+        self,
+        alpha: np.ndarray,
+        tolerance: float,
+        known: DesignPoint | None = None,
+        after: State | None = None,
+    ) -> State:
         """Compute an equilibrium, from a less accurate one of the same design if known. Collective."""
         previous = self._memory.state if known is None else known.state
         if previous is None and self._beside is not None:  # the first state of a load case
             previous = self._beside._memory.state
         with self._timer.phase("mesh motion"):
             scene = self.scene_of(alpha) if known is None else known.state.scene
-        try:
-            state = self.contact.solve(
-                scene, start=previous, tolerance=tolerance, overlap=previous is not None, sensitivity=True
-            )
-        except InfeasibleError as error:
-            raise InvalidDesignError(f"the design has no equilibrium: {error}") from error
-        except ConvergenceError as error:
-            if previous is None:
-                raise
-            tell(logger.warning, "a warm start failed, a cold one follows: %s", error)
-            state = self._solved_cold(scene, tolerance)
+        state = design_state(self.contact, scene, previous, tolerance, slip_from=after)
         self._memory.record_state(alpha, state)
         return state
 
-    def _solved_cold(self, scene: Scene, tolerance: float) -> State:
-        try:
-            return self.contact.solve(scene, start=None, tolerance=tolerance, overlap=True, sensitivity=True)
-        except (ConvergenceError, InfeasibleError) as error:
-            raise InvalidDesignError(f"no equilibrium of the design was found: {error}") from error
-
     def _point_at(
-        self, alpha: np.ndarray, state: State, tolerance: float, known: DesignPoint | None
+        self,
+        alpha: np.ndarray,
+        state: State,
+        tolerance: float,
+        known: DesignPoint | None,
+        partials: Partials | None = None,
     ) -> DesignPoint:
         """Return objective, subgradient and their errors at a state. Collective."""
         before = state.dual.products
-        with self._timer.phase("objective"), asking(self.comm):
-            partials = finite_partials(self.objective.partials(state, self.geometry.forms))
+        if partials is None:
+            partials = self.partials_of(self.objective, state)
         with self._timer.phase("adjoint"):
             linearised = linearise_face(state, self.choice)
             adjoint = solve_adjoint(
@@ -341,17 +347,10 @@ class ShapeProblem:
         finite("gradient", gradient)
         tell(logger.info, "J = %.9g ± %.1e, %d products", value, error.size, state.dual.products)
         return DesignPoint(
-            alpha=np.array(alpha, dtype=float),
-            value=value,
-            gradient=gradient,
-            state=state,
-            weak=linearised.weak,
-            adjoint_iterations=state.dual.products - before,
-            tolerance=tolerance,
-            correction=error.correction,
-            error=error.size,
-            adjoint_multiplier=adjoint.multiplier,
-        )
+            alpha=np.array(alpha, dtype=float), value=value, gradient=gradient, state=state,
+            weak=linearised.weak, adjoint_iterations=state.dual.products - before, tolerance=tolerance,
+            correction=error.correction, error=error.size, adjoint_multiplier=adjoint.multiplier,
+        )  # fmt: skip
 
     @collectively("ShapeProblem.case", _comm)
     def case(self, scene: Scene, objective: Objective | None = None) -> ShapeProblem:

@@ -72,6 +72,7 @@ from fenics_contact.shape import (
     LargestPressure,
     LargestStress,
     LoadCases,
+    LoadPath,
     MovedSurface,
     Movement,
     PressureNorm,
@@ -112,6 +113,7 @@ def objects() -> dict[str, Any]:
     limits = LinearConstraints(np.ones((40, 60)), np.ones(40))
     search = ForScipy(bowl, np.zeros(60), constraints=limits)
     search.arguments("SLSQP")["fun"](np.zeros(60))
+    path = LoadPath(shape, [LoadStep("push")])
     weights = [BodyForce("block", (0, 0, float(k))) for k in range(50)]
     roots = [
         shape.function(TotalPotential()),
@@ -121,7 +123,8 @@ def objects() -> dict[str, Any]:
         certify(state.dual, state.dual_solution), solver_errors(state.system, state.solution),
         Balanced(), FixedPoint(FaceNewton()), LoadSequence(shape.contact), AdaptiveTolerance(),
         UnheldMotion({"block": np.eye(6)[0]}), RigidSurface("block", "z1", (0.5, 0.5, 1.0)),
-        *shape.geometry.motions, LoadCases({"one": shape}),
+        *shape.geometry.motions, LoadCases({"one": shape}), path,
+        path.evaluate(np.zeros(path.size)),
         RigidMotion(Surface("block", "z1"), np.zeros(3), np.ones(3), np.arange(3.0)),
         limits, Bounds(np.zeros(60), np.ones(60)), BundleTrust(),
         minimize(bowl, np.ones(60), constraints=NonlinearConstraint(bowl, 90.0, name="size")),

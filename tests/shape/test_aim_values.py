@@ -15,7 +15,6 @@ from fenics_contact.gallery import block
 from fenics_contact.scene import (
     Body,
     ContactPair,
-    Coulomb,
     IsotropicElasticity,
     RigidPlane,
     Scene,
@@ -274,19 +273,10 @@ def test_nothing_is_stressed_where_nothing_is_loaded() -> None:
     assert not found.by_displacement.any()
 
 
-def test_work_of_friction_needs_friction_and_a_single_load_step() -> None:
+def test_work_of_friction_needs_friction() -> None:
     assert refused(FrictionWork(), even("N and mm")).startswith(
         "FrictionWork needs friction, but the scene's"
     )
-    pressed = Column(1.0, 1.0).state().scene
-    steps = ContactProblem(
-        Scene(pressed.bodies, [], pressed.loads, [ContactPair(Surface("block", "z0"), FLOOR, Coulomb(0.2))]),
-        MPI.COMM_SELF,
-        tolerance=1e-8,
-    )
-    first = steps.solve(sensitivity=True)
-    second = steps.solve(slip_from=first, sensitivity=True)
-    assert refused(FrictionWork(), second).startswith("FrictionWork needs a single load step from rest")
 
 
 def test_strain_energy_of_a_heated_body_is_refused_and_its_stress_is_not() -> None:

@@ -1,0 +1,55 @@
+"""The equilibrium of a design, started from a neighbour and, where that fails, from nothing."""
+
+from __future__ import annotations
+
+import logging
+
+from fenics_contact.contact import ContactProblem, State
+from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidDesignError, tell
+from fenics_contact.scene import Scene
+
+logger = logging.getLogger(__name__)
+
+
+def design_state(
+    contact: ContactProblem,
+    scene: Scene,
+    start: State | None,
+    tolerance: float,
+    *,
+    slip_from: State | None = None,
+) -> State:
+    """Compute the equilibrium of a design. Collective.
+
+    Args:
+        contact: The problem that computes it.
+        scene: The scene in the shape of the design.
+        start: State of a neighbouring design, or None for the first one.
+        tolerance: Relative residual.
+        slip_from: State of the same design after the last load step, or None.
+
+    Raises:
+        InvalidDesignError: If the design has no equilibrium.
+        ConvergenceError: If the first one is not found.
+    """
+    try:
+        return contact.solve(
+            scene,
+            start=start,
+            slip_from=slip_from,
+            tolerance=tolerance,
+            overlap=start is not None,
+            sensitivity=True,
+        )
+    except InfeasibleError as error:
+        raise InvalidDesignError(f"the design has no equilibrium: {error}") from error
+    except ConvergenceError as error:
+        if start is None:
+            raise
+        tell(logger.warning, "a warm start failed, a cold one follows: %s", error)
+    try:
+        return contact.solve(
+            scene, start=None, slip_from=slip_from, tolerance=tolerance, overlap=True, sensitivity=True
+        )
+    except (ConvergenceError, InfeasibleError) as error:
+        raise InvalidDesignError(f"no equilibrium of the design was found: {error}") from error

@@ -1,0 +1,321 @@
+"""One design under load steps that follow one another: the objectives of all steps, with a subgradient."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fenics_contact._libraries import MPI
+from fenics_contact.contact import State
+from fenics_contact.display import displayed
+from fenics_contact.errors import InvalidInputError, collectively, together
+from fenics_contact.fingerprint import described
+from fenics_contact.scene import LoadStep
+from fenics_contact.shape.beside import with_fewest_weak_points
+from fenics_contact.shape.design import SurfaceDesign
+from fenics_contact.shape.forms import ShapeForms
+from fenics_contact.shape.linearised_face import WeakPoints
+from fenics_contact.shape.memory import DesignPoint, joined_memory, parted_memory
+from fenics_contact.shape.objective import Objective, Partials, asking, finite_value
+from fenics_contact.shape.problem import ShapeProblem
+from fenics_contact.shape.slip_history import by_slip_origin, with_later_steps
+
+
+def _comm(path: LoadPath, *_: Any, **__: Any) -> MPI.Comm:
+    return path.comm
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class PathPoint:
+    """An evaluated design of a `LoadPath`.
+
+    Attributes:
+        alpha: Design variables, shape (size,), [length].
+        value: J, the sum over all steps.
+        gradient: Its gradient or subgradient, see `DesignPoint`, shape (size,).
+        weak: Weakly active points of all steps.
+        steps: Name of the step -> its state, its own objective and its share of the gradient, up to the last
+            step with an objective.
+    """
+
+    alpha: np.ndarray
+    value: float
+    gradient: np.ndarray
+    weak: WeakPoints
+    steps: Mapping[str, DesignPoint]
+
+
+@displayed
+class LoadPath:
+    """J(α) = Σ J_n(α) over quasi-static load steps of one design, with a subgradient.
+
+    Slip of a step is measured from the step before, as by `LoadSequence`, so that its state depends on the
+    design through all steps before, too: adjoints are solved from the last step to the first, each with the
+    active set of its step and a load along the contact points' tangents from the step after. A design costs a
+    state and an adjoint for each step, one mesh motion, and one assembly and factorisation of what moved.
+
+    With `FrictionWork` as objective J is the work that friction dissipates in all steps.
+
+    Attributes:
+        problems: Name of the step -> its problem, with the loads of the step.
+        objectives: Name of the step -> J_n, for steps that have one.
+
+    Example:
+        >>> problem = ShapeProblem(ContactProblem(scene, comm), designs, FrictionWork())  # doctest: +SKIP
+        >>> steps = [LoadStep(name, loads=[weight, pull(s)]) for name, s in forth_and_back]  # doctest: +SKIP
+        >>> wear = LoadPath(problem, steps)  # doctest: +SKIP
+        >>> result = minimize(wear, np.zeros(wear.size), bounds=(-1.0, 1.0))  # doctest: +SKIP
+
+    References:
+        P. Michaleris, D. A. Tortorelli, C. A. Vidal, Tangent operators and design sensitivity formulations
+        for transient non-linear coupled problems with applications to elastoplasticity, Int. J. Numer.
+        Methods Eng. 37 (1994) 2471-2499.
+    """
+
+    def __init__(
+        self,
+        problem: ShapeProblem,
+        steps: Sequence[LoadStep],
+        objectives: Mapping[str, Objective] | None = None,
+    ) -> None:
+        """Apply the steps to the problem's scene, one after the other. Collective.
+
+        Args:
+            problem: Scene, designs and tolerance.
+            steps: The steps in their order, each with a name of its own; slip of the first is measured from
+                the undeformed state.
+            objectives: Name of the step -> its objective; None for that of the problem in every step.
+
+        Raises:
+            InvalidInputError: If there is no step, two have the same name, an objective is that of no step or
+                none is that of the last one, or the problem has an adaptive tolerance.
+        """
+        names = [step.name for step in steps]
+        with together(problem.comm):
+            if problem.inexact:
+                raise InvalidInputError(
+                    "LoadPath needs states that are all solved to one tolerance, as errors of a step enter "
+                    "the next one, got an adaptive one: give ShapeProblem a number as tolerance"
+                )
+            _check_names(names)
+        self.objectives = _checked(problem.comm, names, objectives or dict.fromkeys(names, problem.objective))
+        self.problems: dict[str, ShapeProblem] = {}
+        scene, last = problem.scene, problem
+        for step in steps:
+            scene = step.applied_to(scene)
+            self.problems[step.name] = last = last.case(scene)
+        self.evaluations, self._states = 0, _States(self.problems)
+        self._last: PathPoint | None = None
+
+    def _facts(self) -> dict[str, Any]:
+        work = f"{self.evaluations} designs, {self.products} products with F"
+        return {"steps": list(self.problems), "objectives": self.objectives, "work": work}
+
+    @property
+    def _first(self) -> ShapeProblem:
+        return next(iter(self.problems.values()))
+
+    @property
+    def size(self) -> int:
+        """Number of design variables."""
+        return self._first.size
+
+    @property
+    def designs(self) -> tuple[SurfaceDesign, ...]:
+        """The moving surfaces; α is the concatenation of their variables."""
+        return self._first.designs
+
+    @property
+    def forms(self) -> ShapeForms:
+        """Compiled derivatives, which objectives take beside a state."""
+        return self._first.geometry.forms
+
+    @property
+    def comm(self) -> MPI.Comm:
+        """Communicator over which the subdomains are spread."""
+        return self._first.comm
+
+    @property
+    def products(self) -> int:
+        """F-products of states and adjoints so far."""
+        return self._states.products
+
+    def __call__(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return J(α) and a subgradient. Collective; raises as `evaluate` does."""
+        point = self.evaluate(alpha)
+        return point.value, point.gradient
+
+    @collectively("LoadPath.evaluate", _comm)
+    def evaluate(self, alpha: np.ndarray) -> PathPoint:
+        """Solve the states of all steps and their adjoints. Collective.
+
+        States of the design solved last are not solved again.
+
+        Raises:
+            InvalidDesignError: If the design inverts a cell or has no equilibrium.
+        """
+        point = self._point_at(alpha)
+        self.evaluations += 1
+        self._last = point
+        return point
+
+    @collectively("LoadPath.states_of", _comm)
+    def states_of(self, alpha: np.ndarray) -> dict[str, State]:
+        """Return the equilibrium after every step. Collective."""
+        return dict(self._states.of(alpha))
+
+    @collectively("LoadPath.values_of", _comm)
+    def values_of(self, alpha: np.ndarray) -> dict[str, float]:
+        """Return J_n(α) of every step that has an objective. Collective."""
+        states, forms = self._states.of(alpha), self.forms
+        with asking(self.comm):
+            given = {name: each.value(states[name], forms) for name, each in self.objectives.items()}
+            return {name: finite_value(value) for name, value in given.items()}
+
+    def value_of(self, alpha: np.ndarray) -> float:
+        """Return J(α) alone, without adjoints. Collective."""
+        return sum(self.values_of(alpha).values())
+
+    def function(self, objectives: Mapping[str, Objective]) -> LoadPath:
+        """Return other objectives of the same steps as a function of the designs, for a constraint.
+
+        At the design solved last it uses the states and costs the adjoints. Collective.
+
+        Args:
+            objectives: Name of the step -> its objective, for some of the steps.
+        """
+        other = copy(self)
+        other.objectives = _checked(self.comm, list(self.problems), objectives, last=False)
+        other.evaluations, other._last = 0, None
+        return other
+
+    def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the volume of the designed bodies, in the plane the area, and its gradient. Collective."""
+        return self._first.volume(alpha)
+
+    def doubtful(self, alpha: np.ndarray) -> bool:
+        """Return whether the last result, at α, may not be a subgradient."""
+        return self._last is not None and np.array_equal(self._last.alpha, alpha) and self._last.weak.doubtful
+
+    @collectively("LoadPath.beside", _comm)
+    def beside(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """Return a gradient near α, see `ShapeProblem.beside`. Collective."""
+        return with_fewest_weak_points(alpha, end, self._point_at).gradient
+
+    def fingerprint(self) -> dict[str, str]:
+        """Identify the problem, for a checkpoint."""
+        parts = {
+            f"{name}.{key}": text
+            for name, problem in self.problems.items()
+            for key, text in problem.fingerprint().items()
+        }
+        return parts | described(self.objectives, "objectives")
+
+    def memory(self) -> dict[str, np.ndarray]:
+        """Return what the next states depend on. Collective."""
+        counts = np.array([self.evaluations, self.products])
+        return {"counts": counts, **joined_memory(self.problems.values())}
+
+    def recall(self, memory: Mapping[str, np.ndarray]) -> None:
+        """Continue from what `memory` returned, also on another number of ranks. Collective."""
+        stored = dict(memory)
+        self.evaluations, self._states.products = (int(count) for count in stored.pop("counts"))
+        parts = parted_memory(stored, len(self.problems))
+        for problem, part in zip(self.problems.values(), parts, strict=True):
+            problem.recall(part)
+
+    def _point_at(self, alpha: np.ndarray) -> PathPoint:
+        """Solve the adjoints from the last step to the first. Collective."""
+        states = self._states.of(alpha)
+        found: dict[str, DesignPoint] = {}
+        by_position = np.zeros(0)
+        for name in reversed(self.problems):
+            problem, state = self.problems[name], states[name]
+            if not found and name not in self.objectives:
+                continue
+            own = Partials.of(state, 0.0)
+            if name in self.objectives:
+                own = problem.partials_of(self.objectives[name], state)
+            found[name] = problem.differentiate(
+                state, with_later_steps(state, own, by_position) if found else own
+            )
+            by_position = by_slip_origin(state, own, found[name].adjoint_multiplier)
+            self._states.products += found[name].adjoint_iterations
+        points = {name: found[name] for name in self.problems if name in found}
+        return PathPoint(
+            np.array(alpha, dtype=float),
+            sum(point.value for point in points.values()),
+            np.asarray(sum(point.gradient for point in points.values())),
+            _together([point.weak for point in points.values()]),
+            points,
+        )
+
+
+class _States:
+    """States of all steps of one design after another; those of the last one are kept.
+
+    Attributes:
+        products: F-products of states, and of the adjoints that paths add, so far.
+    """
+
+    def __init__(self, problems: Mapping[str, ShapeProblem]) -> None:
+        self._problems = problems
+        self._alpha: np.ndarray | None = None
+        self._known: dict[str, State] = {}
+        self.products = 0
+
+    def of(self, alpha: np.ndarray) -> Mapping[str, State]:
+        """Return the states of a design. Collective."""
+        if self._alpha is not None and np.array_equal(self._alpha, alpha):
+            return self._known
+        states: dict[str, State] = {}
+        last = None
+        for name, problem in self._problems.items():
+            states[name] = last = problem.state_of(alpha, last)
+            self.products += last.dual.products
+        self._alpha, self._known = np.array(alpha, dtype=float), states
+        return states
+
+
+def _together(weak: Sequence[WeakPoints]) -> WeakPoints:
+    """Return the weak points of all steps."""
+    counts = np.sum([(each.contacts, each.discs, each.edges) for each in weak], axis=0)
+    return WeakPoints(int(counts[0]), int(counts[1]), int(counts[2]), weak[0].choice)
+
+
+def _check_names(names: Sequence[str]) -> None:
+    """Check that there are steps with different names."""
+    if not names:
+        raise InvalidInputError("LoadPath needs a load step, got none: give [LoadStep('push', loads=...)]")
+    if len(set(names)) < len(names):
+        raise InvalidInputError(
+            f"LoadPath needs a name for each of its steps, got {list(names)}: number those that recur"
+        )
+
+
+def _checked(
+    comm: MPI.Comm, names: Sequence[str], objectives: Mapping[str, Objective], *, last: bool = True
+) -> dict[str, Objective]:
+    """Return the objectives of steps in the order of the steps.
+
+    Raises:
+        InvalidInputError: If there is none, one is that of no step, or ``last`` and none is that of the last
+            step.
+    """
+    with together(comm):
+        if not objectives or not set(objectives) <= set(names):
+            raise InvalidInputError(
+                f"LoadPath.objectives must be those of some of the steps {list(names)}, got those of "
+                f"{list(objectives)}: give {{'{names[-1]}': objective}}"
+            )
+        if last and names[-1] not in objectives:
+            raise InvalidInputError(
+                f"the last step needs an objective, as nothing depends on it otherwise, but {names[-1]!r} "
+                f"is not among {list(objectives)}: leave out the steps after the last objective"
+            )
+    return {name: objectives[name] for name in names if name in objectives}
