@@ -66,9 +66,11 @@ class LoadPath:
         objectives: Name of the step -> J_n, for steps that have one.
 
     Example:
+        >>> designs = SurfaceDesign("block", "z0", net=(4, 3))  # doctest: +SKIP
         >>> problem = ShapeProblem(ContactProblem(scene, comm), designs, FrictionWork())  # doctest: +SKIP
-        >>> steps = [LoadStep(name, loads=[weight, pull(s)]) for name, s in forth_and_back]  # doctest: +SKIP
-        >>> wear = LoadPath(problem, steps)  # doctest: +SKIP
+        >>> forth = LoadStep("forth", loads=[TotalForce("block", "z1", (9, 0, -50))])  # doctest: +SKIP
+        >>> back = LoadStep("back", loads=[TotalForce("block", "z1", (-9, 0, -50))])  # doctest: +SKIP
+        >>> wear = LoadPath(problem, [forth, back])  # doctest: +SKIP
         >>> result = minimize(wear, np.zeros(wear.size), bounds=(-1.0, 1.0))  # doctest: +SKIP
 
     References:

@@ -107,13 +107,13 @@ def objects() -> dict[str, Any]:
     scene = block_on_floor(Coulomb(0.4), load=(0.4, 0.1, -2.0))
     contact = ContactProblem(scene, MPI.COMM_SELF, partitions=partitions(scene), tolerance=1e-8)
     shape = ShapeProblem(contact, designs_of(scene), TotalPotential())
-    point = shape.evaluate(np.zeros(shape.size))
+    path = LoadPath(shape, [LoadStep("push")])
+    followed, point = path.evaluate(np.zeros(path.size)), shape.evaluate(np.zeros(shape.size))
     state = point.state
     partials = shape.objective.partials(state, shape.geometry.forms)
     limits = LinearConstraints(np.ones((40, 60)), np.ones(40))
     search = ForScipy(bowl, np.zeros(60), constraints=limits)
     search.arguments("SLSQP")["fun"](np.zeros(60))
-    path = LoadPath(shape, [LoadStep("push")])
     weights = [BodyForce("block", (0, 0, float(k))) for k in range(50)]
     roots = [
         shape.function(TotalPotential()),
@@ -123,8 +123,7 @@ def objects() -> dict[str, Any]:
         certify(state.dual, state.dual_solution), solver_errors(state.system, state.solution),
         Balanced(), FixedPoint(FaceNewton()), LoadSequence(shape.contact), AdaptiveTolerance(),
         UnheldMotion({"block": np.eye(6)[0]}), RigidSurface("block", "z1", (0.5, 0.5, 1.0)),
-        *shape.geometry.motions, LoadCases({"one": shape}), path,
-        path.evaluate(np.zeros(path.size)),
+        *shape.geometry.motions, LoadCases({"one": shape}), path, followed,
         RigidMotion(Surface("block", "z1"), np.zeros(3), np.ones(3), np.arange(3.0)),
         limits, Bounds(np.zeros(60), np.ones(60)), BundleTrust(),
         minimize(bowl, np.ones(60), constraints=NonlinearConstraint(bowl, 90.0, name="size")),
