@@ -40,7 +40,7 @@ def minimize(
         constraints: `LinearConstraints`, `NonlinearConstraint`, SciPy's of either kind, or a list of them.
             All are met at the stop, linear ones and, after corrections, equalities at every point tried.
         scale: Size of each variable, shape (n,) or a number. None takes the widths of the box where it is
-            bounded on all sides, so choose meaningful bounds; else 1.
+            bounded on all sides, of the narrowest for fixed variables, so choose meaningful bounds; else 1.
         restore: Whether x0 may violate nonlinear constraints; the method then restores them.
         callback: Called after every evaluation with its record and the best point so far, and before the
             checkpoint is written: a run that died in between reports the record again when it continues.

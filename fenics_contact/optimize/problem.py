@@ -106,7 +106,10 @@ def _named(given: Sequence[Any], start: Array) -> tuple[NonlinearConstraint, ...
 def _scale(n: int, allowed: FeasibleSet, scale: ArrayLike | None) -> Array:
     if scale is None:
         width = allowed.upper - allowed.lower
-        return np.where(width > 0.0, width, 1.0) if np.isfinite(width).all() else np.ones(n)
+        if not np.isfinite(width).all() or not width.any():
+            return np.ones(n)
+        # A fixed variable takes no step, but its derivative is part of norms: in units of the others.
+        return np.where(width > 0.0, width, width[width > 0.0].min())
     size = np.array(scale, dtype=float)
     if size.shape not in ((), (n,)) or not (np.isfinite(size).all() and (size > 0.0).all()):
         raise InvalidInputError(f"scale must be positive, a number or of shape ({n},), got {size}")

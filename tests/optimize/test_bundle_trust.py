@@ -95,6 +95,23 @@ def test_widths_of_the_box_are_the_scale_when_none_is_named() -> None:
     assert result.x == pytest.approx(0.2 * size, rel=1e-4)
 
 
+def test_a_fixed_variable_costs_nothing_in_any_unit() -> None:
+    case = BY_NAME["Shor"]
+
+    def minimised(unit: float) -> tuple[int, float]:
+        def fun(x: Array) -> tuple[float, Array]:
+            value, gradient = shor(x[1:] / unit)
+            return value + x[0] / unit, np.append(1.0, gradient) / unit
+
+        widths = unit * np.array([0.0, *[60.0] * 5])
+        result = minimize(fun, unit * np.append(0.0, case.start), bounds=(-widths, widths))
+        return result.evaluations, result.value
+
+    evaluations, value = minimised(1.0)
+    assert value == pytest.approx(case.minimum, rel=1e-4)
+    assert minimised(1e-6) == (evaluations, pytest.approx(value, rel=1e-6))
+
+
 def test_gradients_of_very_different_size_are_handled_in_one_bundle() -> None:
     # A cliff of slope 1e6 beside a slope of 1: the penalty of a constraint x_0 ≥ 0.
     def fun(x: Array) -> tuple[float, Array]:
