@@ -11,7 +11,7 @@ from fenics_contact.shape.linearised_face import WeakChoice, WeakPoints, lineari
 from fenics_contact.shape.load_cases import LoadCases
 from fenics_contact.shape.load_path import LoadPath, PathPoint
 from fenics_contact.shape.memory import DesignPoint
-from fenics_contact.shape.motion import HarmonicExtension
+from fenics_contact.shape.motion import MeshMotion
 from fenics_contact.shape.moved_surface import MovedSurface
 from fenics_contact.shape.movement import Movement
 from fenics_contact.shape.objective import Objective, Partials
@@ -29,12 +29,12 @@ __all__ = [
     "DesignFunction",
     "DesignPoint",
     "FrictionWork",
-    "HarmonicExtension",
     "Largest",
     "LargestPressure",
     "LargestStress",
     "LoadCases",
     "LoadPath",
+    "MeshMotion",
     "MovedSurface",
     "Movement",
     "Objective",

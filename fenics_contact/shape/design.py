@@ -23,8 +23,8 @@ TRANSITION = 0.15
 #: Parameters of a design surface to what a net on it needs, in words, and to one such net.
 _KINDS = {1: "a curve in the plane is a number of control points", 2: "a surface is a pair of numbers"}
 _NETS: dict[int, int | tuple[int, int]] = {1: 7, 2: (7, 4)}
-#: Distance from the surface, relative to its extent, beyond which nothing moves: behind a fixed boundary a
-#: harmonic displacement has decayed there.
+#: Distance from the surface, relative to its extent, beyond which nothing moves: behind a fixed boundary the
+#: displacement has decayed there.
 FAR = 0.4
 
 

@@ -1,8 +1,9 @@
-"""Smooth extension of a surface displacement into the mesh."""
+"""The mesh follows its design surface."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import ufl
@@ -19,25 +20,69 @@ from fenics_contact.scene import Body, Scene, mirrored
 from fenics_contact.shape.design import SurfaceDesign
 
 
-@displayed
-class HarmonicExtension:
-    """Each component of the mesh displacement is harmonic, prescribed on the design surface, zero where held.
+@dataclass(frozen=True)
+class _Components:
+    """Some components of nodes: where they are in arrays of all and in distributed vectors of them alone."""
 
-    The matrix is that of the reference mesh: the extension is linear in the surface displacement, and one
-    factorisation serves all designs and, transposed, all gradients.
+    comm: MPI.Comm
+    rows: PETSc.IS
+    here: np.ndarray
+
+    @classmethod
+    def chosen(cls, space: _dolfinx.fem.FunctionSpace, marks: np.ndarray) -> _Components:
+        """Return the marked ones, marks of shape (n_nodes, dim). Collective."""
+        dim = marks.shape[1]
+        nodes, dofs = _dolfinx.node_dofs(space)
+        own = dofs < space.dofmap.index_map.size_local
+        blocks = _dolfinx.global_dofs(space, dofs[own])
+        place, row = ((part[:, None] * dim + np.arange(dim)).ravel() for part in (nodes[own], blocks))
+        order = np.argsort(row)
+        order = order[marks.ravel()[place[order]]]
+        comm = space.mesh.comm
+        return cls(comm, PETSc.IS().createGeneral(row[order].astype(PETSc.IntType), comm), place[order])
+
+    def put(self, values: np.ndarray, vector: PETSc.Vec) -> None:
+        """Take this rank's entries of a vector from values at all nodes, shape (n_nodes, dim)."""
+        vector.array_w[:] = values.ravel()[self.here]
+
+    def add(self, vector: PETSc.Vec, values: np.ndarray) -> None:
+        """Add a vector to values at all nodes, shape (n_nodes, dim), on every rank. Collective."""
+        for places, part in self.comm.allgather((self.here, vector.array_r)):
+            values.ravel()[places] += part
+
+
+@displayed
+class MeshMotion:
+    """The mesh deforms as an elastic body that is stiffer where its cells are smaller.
+
+    Its displacement v minimises ∫ |ε(v)|² det(J)^(−χ) dx, J the Jacobian of the cells and ε(v) the symmetric
+    gradient, prescribed on the design surface, zero where held: large cells give way and small ones keep
+    their shape. All is integrated over the reference mesh: the motion is linear in the surface displacement,
+    and one factorisation serves all designs and, transposed, all gradients.
 
     Attributes:
         moving: Nodes of the design surface.
         held: Components of nodes that do not move, shape (n_nodes, dim).
+
+    References:
+        Stein, Tezduyar and Benson, Mesh moving techniques for fluid-structure interactions with large
+        displacements, J. Appl. Mech. 70 (2003), 58-63: stiffness by the Jacobian.
     """
 
     def _facts(self) -> dict[str, np.ndarray]:
         return {"moving": self.moving, "held": self.held}
 
     def __init__(
-        self, decomposition: Decomposition, name: str, body: Body, moving: np.ndarray, held: np.ndarray
+        self,
+        decomposition: Decomposition,
+        name: str,
+        body: Body,
+        moving: np.ndarray,
+        held: np.ndarray,
+        *,
+        stiffening: float = 1.5,
     ) -> None:
-        """Assemble and factor the Laplacian of a body. Collective on the decomposition's communicator.
+        """Assemble and factor the stiffness of a mesh. Collective on the decomposition's communicator.
 
         Args:
             decomposition: Which rank owns which cells.
@@ -46,6 +91,7 @@ class HarmonicExtension:
             moving: Nodes of the design surface.
             held: Components of nodes that do not move, shape (n_nodes, dim): all of them, or on a plane of
                 symmetry the one across it.
+            stiffening: χ: 0 makes all cells equally stiff.
 
         Raises:
             InvalidInputError: If a node is both moved and held.
@@ -59,56 +105,33 @@ class HarmonicExtension:
             )
         self.moving, self.held = moving, held
         mesh = body_mesh(decomposition, name, body)
-        V = _dolfinx.nodal_space(body.mesh.cell_type)
-        form = ufl.inner(ufl.grad(ufl.TrialFunction(V)), ufl.grad(ufl.TestFunction(V)))
-        template = Template(mesh.comm, form * volume_measure(body.mesh.cell_type, 2), ())
-        space = _dolfinx.scalar_space(mesh, 1)
-        self._space = space  # its mesh owns the matrix's communicator, which must not be freed before
-        self._laplacian = _dolfinx.assemble_matrix(template.bind([space, space], ()))
-        nodes, dofs = _dolfinx.node_dofs(space)
-        self._rows = np.zeros(body.mesh.n_nodes, dtype=PETSc.IntType)
-        mine = np.full(body.mesh.n_nodes, -1, dtype=np.int64)
-        mine[nodes] = _dolfinx.global_dofs(space, dofs)
-        mesh.comm.Allreduce(mine, everywhere := np.empty_like(mine), op=MPI.MAX)
-        self._rows[:] = everywhere
-        dispose_with(self, self._laplacian, comm=decomposition.comm, keep=space)
-        known: dict[bytes, PETSc.KSP] = {}
-        self._given, self._ksp = [], []
-        for column in held.T:
-            given = np.union1d(moving, np.flatnonzero(column))
-            self._given.append(self._rows[given])
-            key = given.tobytes()
-            known[key] = known.get(key) or self._factor(given)
-            self._ksp.append(known[key])
-
-    def _factor(self, given: np.ndarray) -> PETSc.KSP:
-        matrix = self._laplacian.copy()
-        matrix.zeroRowsColumns(self._rows[given], diag=1.0)
-        ksp = PETSc.KSP().create(matrix.getComm())
-        ksp.setOperators(matrix)
-        ksp.setType(PETSc.KSP.Type.PREONLY)
-        ksp.getPC().setType(PETSc.PC.Type.LU)
-        ksp.getPC().setFactorSolverType("mumps")
-        ksp.setUp()
-        comm = self._laplacian.getComm().tompi4py()
-        dispose_with(self, ksp.getPC(), ksp, matrix, comm=comm, keep=self._space)
-        return ksp
+        space = _dolfinx.nodal_space_on(mesh, body.mesh.dim)
+        template = Template(mesh.comm, _stiffness(body.mesh.cell_type, stiffening), ())
+        matrix = _dolfinx.assemble_matrix(template.bind([space, space], ()))
+        given = np.zeros_like(held)
+        given[moving] = True
+        self._given = _Components.chosen(space, given)
+        self._free = _Components.chosen(space, ~(given | held))
+        inner = matrix.createSubMatrix(self._free.rows, self._free.rows)
+        self._coupling = matrix.createSubMatrix(self._free.rows, self._given.rows)
+        self._ksp = _factored(inner)
+        held_by_petsc = (self._ksp.getPC(), self._ksp, inner, self._coupling, matrix)
+        indices = (self._free.rows, self._given.rows)
+        # The mesh owns the communicator, which must not be freed before them.
+        dispose_with(self, *held_by_petsc, *indices, comm=decomposition.comm, keep=space)
 
     def extend(self, displacement: np.ndarray) -> np.ndarray:
         """Return the displacement of all nodes, shape (n_nodes, dim), from the moving ones'. Collective."""
         check_not_forked()
-        prescribed, right = self._laplacian.createVecs()
+        result = np.zeros(self.held.shape)
+        result[self.moving] = displacement
+        known, right = self._coupling.createVecs()
         solution = right.duplicate()
-        result = np.zeros((len(self._rows), displacement.shape[1]))
-        for axis in range(displacement.shape[1]):
-            prescribed.zeroEntries()
-            self._put(prescribed, self._rows[self.moving], displacement[:, axis])
-            self._laplacian.mult(prescribed, right)
-            right.scale(-1.0)
-            self._put(right, self._given[axis], self._values(prescribed)[self._given[axis]])
-            self._ksp[axis].solve(right, solution)
-            result[:, axis] = self._values(solution)[self._rows]
-        for vector in (prescribed, right, solution):
+        self._given.put(-result, known)
+        self._coupling.mult(known, right)
+        self._ksp.solve(right, solution)
+        self._free.add(solution, result)
+        for vector in (known, right, solution):
             vector.destroy()
         return result
 
@@ -119,35 +142,39 @@ class HarmonicExtension:
             gradient: Derivative by the displacement of every node, shape (n_nodes, dim), replicated.
         """
         check_not_forked()
-        right, image = self._laplacian.createVecs()
+        result = gradient.copy()
+        known, right = self._coupling.createVecs()
         adjoint = right.duplicate()
-        result = np.zeros((len(self.moving), gradient.shape[1]))
-        for axis in range(gradient.shape[1]):
-            self._put(right, self._rows, gradient[:, axis])
-            self._put(right, self._given[axis], np.zeros(len(self._given[axis])))
-            self._ksp[axis].solve(right, adjoint)
-            self._laplacian.mult(adjoint, image)
-            result[:, axis] = gradient[self.moving, axis] - self._values(image)[self._rows[self.moving]]
-        for vector in (right, image, adjoint):
+        self._free.put(-gradient, right)
+        self._ksp.solve(right, adjoint)
+        self._coupling.multTranspose(adjoint, known)
+        self._given.add(known, result)
+        for vector in (known, right, adjoint):
             vector.destroy()
-        return result
-
-    @staticmethod
-    def _put(vector: PETSc.Vec, rows: np.ndarray, values: np.ndarray) -> None:
-        """Set the entries that this rank owns."""
-        start, stop = vector.getOwnershipRange()
-        here = (rows >= start) & (rows < stop)
-        vector.array_w[rows[here] - start] = values[here]
-
-    @staticmethod
-    def _values(vector: PETSc.Vec) -> np.ndarray:
-        """Return all entries of a distributed vector on every rank."""
-        comm = vector.getComm().tompi4py()
-        return np.concatenate(comm.allgather(vector.array_r))
+        return np.asarray(result[self.moving])
 
 
-def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign) -> HarmonicExtension:
-    """Return the extension that moves the mesh of a body with its design. Collective.
+def _stiffness(cell_type: str, stiffening: float) -> ufl.Form:
+    """Write ∫ ε(u) : ε(v) det(J)^(−χ) dx."""
+    V, mesh = _dolfinx.displacement_space(cell_type), _dolfinx.template(cell_type)
+    u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
+    weight = abs(ufl.JacobianDeterminant(mesh)) ** (-stiffening)
+    return weight * ufl.inner(ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v))) * volume_measure(cell_type, 2)
+
+
+def _factored(matrix: PETSc.Mat) -> PETSc.KSP:
+    """Return a direct solver of a symmetric matrix. Collective."""
+    ksp = PETSc.KSP().create(matrix.getComm())
+    ksp.setOperators(matrix)
+    ksp.setType(PETSc.KSP.Type.PREONLY)
+    ksp.getPC().setType(PETSc.PC.Type.LU)
+    ksp.getPC().setFactorSolverType("mumps")
+    ksp.setUp()
+    return ksp
+
+
+def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign) -> MeshMotion:
+    """Return how the mesh of a body follows its design. Collective.
 
     Raises:
         InvalidInputError: If a moving surface is held.
@@ -161,11 +188,11 @@ def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign)
             facets = body.mesh.surfaces[support.surface]
             held[facets[~cut[facets].all(axis=1).any(axis=1)]] = True
     held[design.nodes_beyond_transition(body.mesh, cut)] = True
-    return HarmonicExtension(decomposition, name, body, design.lattice.nodes, held)
+    return MeshMotion(decomposition, name, body, design.lattice.nodes, held)
 
 
 def moving_nodes(
-    scene: Scene, designs: Sequence[SurfaceDesign], motions: Sequence[HarmonicExtension]
+    scene: Scene, designs: Sequence[SurfaceDesign], motions: Sequence[MeshMotion]
 ) -> dict[str, np.ndarray]:
     """Return which nodes of each body its designs move, body name -> marks, shape (n_nodes,)."""
     moving = {name: np.zeros(body.mesh.n_nodes, dtype=bool) for name, body in scene.bodies.items()}

@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
 from fenics_contact.scene import BodyForce, Coulomb, Surface, ThermalStrain, TotalForce, Tresca
-from fenics_contact.shape import HarmonicExtension
+from fenics_contact.shape import MeshMotion
 from tests.shape.aims import aims
 from tests.shape.blocks import block_on_block, problem
 from tests.shape.chains import chain_problem
@@ -104,7 +104,7 @@ def motion_case(comm: MPI.Comm) -> dict[str, Any]:
     moving = PROBLEMS["blocks, tetrahedra"](comm)
     rng, found = np.random.default_rng(2), {}
     bodies = {mesh.body for mesh in moving.contact.decomposition.meshes}
-    motion: HarmonicExtension
+    motion: MeshMotion
     for design, motion in zip(moving.designs, moving.geometry.motions, strict=True):
         given = rng.standard_normal((len(motion.moving), 3))
         by_points = rng.standard_normal((moving.scene.bodies[design.body].mesh.n_nodes, 3))

@@ -10,11 +10,14 @@ from mpi4py import MPI
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import decompose
-from fenics_contact.gallery import block
+from fenics_contact.gallery import LinkShape, block, box_lattice, chain_link
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.mesh.quality import thickness
 from fenics_contact.partition import box_partition
 from fenics_contact.scene import Body, Scene, Support
-from fenics_contact.shape import HarmonicExtension, SurfaceDesign
+from fenics_contact.shape import MeshMotion, SurfaceDesign
 from fenics_contact.shape.geometry import DesignGeometry
+from fenics_contact.shape.motion import motion_of
 from tests.shape.blocks import RUBBER
 from tests.shape.chains import chain_problem, crossed_links
 
@@ -33,12 +36,12 @@ def marks(body: Body, nodes: np.ndarray) -> np.ndarray:
     return held
 
 
-def extension(cell: str, held: str = "z0") -> HarmonicExtension:
+def extension(cell: str, held: str = "z0") -> MeshMotion:
     scene = brick(cell)
     body = scene.bodies["brick"]
     decomposition = decompose(scene, {"brick": box_partition(body.mesh, (2, 1, 1))}, MPI.COMM_SELF)
     top, bottom = (np.unique(body.mesh.surfaces[name]) for name in ("z1", held))
-    return HarmonicExtension(decomposition, "brick", body, top, marks(body, np.setdiff1d(bottom, top)))
+    return MeshMotion(decomposition, "brick", body, top, marks(body, np.setdiff1d(bottom, top)))
 
 
 @pytest.mark.parametrize("cell", CELLS)
@@ -56,9 +59,9 @@ def test_prescribed_values_are_met_and_held_nodes_stay(cell: str) -> None:
 @pytest.mark.parametrize("cell", CELLS)
 def test_a_top_that_moves_as_a_whole_stretches_the_body_evenly(cell: str) -> None:
     motion, mesh = extension(cell), brick(cell).bodies["brick"].mesh
-    shift = np.array([0.3, -0.2, 0.1])
-    moved = motion.extend(np.tile(shift, (len(motion.moving), 1)))
-    assert moved == pytest.approx(mesh.points[:, 2:] / 1.5 * shift, abs=1e-13)
+    lift = np.array([0.0, 0.0, 0.1])
+    moved = motion.extend(np.tile(lift, (len(motion.moving), 1)))
+    assert moved == pytest.approx(mesh.points[:, 2:] / 1.5 * lift, abs=1e-13)
 
 
 @pytest.mark.parametrize("cell", CELLS)
@@ -71,13 +74,39 @@ def test_pulling_back_is_the_transpose_of_extending(cell: str) -> None:
     assert back == pytest.approx(forth, rel=1e-12)
 
 
-def test_components_do_not_mix() -> None:
-    motion = extension("hexahedron")
-    given = np.zeros((len(motion.moving), 3))
-    given[:, 1] = 1.0
-    moved = motion.extend(given)
-    assert np.all(moved[:, [0, 2]] == 0.0)
-    assert moved[:, 1].max() == 1.0
+@pytest.mark.parametrize("stiffening", [0.0, 1.0, 1.5])
+def test_cells_deform_as_much_as_their_volume_to_the_stiffening(stiffening: float) -> None:
+    mesh = box_lattice([np.linspace(0.0, 1.0, 3), np.linspace(0.0, 1.0, 3), np.array([0.0, 1.0, 1.25, 1.5])])
+    scene = Scene({"brick": Body(mesh, RUBBER)}, [Support("brick", "z0")])
+    decomposition = decompose(scene, {"brick": box_partition(mesh, (2, 1, 1))}, MPI.COMM_SELF)
+    top, bottom = (np.unique(mesh.surfaces[name]) for name in ("z1", "z0"))
+    held = marks(scene.bodies["brick"], bottom)
+    motion = MeshMotion(decomposition, "brick", scene.bodies["brick"], top, held, stiffening=stiffening)
+    moved = motion.extend(np.tile([0.0, 0.0, 0.1], (len(top), 1)))[:, 2]
+    levels = [moved[np.isclose(mesh.points[:, 2], z)] for z in (0.0, 1.0, 1.25, 1.5)]
+    assert max(np.ptp(level) for level in levels) < 1e-13
+    thick, thin, top_strain = np.diff([level[0] for level in levels]) / [1.0, 0.25, 0.25]
+    assert thin == pytest.approx(top_strain)
+    assert thick / thin == pytest.approx(4.0**stiffening)
+
+
+def test_small_cells_on_a_crown_let_it_move_farther() -> None:
+    links = chain_link(LinkShape(n_around=24, n_a=4, n_b=10, grading=2.5))
+    scene = Scene({"link": Body(links.mesh, RUBBER)}, [Support("link", "grip")])
+    decomposition = decompose(scene, {"link": box_partition(links.mesh, (2, 1, 1))}, MPI.COMM_SELF)
+    design = SurfaceDesign("link", links.crown, (7, 4))
+    motion = motion_of(decomposition, scene, design)
+    even = MeshMotion(decomposition, "link", scene.bodies["link"], motion.moving, motion.held, stiffening=0.0)
+    given = design.displacement(np.random.default_rng(3).uniform(-1.0, 1.0, 28))
+    far, near = (largest(links.mesh, way.extend(given)) for way in (motion, even))
+    assert far > 3.0 * near > 0.0
+
+
+def largest(mesh: BodyMesh, moved: np.ndarray) -> float:
+    """How often the displacement can be applied before a cell inverts."""
+    steps = np.geomspace(0.01, 10.0, 100)
+    sound = [bool(thickness(mesh.points + step * moved, mesh.cells).min() > 0.0) for step in steps]
+    return float(steps[np.argmin(sound) - 1]) if not all(sound) else float(steps[-1])
 
 
 def test_nodes_that_are_to_move_and_to_stay_are_refused() -> None:
@@ -88,7 +117,7 @@ def test_nodes_that_are_to_move_and_to_stay_are_refused() -> None:
     with pytest.raises(
         InvalidInputError, match=r"4 nodes of body 'brick' lie on both: choose another surface"
     ):
-        HarmonicExtension(decomposition, "brick", body, top, marks(body, side))
+        MeshMotion(decomposition, "brick", body, top, marks(body, side))
 
 
 def test_a_chain_follows_its_crowns_and_stays_where_it_is_held_or_pulled() -> None:
