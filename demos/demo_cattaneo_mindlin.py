@@ -116,7 +116,7 @@ def theory(x: np.ndarray, ratio: float) -> np.ndarray:
 # Inside the stick zone $(\mu p - q)^2$ falls with $x^2$ along a straight line that ends at $c^2$: fitted to
 # the nodes that stick, it measures $c$ better than counting them.
 
-place = np.concatenate([body.mesh.points for body in scene.bodies.values()])
+place = scene.points
 place = place[states["pressed"].contact.points.slave, 0]
 found = {}
 for name, state in list(states.items())[1:]:

@@ -63,7 +63,7 @@ with show_progress(comm):
 # counting cells.
 
 contact = state.contact
-place = np.concatenate([body.mesh.points for body in scene.bodies.values()])[contact.points.slave, 0]
+place = scene.points[contact.points.slave, 0]
 force = contact.normal_force.sum()  # N/mm
 stiffness = 1 / sum((1 - m.poisson_ratio**2) / m.young_modulus for m in (steel, aluminium))
 half_width = np.sqrt(4 * force * radius / (np.pi * stiffness))

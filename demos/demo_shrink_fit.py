@@ -115,7 +115,7 @@ limit = friction_coefficient * pressure * 2 * np.pi * seat**2
 
 fitted = states[0].contact
 found_pressure = fitted.normal_force.sum() / (2 * np.pi * seat)
-place = np.concatenate([body.mesh.points for body in scene.bodies.values()])[fitted.points.slave]
+place = scene.points[fitted.points.slave]
 around = np.column_stack([-place[:, 1], place[:, 0]])
 torques = np.array([np.sum(around * state.contact.force) for state in states])
 

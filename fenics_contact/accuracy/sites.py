@@ -60,7 +60,7 @@ def find_sites(torn: TornSystem, order: int = 1) -> Sites:
         number: part.reshape(known.shape) for (number, known), part in zip(keys.items(), parts, strict=False)
     }
     node = key // kinds
-    points = np.concatenate([body.mesh.points for body in scene.bodies.values()])[node]
+    points = scene.points[node]
     several = np.flatnonzero(tearing.on_several_ranks[node])
     sharing = Sharing(torn.decomposition.comm, key, several)
     neighbours, cells = _neighbours(list(of_cells.values()), len(key))

@@ -51,7 +51,7 @@ def nodal_forces(
     joined = torn.points.jump.T @ contact + torn.ties.jump.T @ tie
     connecting = -nodal_sum(decomposition, system.force(multiplier))
     return NodalForces(
-        np.concatenate([body.mesh.points for body in torn.scene.bodies.values()]),
+        torn.scene.points,
         nodal_sum(decomposition, torn.load),
         np.where(decomposition.fixed, connecting - joined, 0.0),
         contact,

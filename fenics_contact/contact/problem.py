@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Mapping
 from typing import Any, Literal
 
@@ -210,8 +209,7 @@ class ContactProblem:
         """Return the state to reuse: the last one if it has the scene's meshes, else the start."""
         if start is None or self.state is None:
             return start
-        meshes = [[body.mesh for body in each.bodies.values()] for each in (scene, self.state.scene)]
-        return self.state if all(map(operator.is_, *meshes)) else start
+        return self.state if scene.has_meshes_of(self.state.scene) else start
 
     def _torn(self, scene: Scene, previous: State | None, overlap: bool) -> TornSystem:
         return build_torn_system(

@@ -153,8 +153,7 @@ class State:
     @cached_property
     def contact_places(self) -> np.ndarray:
         """Positions of the contact points' slave nodes before deformation, shape (n, dim), [length]."""
-        places = np.concatenate([body.mesh.points for body in self.scene.bodies.values()])
-        return np.asarray(places[self.contact.points.slave])
+        return np.asarray(self.scene.points[self.contact.points.slave])
 
     @cached_property
     @collectively("State.conforming_displacement", _comm)

@@ -260,9 +260,8 @@ def build_torn_system(
 
 def _meets_alike(scene: Scene, other: Scene) -> bool:
     """Return whether two scenes have the same meshes and the same pairs of surfaces."""
-    meshes = [[body.mesh for body in each.bodies.values()] for each in (scene, other)]
-    same = all(mesh is mate for mesh, mate in zip(*meshes, strict=True))
-    return same and list(scene.contacts) == list(other.contacts) and list(scene.ties) == list(other.ties)
+    pairs = [[*each.contacts, *each.ties] for each in (scene, other)]
+    return scene.has_meshes_of(other) and pairs[0] == pairs[1]
 
 
 def _joined(

@@ -247,8 +247,7 @@ def _evaluated(
 ) -> Evaluation:
     """Call the functions, and once more near x where needed."""
     number = state.evaluations + 1
-    unequal = [k for k, one in enumerate(problem.nonlinear) if not one.equality]
-    penalties = {k: one.penalty for k, one in zip(unequal, state.soft, strict=True)}
+    penalties = {k: one.penalty for k, one in zip(problem.inequalities, state.soft, strict=True)}
     evaluation = evaluate_problem(problem, x, number, accuracy, penalties, known)
     return surely(problem, evaluation, number) if state.careful else evaluation
 
@@ -296,7 +295,7 @@ def _wanted(
 
 def _refined(problem: PosedProblem, state: MethodState, step: Step, accuracy: Accuracy) -> MethodState:
     """Re-evaluate the centre, more accurately."""
-    centre, equal = state.centre, [k for k, one in enumerate(problem.nonlinear) if one.equality]
+    centre, equal = state.centre, problem.equalities
     met = {k: replace(centre, value=centre.constraints[k], subgradient=centre.slopes[k]) for k in equal}
     evaluation = again(centre, _evaluated(problem, state, centre.x, accuracy, met))
     planes, doubtful = merit_planes(problem, evaluation), evaluation.doubtful

@@ -14,7 +14,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.optimize.contradiction import contradicting
 from fenics_contact.optimize.from_scipy import rows_of
 from fenics_contact.optimize.nonlinear import NonlinearConstraint
-from fenics_contact.optimize.quadratic_program import QuadraticProgram, solve
+from fenics_contact.optimize.quadratic_program import QuadraticProgram, solve, unit_rows
 
 if TYPE_CHECKING:
     import scipy.optimize
@@ -219,21 +219,15 @@ class FeasibleSet:
         below, above = (x - self.lower) / scale, (self.upper - x) / scale
         fixed = self.lower == self.upper
         low, high = np.isfinite(below) & ~fixed, np.isfinite(above) & ~fixed
-        rows, room = _unit_rows(self.matrix * scale, self.limit - self.matrix @ x)
+        rows, room = unit_rows(self.matrix * scale, self.limit - self.matrix @ x)
         gap = self.equality_value - self.equality_matrix @ x
-        equality, miss = _unit_rows(self.equality_matrix * scale, gap)
+        equality, miss = unit_rows(self.equality_matrix * scale, gap)
         return Surroundings(
             rows=np.vstack([rows, -unit[low], unit[high]]),
             room=np.concatenate([room, below[low], above[high]]),
             equality_rows=np.vstack([equality, unit[fixed]]),
             miss=np.concatenate([miss, above[fixed]]),
         )
-
-
-def _unit_rows(rows: Array, distance: Array) -> tuple[Array, Array]:
-    length = np.sqrt((rows**2).sum(axis=1))
-    length = np.where(length > 0.0, length, 1.0)
-    return rows / length[:, None], distance / length
 
 
 def _residual(matrix: Array, limit: Array, x: Array) -> tuple[Array, Array]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fenics_contact.optimize.quadratic_program import unit_rows
+
 Array = NDArray[np.float64]
 
 
@@ -26,9 +28,7 @@ def contradicting(rows: Array, limits: Array, equal: NDArray[np.bool_]) -> list[
         J. W. Chinneck, Feasibility and infeasibility in optimization, Springer, 2008 (elastic and deletion
         filters, chapter 6).
     """
-    length = np.linalg.norm(rows, axis=1)
-    length = np.where(length > 0.0, length, 1.0)
-    unit, limit = rows / length[:, None], limits / length
+    unit, limit = unit_rows(rows, limits)
     left = _elastic(unit, limit, equal)
     for k in list(left):
         others = [one for one in left if one != k]

@@ -24,11 +24,8 @@ def first_centre(problem: PosedProblem, subgradient: float, feasibility: float) 
         InvalidDesignError: If a function does not exist there, or no point near it meets the equalities.
         InvalidInputError: If it violates nonlinear constraints although it must not.
     """
-    equal = [k for k, one in enumerate(problem.nonlinear) if one.equality]
-    accuracy, penalties = (
-        Accuracy(np.inf, subgradient),
-        {k: 1.0 for k, one in enumerate(problem.nonlinear) if not one.equality},
-    )
+    equal, accuracy = problem.equalities, Accuracy(np.inf, subgradient)
+    penalties = dict.fromkeys(problem.inequalities, 1.0)
     try:
         if equal and problem.restore:
             x, known = restored(problem, problem.start, 1, feasibility)

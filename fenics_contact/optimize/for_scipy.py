@@ -16,6 +16,7 @@ from fenics_contact.optimize.evaluation import evaluate_constraint
 from fenics_contact.optimize.nonlinear import NonlinearConstraint, scaled_constraints
 from fenics_contact.optimize.objective import Evaluation, Fun, evaluate, require_finite
 from fenics_contact.optimize.problem import pose
+from fenics_contact.optimize.quadratic_program import unit_rows
 
 if TYPE_CHECKING:
     import scipy.optimize
@@ -282,6 +283,4 @@ def _linear_constraint(matrix: Array, below: Array, above: Array) -> scipy.optim
     """Return below ≤ matrix z ≤ above with rows of length one."""
     from scipy.optimize import LinearConstraint
 
-    length = np.linalg.norm(matrix, axis=1)
-    length = np.where(length > 0.0, length, 1.0)
-    return LinearConstraint(matrix / length[:, None], below / length, above / length)
+    return LinearConstraint(*unit_rows(matrix, below, above))

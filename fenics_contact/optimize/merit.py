@@ -14,7 +14,7 @@ from fenics_contact.optimize.constraints import Surroundings
 from fenics_contact.optimize.nonlinear import Scaled
 from fenics_contact.optimize.objective import Evaluation
 from fenics_contact.optimize.problem import PosedProblem
-from fenics_contact.optimize.quadratic_program import QuadraticProgram, SubproblemError, solve
+from fenics_contact.optimize.quadratic_program import QuadraticProgram, SubproblemError, solve, unit_rows
 from fenics_contact.optimize.soft_constraint import Plane, SoftConstraint
 from fenics_contact.optimize.state import MethodState
 from fenics_contact.optimize.subproblem import Step, solve_step
@@ -25,15 +25,14 @@ Array = NDArray[np.float64]
 def surroundings(problem: PosedProblem, centre: Evaluation) -> Surroundings:
     """Return linear constraints and linearised equalities around a centre, in scaled variables."""
     near = problem.allowed.around(centre.x, problem.scale)
-    if not any(one.equality for one in problem.nonlinear):
+    if not problem.equalities:
         return near
     here, slopes = _slopes(problem, centre)
-    rows = slopes[here.equal]
-    lengths = np.linalg.norm(rows, axis=1)
+    (rows,) = unit_rows(slopes[here.equal])
     return Surroundings(
         near.rows,
         near.room,
-        np.vstack([rows / np.where(lengths > 0.0, lengths, 1.0)[:, None], near.equality_rows]),
+        np.vstack([rows, near.equality_rows]),
         np.concatenate([np.zeros(len(rows)), near.miss]),
     )
 

@@ -42,6 +42,16 @@ class PosedProblem:
     nonlinear: tuple[NonlinearConstraint, ...] = ()
     restore: bool = False
 
+    @property
+    def equalities(self) -> list[int]:
+        """Numbers of the nonlinear constraints that are equalities."""
+        return [k for k, one in enumerate(self.nonlinear) if one.equality]
+
+    @property
+    def inequalities(self) -> list[int]:
+        """Numbers of the other nonlinear constraints."""
+        return [k for k, one in enumerate(self.nonlinear) if not one.equality]
+
     def constraints_at(self, evaluation: Evaluation) -> Scaled:
         """Return the nonlinear constraints of an evaluation in units of their sizes."""
         return scaled_constraints(self.nonlinear, evaluation.constraints)

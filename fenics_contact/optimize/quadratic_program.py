@@ -31,6 +31,13 @@ class SubproblemError(ConvergenceError):
     """The quadratic programme of a step could not be solved with any of the settings tried."""
 
 
+def unit_rows(rows: Array, *sides: Array) -> tuple[Array, ...]:
+    """Return rows divided by their lengths, shape (m, n), and so their sides, shape (m,) each; 0 stays 0."""
+    length = np.sqrt((rows**2).sum(axis=1))
+    length = np.where(length > 0.0, length, 1.0)
+    return rows / length[:, None], *(side / length for side in sides)
+
+
 @dataclass(frozen=True)
 class QuadraticProgram:
     """The data of min ½ yᵀ diag(h) y + qᵀy subject to E y = e and C y ≤ c.

@@ -9,7 +9,7 @@ from fenics_contact.errors import InvalidDesignError, InvalidInputError
 from fenics_contact.optimize.evaluation import Known, evaluate_constraint
 from fenics_contact.optimize.nonlinear import Scaled, scaled_constraints
 from fenics_contact.optimize.problem import PosedProblem
-from fenics_contact.optimize.quadratic_program import QuadraticProgram, SubproblemError, solve
+from fenics_contact.optimize.quadratic_program import QuadraticProgram, SubproblemError, solve, unit_rows
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ def restored(
     Raises:
         InvalidDesignError: If none is found.
     """
-    equal = [k for k, constraint in enumerate(problem.nonlinear) if constraint.equality]
+    equal = problem.equalities
     if not equal:
         return x, {}
     constraints = [problem.nonlinear[k] for k in equal]
@@ -69,15 +69,12 @@ def _corrected(problem: PosedProblem, x: Array, known: Known, missed: Scaled) ->
     """Return the nearest point, in scaled variables, that meets the linearised equalities."""
     near, n = problem.allowed.around(x, problem.scale), x.size
     slopes = np.array([one.subgradient for one in known.values()])
-    rows = missed.factors[:, None] * slopes * problem.scale
-    lengths = np.linalg.norm(rows, axis=1)
-    lengths = np.where(lengths > 0.0, lengths, 1.0)
-    miss = -missed.excess / lengths
+    rows, miss = unit_rows(missed.factors[:, None] * slopes * problem.scale, -missed.excess)
     reach = float(np.abs(miss).max())
     program = QuadraticProgram(
         curvature=np.ones(n),
         slope=np.zeros(n),
-        equality_rows=np.vstack([near.equality_rows, rows / lengths[:, None]]),
+        equality_rows=np.vstack([near.equality_rows, rows]),
         equality_values=np.concatenate([near.miss, miss]) / reach,
         rows=near.rows,
         limits=np.maximum(near.room, 0.0) / reach,

@@ -133,22 +133,20 @@ def _measured(
 ) -> ContactPoints:
     """Return the points of one pair with the gaps between its surfaces. Collective."""
     numbers = NodeNumbers.of(scene)
-    # The gap between tied surfaces stays as it is and is not used.
-    geometry = pair.geometry if isinstance(pair, ContactPair) else "faceted"
-    slave = _Side.of(scene, pair.slave, geometry, numbers, finer)
+    slave = _Side.of(scene, pair.slave, pair.geometry, numbers, finer)
     movable = ~fixed[slave.nodes].all(axis=1)
     bearing = movable & (slave.surface.areas > 0.0) if isinstance(pair, ContactPair) else movable
     if not finer:
-        warn_of_surface(scene, pair.slave, geometry, slave.surface, comm)
+        warn_of_surface(scene, pair.slave, pair.geometry, slave.surface, comm)
     if not isinstance(pair.master, Surface):
         with together(comm):
             points = _on_obstacle(slave, bearing, pair.master)
         name = f"what ContactPair {index} asks its obstacle, {type(pair.master).__name__}"
         require_alike(comm, described((points.slave, points.normal, points.gap), name))
     else:
-        master = _Side.of(scene, pair.master, geometry, numbers, finer)
+        master = _Side.of(scene, pair.master, pair.geometry, numbers, finer)
         if not finer:
-            warn_of_surface(scene, pair.master, geometry, master.surface, comm)
+            warn_of_surface(scene, pair.master, pair.geometry, master.surface, comm)
         if pair.discretisation == "mortar":
             points = _by_mortar(slave, bearing, master, comm, master_share(scene, pair))
         else:

@@ -19,7 +19,7 @@ def friction_data(scene: Scene, points: ContactPoints) -> tuple[np.ndarray, np.n
         InvalidInputError: If friction given as a function is negative somewhere, or no number.
     """
     has, coefficient, bound = np.zeros(points.count, dtype=bool), *np.zeros((2, points.count))
-    places = np.concatenate([body.mesh.points for body in scene.bodies.values()])[points.slave]
+    places = scene.points[points.slave]
     for number, pair in enumerate(scene.contacts):
         mine = np.flatnonzero(points.pair == number)
         has[mine] = pair.has_friction

@@ -234,6 +234,11 @@ class Tie:
             )
 
     @property
+    def geometry(self) -> Geometry:
+        """Facets, as the gap between tied surfaces is not used."""
+        return "faceted"
+
+    @property
     def place(self) -> str:
         """Its surfaces: "upper z0 on lower z1"."""
         return _place(self.slave, self.master)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
@@ -166,6 +167,16 @@ class SceneParts:
     def facets(self, surface: Surface) -> np.ndarray:
         """Return the linear facets through the nodes of a surface, rows of node numbers of its body."""
         return self.bodies[surface.body].mesh.linear.surfaces[surface.name]
+
+    @property
+    def points(self) -> np.ndarray:
+        """Coordinates of the nodes of all bodies in their order, shape (n_nodes, dim), [length]."""
+        return np.concatenate([body.mesh.points for body in self.bodies.values()])
+
+    def has_meshes_of(self, other: SceneParts) -> bool:
+        """Return whether its bodies have the very meshes of those of another scene."""
+        meshes = [[body.mesh for body in each.bodies.values()] for each in (self, other)]
+        return len(meshes[0]) == len(meshes[1]) and all(map(operator.is_, *meshes))
 
     def moved(self, points: Mapping[str, np.ndarray]) -> Self:
         """Return the scene with new coordinates for some bodies; topology and names stay.

@@ -121,7 +121,7 @@ def _add_projected(
 
 def _points(torn: TornSystem, nodes: np.ndarray) -> np.ndarray:
     """Return the coordinates of nodes of all bodies, shape (n, dim)."""
-    return np.concatenate([body.mesh.points for body in torn.scene.bodies.values()])[nodes]
+    return torn.scene.points[nodes]
 
 
 def _row_fields(state: State, multiplier: np.ndarray, displacement: np.ndarray) -> RowFields:

@@ -56,7 +56,7 @@ def bounds_by_place(torn: TornSystem, normal_force: np.ndarray, by_bound: np.nda
     points = torn.points
     result, by_all = np.zeros((points.count, torn.dim)), np.zeros(points.count)
     by_all[torn.frictional] = by_bound
-    places = np.concatenate([body.mesh.points for body in torn.scene.bodies.values()])[points.slave]
+    places = torn.scene.points[points.slave]
     for index, pair in enumerate(torn.scene.contacts):
         if pair.friction_varies:
             mine = np.flatnonzero(points.pair == index)

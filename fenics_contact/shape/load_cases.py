@@ -188,9 +188,13 @@ class LoadCases:
         )
 
     def _counting(self, alpha: np.ndarray) -> dict[str, ShapeProblem]:
-        """Return the cases of which the last subgradient, at α, was made."""
+        """Return the cases of which the subgradient at α is made. Collective."""
         if self.weights is not None:
             return self.problems
-        values = {name: each.last.value for name, each in self.problems.items() if each.last is not None}
+        known = {name: each.known(alpha) for name, each in self.problems.items()}
+        values = {
+            name: each.value_of(alpha) if point is None else point.value
+            for (name, each), point in zip(self.problems.items(), known.values(), strict=True)
+        }
         name = max(values, key=values.__getitem__)
         return {name: self.problems[name]}

@@ -52,8 +52,7 @@ def mortar_by_shape(
     """
     tearing, scene = torn.decomposition.tearing, torn.scene
     assert isinstance(pair.master, Surface)
-    geometry = pair.geometry if isinstance(pair, ContactPair) else "faceted"
-    slave, master = (surface_of(scene, side, geometry) for side in (pair.slave, pair.master))
+    slave, master = (surface_of(scene, side, pair.geometry) for side in (pair.slave, pair.master))
     nodes, opposite = (
         tearing.global_nodes(side.body, surface.nodes)
         for side, surface in ((pair.slave, slave), (pair.master, master))

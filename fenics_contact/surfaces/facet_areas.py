@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -80,7 +81,7 @@ class GaussPoint:
     gradients: np.ndarray
     tangents: np.ndarray
 
-    @property
+    @cached_property
     def normals(self) -> np.ndarray:
         """Outward normals times the area that belongs to the point, shape (n_facets, dim)."""
         if self.tangents.shape[2] == 3:
@@ -92,7 +93,7 @@ class GaussPoint:
         """Return nodal vectors, or the coordinates, at the point in every facet, shape (n_facets, dim)."""
         return np.asarray(np.einsum("k,nkd->nd", self.values, nodal[facets]))
 
-    @property
+    @cached_property
     def areas(self) -> np.ndarray:
         """The area that belongs to the point, shape (n_facets,), [length²] or [length]."""
         return np.asarray(np.linalg.norm(self.normals, axis=1))

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
-from fenics_contact.contact import State, Status
+from fenics_contact.contact import ContactProblem, State, Status
 from fenics_contact.shape import DesignPoint, Objective, ShapeProblem
 
 
@@ -115,6 +116,26 @@ class Line:
     def counts(self) -> dict[str, int]:
         """How many points have each status."""
         return {status.name: self.state().contact.count(status) for status in Status}
+
+
+def check_statuses(here: Line) -> None:
+    """Points stick, slip and are open, the same ones all along the line."""
+    assert all(count > 0 for count in here.counts().values()), here.counts()
+    assert here.is_smooth()
+
+
+def check_adjoint(here: Line, objective: Objective, steepness: float = 0.02) -> None:
+    """The adjoint agrees with central differences along a direction in which the objective changes."""
+    assert here.steepness(objective) > steepness
+    assert here.miss(objective) < 1e-5
+
+
+def check_default_settings(here: Line, objective: Objective) -> None:
+    """A problem with default settings and cut has the same derivative, to its tolerance."""
+    contact = ContactProblem(here.problem.scene, MPI.COMM_SELF)
+    default = ShapeProblem(contact, here.problem.designs, objective)
+    slope = float(default(here.alpha)[1] @ here.direction)
+    assert slope == pytest.approx(here.quotient(objective), rel=1e-3)
 
 
 Patch = pytest.MonkeyPatch

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import pytest
 
-from fenics_contact.contact import Status
 from tests.shape.moved_blocks import OBJECTIVES, SCENES, line
+from tests.shape.quotients import check_adjoint, check_statuses
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_points_stick_slip_and_lift_off_all_along_the_line(name: str) -> None:
-    contact = line(name).state().contact
-    assert all(contact.count(status) > 0 for status in Status)
-    assert line(name).is_smooth()
+    check_statuses(line(name))
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES["floor"])
 @pytest.mark.parametrize("name", SCENES)
 def test_the_adjoint_agrees_with_central_differences(name: str, objective: str) -> None:
-    here, judge = line(name), OBJECTIVES[name][objective]
-    assert here.steepness(judge) > 0.02
-    assert here.miss(judge) < 1e-5
+    check_adjoint(line(name), OBJECTIVES[name][objective])
 
 
 @pytest.mark.parametrize("name", SCENES)

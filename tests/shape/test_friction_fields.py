@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, Status
+from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene import Coulomb, Sampled, Scene, Tresca, gradients_of
 from fenics_contact.shape import Objective, ShapeProblem, contact_derivative
 from tests.shape.blocks import block_on_block, block_on_floor, designs_of, problem
 from tests.shape.objectives import objectives
 from tests.shape.plane_blocks import line_of, on_block, on_obstacle, plane_problem
-from tests.shape.quotients import Line, Patch, miss_without
+from tests.shape.quotients import Line, Patch, check_statuses, miss_without
 
 
 def rough(points: np.ndarray) -> np.ndarray:
@@ -79,9 +79,7 @@ def without_gradients(patch: Patch) -> None:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_points_stick_slip_and_lift_off_all_along_the_line(name: str) -> None:
-    contact = line(name).state().contact
-    assert all(contact.count(status) > 0 for status in Status), line(name).counts()
-    assert line(name).is_smooth()
+    check_statuses(line(name))
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES)

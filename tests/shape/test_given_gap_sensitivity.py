@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, Status
+from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidDesignError
 from fenics_contact.scene import Coulomb, Scene
 from fenics_contact.shape import ShapeProblem, TotalPotential
 from tests.shape.blocks import block_on_block, block_on_floor, designs_of, problem
 from tests.shape.moved_blocks import DRAG, PUSH
 from tests.shape.objectives import objectives
-from tests.shape.quotients import Line
+from tests.shape.quotients import Line, check_adjoint, check_statuses
 
 
 def bowl(points: np.ndarray) -> np.ndarray:
@@ -72,7 +72,7 @@ def test_the_gap_is_the_given_one_and_what_the_design_adds(name: str) -> None:
     measured = pair.interference == "measured"
     assert near.any()
     np.testing.assert_array_equal(start.given, near)
-    wanted = pair.gap_at(_places(here.problem.scene, start))
+    wanted = pair.gap_at(here.problem.scene.points[start.slave])
     wanted = 0.0 if wanted is None else wanted
     np.testing.assert_allclose(
         start.gap, np.where(near & (not measured), wanted, start.distance), rtol=0, atol=1e-15
@@ -82,23 +82,15 @@ def test_the_gap_is_the_given_one_and_what_the_design_adds(name: str) -> None:
     np.testing.assert_allclose(change, moved.distance - start.distance, rtol=0, atol=1e-14)
 
 
-def _places(scene: Scene, points: Any) -> np.ndarray:
-    return np.concatenate([body.mesh.points for body in scene.bodies.values()])[points.slave]
-
-
 @pytest.mark.parametrize("name", SCENES)
 def test_points_stick_slip_and_lift_off_all_along_the_line(name: str) -> None:
-    contact = line(name).state().contact
-    assert all(contact.count(status) > 0 for status in Status), line(name).counts()
-    assert line(name).is_smooth()
+    check_statuses(line(name))
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES["floor, gap"])
 @pytest.mark.parametrize("name", SCENES)
 def test_the_adjoint_agrees_with_central_differences(name: str, objective: str) -> None:
-    here, judge = line(name), OBJECTIVES[name][objective]
-    assert here.steepness(judge) > 0.02
-    assert here.miss(judge) < 1e-5
+    check_adjoint(line(name), OBJECTIVES[name][objective])
 
 
 def test_default_settings_are_as_good() -> None:

@@ -75,6 +75,21 @@ def test_a_minimum_of_the_largest_case_lies_above_each_case_alone() -> None:
     assert result.value < start - 1e-3 * abs(start)
 
 
+def test_a_gradient_near_an_earlier_design_is_that_of_the_case_which_is_largest_there() -> None:
+    known = cases(False).problems
+    dragged = known["dragged"].case(known["dragged"].scene, 1.6 * known["dragged"].objective)
+    either = LoadCases({"pressed": known["pressed"].case(known["pressed"].scene), "dragged": dragged})
+    largest = []
+    for seed in (1, 0, 8, 4):  # the second is neither the first design, nor the best, nor the last
+        either(design(seed, 0.004))
+        values = {name: each.value_of(design(seed, 0.004)) for name, each in either.problems.items()}
+        largest.append(max(values, key=values.__getitem__))
+    assert largest == ["dragged", "pressed", "dragged", "dragged"]
+    alpha = design(0, 0.004)
+    found = either.beside(alpha, alpha + 1e-9 * design(10, 1.0))
+    np.testing.assert_allclose(found, known["pressed"](alpha)[1], rtol=1e-4, atol=1e-6)
+
+
 def test_what_was_stored_is_recalled() -> None:
     first = cases_of(MPI.COMM_SELF, None)
     first(design(4, 0.002))

@@ -8,15 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, Status
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene import Pressure
 from fenics_contact.shape import ShapeProblem, resultant_derivative, volume_integral, work_derivative
 from tests.shape.loaded_blocks import OBJECTIVES, PLANE_PUSH, SCENES, line, loaded
 from tests.shape.plane_blocks import plane_problem
-from tests.shape.quotients import Patch, miss_without
+from tests.shape.quotients import Patch, check_adjoint, check_default_settings, check_statuses, miss_without
 
 #: Many states: what claims rest on.
 pytestmark = [pytest.mark.slow, pytest.mark.claim]
@@ -53,17 +51,13 @@ def without_moments(coefficient: str) -> Callable[[Patch], None]:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_points_stick_slip_and_lift_off_all_along_the_line(name: str) -> None:
-    contact = line(name).state().contact
-    assert all(contact.count(status) > 0 for status in Status), line(name).counts()
-    assert line(name).is_smooth()
+    check_statuses(line(name))
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
 @pytest.mark.parametrize("name", SCENES)
 def test_the_adjoint_agrees_with_central_differences(name: str, objective: str) -> None:
-    here, judge = line(name), OBJECTIVES[objective]
-    assert here.steepness(judge) > 0.02
-    assert here.miss(judge) < 1e-5
+    check_adjoint(line(name), OBJECTIVES[objective])
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -93,10 +87,7 @@ def test_area_centroid_and_second_moment_of_the_surface_count(name: str, coeffic
 
 
 def test_default_settings_give_the_same_gradient() -> None:
-    here, judge = line("tractions of position"), OBJECTIVES["energy"]
-    default = ShapeProblem(ContactProblem(here.problem.scene, MPI.COMM_SELF), here.problem.designs, judge)
-    slope = float(default(here.alpha)[1] @ here.direction)
-    assert slope == pytest.approx(here.quotient(judge), rel=1e-3)
+    check_default_settings(line("tractions of position"), OBJECTIVES["energy"])
 
 
 def test_a_field_that_is_not_known_beside_the_surface_is_refused() -> None:

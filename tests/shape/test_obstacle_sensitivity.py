@@ -7,7 +7,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fenics_contact.contact import Status
 from fenics_contact.gallery import block
 from fenics_contact.scene import (
     Body,
@@ -25,7 +24,7 @@ from fenics_contact.scene import (
 from tests.contact.gallery import Friction, crowned
 from tests.shape.blocks import RUBBER, problem
 from tests.shape.objectives import objectives
-from tests.shape.quotients import Line
+from tests.shape.quotients import Line, check_adjoint, check_statuses
 
 BALL = RigidSphere((0.9, 0.55, -4.0), 4.0)
 #: Obstacle under the block, by how much the block's lower face is crowned, and the law of friction.
@@ -61,17 +60,13 @@ def line(name: str) -> Line:
 
 @pytest.mark.parametrize("name", CASES)
 def test_points_stick_slip_and_lift_off_all_along_the_line(name: str) -> None:
-    contact = line(name).state().contact
-    assert all(contact.count(status) > 0 for status in Status), line(name).counts()
-    assert line(name).is_smooth()
+    check_statuses(line(name))
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
 @pytest.mark.parametrize("name", CASES)
 def test_the_adjoint_agrees_with_central_differences(name: str, objective: str) -> None:
-    here, judge = line(name), OBJECTIVES[objective]
-    assert here.steepness(judge) > 0.02
-    assert here.miss(judge) < 1e-5
+    check_adjoint(line(name), OBJECTIVES[objective])
 
 
 @pytest.mark.parametrize("name", ["ball", "socket", "bar"])

@@ -3,28 +3,21 @@
 from __future__ import annotations
 
 import pytest
-from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, Status
-from fenics_contact.shape import ShapeProblem
 from tests.shape.left_out import TERMS, without_areas
 from tests.shape.plane_blocks import OBJECTIVES, SCENES, line
-from tests.shape.quotients import miss_without
+from tests.shape.quotients import check_adjoint, check_default_settings, check_statuses, miss_without
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_points_stick_slip_and_lift_off_all_along_the_line(name: str) -> None:
-    contact = line(name).state().contact
-    assert all(contact.count(status) > 0 for status in Status), line(name).counts()
-    assert line(name).is_smooth()
+    check_statuses(line(name))
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
 @pytest.mark.parametrize("name", SCENES)
 def test_the_adjoint_agrees_with_central_differences(name: str, objective: str) -> None:
-    here, judge = line(name), OBJECTIVES[objective]
-    assert here.steepness(judge) > 0.015
-    assert here.miss(judge) < 1e-5
+    check_adjoint(line(name), OBJECTIVES[objective], 0.015)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -47,8 +40,4 @@ def test_the_slip_bound_of_tresca_friction_changes_with_the_nodal_length() -> No
 
 @pytest.mark.parametrize("name", ["pipe", "blocks"])
 def test_default_settings_give_the_same_gradient(name: str) -> None:
-    here, judge = line(name), OBJECTIVES["energy"]
-    scene = SCENES[name]()
-    default = ShapeProblem(ContactProblem(scene, MPI.COMM_SELF), here.problem.designs, judge)
-    slope = float(default(here.alpha)[1] @ here.direction)
-    assert slope == pytest.approx(here.quotient(judge), rel=1e-3)
+    check_default_settings(line(name), OBJECTIVES["energy"])

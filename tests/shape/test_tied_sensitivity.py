@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, Status
-from fenics_contact.shape import ShapeProblem, tied_derivative
-from tests.shape.quotients import Patch, miss_without
+from fenics_contact.shape import tied_derivative
+from tests.shape.quotients import Patch, check_adjoint, check_default_settings, check_statuses, miss_without
 from tests.shape.tied_blocks import OBJECTIVES, SCENES, line
 
 
@@ -37,18 +35,14 @@ def without(term: str) -> Callable[[Patch], None]:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_points_stick_slip_and_lift_off_all_along_the_line(name: str) -> None:
-    contact = line(name).state().contact
-    assert all(contact.count(status) > 0 for status in Status), line(name).counts()
+    check_statuses(line(name))
     assert line(name).state().torn.ties.count > 5
-    assert line(name).is_smooth()
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
 @pytest.mark.parametrize("name", SCENES)
 def test_the_adjoint_agrees_with_central_differences(name: str, objective: str) -> None:
-    here, judge = line(name), OBJECTIVES[objective]
-    assert here.steepness(judge) > 0.02
-    assert here.miss(judge) < 1e-5
+    check_adjoint(line(name), OBJECTIVES[objective])
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -69,7 +63,4 @@ def test_the_normals_of_sliding_ties_count(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["plane", "sliding"])
 def test_default_settings_give_the_same_gradient(name: str) -> None:
-    here, judge = line(name), OBJECTIVES["energy"]
-    default = ShapeProblem(ContactProblem(SCENES[name](), MPI.COMM_SELF), here.problem.designs, judge)
-    slope = float(default(here.alpha)[1] @ here.direction)
-    assert slope == pytest.approx(here.quotient(judge), rel=1e-3)
+    check_default_settings(line(name), OBJECTIVES["energy"])

@@ -47,7 +47,7 @@ def spot_of(state: State) -> Spot:
 
 def test_sections_cut_through_the_middle_of_the_contact_along_its_normal() -> None:
     state = touching_blocks()
-    everything = np.concatenate([body.mesh.points for body in state.scene.bodies.values()])
+    everything = state.scene.points
     spot = spot_of(state)
     np.testing.assert_allclose(spot.normal, [0, 0, 1], atol=0.1)
     assert 0.1 < spot.centre[0] < 1.9
