@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -125,7 +126,8 @@ def write_optimisation_result(
 
     | entry | what it holds |
     |---|---|
-    | ``optimisation.objective`` | ``type``, ``initial``, ``final``, ``drop_percent`` |
+    | ``optimisation.objective`` | ``type``, ``definition`` with all arguments, ``initial``, ``final``, \
+``drop_percent`` |
     | ``optimisation.design`` | ``variables``, ``bodies``, ``values`` at the best point |
     | ``optimisation.stop`` | ``converged``, ``reason``, ``iterations``, ``evaluations``, ``f_products`` |
     | ``optimisation.constraints`` | of each nonlinear one ``name``, ``value``, ``lower``, ``upper``, \
@@ -281,6 +283,7 @@ def _errors(state: State) -> dict[str, Any]:
 def _objective(problem: ShapeProblem, initial: float, final: float) -> dict[str, Any]:
     return {
         "type": type(problem.objective).__name__,
+        "definition": re.sub(r" at 0x[0-9a-f]+", "", repr(problem.objective)),
         "initial": initial,
         "final": final,
         "drop_percent": (initial - final) / abs(initial) * 100.0 if initial else None,

@@ -12,7 +12,7 @@ from fenics_contact.scene_file.values import Line, Row, one_of
 
 
 class VolumeConstraint(Part):
-    """The volume of the designed bodies, linearised at the start, relative to that of the start."""
+    """The volume of the designed bodies relative to that of the start."""
 
     kind: Literal["volume"]
     at_least: PositiveFloat | None = Field(None, description="least volume relative to that of the start")

@@ -38,7 +38,7 @@ class ShapeTask:
         problem: J(α) with its subgradient.
         start: Design variables at the start, [length].
         bounds: Least and largest values of the variables, [length].
-        constraints: The linear ones in one, and limits of other objectives.
+        constraints: The linear ones in one, volumes, and limits of other objectives.
         method: The optimiser.
         restore: Whether the start may violate limits of other objectives.
     """
@@ -136,15 +136,8 @@ def _constraints(
     others: list[NonlinearConstraint] = []
     for part in design.constraints:
         if isinstance(part, VolumeConstraint):
-            volume, gradient = problem.volume(start)
-            # V(α) ≈ V + V'·(α − start)
-            offset = float(gradient @ start)
-            if part.at_least is not None:
-                rows.append(-gradient)
-                limits.append((1.0 - part.at_least) * volume - offset)
-            if part.at_most is not None:
-                rows.append(gradient)
-                limits.append((part.at_most - 1.0) * volume + offset)
+            upper, lower = _limits(part, problem.volume(start)[0])
+            others.append(NonlinearConstraint(problem.volume, upper, lower, "volume"))
         elif isinstance(part, ObjectiveConstraint):
             others.append(_limited(part, problem, source))
         else:
@@ -158,9 +151,15 @@ def _limited(part: ObjectiveConstraint, problem: ShapeProblem, source: Source) -
     with together(problem.comm):
         objective = _objective(part.objective, source)
     name = part.name or in_words(part.objective)
-    upper, lower = np.inf if part.at_most is None else part.at_most, part.at_least
-    function = problem.function(objective, name)
-    return NonlinearConstraint(function, upper, -np.inf if lower is None else lower, name)
+    return NonlinearConstraint(problem.function(objective, name), *_limits(part), name)
+
+
+def _limits(part: VolumeConstraint | ObjectiveConstraint, unit: float = 1.0) -> tuple[float, float]:
+    """Return the upper and the lower limit, infinite where it is not given."""
+    return (
+        np.inf if part.at_most is None else part.at_most * unit,
+        -np.inf if part.at_least is None else part.at_least * unit,
+    )
 
 
 def _fitting(name: str, values: tuple[float, ...], size: int) -> np.ndarray:

@@ -188,6 +188,7 @@ def test_an_optimisation_is_told_with_its_history_and_design(tmp_path: Path) -> 
     assert found["kind"] == "optimisation"
     told = found["optimisation"]
     assert told["objective"]["type"] == "ContactForces"
+    assert told["objective"]["definition"] == "ContactForces(function=<function normal_forces>)"
     assert told["objective"]["final"] == result.value
     assert told["objective"]["drop_percent"] > 0.0
     assert told["design"]["values"] == result.x.tolist()

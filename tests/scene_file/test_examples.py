@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.optimize import LinearConstraints
+from fenics_contact.optimize import LinearConstraints, NonlinearConstraint
 from fenics_contact.scene_file import SceneFileError, read_scene_file
 from tests.conftest import ROOT
 from tests.scene_file.compared import compare_states, two_blocks
@@ -45,13 +45,15 @@ def test_a_side_of_a_block_can_be_designed() -> None:
     moved = task.problem.points_of(np.full(4, 0.01))["upper"]
     bottom = task.problem.designs[0].surface.nodes
     np.testing.assert_allclose(moved[bottom, 2], 1.0 - 0.01, atol=1e-12)  # added material: downwards
-    (linear,) = task.constraints
+    linear, volume = task.constraints
     assert isinstance(linear, LinearConstraints)
-    matrix, limit = np.asarray(linear.matrix), np.asarray(linear.limit)
-    volume, gradient = task.problem.volume(task.start)
-    assert volume == pytest.approx(4.0)
-    np.testing.assert_allclose(matrix, [-gradient, gradient, np.ones(4)])
-    np.testing.assert_allclose(limit, [0.01 * volume, 0.5 * volume, 0.01])
+    np.testing.assert_allclose(linear.matrix, np.ones((1, 4)))
+    np.testing.assert_allclose(linear.limit, [0.01])
+    assert isinstance(volume, NonlinearConstraint)
+    assert (volume.lower, volume.upper) == pytest.approx((0.99 * 4.0, 1.5 * 4.0))
+    found, gradient = volume.fun(np.full(4, 0.01))
+    assert found == pytest.approx(4.0 + 0.01 * gradient.sum())
+    assert gradient.sum() == pytest.approx(4.0)  # the area of the side
 
 
 def plane_scene(**change: object) -> dict[str, object]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.optimize import LinearConstraints, NonlinearConstraint
+from fenics_contact.optimize import NonlinearConstraint
 from fenics_contact.scene_file import SceneFile, SceneFileError, read_scene_file
 from fenics_contact.shape import (
     ContactArea,
@@ -82,9 +82,10 @@ def test_an_objective_may_be_limited() -> None:
     limited = {"kind": "objective", "objective": stress, "at_most": 1000, "at_least": 1, "name": "stress"}
     kept = {"kind": "volume", "at_least": 0.9}
     task = constrained(limited, kept, restore=True).shape_task()
-    linear, constraint = task.constraints
-    assert isinstance(linear, LinearConstraints)
+    constraint, volume = task.constraints
     assert isinstance(constraint, NonlinearConstraint)
+    assert isinstance(volume, NonlinearConstraint)
+    assert (volume.name, volume.upper) == ("volume", np.inf)
     assert (constraint.name, constraint.lower, constraint.upper) == ("stress", 1.0, 1000.0)
     start = np.zeros(4)
     value, gradient = constraint.fun(start)
