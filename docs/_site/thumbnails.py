@@ -26,6 +26,7 @@ PIECES = {
     "bolted_joint_stress": (0.00, 0.455, 0.62, 0.985),
     "five_links_stress": (0.00, 0.05, 0.50, 0.36),
     "orthotropic_stress": (0.06, 0.05, 0.86, 0.75),
+    "tooth_flank_stress": (0.49, 0.16, 0.89, 0.89),
     "chain_links_stress": (0.01, 0.06, 0.87, 0.53),
     "uncertain_friction_samples": (0.09, 0.06, 0.97, 0.79),
     "01_first_contact": (0.17, 0.04, 0.75, 0.52),

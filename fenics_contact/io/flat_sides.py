@@ -144,14 +144,14 @@ def _loops(
     after = {int(start): (int(end), int(label)) for (start, end), label in zip(edges, labels, strict=True)}
     before = {end: (start, label) for start, (end, label) in after.items()}
     corners = {int(node) for surface in surfaces for line in _lines(surface) for node in line[[0, -1]]}
-    breaks = [node for node in after if node in corners or after[node][1] != before[node][1]]
-    left, loops = dict.fromkeys(breaks), []
+    breaks = {node for node in after if node in corners or after[node][1] != before[node][1]}
+    left, loops = dict.fromkeys(node for node in after if node in breaks), []
     while left:
         loop, node = [], next(iter(left))
         while node in left:
             del left[node]
             label, nodes = after[node][1], [node, after[node][0]]
-            while nodes[-1] not in left and nodes[-1] not in breaks:
+            while nodes[-1] not in breaks:
                 nodes.append(after[nodes[-1]][0])
             loop.append(_edge(np.array(nodes), label, surfaces))
             node = nodes[-1]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError, collectively, together
+from fenics_contact.io.exact_planes import corners_in_planes, rims_in_planes
 from fenics_contact.io.flat_sides import Edge, FlatSide, flat_sides
 from fenics_contact.io.moved_bodies import moved_body, moved_surfaces
 from fenics_contact.io.replacing import replacing
@@ -97,8 +98,9 @@ def write_step(
             fits = [fitted(surface, tolerance) for surface in surfaces]
             lattices = [one.design.lattice for one in surfaces]
             sides = flat_sides(problem.scene.bodies[name].mesh, mesh.points, lattices) if solid else []
+            fits = rims_in_planes(fits, sides, tolerance)
             with replacing(target) as (temporary,), gmsh_model("fenics_contact STEP") as gmsh:
-                drawing = _Drawing(gmsh, fits, mesh.points, scale)
+                drawing = _Drawing(gmsh, fits, corners_in_planes(mesh.points, sides), scale)
                 volume: float | None = None
                 with _reasons():
                     if solid:
@@ -130,9 +132,11 @@ def _reasons() -> Iterator[None]:
 class _Drawing:
     """Surfaces and sides in gmsh's current model, in millimetres."""
 
-    def __init__(self, gmsh: ModuleType, fits: Sequence[SplineFit], points: np.ndarray, scale: float) -> None:
+    def __init__(
+        self, gmsh: ModuleType, fits: Sequence[SplineFit], corners: Mapping[int, np.ndarray], scale: float
+    ) -> None:
         self._gmsh, self._occ = gmsh, gmsh.model.occ
-        self._fits, self._points, self._scale = fits, points, scale
+        self._fits, self._corners, self._scale = fits, corners, scale
 
     def surfaces(self) -> None:
         """Draw the designed surfaces alone."""
@@ -140,26 +144,23 @@ class _Drawing:
 
     def body(self, sides: Sequence[FlatSide]) -> float:
         """Draw the body that surfaces and flat sides enclose; return its volume in the scene's units."""
-        faces = [(2, self._face(side)) for side in sides]
-        if self._points.shape[1] == 3:
+        body = 2, self._face(sides[0])
+        if self._fits[0].points.ndim == 3:
+            faces = [body, *((2, self._face(side)) for side in sides[1:])]
             faces += [self._spline(fit) for fit in self._fits]
-            # Sides meet surfaces along splines through the same points: to rounding of a larger model.
-            gap = 1e-6 * self._scale * float(np.ptp(self._points, axis=0).max())
-            sewn = self._occ.healShapes(faces, tolerance=gap, fixSmallEdges=False, fixSmallFaces=False)
-            bodies = [entity for entity in sewn if entity[0] == 3]
-        else:
-            bodies = faces
+            # Sides meet along edges of the same control points.
+            shell = self._occ.addSurfaceLoop([tag for _, tag in faces], sewing=True)
+            body = 3, self._occ.addVolume([shell])
         self._occ.synchronize()
-        edges = self._gmsh.model.getBoundary(self._gmsh.model.getBoundary(bodies), combined=True)
-        size = self._occ.getMass(*bodies[0]) if len(bodies) == 1 else 0.0
-        if len(bodies) != 1 or edges or size <= 0.0:
+        edges = self._gmsh.model.getBoundary(self._gmsh.model.getBoundary([body]), combined=True)
+        if edges:
             raise CadError(
-                f"the sides of a body in a CAD file must enclose it, {len(faces)} sides gave {len(bodies)} "
-                f"bodies with {len(edges)} open edges: hold the rims of designed surfaces that leave flat "
-                "sides with optimize.fixed_rim, or write the surfaces alone with solid=False"
+                f"the sides of a body in a CAD file must enclose it, {len(sides)} flat ones and "
+                f"{len(self._fits)} designed surfaces leave {len(edges)} open edges: write the surfaces "
+                "alone with solid=False"
             )
-        self._keep(bodies)
-        return float(size / self._scale ** bodies[0][0])
+        self._keep([body])
+        return float(abs(self._occ.getMass(*body)) / self._scale ** body[0])
 
     def _keep(self, wanted: list[tuple[int, int]]) -> None:
         """Remove everything but some entities and what they consist of."""
@@ -188,23 +189,17 @@ class _Drawing:
     def _face(self, side: FlatSide) -> int:
         """Draw a flat side."""
         wires = [
-            self._occ.addWire([self._edge(edge, side) for edge in loop], checkClosed=True)
-            for loop in side.loops
+            self._occ.addWire([self._edge(edge) for edge in loop], checkClosed=True) for loop in side.loops
         ]
         return int(self._occ.addPlaneSurface(wires))
 
-    def _edge(self, edge: Edge, side: FlatSide) -> int:
+    def _edge(self, edge: Edge) -> int:
         if edge.surface is None:
-            ends = self._in_plane(self._points[edge.nodes[[0, -1]]], side)
+            ends = (self._corners[int(node)] for node in edge.nodes[[0, -1]])
             return int(self._occ.addLine(*[self._point(end) for end in ends]))
         fit = self._fits[edge.surface]
         points = fit.sides[edge.side]
-        return self._curve(self._in_plane(points[::-1] if edge.reversed else points, side), fit.knots)
-
-    def _in_plane(self, points: np.ndarray, side: FlatSide) -> np.ndarray:
-        if side.normal is None:
-            return points
-        return np.asarray(points - np.outer(points @ side.normal - side.level, side.normal))
+        return self._curve(points[::-1] if edge.reversed else points, fit.knots)
 
     def _curve(self, points: np.ndarray, knots: np.ndarray) -> int:
         distinct, times = _counted(knots)

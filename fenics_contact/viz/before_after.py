@@ -13,7 +13,7 @@ from matplotlib.collections import LineCollection
 from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.shape import DesignPoint
-from fenics_contact.viz.colours import BLUE, GREY, ORANGE
+from fenics_contact.viz.colours import BLUE, GREY, INK, ORANGE
 from fenics_contact.viz.patch import checked_pair, contact_patches
 from fenics_contact.viz.patch_axes import label_axes, label_patch, pressure_bar
 from fenics_contact.viz.picture import Picture, draw_picture, png_path
@@ -52,9 +52,9 @@ def plot_before_after(
     """Draw contact pressure before and after in the same colours, and the movement of outlines. Collective.
 
     The outlines are those of the undeformed bodies around the strongest contact: in space in two sections, in
-    the plane directly. Their movement is magnified by a stated factor. The title reports the decrease of the
-    objective, if design points are given, and by how much the seat of the slave receded: the distance that
-    the unloaded slave may travel along its contact force until it touches.
+    the plane directly; those after in true scale, and with their movement magnified by a stated factor. The
+    title reports the decrease of the objective, if design points are given, and by how much the seat of the
+    slave receded: the distance that the unloaded slave may travel along its contact force until it touches.
 
     Args:
         first: State before, or the design point, for instance ``problem.first``.
@@ -140,7 +140,7 @@ def _draw_in_space(first: State, best: State, paper: BinaryIO, look: _Look) -> N
         sections = lower.subplots(1, len(outlines), width_ratios=wide)
         for axes, profile in zip(sections, outlines, strict=True):
             _draw_profile(axes, profile, min(profile.factor for profile in outlines), look.units)
-        lower.legend(*sections[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+        lower.legend(*sections[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
 
 
 def _draw_in_plane(first: State, best: State, paper: BinaryIO, look: _Look) -> None:
@@ -167,15 +167,17 @@ def _draw_in_plane(first: State, best: State, paper: BinaryIO, look: _Look) -> N
         left.grid(color=GREY, alpha=0.25)
         left.legend(loc="upper right")
         _draw_profile(right, profile, profile.factor, look.units)
-        right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
+        right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
 
 
 def _draw_profile(axes: Axes, profile: Profile, factor: float, units: Units) -> None:
+    drawn = [("before", 0.0, GREY, 3.5), (f"after, movement × {factor:g}", factor, ORANGE, 1.6)]
+    if factor > 1.0:
+        drawn.append(("after", 1.0, INK, 0.8))
     for number, (name, lines) in enumerate(profile.before.items()):
-        after = lines + factor * profile.moves[name]
-        words = ("before", f"after, movement × {factor:g}") if not number else (None, None)
-        axes.add_collection(LineCollection(lines, colors=GREY, linewidths=3.5, label=words[0]))
-        axes.add_collection(LineCollection(after, colors=ORANGE, linewidths=1.6, label=words[1]))
+        for word, by, colour, width in drawn:
+            moved, label = lines + by * profile.moves[name], None if number else word
+            axes.add_collection(LineCollection(moved, colors=colour, linewidths=width, label=label))
         place = profile.place_in(name)
         if place is not None:
             axes.text(*place, name, color=BLUE, ha="center", va="center")

@@ -55,6 +55,10 @@ DEMOS: dict[str, tuple[dict[str, float | list[float]], set[str]]] = {
         {"slide": 7, "largest_pressure_median": 2384.37, "largest_pressure_95": 2571.78},
         {"samples", "distribution", "stress"},
     ),
+    "tooth_flank": (
+        {"pitch_peak": 928.90, "unrelieved_peak": 3341.70, "relieved_peak": 987.59},
+        {"before_after", "stress"},
+    ),
     "orthotropic": (
         {"force": 1849.15, "half_axes": [3.20134, 2.71753], "angle": 89.153},
         {"stress", "pressure"},

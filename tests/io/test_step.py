@@ -152,9 +152,19 @@ def test_a_rim_over_two_flat_sides_is_refused() -> None:
 
 def test_a_rim_that_leaves_its_flat_side_is_refused(tmp_path: Path) -> None:
     problem = crown((2, 1), (4, 2, 2))
-    with pytest.raises(CadError, match=r"must enclose it, 6 sides gave \d bodies with \d* open edges"):
+    with pytest.raises(
+        CadError, match=r"must stay within .* of the flat side beside it, it leaves it by 0\.0"
+    ):
         write_step(problem, np.array([0.0, 0.2]), tmp_path / "pad.step")
     assert not list(tmp_path.iterdir())
+
+
+def test_sides_that_do_not_enclose_a_body_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fenics_contact.io.step.flat_sides", lambda *given: flat_sides(*given)[:-1])
+    with pytest.raises(CadError, match=r"must enclose it, 4 flat ones and 1 designed .* leave 4 open edges"):
+        write_step(lid(), variables(), tmp_path / "pad.step")
 
 
 def test_what_opencascade_says_is_passed_on(tmp_path: Path) -> None:

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from fenics_contact.contact import State, solve_scene
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.viz import before_after, plot_before_after
+from fenics_contact.viz import Units, before_after, plot_before_after
 from fenics_contact.viz.colours import GREY, ORANGE
 from fenics_contact.viz.profile import profiles
 from fenics_contact.viz.view import Frame, axis_label
@@ -69,6 +70,18 @@ def test_outlines_move_as_the_design_does(dim: int) -> None:
     assert largest > 0.3 * RISE, "hardly anything moved: nothing was tested"
     still = profiles(first, first, None, "mm")
     assert all(profile.largest == 0 and profile.factor == 1 for profile in still)
+
+
+def test_outlines_after_are_drawn_in_true_scale_and_magnified() -> None:
+    (profile,) = profiles(plane_block(), raised(2), None, "mm")
+    axes = Figure().subplots()
+    before_after._draw_profile(axes, profile, profile.factor, Units())  # type: ignore[attr-defined]
+    lines = {each.get_label(): np.array(each.get_segments()) for each in axes.collections}
+    assert profile.factor > 1.0
+    words = ["before", f"after, movement × {profile.factor:g}", "after"]
+    name = next(iter(profile.before))
+    for word, factor in zip(words, (0.0, profile.factor, 1.0), strict=True):
+        np.testing.assert_allclose(lines[word], profile.before[name] + factor * profile.moves[name])
 
 
 def test_a_section_cuts_the_outline_where_it_is() -> None:
