@@ -29,7 +29,15 @@ from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, Status, contact_area
 from fenics_contact.gallery import LinkShape, two_links
-from fenics_contact.io import ResultSeries, write_optimisation_result, write_vtu, write_xdmf
+from fenics_contact.io import (
+    ResultSeries,
+    write_design_table,
+    write_optimisation_result,
+    write_step,
+    write_stl,
+    write_vtu,
+    write_xdmf,
+)
 from fenics_contact.optimize import BundleTrust, LinearConstraints, NonlinearConstraint, minimize
 from fenics_contact.partition import box_partition
 from fenics_contact.progress import show_progress
@@ -204,9 +212,14 @@ with show_progress(comm), timer.phase("pictures"):
     ends = (before.state, after.state) if aim == "pressure" else (before, after)  # named in any case
     plot_before_after(*ends, output / "before_after.png", label=label)
 
-# ## Files for ParaView
+# ## Files for ParaView, CAD and printers
+#
+# The crown as a table in the parameters of the net and as a B-spline surface, link 1 as triangles.
 
 with timer.phase("files"):
+    write_design_table(problem, result.x, output / "crown.csv", lines=(57, 25))
+    write_step(problem, result.x, output / "crown.step", solid=False)
+    write_stl(problem, result.x, output / "link_1.stl")
     for name, point in points.items():
         write_vtu(point.state, output, name)
         write_xdmf(point.state, output / f"{name}.xdmf")

@@ -45,7 +45,9 @@ def test_the_small_demo_lowers_the_energy_and_leaves_pictures_files_and_result(
     for name in PICTURES:
         assert (output / f"{name}.png").stat().st_size > 10_000
     suffixes = {path.suffix for path in output.iterdir() if path.is_file()}
-    assert suffixes == {".png", ".json", ".vtm", ".vtu", ".xdmf", ".h5", ".pvd"}
+    assert suffixes == {
+        ".png", ".json", ".vtm", ".vtu", ".xdmf", ".h5", ".pvd", ".csv", ".stl", ".step",
+    }  # fmt: skip
 
 
 @pytest.mark.slow

@@ -7,10 +7,14 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
+from mpi4py import MPI
 
+from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import block
 from fenics_contact.io import write_design_table, write_stl
-from fenics_contact.scene import read_field
+from fenics_contact.scene import Body, IsotropicElasticity, Scene, read_field
+from fenics_contact.shape import ShapeProblem, StrainEnergy, SurfaceDesign
 from tests.io.designed_block import lid, variables
 
 
@@ -61,6 +65,18 @@ def test_an_stl_of_hexahedra_has_two_triangles_for_every_facet(tmp_path: Path) -
     corners = read.points[read.cells_dict["triangle"]].astype(float)
     assert len(corners) == 2 * 2 * (8 * 4 + 8 * 2 + 4 * 2)
     assert np.linalg.det(corners).sum() / 6 == pytest.approx(8.0)
+
+
+def test_a_surface_that_two_designs_move_is_refused(tmp_path: Path) -> None:
+    mesh = block((0, 0, 0), (4, 2, 1), (16, 4, 4))
+    scene = Scene({"pad": Body(mesh, IsotropicElasticity(100.0, 0.3))})
+    nets = SurfaceDesign("pad", "z1", net=(3, 3)), SurfaceDesign("pad", "x1", net=(3, 3))
+    problem = ShapeProblem(ContactProblem(scene, MPI.COMM_SELF), nets, StrainEnergy())
+    alpha = np.zeros(18)
+    write_design_table(problem, alpha, tmp_path / "lid.csv")
+    alpha[9 + 4] = 0.05
+    with pytest.raises(InvalidInputError, match=r"that on 'pad' is moved by 0\.\d+ by another one, too"):
+        write_design_table(problem, alpha, tmp_path / "lid.csv")
 
 
 def test_what_cannot_be_written_is_refused(tmp_path: Path) -> None:
