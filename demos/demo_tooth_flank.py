@@ -205,12 +205,12 @@ if comm.rank == 0:
     print(f"  control points {', '.join(f'{1e3 * value:.1f}' for value in result.x + 0.0)} µm")
     print(f"pictures and files in {output}/")
 
-# Hertz to 1 %; less than a third of the unrelieved peak; the same on the finer mesh to 2 %, where the sharp
+# Hertz to 1 %; less than a third of the unrelieved peak; the same on the finer mesh to 3 %, where the sharp
 # edge has 10 % more.
 
 assert abs(pitch_peak / hertz.peak_pressure - 1) < 0.01
 assert result.value < before.value / 3
-assert abs(peaks[1] / after.value - 1) < 0.02
+assert abs(peaks[1] / after.value - 1) < 0.03
 assert peaks[0] > 1.1 * before.value
 assert imbalance < 1e-9
 
