@@ -10,7 +10,7 @@ from fenics_contact.cli.desk import Desk
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.io import CadError, file_of_each, write_design_table, write_step, write_stl
 from fenics_contact.scene_file import SceneFile
-from fenics_contact.shape import ShapeProblem
+from fenics_contact.shape import LoadPath, ShapeProblem
 
 _MILLIMETRES = {"µm": 1e-3, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 
@@ -31,7 +31,9 @@ def check_design_files(file: SceneFile) -> None:
         )
 
 
-def write_design_files(desk: Desk, file: SceneFile, problem: ShapeProblem, alpha: np.ndarray) -> list[Path]:
+def write_design_files(
+    desk: Desk, file: SceneFile, problem: ShapeProblem | LoadPath, alpha: np.ndarray
+) -> list[Path]:
     """Write the files of a design that the scene file asks for, and return them. Collective."""
     kinds, length, folder = file.document.output.design, file.document.units.length, file.folder
     bodies = sorted({design.body for design in problem.designs})
@@ -51,7 +53,7 @@ def write_design_files(desk: Desk, file: SceneFile, problem: ShapeProblem, alpha
 
 
 def _write_step(
-    desk: Desk, problem: ShapeProblem, alpha: np.ndarray, path: Path, body: str, scale: float
+    desk: Desk, problem: ShapeProblem | LoadPath, alpha: np.ndarray, path: Path, body: str, scale: float
 ) -> None:
     """Write a body, or what can be written of it. Collective."""
     try:

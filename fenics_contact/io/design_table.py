@@ -13,12 +13,12 @@ from fenics_contact.io.moved_bodies import moved_surfaces
 from fenics_contact.io.replacing import write_text
 
 if TYPE_CHECKING:
-    from fenics_contact.shape import MovedSurface, ShapeProblem
+    from fenics_contact.shape import LoadPath, MovedSurface, ShapeProblem
 
 
 @collectively("write_design_table", lambda problem, *_, **__: problem.comm)
 def write_design_table(
-    problem: ShapeProblem,
+    problem: ShapeProblem | LoadPath,
     alpha: np.ndarray,
     path: str | Path,
     *,

@@ -11,13 +11,13 @@ from fenics_contact.shape import MovedSurface
 
 if TYPE_CHECKING:
     from fenics_contact.mesh import BodyMesh
-    from fenics_contact.shape import ShapeProblem
+    from fenics_contact.shape import LoadPath, ShapeProblem
 
 #: Largest distance of a node from its smooth surface, relative to the extent of the surface.
 OFF = 1e-9
 
 
-def moved_surfaces(problem: ShapeProblem, alpha: np.ndarray) -> tuple[MovedSurface, ...]:
+def moved_surfaces(problem: ShapeProblem | LoadPath, alpha: np.ndarray) -> tuple[MovedSurface, ...]:
     """Return the surface of every design, moved. Collective.
 
     Raises:
@@ -40,7 +40,7 @@ def moved_surfaces(problem: ShapeProblem, alpha: np.ndarray) -> tuple[MovedSurfa
     return tuple(found)
 
 
-def moved_body(problem: ShapeProblem, alpha: np.ndarray, body: str | None) -> tuple[str, BodyMesh]:
+def moved_body(problem: ShapeProblem | LoadPath, alpha: np.ndarray, body: str | None) -> tuple[str, BodyMesh]:
     """Return the name and the mesh of a designed body in the shape of a design. Collective.
 
     Args:

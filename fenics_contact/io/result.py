@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
     from fenics_contact.optimize import Result
-    from fenics_contact.shape import ShapeProblem
+    from fenics_contact.shape import LoadPath, ShapeProblem
 
 UNITS = (
     "those of the input: a scene in N and mm has forces in N, stresses, moduli and pressures in N/mm², "
@@ -113,7 +113,7 @@ def result_record(
 @collectively("write_optimisation_result", lambda result, problem, *_, **__: problem.comm)
 def write_optimisation_result(
     result: Result,
-    problem: ShapeProblem,
+    problem: ShapeProblem | LoadPath,
     folder: str | Path,
     *,
     name: str = "result",
@@ -280,10 +280,14 @@ def _errors(state: State) -> dict[str, Any]:
     }
 
 
-def _objective(problem: ShapeProblem, initial: float, final: float) -> dict[str, Any]:
+def _objective(problem: ShapeProblem | LoadPath, initial: float, final: float) -> dict[str, Any]:
+    from fenics_contact.shape import LoadPath
+
+    kind: object = problem if isinstance(problem, LoadPath) else problem.objective
+    objective = problem.objectives if isinstance(problem, LoadPath) else problem.objective
     return {
-        "type": type(problem.objective).__name__,
-        "definition": re.sub(r" at 0x[0-9a-f]+", "", repr(problem.objective)),
+        "type": type(kind).__name__,
+        "definition": re.sub(r" at 0x[0-9a-f]+", "", repr(objective)),
         "initial": initial,
         "final": final,
         "drop_percent": (initial - final) / abs(initial) * 100.0 if initial else None,

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import xml.etree.ElementTree as ET
 
     from fenics_contact.optimize import Record
-    from fenics_contact.shape import ShapeProblem
+    from fenics_contact.shape import LoadPath, ShapeProblem
 
 FORMATS = ("vtu", "xdmf", "vtx")
 
@@ -128,7 +128,7 @@ class ResultSeries:
                 self._write_indices(state.scene.body_names)
         return self.path
 
-    def follow(self, problem: ShapeProblem) -> Callable[[Record, np.ndarray], None]:
+    def follow(self, problem: ShapeProblem | LoadPath) -> Callable[[Record, np.ndarray], None]:
         """Return a callback for `minimize` that adds the first design and every better one.
 
         Their values are the numbers of the evaluations, their labels the objectives.

@@ -21,7 +21,7 @@ from fenics_contact.io.spline_fit import DEGREE, CadError, SplineFit, fitted
 from fenics_contact.mesh_io import gmsh_model, silenced
 
 if TYPE_CHECKING:
-    from fenics_contact.shape import ShapeProblem
+    from fenics_contact.shape import LoadPath, ShapeProblem
 
 
 @displayed
@@ -46,7 +46,7 @@ class StepFile:
 
 @collectively("write_step", lambda problem, *_, **__: problem.comm)
 def write_step(
-    problem: ShapeProblem,
+    problem: ShapeProblem | LoadPath,
     alpha: np.ndarray,
     path: str | Path,
     *,

@@ -14,11 +14,13 @@ from fenics_contact.mesh import boundary_faces
 
 if TYPE_CHECKING:
     from fenics_contact.mesh import BodyMesh
-    from fenics_contact.shape import ShapeProblem
+    from fenics_contact.shape import LoadPath, ShapeProblem
 
 
 @collectively("write_stl", lambda problem, *_, **__: problem.comm)
-def write_stl(problem: ShapeProblem, alpha: np.ndarray, path: str | Path, *, body: str | None = None) -> Path:
+def write_stl(
+    problem: ShapeProblem | LoadPath, alpha: np.ndarray, path: str | Path, *, body: str | None = None
+) -> Path:
     """Write the closed boundary of a designed body as a binary STL file. Collective.
 
     The triangles are the facets of the mesh, of quadrilaterals two, of quadratic facets the pieces between

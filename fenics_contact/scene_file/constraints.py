@@ -34,6 +34,7 @@ class ObjectiveConstraint(Part):
     objective: AnyObjective = Field(description="what is limited, given like the objective of the design")
     at_least: float | None = Field(None, description="least value, in the unit of the objective")
     at_most: float | None = Field(None, description="largest value; equal to at_least for an equality")
+    step: Line | None = Field(None, description="load step after which it holds; the last by default")
     name: Line = Field("", description="its name in results")
 
 

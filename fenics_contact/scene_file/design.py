@@ -10,7 +10,7 @@ from fenics_contact.optimize import BundleTrust
 from fenics_contact.scene_file.constraints import Constraint
 from fenics_contact.scene_file.objectives import AnyObjective, in_words
 from fenics_contact.scene_file.part import Part, keys_of
-from fenics_contact.scene_file.values import Net, Row
+from fenics_contact.scene_file.values import Line, Net, Row
 
 
 class DesignSurfacePart(Part):
@@ -40,6 +40,11 @@ class DesignPart(Part):
         "total_potential",
         description="what is minimised: a name, a table with its kind and arguments, a list of tables, which "
         'are added, or "file.py:NAME", an Objective',
+    )
+    over_steps: list[Line] | None = Field(
+        None,
+        description="names of the load steps whose objectives are added, the last one among them; by default "
+        "all",
     )
     surfaces: list[DesignSurfacePart] = Field(min_length=1, description="what moves")
     constraints: list[Constraint] = Field([], description="what must hold")

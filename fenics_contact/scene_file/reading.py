@@ -149,9 +149,10 @@ class SceneFile:
             SceneFileError: If it describes none, or it cannot be posed.
         """
         self.require_design()
+        steps = self.steps
         with self._at("design"):
             _, shapes = self._built
-            return shape_task(self.source, self.document, self.problem, shapes)
+            return shape_task(self.source, self.document, self.problem, shapes, steps)
 
     def _at(self, *keys: str | int) -> AbstractContextManager[None]:
         return located(self.source, keys)

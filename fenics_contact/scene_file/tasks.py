@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ from fenics_contact.optimize import (
     Result,
     minimize,
 )
+from fenics_contact.scene import LoadStep
 from fenics_contact.scene_file.constraints import ObjectiveConstraint, VolumeConstraint
 from fenics_contact.scene_file.design import DesignPart
 from fenics_contact.scene_file.design_surfaces import design_surface
@@ -27,7 +28,7 @@ from fenics_contact.scene_file.objectives import in_words, objective_of
 from fenics_contact.scene_file.own_python import is_reference, load
 from fenics_contact.scene_file.placing import Shaped
 from fenics_contact.scene_file.source import Source
-from fenics_contact.shape import AdaptiveTolerance, Objective, ShapeProblem, SurfaceDesign
+from fenics_contact.shape import AdaptiveTolerance, LoadPath, Objective, ShapeProblem, SurfaceDesign
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +44,7 @@ class ShapeTask:
         restore: Whether the start may violate limits of other objectives.
     """
 
-    problem: ShapeProblem
+    problem: ShapeProblem | LoadPath
     start: np.ndarray
     bounds: tuple[np.ndarray, np.ndarray]
     constraints: tuple[LinearConstraints | NonlinearConstraint, ...]
@@ -74,6 +75,7 @@ def shape_task(
     document: Document,
     contact: ContactProblem,
     shapes: Mapping[str, Shaped],
+    steps: Sequence[LoadStep],
 ) -> ShapeTask:
     """Pose the optimisation of a scene file. Collective.
 
@@ -82,6 +84,7 @@ def shape_task(
         document: The file; it has a design.
         contact: Problem that computes the states of its scene.
         shapes: Body name -> its mesh with its shape.
+        steps: All load steps; none where everything acts at once.
 
     Raises:
         InvalidInputError: If a surface cannot be designed or numbers do not fit the number of variables.
@@ -97,7 +100,8 @@ def shape_task(
     with together(contact.comm):
         objective = _objective(design.objective, source)
     adaptive = AdaptiveTolerance() if design.adaptive else None
-    problem = ShapeProblem(contact, moving, objective, tolerance=adaptive)
+    alone = ShapeProblem(contact, moving, objective, tolerance=adaptive)
+    problem = _over_steps(alone, design, steps)
     lower, upper = (
         np.concatenate([np.full(move.size, getattr(part, side)) for move, part in _paired(moving, design)])
         for side in ("lower", "upper")
@@ -106,6 +110,22 @@ def shape_task(
     method = design.made(raise_on_failure=False)
     constraints = _constraints(design, problem, start, source)
     return ShapeTask(problem, start, (lower, upper), constraints, method, design.restore)
+
+
+def _over_steps(
+    problem: ShapeProblem, design: DesignPart, steps: Sequence[LoadStep]
+) -> ShapeProblem | LoadPath:
+    """Return the problem whose objective is added over load steps, if there are any. Collective."""
+    if not steps:
+        if design.over_steps is not None or any(getattr(part, "step", None) for part in design.constraints):
+            raise InvalidInputError(
+                "over_steps and step are names of load steps, but the file has none: give [[steps]], or "
+                "leave them out"
+            )
+        return problem
+    if design.over_steps is None:
+        return LoadPath(problem, steps)
+    return LoadPath(problem, steps, dict.fromkeys(design.over_steps, problem.objective))
 
 
 def _paired(moving: tuple[SurfaceDesign, ...], design: DesignPart) -> Any:
@@ -128,7 +148,7 @@ def _objective(name: Any, source: Source) -> Objective:
 
 
 def _constraints(
-    design: DesignPart, problem: ShapeProblem, start: np.ndarray, source: Source
+    design: DesignPart, problem: ShapeProblem | LoadPath, start: np.ndarray, source: Source
 ) -> tuple[LinearConstraints | NonlinearConstraint, ...]:
     """Return the constraints of a design, all linear ones in one. Collective."""
     rows: list[np.ndarray] = []
@@ -146,11 +166,16 @@ def _constraints(
     return (*([LinearConstraints(np.array(rows), np.array(limits))] if rows else []), *others)
 
 
-def _limited(part: ObjectiveConstraint, problem: ShapeProblem, source: Source) -> NonlinearConstraint:
+def _limited(
+    part: ObjectiveConstraint, problem: ShapeProblem | LoadPath, source: Source
+) -> NonlinearConstraint:
     """Return the limits of an objective. Collective."""
     with together(problem.comm):
         objective = _objective(part.objective, source)
     name = part.name or in_words(part.objective)
+    if isinstance(problem, LoadPath):
+        step = part.step or list(problem.problems)[-1]
+        return NonlinearConstraint(problem.function({step: objective}), *_limits(part), name)
     return NonlinearConstraint(problem.function(objective, name), *_limits(part), name)
 
 

@@ -9,12 +9,13 @@ from fenics_contact.shape.friction_work import FrictionWork
 from fenics_contact.shape.largest_stress import LargestStress
 from fenics_contact.shape.linearised_face import WeakChoice, WeakPoints, linearise_face
 from fenics_contact.shape.load_cases import LoadCases
-from fenics_contact.shape.load_path import LoadPath, PathPoint
+from fenics_contact.shape.load_path import LoadPath
 from fenics_contact.shape.memory import DesignPoint
 from fenics_contact.shape.motion import MeshMotion
 from fenics_contact.shape.moved_surface import MovedSurface
 from fenics_contact.shape.movement import Movement
 from fenics_contact.shape.objective import Objective, Partials
+from fenics_contact.shape.path_points import PathPoint
 from fenics_contact.shape.pressures import ContactArea, LargestPressure, PressureNorm, PressureUnevenness
 from fenics_contact.shape.problem import ShapeProblem
 from fenics_contact.shape.sums import Largest, Weighable, WeightedSum

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,40 +14,20 @@ from fenics_contact.contact import State
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.fingerprint import described
-from fenics_contact.scene import LoadStep
+from fenics_contact.scene import LoadStep, Scene
 from fenics_contact.shape.beside import with_fewest_weak_points
 from fenics_contact.shape.design import SurfaceDesign
 from fenics_contact.shape.forms import ShapeForms
 from fenics_contact.shape.linearised_face import WeakPoints
 from fenics_contact.shape.memory import DesignPoint, joined_memory, parted_memory
 from fenics_contact.shape.objective import Objective, Partials, asking, finite_value
+from fenics_contact.shape.path_points import PathPoint, PathPoints
 from fenics_contact.shape.problem import ShapeProblem
 from fenics_contact.shape.slip_history import by_slip_origin, with_later_steps
 
 
 def _comm(path: LoadPath, *_: Any, **__: Any) -> MPI.Comm:
     return path.comm
-
-
-@displayed
-@dataclass(frozen=True, eq=False)
-class PathPoint:
-    """An evaluated design of a `LoadPath`.
-
-    Attributes:
-        alpha: Design variables, shape (size,), [length].
-        value: J, the sum over all steps.
-        gradient: Its gradient or subgradient, see `DesignPoint`, shape (size,).
-        weak: Weakly active points of all steps.
-        steps: Name of the step -> its state, its own objective and its share of the gradient, up to the last
-            step with an objective.
-    """
-
-    alpha: np.ndarray
-    value: float
-    gradient: np.ndarray
-    weak: WeakPoints
-    steps: Mapping[str, DesignPoint]
 
 
 @displayed
@@ -112,7 +92,7 @@ class LoadPath:
             scene = step.applied_to(scene)
             self.problems[step.name] = last = last.case(scene)
         self.evaluations, self._states = 0, _States(self.problems)
-        self._last: PathPoint | None = None
+        self._points = PathPoints(self._point_at)
 
     def _facts(self) -> dict[str, Any]:
         work = f"{self.evaluations} designs, {self.products} products with F"
@@ -131,6 +111,16 @@ class LoadPath:
     def designs(self) -> tuple[SurfaceDesign, ...]:
         """The moving surfaces; α is the concatenation of their variables."""
         return self._first.designs
+
+    @property
+    def scene(self) -> Scene:
+        """The scene after the last step, in its reference shape."""
+        return list(self.problems.values())[-1].scene
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Wall time of this rank by phase, over all evaluations."""
+        return self._first.seconds
 
     @property
     def forms(self) -> ShapeForms:
@@ -163,8 +153,35 @@ class LoadPath:
         """
         point = self._point_at(alpha)
         self.evaluations += 1
-        self._last = point
+        self._points.record(point)
         return point
+
+    def at(self, alpha: np.ndarray) -> PathPoint:
+        """Return a design as evaluated, again unless it is known, such as the x of a result. Collective."""
+        return self._points.of_design(alpha) or self.evaluate(alpha)
+
+    @property
+    def first(self) -> PathPoint | None:
+        """The design evaluated first. Collective after a run was resumed, as it is evaluated anew then."""
+        return self._points.point("first")
+
+    @property
+    def best(self) -> PathPoint | None:
+        """The design with the smallest J so far, feasible or not. Collective after a run was resumed."""
+        return self._points.point("best")
+
+    @property
+    def last(self) -> PathPoint | None:
+        """The design evaluated last. Collective after a run was resumed."""
+        return self._points.point("last")
+
+    def points_of(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the coordinates of the designed bodies, see `DesignGeometry.points_of`. Collective."""
+        return self._first.points_of(alpha)
+
+    def scene_of(self, alpha: np.ndarray) -> Scene:
+        """Return the scene after the last step in the shape of a design. Collective; raises as `evaluate`."""
+        return list(self.problems.values())[-1].scene_of(alpha)
 
     @collectively("LoadPath.states_of", _comm)
     def states_of(self, alpha: np.ndarray) -> dict[str, State]:
@@ -193,7 +210,7 @@ class LoadPath:
         """
         other = copy(self)
         other.objectives = _checked(self.comm, list(self.problems), objectives, last=False)
-        other.evaluations, other._last = 0, None
+        other.evaluations, other._points = 0, PathPoints(other._point_at)
         return other
 
     def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
@@ -202,7 +219,8 @@ class LoadPath:
 
     def doubtful(self, alpha: np.ndarray) -> bool:
         """Return whether the last result, at α, may not be a subgradient."""
-        return self._last is not None and np.array_equal(self._last.alpha, alpha) and self._last.weak.doubtful
+        known = self._points.of_design(alpha)
+        return known is not None and known.weak.doubtful
 
     @collectively("LoadPath.beside", _comm)
     def beside(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
@@ -221,12 +239,15 @@ class LoadPath:
     def memory(self) -> dict[str, np.ndarray]:
         """Return what the next states depend on. Collective."""
         counts = np.array([self.evaluations, self.products])
-        return {"counts": counts, **joined_memory(self.problems.values())}
+        kept = {f"design.{name}": known for name, known in self._points.stored().items()}
+        return {"counts": counts, **kept, **joined_memory(self.problems.values())}
 
     def recall(self, memory: Mapping[str, np.ndarray]) -> None:
         """Continue from what `memory` returned, also on another number of ranks. Collective."""
         stored = dict(memory)
         self.evaluations, self._states.products = (int(count) for count in stored.pop("counts"))
+        names = [name for name in stored if name.startswith("design.")]
+        self._points.recall({name.removeprefix("design."): stored.pop(name) for name in names})
         parts = parted_memory(stored, len(self.problems))
         for problem, part in zip(self.problems.values(), parts, strict=True):
             problem.recall(part)
@@ -248,9 +269,10 @@ class LoadPath:
             )
             by_position = by_slip_origin(state, own, found[name].adjoint_multiplier)
             self._states.products += found[name].adjoint_iterations
-        points = {name: found[name] for name in self.problems if name in found}
+        alpha = np.array(alpha, dtype=float)
+        points = {name: replace(found[name], alpha=alpha) for name in self.problems if name in found}
         return PathPoint(
-            np.array(alpha, dtype=float),
+            alpha,
             sum(point.value for point in points.values()),
             np.asarray(sum(point.gradient for point in points.values())),
             _together([point.weak for point in points.values()]),

@@ -98,6 +98,7 @@ def test_an_objective_of_the_last_step_depends_on_the_steps_before() -> None:
     point = path.evaluate(here.alpha)
     assert [step.value == 0.0 for step in point.steps.values()] == [True, True, True, False]
     assert point.value == point.steps["let go"].value
+    assert all(np.array_equal(step.alpha, here.alpha) for step in point.steps.values())
     assert np.abs(point.steps["push"].gradient).max() > 1e-3 * np.abs(point.gradient).max()
 
 
@@ -175,10 +176,16 @@ def test_what_was_stored_is_recalled() -> None:
     again.recall(first.memory())
     assert first.fingerprint() == again.fingerprint()
     assert (again.products, again.evaluations) == (first.products, first.evaluations)
+    assert again.first is not None
+    assert first.first is not None
+    assert again.first.value == pytest.approx(first.first.value, rel=1e-6)
+    assert again.at(alpha) is again.first is again.best is again.last
+    assert again.first.state is again.first.steps["let go"].state
     fresh = path_of("floor")
     fresh(0.9 * alpha)
+    spent = again.products
     again(0.9 * alpha)
-    assert again.products - first.products < fresh.products
+    assert again.products - spent < fresh.products
     np.testing.assert_allclose(again(0.9 * alpha)[1], fresh(0.9 * alpha)[1], rtol=1e-5, atol=1e-9)
 
 
