@@ -332,6 +332,11 @@ def _checked(
             step.
     """
     with together(comm):
+        if not isinstance(objectives, Mapping):
+            raise InvalidInputError(
+                f"LoadPath.objectives must map names of steps to objectives, got {type(objectives).__name__}: "
+                f"give {{'{names[-1]}': objective}}, or none for that of the problem in all steps"
+            )
         if not objectives or not set(objectives) <= set(names):
             raise InvalidInputError(
                 f"LoadPath.objectives must be those of some of the steps {list(names)}, got those of "

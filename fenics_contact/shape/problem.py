@@ -25,7 +25,7 @@ from fenics_contact.shape.geometry import DesignGeometry
 from fenics_contact.shape.linearised_face import LinearisedFace, WeakChoice, linearise_face
 from fenics_contact.shape.memory import DesignMemory, DesignPoint, Stored
 from fenics_contact.shape.objective import Objective, Partials, asking, finite, finite_partials, finite_value
-from fenics_contact.shape.scenes import check_case, checked_contact
+from fenics_contact.shape.scenes import check_case, checked_contact, require_influence
 from fenics_contact.shape.slip_history import require_from_rest
 from fenics_contact.shape.state_error import state_error
 from fenics_contact.shape.tied_derivative import ties_by_shape
@@ -147,8 +147,7 @@ class ShapeProblem:
 
     def memory(self) -> dict[str, np.ndarray]:
         """Return what the next state depends on, and the stored designs. Collective."""
-        counts = np.array([self.evaluations, self.products])
-        return {"counts": counts, **self._memory.stored()}
+        return {"counts": np.array([self.evaluations, self.products]), **self._memory.stored()}
 
     def recall(self, memory: Mapping[str, np.ndarray]) -> None:
         """Continue from what `memory` returned, also on another number of ranks. Collective."""
@@ -200,13 +199,11 @@ class ShapeProblem:
 
         Raises:
             InvalidDesignError: If the design inverts a cell or has no equilibrium.
+            InvalidInputError: If no variable changes the objective at the first design.
         """
         known = self._memory.of_design(alpha) if self.inexact else None
         state = self._solved(alpha, self._tightest, known) if self.inexact else self.state_of(alpha)
-        point = self._point_at(alpha, state, self._tightest, known)
-        self.evaluations += 1
-        self._memory.record_point(point)
-        return point
+        return self._recorded(self._point_at(alpha, state, self._tightest, known))
 
     @collectively("ShapeProblem.differentiate", _comm)
     def differentiate(self, state: State, partials: Partials | None = None) -> DesignPoint:
@@ -272,15 +269,20 @@ class ShapeProblem:
         while point.error > value and tolerance > policy.tightest:
             tolerance = policy.next(tolerance, point.error, value)
             point = self._point_at(alpha, self._solved(alpha, tolerance, point), tolerance, point)
+        self._recorded(point)
+        return point.value, point.gradient, point.error
+
+    def _recorded(self, point: DesignPoint) -> DesignPoint:
+        if not self.evaluations:
+            require_influence(self.objective, self.scene, point.value, point.gradient)
         self.evaluations += 1
         self._memory.record_point(point)
-        return point.value, point.gradient, point.error
+        return point
 
     @collectively("ShapeProblem.doubtful", _comm)
     def doubtful(self, alpha: np.ndarray) -> bool:
         """Return whether the last result, at α, may not be a subgradient. Collective."""
-        known = self._memory.of_design(alpha)
-        return known is not None and known.weak.doubtful
+        return (known := self._memory.of_design(alpha)) is not None and known.weak.doubtful
 
     @collectively("ShapeProblem.beside", _comm)
     def beside(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:

@@ -6,7 +6,9 @@ import numpy as np
 
 from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.linalg import LAST_PLACES
 from fenics_contact.scene import Scene
+from fenics_contact.shape.objective import Objective
 
 
 def checked_contact(contact: ContactProblem) -> ContactProblem:
@@ -21,6 +23,27 @@ def checked_contact(contact: ContactProblem) -> ContactProblem:
             "ShapeProblem(ContactProblem(scene, comm), designs, objective)"
         )
     return contact
+
+
+def require_influence(objective: Objective, scene: Scene, value: float, gradient: np.ndarray) -> None:
+    """Reject an objective that no design variable changes.
+
+    Args:
+        objective: The objective.
+        scene: The scene.
+        value: J.
+        gradient: Its gradient by the variables, shape (n,), by [length].
+
+    Raises:
+        InvalidInputError: If the gradient is zero, or rounding over the size of the scene.
+    """
+    change = float(np.abs(gradient).max(initial=0.0) * np.ptp(scene.points))
+    if change <= LAST_PLACES * abs(value):
+        raise InvalidInputError(
+            f"an objective must change with the design, but {objective!r} is {value:.6g} and none of "
+            f"{len(gradient)} variables changes it: choose one that the moving surfaces affect (pressures "
+            "need a pair in contact, movements a body that they load), or start from another design"
+        )
 
 
 def check_case(first: Scene, scene: Scene) -> None:

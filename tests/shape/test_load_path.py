@@ -222,6 +222,7 @@ def test_a_later_step_alone_has_no_derivative() -> None:
         ([], None, "needs a load step, got none"),
         (["a", "a"], None, r"a name for each of its steps, got \['a', 'a'\]"),
         (["a", "b"], {"c": FrictionWork()}, r"those of some of the steps \['a', 'b'\], got those of \['c'\]"),
+        (["a", "b"], FrictionWork(), "must map names of steps to objectives, got FrictionWork"),
         (["a", "b"], {"a": FrictionWork()}, "the last step needs an objective, .* 'b' is not among"),
     ],
 )

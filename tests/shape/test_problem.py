@@ -264,3 +264,25 @@ def test_a_design_by_name_says_what_its_surface_needs() -> None:
         InvalidInputError, match="nodes of surface 'z1', given by name, are not known yet: take"
     ):
         _ = SurfaceDesign("lower", "z1").basis
+
+
+class Settled:
+    """An objective that is the same for all designs."""
+
+    def value(self, state: State, forms: ShapeForms) -> float:
+        return 2.0
+
+    def partials(self, state: State, forms: ShapeForms) -> Partials:
+        return Partials.of(state, 2.0)
+
+    def __repr__(self) -> str:
+        return "Settled()"
+
+
+def test_an_objective_that_no_variable_changes_is_refused() -> None:
+    first = fresh()
+    idle = first.case(first.scene, Settled())
+    with pytest.raises(InvalidInputError, match=r"but Settled\(\) is 2 and none of 12 variables changes it"):
+        idle.evaluate(DESIGN)
+    moving = first.case(first.scene, TotalPotential() + Settled())
+    assert moving.evaluate(DESIGN).gradient.any()
