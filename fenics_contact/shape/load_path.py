@@ -334,8 +334,8 @@ def _checked(
     with together(comm):
         if not isinstance(objectives, Mapping):
             raise InvalidInputError(
-                f"LoadPath.objectives must map names of steps to objectives, got {type(objectives).__name__}: "
-                f"give {{'{names[-1]}': objective}}, or none for that of the problem in all steps"
+                "LoadPath.objectives must map names of steps to objectives, got "
+                f"{type(objectives).__name__}: give {{'{names[-1]}': objective}}, or none for that of the problem in all steps"
             )
         if not objectives or not set(objectives) <= set(names):
             raise InvalidInputError(
