@@ -21,7 +21,7 @@
 # strain energy $\tfrac12 u^T K u$, the compliance of the links, of which no retreat is a part; both keep the
 # volume of the link.
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -89,15 +89,11 @@ OBJECTIVES = {
 }
 
 
-def chosen(option, known, default):
-    found = sys.argv[sys.argv.index(option) + 1] if option in sys.argv[:-1] else default
-    if found not in known:
-        sys.exit(f"{option} must be one of {sorted(known)}, got {found!r}")
-    return found
-
-
-size = chosen("--size", SIZES, "paper")
-aim = chosen("--objective", OBJECTIVES, "potential")
+parser = argparse.ArgumentParser(description="Optimise the contact shape of two chain links.")
+parser.add_argument("--size", choices=list(SIZES), default="paper")
+parser.add_argument("--objective", choices=list(OBJECTIVES), default="potential")
+given = parser.parse_args()
+size, aim = given.size, given.objective
 objective, label = OBJECTIVES[aim]
 published = aim == "potential"
 output = Path("output") / ("chain_links" if published else f"chain_links_{aim}")

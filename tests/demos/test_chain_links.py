@@ -77,5 +77,5 @@ def test_shapes_that_fit_lower_pressure_or_energy_and_keep_the_volume(
 
 
 def test_an_unknown_size_is_refused(mpirun: Callable[..., str]) -> None:
-    with pytest.raises(pytest.fail.Exception, match=r"--size must be one of .*got 'huge'"):
+    with pytest.raises(pytest.fail.Exception, match=r"--size: invalid choice: 'huge'"):
         mpirun(ROOT / "demos" / "demo_chain_links.py", 1, "--size", "huge")
