@@ -92,8 +92,8 @@ objective = ContactForces(largest_force)
 # ## Design and mesh motion
 #
 # A net of 5 × 3 control points lies on the crown. Control point $k$ moves the surface along its normals by
-# $\alpha_k B_k(s, t)$, with Bernstein polynomials $B_k$. The inner nodes of the mesh follow like
-# those of an elastic body that is stiffer where cells are small, zero farther away. Topology and
+# $\alpha_k B_k(s, t)$, with Bernstein polynomials $B_k$. The inner nodes of the mesh follow
+# smoothly, those of small cells most of all, and stay where they are farther away. Topology and
 # partition stay, so that each new design is a small change of the one before.
 
 # %%

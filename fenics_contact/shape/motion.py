@@ -21,44 +21,86 @@ from fenics_contact.shape.design import SurfaceDesign
 
 
 @dataclass(frozen=True)
-class _Components:
-    """Some components of nodes: where they are in arrays of all and in distributed vectors of them alone."""
+class _Nodes:
+    """Some nodes: where they are in arrays of all and in distributed vectors of them alone."""
 
     comm: MPI.Comm
     rows: PETSc.IS
     here: np.ndarray
 
     @classmethod
-    def chosen(cls, space: _dolfinx.fem.FunctionSpace, marks: np.ndarray) -> _Components:
-        """Return the marked ones, marks of shape (n_nodes, dim). Collective."""
-        dim = marks.shape[1]
+    def chosen(cls, space: _dolfinx.fem.FunctionSpace, marks: np.ndarray) -> _Nodes:
+        """Return the marked ones, marks of shape (n_nodes,). Collective."""
         nodes, dofs = _dolfinx.node_dofs(space)
-        own = dofs < space.dofmap.index_map.size_local
-        blocks = _dolfinx.global_dofs(space, dofs[own])
-        place, row = ((part[:, None] * dim + np.arange(dim)).ravel() for part in (nodes[own], blocks))
-        order = np.argsort(row)
-        order = order[marks.ravel()[place[order]]]
-        comm = space.mesh.comm
-        return cls(comm, PETSc.IS().createGeneral(row[order].astype(PETSc.IntType), comm), place[order])
-
-    def put(self, values: np.ndarray, vector: PETSc.Vec) -> None:
-        """Take this rank's entries of a vector from values at all nodes, shape (n_nodes, dim)."""
-        vector.array_w[:] = values.ravel()[self.here]
+        own = (dofs < space.dofmap.index_map.size_local) & marks[nodes]
+        rows = _dolfinx.global_dofs(space, dofs[own])
+        order, comm = np.argsort(rows), space.mesh.comm
+        return cls(comm, PETSc.IS().createGeneral(rows[order].astype(PETSc.IntType), comm), nodes[own][order])
 
     def add(self, vector: PETSc.Vec, values: np.ndarray) -> None:
-        """Add a vector to values at all nodes, shape (n_nodes, dim), on every rank. Collective."""
+        """Add a vector to values at all nodes, shape (n_nodes,), on every rank. Collective."""
         for places, part in self.comm.allgather((self.here, vector.array_r)):
-            values.ravel()[places] += part
+            values[places] += part
+
+
+class _Component:
+    """One component of the motion: at some nodes it is free, at others given, at the rest zero."""
+
+    def __init__(
+        self, space: _dolfinx.fem.FunctionSpace, matrix: PETSc.Mat, given: np.ndarray, free: np.ndarray
+    ) -> None:
+        """Factor the matrix of the free nodes. Collective.
+
+        Args:
+            space: The space of scalars on the mesh.
+            matrix: Its matrix.
+            given: Marks of the nodes where it is given, shape (n_nodes,).
+            free: Marks of those where it is free.
+        """
+        self._given, self._free = _Nodes.chosen(space, given), _Nodes.chosen(space, free)
+        inner = matrix.createSubMatrix(self._free.rows, self._free.rows)
+        self._coupling = matrix.createSubMatrix(self._free.rows, self._given.rows)
+        self._ksp = PETSc.KSP().create(inner.getComm())
+        self._ksp.setOperators(inner)
+        self._ksp.setType(PETSc.KSP.Type.PREONLY)
+        self._ksp.getPC().setType(PETSc.PC.Type.LU)
+        self._ksp.getPC().setFactorSolverType("mumps")
+        self._ksp.setUp()
+        owned = (self._ksp.getPC(), self._ksp, inner, self._coupling, self._free.rows, self._given.rows)
+        # The mesh owns the communicator, which must not be freed before them.
+        dispose_with(self, *owned, comm=space.mesh.comm, keep=space)
+
+    def extend(self, values: np.ndarray) -> None:
+        """Fill in the free nodes, of values at all nodes. Collective."""
+        known, right = self._coupling.createVecs()
+        solution = right.duplicate()
+        known.array_w[:] = -values[self._given.here]
+        self._coupling.mult(known, right)
+        self._ksp.solve(right, solution)
+        self._free.add(solution, values)
+        for vector in (known, right, solution):
+            vector.destroy()
+
+    def pull_back(self, values: np.ndarray) -> None:
+        """Add to derivatives at the given nodes those at the free ones that follow them. Collective."""
+        known, right = self._coupling.createVecs()
+        adjoint = right.duplicate()
+        right.array_w[:] = -values[self._free.here]
+        self._ksp.solve(right, adjoint)
+        self._coupling.multTranspose(adjoint, known)
+        self._given.add(known, values)
+        for vector in (known, right, adjoint):
+            vector.destroy()
 
 
 @displayed
 class MeshMotion:
-    """The mesh deforms as an elastic body that is stiffer where its cells are smaller.
+    """Each component of the mesh displacement is as smooth as the mesh allows, in small cells above all.
 
-    Its displacement v minimises ∫ |ε(v)|² det(J)^(−χ) dx, J the Jacobian of the cells and ε(v) the symmetric
-    gradient, prescribed on the design surface, zero where held: large cells give way and small ones keep
-    their shape. All is integrated over the reference mesh: the motion is linear in the surface displacement,
-    and one factorisation serves all designs and, transposed, all gradients.
+    It minimises ∫ |∇v|² det(J)^(−χ) dx, J the Jacobian of the cells, prescribed on the design surface, zero
+    where held: large cells give way and small ones keep their shape. On equal cells it is harmonic. Sides
+    along which the surface moves stay flat. All is integrated over the reference mesh: the motion is linear
+    in the surface displacement, and one factorisation serves all designs and, transposed, all gradients.
 
     Attributes:
         moving: Nodes of the design surface.
@@ -80,7 +122,7 @@ class MeshMotion:
         moving: np.ndarray,
         held: np.ndarray,
         *,
-        stiffening: float = 1.5,
+        stiffening: float = 2.0,
     ) -> None:
         """Assemble and factor the stiffness of a mesh. Collective on the decomposition's communicator.
 
@@ -105,34 +147,25 @@ class MeshMotion:
             )
         self.moving, self.held = moving, held
         mesh = body_mesh(decomposition, name, body)
-        space = _dolfinx.nodal_space_on(mesh, body.mesh.dim)
+        space = _dolfinx.scalar_space(mesh, 1)
         template = Template(mesh.comm, _stiffness(body.mesh.cell_type, stiffening), ())
         matrix = _dolfinx.assemble_matrix(template.bind([space, space], ()))
-        given = np.zeros_like(held)
+        given = np.zeros(body.mesh.n_nodes, dtype=bool)
         given[moving] = True
-        self._given = _Components.chosen(space, given)
-        self._free = _Components.chosen(space, ~(given | held))
-        inner = matrix.createSubMatrix(self._free.rows, self._free.rows)
-        self._coupling = matrix.createSubMatrix(self._free.rows, self._given.rows)
-        self._ksp = _factored(inner)
-        held_by_petsc = (self._ksp.getPC(), self._ksp, inner, self._coupling, matrix)
-        indices = (self._free.rows, self._given.rows)
-        # The mesh owns the communicator, which must not be freed before them.
-        dispose_with(self, *held_by_petsc, *indices, comm=decomposition.comm, keep=space)
+        known: dict[bytes, _Component] = {}
+        for column in held.T:
+            key = column.tobytes()
+            known[key] = known.get(key) or _Component(space, matrix, given, ~(given | column))
+        self._components = [known[column.tobytes()] for column in held.T]
+        matrix.destroy()
 
     def extend(self, displacement: np.ndarray) -> np.ndarray:
         """Return the displacement of all nodes, shape (n_nodes, dim), from the moving ones'. Collective."""
         check_not_forked()
         result = np.zeros(self.held.shape)
         result[self.moving] = displacement
-        known, right = self._coupling.createVecs()
-        solution = right.duplicate()
-        self._given.put(-result, known)
-        self._coupling.mult(known, right)
-        self._ksp.solve(right, solution)
-        self._free.add(solution, result)
-        for vector in (known, right, solution):
-            vector.destroy()
+        for component, values in zip(self._components, result.T, strict=True):
+            component.extend(values)
         return result
 
     def pull_back(self, gradient: np.ndarray) -> np.ndarray:
@@ -142,35 +175,18 @@ class MeshMotion:
             gradient: Derivative by the displacement of every node, shape (n_nodes, dim), replicated.
         """
         check_not_forked()
-        result = gradient.copy()
-        known, right = self._coupling.createVecs()
-        adjoint = right.duplicate()
-        self._free.put(-gradient, right)
-        self._ksp.solve(right, adjoint)
-        self._coupling.multTranspose(adjoint, known)
-        self._given.add(known, result)
-        for vector in (known, right, adjoint):
-            vector.destroy()
+        result = np.array(gradient, dtype=float)
+        for component, values in zip(self._components, result.T, strict=True):
+            component.pull_back(values)
         return np.asarray(result[self.moving])
 
 
 def _stiffness(cell_type: str, stiffening: float) -> ufl.Form:
-    """Write ∫ ε(u) : ε(v) det(J)^(−χ) dx."""
-    V, mesh = _dolfinx.displacement_space(cell_type), _dolfinx.template(cell_type)
+    """Write ∫ ∇u · ∇v det(J)^(−χ) dx."""
+    V, mesh = _dolfinx.nodal_space(cell_type), _dolfinx.template(cell_type)
     u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
     weight = abs(ufl.JacobianDeterminant(mesh)) ** (-stiffening)
-    return weight * ufl.inner(ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v))) * volume_measure(cell_type, 2)
-
-
-def _factored(matrix: PETSc.Mat) -> PETSc.KSP:
-    """Return a direct solver of a symmetric matrix. Collective."""
-    ksp = PETSc.KSP().create(matrix.getComm())
-    ksp.setOperators(matrix)
-    ksp.setType(PETSc.KSP.Type.PREONLY)
-    ksp.getPC().setType(PETSc.PC.Type.LU)
-    ksp.getPC().setFactorSolverType("mumps")
-    ksp.setUp()
-    return ksp
+    return weight * ufl.inner(ufl.grad(u), ufl.grad(v)) * volume_measure(cell_type, 2)
 
 
 def motion_of(decomposition: Decomposition, scene: Scene, design: SurfaceDesign) -> MeshMotion:
