@@ -11,10 +11,11 @@ import numpy as np
 from mpi4py import MPI
 
 from benchmarks.cases.chain_design import chain_shape_problem
+from benchmarks.cases.roller_design import RELIEF, roller_shape_problem
 from fenics_contact.contact import ContactResult, State
 from fenics_contact.errors import ConvergenceError, InvalidDesignError
 from fenics_contact.optimize import LinearConstraints, nearest_feasible
-from fenics_contact.shape import AdaptiveTolerance, ContactForces, Objective, TotalPotential
+from fenics_contact.shape import AdaptiveTolerance, ContactForces, Objective, ShapeProblem, TotalPotential
 
 #: Tolerance of all states; looser ones would blur differences that the methods look at.
 STATES = 1e-8
@@ -27,7 +28,7 @@ def _largest(contact: ContactResult) -> tuple[float, np.ndarray, np.ndarray]:
     return float(force[k]), np.eye(len(force))[k], np.zeros((len(force), 2))
 
 
-#: What is minimised, and the same as a function of the state alone.
+#: What is minimised on the chain, and the same as a function of the state alone.
 OBJECTIVES: dict[str, tuple[Objective, Callable[[State], float]]] = {
     "total potential": (TotalPotential(), lambda state: state.energies.total_potential),
     "largest force": (ContactForces(_largest), lambda state: float(state.contact.normal_force.max())),
@@ -36,14 +37,14 @@ OBJECTIVES: dict[str, tuple[Objective, Callable[[State], float]]] = {
 
 @dataclass(frozen=True)
 class Case:
-    """One problem: a chain, what is minimised, its friction and where the search starts.
+    """One problem: a scene, what is minimised, its friction and where the search starts.
 
     Attributes:
-        size: One of `benchmarks.cases.chain_design.SIZES`.
-        objective: One of `OBJECTIVES`.
-        bound: Largest distance of a control point from its place, [mm].
+        size: "roller", or one of `benchmarks.cases.chain_design.SIZES`.
+        objective: One of `OBJECTIVES`; of the roller "largest pressure".
+        bound: Largest distance of a control point from its place, [mm]; of the roller inwards, in A.
         friction: Coefficient of friction.
-        start: 0 for the shape as it is, else the seed of a random feasible one.
+        start: 0 for the shape as it is, else the seed of a random feasible one; of the roller 1: a parabola.
     """
 
     size: str
@@ -53,10 +54,59 @@ class Case:
     start: int
 
     @property
+    def of_roller(self) -> bool:
+        """Whether it is the roller."""
+        return self.size == "roller"
+
+    @property
     def name(self) -> str:
         """How tables call it."""
+        if self.of_roller:
+            start = "a parabola" if self.start else "straight"
+            return f"{self.objective}, roller, relief up to {self.bound:g} A, {start}"
         start = "the link as it is" if self.start == 0 else f"random shape {self.start}"
         return f"{self.objective}, {self.size} chain, ±{self.bound:g} mm, μ = {self.friction:g}, {start}"
+
+
+@dataclass(frozen=True)
+class Posed:
+    """A case as methods get it.
+
+    Attributes:
+        problem: J with its subgradient.
+        judge: J of a state.
+        bounds: Lower and upper, [mm].
+        constraints: The row for the volume; none of the roller.
+        start: Where the search begins, [mm].
+        held: Number of first variables of the design that stay 0 and are none of the methods'.
+    """
+
+    problem: ShapeProblem
+    judge: Callable[[State], float]
+    bounds: tuple[np.ndarray, np.ndarray]
+    constraints: LinearConstraints | None
+    start: np.ndarray
+    held: int = 0
+
+
+def _posed(comm: MPI.Comm, case: Case, tolerance: float | AdaptiveTolerance) -> Posed:
+    if case.of_roller:
+        roller = roller_shape_problem(comm, tolerance=tolerance)
+        along = np.linspace(0.0, 1.0, roller.size)[1:]  # to move the whole roller changes nothing
+        bounds = (np.full(along.size, -case.bound * RELIEF), np.zeros(along.size))
+        start = -4.0 * RELIEF * along**2 * case.start
+        return Posed(roller, lambda s: float(s.contact.pressure.max()), bounds, None, start, held=1)
+    objective, judge = OBJECTIVES[case.objective]
+    problem = chain_shape_problem(
+        comm, case.size, objective=objective, friction=case.friction, tolerance=tolerance
+    )
+    bounds = (np.full(problem.size, -case.bound), np.full(problem.size, case.bound))
+    _, by_volume = problem.volume(np.zeros(problem.size))
+    constraints = LinearConstraints(-by_volume[None, :], [0.0])
+    if case.start == 0:
+        return Posed(problem, judge, bounds, constraints, np.zeros(problem.size))
+    random = np.random.default_rng(case.start).uniform(-0.8, 0.8, problem.size) * case.bound
+    return Posed(problem, judge, bounds, constraints, nearest_feasible(random, bounds, constraints))
 
 
 class Spent(Exception):
@@ -77,21 +127,11 @@ class Book:
         self, comm: MPI.Comm, case: Case, budget: int, tolerance: float | AdaptiveTolerance = STATES
     ) -> None:
         """Prepare the problem; no state is solved."""
-        objective, self._judge = OBJECTIVES[case.objective]
-        self.problem = chain_shape_problem(
-            comm, case.size, objective=objective, friction=case.friction, tolerance=tolerance
-        )
-        size = self.problem.size
-        self.bound = case.bound
-        self.bounds = (np.full(size, -case.bound), np.full(size, case.bound))
-        _, by_volume = self.problem.volume(np.zeros(size))
-        self.constraints = LinearConstraints(-by_volume[None, :], [0.0])
-        self.start: np.ndarray = np.zeros(size)
-        if case.start:
-            random = np.random.default_rng(case.start).uniform(-0.8, 0.8, size) * case.bound
-            self.start = nearest_feasible(random, self.bounds, self.constraints)
+        posed = _posed(comm, case, tolerance)
+        self.problem, self._judge = posed.problem, posed.judge
+        self.bounds, self.constraints, self.start = posed.bounds, posed.constraints, posed.start
         self.budget, self.rows, self.designs, self.notes = budget, [], [], []
-        self._row = by_volume / np.linalg.norm(by_volume)
+        self._held, self._width = posed.held, float(np.max(posed.bounds[1] - posed.bounds[0]))
         self._state_products, self._began = 0, perf_counter()
 
     rows: list[tuple[float, float, int, float]]
@@ -106,15 +146,15 @@ class Book:
     def within(self, alpha: np.ndarray, value: float, subgradient: float) -> tuple[float, np.ndarray, float]:
         """Return J, a subgradient and the error of J, no more accurate than asked."""
         self._ask()
-        found = self.problem.within(alpha, value, subgradient)
-        self._write(alpha, found[0])
-        return found
+        found, gradient, error = self.problem.within(self._whole(alpha), value, subgradient)
+        self._write(alpha, found)
+        return found, gradient[self._held :], error
 
     def __call__(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
         """Return J and a subgradient."""
         value, gradient = self._told(alpha, self.problem)
         self._write(alpha, value)
-        return value, gradient
+        return value, gradient[self._held :]
 
     def value(self, alpha: np.ndarray) -> float:
         """Return J alone, without an adjoint."""
@@ -128,19 +168,26 @@ class Book:
         """Return what a function finds of a design, and write it down where the design does not exist."""
         self._ask()
         try:
-            return solve(alpha)
+            return solve(self._whole(alpha))
         except (InvalidDesignError, ConvergenceError) as error:
             self._write(alpha, np.nan)
             self.notes.append(str(error))
             raise InvalidDesignError(str(error)) from error
+
+    def _whole(self, alpha: np.ndarray) -> np.ndarray:
+        return np.append(np.zeros(self._held), alpha)
 
     def _ask(self) -> None:
         if len(self.rows) >= self.budget:
             raise Spent
 
     def _write(self, alpha: np.ndarray, value: float) -> None:
-        outside = float(np.abs(alpha).max()) - self.bound
-        violation = max(outside, -float(self._row @ alpha), 0.0) / (2.0 * self.bound)
+        lower, upper = self.bounds
+        outside = float(np.maximum(lower - alpha, alpha - upper).max())
+        if self.constraints is not None:
+            (row,) = np.asarray(self.constraints.matrix)
+            outside = max(outside, float(row @ alpha) / float(np.linalg.norm(row)))
+        violation = max(outside, 0.0) / self._width
         products = self.problem.products + self._state_products
         self.rows.append((float(value), violation, products, perf_counter() - self._began))
         self.designs.append(np.array(alpha))

@@ -12,7 +12,8 @@ import scipy.optimize
 from mpi4py import MPI
 
 from benchmarks.optimisers.book import STATES, Book, Case, Spent
-from fenics_contact.optimize import BundleTrust, ForScipy, minimize, nearest_feasible
+from benchmarks.optimisers.rosenbrock import rosenbrock
+from fenics_contact.optimize import BundleTrust, ForScipy, InvalidDesignError, minimize, nearest_feasible
 from fenics_contact.shape import AdaptiveTolerance
 from fenics_contact.study.scenes.chain_links import GRADING
 
@@ -24,11 +25,11 @@ SCIPY: dict[str, dict[str, Any]] = {
     "trust-constr": {"options": {"xtol": 1e-5, "gtol": 1e-5, "maxiter": 1000, "initial_tr_radius": 0.3}},
     "COBYLA": {"options": {"rhobeg": 0.1, "tol": 1e-4}},
 }
-METHODS = ("bundle", "bundle, adaptive states", *SCIPY)
+METHODS = ("bundle", "bundle, adaptive states", *SCIPY, "Rosenbrock")
 #: Most evaluations of a method with derivative by size of the chain, and of one without, which needs one for
 #: each variable to begin; it is left out where an evaluation takes long.
-BUDGET = {"coarse": 150, "small": 80}
-WITHOUT_DERIVATIVE = {"coarse": 300, "small": 0}
+BUDGET = {"coarse": 150, "small": 80, "roller": 60}
+WITHOUT_DERIVATIVE = {"coarse": 300, "small": 0, "roller": 120}
 QUICK_BUDGET = 12
 FULL = (
     Case("coarse", "total potential", 0.25, 0.3, 0),
@@ -36,6 +37,8 @@ FULL = (
     Case("coarse", "largest force", 1.0, 0.3, 1),
     Case("coarse", "largest force", 1.0, 0.1, 0),
     Case("small", "largest force", 1.0, 0.3, 0),
+    Case("roller", "largest pressure", 8.0, 0.0, 0),
+    Case("roller", "largest pressure", 8.0, 0.0, 1),
 )
 #: A start of twice the largest force of the others: a dozen evaluations do not go far from a good one.
 QUICK = (Case("coarse", "largest force", 1.0, 0.3, 56),)
@@ -43,9 +46,11 @@ QUICK = (Case("coarse", "largest force", 1.0, 0.3, 56),)
 
 def budget_of(case: Case, method: str, quick: bool) -> int:
     """Return how many evaluations a method may spend."""
+    if method == "Rosenbrock" and not case.of_roller:
+        return 0
     if quick:
         return QUICK_BUDGET
-    return (WITHOUT_DERIVATIVE if method == "COBYLA" else BUDGET)[case.size]
+    return (WITHOUT_DERIVATIVE if method in ("COBYLA", "Rosenbrock") else BUDGET)[case.size]
 
 
 def run(comm: MPI.Comm, case: Mapping[str, Any], method: str, budget: int) -> dict[str, Any]:
@@ -66,7 +71,7 @@ def run(comm: MPI.Comm, case: Mapping[str, Any], method: str, budget: int) -> di
     stop = "budget spent"
     with suppress(Spent), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of trust-constr, about steps without curvature
-        stop = (_by_bundle if method.startswith("bundle") else _by_scipy(method))(book)
+        stop = _solver(method)(book)
     seconds = book.rows[-1][3]
     best = _best(book)
     # What is compared keeps every constraint: the smallest violation would pay.
@@ -78,11 +83,29 @@ def run(comm: MPI.Comm, case: Mapping[str, Any], method: str, budget: int) -> di
         "invalid": int(sum(np.isnan(row[0]) for row in book.rows)),
         "value_claimed": book.rows[best][0], "value": value, "violation": book.rows[best][1],
         "products": book.rows[-1][2], "seconds": seconds,
-        "design": design, "variables": book.problem.size,
+        "design": design, "variables": book.start.size,
         "unknowns": book.problem.contact.decomposition.torn_unknowns,
         "history": [[None if np.isnan(row[0]) else row[0], *row[1:]] for row in book.rows],
         "notes": sorted(set(book.notes)),
     }  # fmt: skip
+
+
+def _solver(method: str) -> Callable[[Book], str]:
+    if method == "Rosenbrock":
+        return _by_rosenbrock
+    return _by_bundle if method.startswith("bundle") else _by_scipy(method)
+
+
+def _by_rosenbrock(book: Book) -> str:
+    width = np.max(book.bounds[1] - book.bounds[0])
+
+    def value(scaled: np.ndarray) -> float:
+        try:
+            return book.value(width * scaled)
+        except InvalidDesignError:
+            return float("inf")
+
+    return rosenbrock(value, book.start / width, (book.bounds[0] / width, book.bounds[1] / width))
 
 
 def _by_bundle(book: Book) -> str:

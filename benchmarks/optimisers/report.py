@@ -25,6 +25,7 @@ LOOKS = {
     "SLSQP": ("#d55e00", "s", "--"),
     "trust-constr": ("#cc79a7", "^", "--"),
     "COBYLA": ("#009e73", "D", ":"),
+    "Rosenbrock": ("#e69f00", "P", ":"),
 }
 #: What products and times are compared with.
 USUAL = "bundle"
@@ -51,7 +52,7 @@ def above_best(run: dict[str, Any], runs: list[dict[str, Any]]) -> float:
 
 
 def _unit(run: dict[str, Any]) -> str:
-    return "N mm" if run["objective"] == "total potential" else "N"
+    return {"total potential": "N mm", "largest pressure": "N/mm²"}.get(run["objective"], "N")
 
 
 def _table(runs: list[dict[str, Any]]) -> str:

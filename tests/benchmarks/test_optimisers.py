@@ -51,7 +51,8 @@ def test_the_page_tells_how_far_above_the_best_and_at_what_cost(tmp_path: Path) 
 def test_every_method_but_the_one_without_derivative_has_the_same_budget() -> None:
     for case in FULL:
         budgets = {method: budget_of(case, method, quick=False) for method in METHODS}
-        budgets.pop("COBYLA")
+        assert budgets.pop("COBYLA") in (0, 2 * budgets["bundle"])
+        budgets.pop("Rosenbrock")
         assert len(set(budgets.values())) == 1
 
 
@@ -63,7 +64,7 @@ def test_the_stored_study_has_every_problem_and_designs_that_keep_the_constraint
     for run in study["runs"]:
         assert run["violation"] <= ALLOWED
         assert run["evaluations"] == len(run["history"])
-        assert len(run["design"]) == run["variables"] == 28
+        assert len(run["design"]) == run["variables"] == (7 if "roller" in run["case"] else 28)
         assert run["value"] < np.inf
     page = (folder / "README.md").read_text()
     assert page == filled(page, tables(study))
@@ -73,7 +74,7 @@ def test_a_problem_keeps_its_numbers_until_all_its_methods_are_measured_again(tm
     before = json.loads((ROOT / "docs" / "studies" / "optimisers" / "results.json").read_text())["runs"]
     first = {job.name: job for job in jobs(False) if job.arguments["case"] == asdict(FULL[0])}
     new = {name: [{**run, "value": 1.0, "ranks": 1}] for name, run in zip(first, before, strict=False)}
-    assert [run["case"] for run in before[: len(new)]] == [FULL[0].name] * len(METHODS)
+    assert [run["case"] for run in before[: len(new)]] == [FULL[0].name] * len(first)
     some = dict(list(new.items())[1:])
     for records, value in ((some, before[1]["value"]), (new, 1.0)):
         write(tmp_path, records, False)
@@ -93,7 +94,7 @@ def test_the_quick_study_runs_from_its_first_line_to_its_last(tmp_path: Path) ->
     assert (ended.status, ended.errors) == (0, "")
     tmp_path /= "quick"
     study = json.loads((tmp_path / "results.json").read_text())
-    assert [run["method"] for run in study["runs"]] == list(METHODS)
+    assert [run["method"] for run in study["runs"]] == list(METHODS[:-1])
     before = {round(run["history"][0][0], 1) for run in study["runs"]}
     assert len(before) == 1, "all start from the same shape"
     assert all(run["evaluations"] <= 12 for run in study["runs"])
