@@ -13,6 +13,7 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
+from benchmarks.cases.roller_design import PEAK
 from benchmarks.optimisers.measuring import ALLOWED, FULL, METHODS, QUICK, budget_of
 from benchmarks.study import ROOT, Records, Study, filled, found, unfilled
 from fenics_contact.io import versions, write_json, write_text
@@ -31,10 +32,12 @@ LOOKS = {
 USUAL = "bundle"
 #: Smallest distance to the best value that the picture tells apart from none.
 LEAST = 1e-6
+#: Distances to the best largest pressure of the roller, relative to it, for which states are counted.
+NEAR = (0.1, 0.01, 0.001)
 
 
 def tables(study: dict[str, Any]) -> dict[str, str]:
-    """Return the tables of the page by their names, all problems in one."""
+    """Return the tables of the page by their names: all problems in one, and states of the roller."""
     parts = []
     for case in dict.fromkeys(run["case"] for run in study["runs"]):
         runs = [run for run in study["runs"] if run["case"] == case]
@@ -42,7 +45,31 @@ def tables(study: dict[str, Any]) -> dict[str, str]:
         parts.append(f"## {case[0].upper()}{case[1:]}\n")
         parts.append(f"{first['unknowns']} unknowns; J before: {first['history'][0][0]:.1f} {_unit(first)}\n")
         parts.append(_table(runs))
-    return {"problems": "\n".join(parts)}
+    rollers = [run for run in study["runs"] if "roller" in run["case"]]
+    return {"problems": "\n".join(parts)} | ({"roller": _even(rollers)} if rollers else {})
+
+
+def states_to(run: dict[str, Any], pressure: float) -> int | None:
+    """Return after how many states a method met a design with less pressure, None where it met none."""
+    below = (
+        number
+        for number, (value, violation, *_) in enumerate(run["history"], 1)
+        if value is not None and violation <= ALLOWED and value <= pressure
+    )
+    return next(below, None)
+
+
+def _even(runs: list[dict[str, Any]]) -> str:
+    best = {run["case"]: min(each["value"] for each in runs if each["case"] == run["case"]) for run in runs}
+    rows = [
+        (run["case"].rpartition(", ")[2], run["method"],
+         *(str(states_to(run, (1.0 + near) * best[run["case"]]) or "–") for near in NEAR),
+         f"{run['value'] / PEAK:.4f}", str(run["evaluations"]))
+        for run in runs
+    ]  # fmt: skip
+    return table(
+        ("start", "method", *(f"to {100 * near:g} %" for near in NEAR), "best over p0", "states"), rows
+    )
 
 
 def above_best(run: dict[str, Any], runs: list[dict[str, Any]]) -> float:
@@ -86,10 +113,10 @@ def plot(path: Path, runs: list[dict[str, Any]]) -> None:
         axes[0].set_ylabel("above the best")
     for axis, label in zip(grid[-1], ("evaluations", "products with the dual operator"), strict=True):
         axis.set_xlabel(label)
-    handles, labels = grid[-1][0].get_legend_handles_labels()
-    if len(cases) > 1:
-        handles, labels = grid[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
+    shown = {}
+    for row in grid:
+        shown |= dict(zip(*row[0].get_legend_handles_labels()[::-1], strict=True))
+    figure.legend(shown.values(), shown, loc="outside lower center", ncols=len(shown), frameon=False)
     figure.savefig(path, dpi=130)
     plt.close(figure)
 

@@ -29,7 +29,7 @@ def rosenbrock(
         start: Scaled variables, shape (n,).
         bounds: Scaled bounds; variables between equal ones stay.
         step: First step along every axis.
-        least: Stops where all steps are shorter.
+        least: Stops where all steps, or all ways of a stage, are shorter.
 
     Returns:
         Why it stopped.
@@ -45,7 +45,7 @@ def rosenbrock(
             for k, axis in enumerate(axes):
                 trial = x + steps[k] * axis
                 inside = (trial >= lower).all() and (trial <= upper).all()
-                if inside and (found := value(trial)) <= best:
+                if inside and (found := value(trial)) < best:
                     x, best, sums[k], steps[k] = trial, found, sums[k] + steps[k], 3.0 * steps[k]
                     gained[k] = True
                 else:
@@ -53,6 +53,8 @@ def rosenbrock(
                     lost[k] |= gained[k]
             if np.abs(steps).max() < least:
                 return "converged"
+        if np.abs(sums).max() < least:
+            return "converged"
         axes = _turned(axes, sums)
 
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from benchmarks.optimisers.measuring import ALLOWED, FULL, METHODS, budget_of
-from benchmarks.optimisers.report import above_best, jobs, plot, tables, write
+from benchmarks.optimisers.report import above_best, jobs, plot, states_to, tables, write
+from benchmarks.optimisers.rosenbrock import rosenbrock
 from benchmarks.study import filled
 from fenics_contact.launching import finished
 from tests.conftest import ROOT
@@ -46,6 +47,26 @@ def test_the_page_tells_how_far_above_the_best_and_at_what_cost(tmp_path: Path) 
     assert above_best(runs()[0], runs()) == 0.0
     plot(tmp_path / "optimisers.png", runs())
     assert (tmp_path / "optimisers.png").stat().st_size > 10_000
+
+
+def test_states_are_counted_until_a_design_that_keeps_its_bounds_has_little_pressure() -> None:
+    first, second = runs()
+    assert [states_to(first, most) for most in (20.0, 12.0, 9.0)] == [1, 2, None]
+    assert states_to(second, 6.0) is None, "the last design lies outside"
+
+
+def test_rosenbrocks_search_follows_a_curved_valley_and_stays_in_its_box() -> None:
+    tried: list[tuple[float, np.ndarray]] = []
+
+    def valley(x: np.ndarray) -> float:
+        value = float(100.0 * (x[1] - x[0] ** 2) ** 2 + (1.0 - x[0]) ** 2)
+        tried.append((value, np.array(x)))
+        return value
+
+    box = (np.array([-1.5, -0.5]), np.array([0.8, 2.0]))
+    assert rosenbrock(valley, np.array([-1.2, 1.0]), box, least=1e-6) == "converged"
+    assert min(tried, key=lambda each: each[0])[1] == pytest.approx([0.8, 0.64], abs=1e-3)
+    assert all((box[0] <= x).all() and (x <= box[1]).all() for _, x in tried)
 
 
 def test_every_method_but_the_one_without_derivative_has_the_same_budget() -> None:
