@@ -113,7 +113,7 @@ def plot(path: Path, runs: list[dict[str, Any]]) -> None:
         axes[0].set_ylabel("above the best")
     for axis, label in zip(grid[-1], ("evaluations", "products with the dual operator"), strict=True):
         axis.set_xlabel(label)
-    shown = {}
+    shown: dict[str, Any] = {}
     for row in grid:
         shown |= dict(zip(*row[0].get_legend_handles_labels()[::-1], strict=True))
     figure.legend(shown.values(), shown, loc="outside lower center", ncols=len(shown), frameon=False)
