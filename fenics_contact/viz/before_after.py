@@ -83,11 +83,12 @@ def plot_before_after(
     named = units or Units()
     contacts = before.contact, after.contact
     peaks = [float(contact.pressure[contact.on_pair(pair)].max(initial=0.0)) for contact in contacts]
-    facts = f"largest pressure {written(peaks[0])} → {written(peaks[1])} {named.stress}"
-    facts += f"; seat gives way by {written(_retreat(before, after, pair), 2)} {named.length}"
-    if isinstance(first, DesignPoint) and isinstance(best, DesignPoint):
-        facts = f"{label} {change(first.value, best.value)}; {facts}"
-    look = _Look(pair, given, reach, headline(title, facts), named, width)
+    values = [each.value for each in (first, best) if isinstance(each, DesignPoint)]
+    facts = [f"{label} {change(*values)}"] if len(values) == 2 else []
+    if len(values) < 2 or not np.allclose(values, peaks, rtol=1e-6):
+        facts.append(f"largest pressure {written(peaks[0])} → {written(peaks[1])} {named.stress}")
+    facts.append(f"seat gives way by {written(_retreat(before, after, pair), 2)} {named.length}")
+    look = _Look(pair, given, reach, headline(title, "; ".join(facts)), named, width)
     draw = _draw_in_plane if before.scene.dim == 2 else _draw_in_space
     comm = before.torn.decomposition.comm
     return draw_picture(comm, target, lambda paper: draw(before, after, paper, look))
