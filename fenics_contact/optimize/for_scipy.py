@@ -238,11 +238,12 @@ class ForScipy:
         return ScipyBounds(allowed.lower / scale, allowed.upper / scale, keep_feasible)
 
     def _rows(self, with_box: bool) -> list[Any]:
-        """All rows in scaled variables, optionally with those of the box."""
+        """All rows in scaled variables, optionally with those of the box, then without equalities."""
         allowed, scale = self._problem.allowed, self._problem.scale
         rows = ranges(allowed)
         if with_box:
             rows.append((np.eye(scale.size), allowed.lower, allowed.upper))
+            rows = [half for row in rows for half in _from_both_sides(*row)]
         return [_linear_constraint(matrix * scale, below, above) for matrix, below, above in rows]
 
 
@@ -277,6 +278,16 @@ class _Remembered:
             self._constraint.upper / size,
             jac=lambda z: (scale * self.at(scale * np.asarray(z)).subgradient / size)[None],
         )
+
+
+def _from_both_sides(matrix: Array, below: Array, above: Array) -> list[tuple[Array, Array, Array]]:
+    """Return rows of which none is an equality, which COBYLA does not take: these are bounded twice."""
+    equal = below == above
+    upper = np.full(int(equal.sum()), -np.inf), above[equal]
+    return [
+        (matrix, below, np.where(equal, np.inf, above)),
+        *([(matrix[equal], *upper)] if equal.any() else []),
+    ]
 
 
 def _linear_constraint(matrix: Array, below: Array, above: Array) -> scipy.optimize.LinearConstraint:

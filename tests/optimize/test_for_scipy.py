@@ -57,6 +57,13 @@ def test_a_method_without_derivative_keeps_bounds_as_rows_and_asks_for_values_al
     assert len(asked) == task.evaluations
 
 
+def test_a_method_that_takes_no_equality_is_given_its_row_and_a_fixed_variable_from_both_sides() -> None:
+    fixed = Bounds(BOX.lower * [0.0, 1.0, 1.0], BOX.upper * [0.0, 1.0, 1.0])
+    task = ForScipy(bowl, np.zeros(3), bounds=fixed, constraints=PLANE)
+    scipy.optimize.minimize(**task.arguments("COBYLA"), options={"rhobeg": 0.2, "tol": 1e-5, "catol": 1e-5})
+    np.testing.assert_allclose(task.best_within(1e-3).x / SIZE, [0.0, 0.2, -0.2], atol=5e-3)
+
+
 def test_methods_for_boxes_alone_are_given_the_box() -> None:
     task = ForScipy(bowl, np.zeros(3), bounds=BOX)
     scipy.optimize.minimize(**task.arguments("L-BFGS-B"))
