@@ -273,7 +273,7 @@ assert max(cases["two loads"].values()) < (0.67 if small else 0.5) * cases["one 
 
 # ## What to try next
 #
-# - `length = 20 * half_width`, with cells along it of `growing(length / 2, 0.75 * half_width, 1.15)`: from the
-#   straight roller the optimum leaves Lundberg's profile by 12 % and some 15 %, for a reason. His strip is as
-#   wide at the ends as in the middle; the true one narrows there, and its middle is pressed more.
+# - `length = 20 * half_width`, with cells along it of `growing(length / 2, 0.75 * half_width, 1.15)`: from
+#   the straight roller the optimum leaves Lundberg's profile by 12 % and some 15 %, for a reason. His
+#   strip is as wide at the ends as in the middle; the true one narrows there, and its middle is pressed more.
 # - `monotone` or `smallest_radius` (from `fenics_contact.optimize`): rules of the grinding wheel.
