@@ -25,7 +25,7 @@ from fenics_contact.mesh.near_surfaces import near_surfaces
 from fenics_contact.mesh.plane import flattened, turned_counter_clockwise, turned_right_handed
 from fenics_contact.mesh.quadratic import quadratic
 from fenics_contact.mesh.quadratic_nodes import in_vtk_order
-from fenics_contact.mesh.quality import cell_volumes, determinants
+from fenics_contact.mesh.quality import cell_volumes, determinants, jacobians
 from fenics_contact.mesh.rounding import computed_rounding, coordinate_rounding
 from fenics_contact.mesh.shape_functions import quadrature, shape_gradients, shape_values
 
@@ -45,6 +45,7 @@ __all__ = [
     "determinants",
     "flattened",
     "in_vtk_order",
+    "jacobians",
     "match_faces",
     "merge_duplicate_nodes",
     "near_surfaces",

@@ -11,6 +11,7 @@ from fenics_contact.mesh_io.dolfinx_import import from_dolfinx, read_xdmf
 from fenics_contact.mesh_io.gmsh_import import from_gmsh_model, read_msh
 from fenics_contact.mesh_io.gmsh_session import gmsh_model, silenced
 from fenics_contact.mesh_io.meshio_import import from_meshio, read_mesh, read_with_meshio
+from fenics_contact.mesh_io.refilling import refilled
 
 __all__ = [
     "CadFace",
@@ -28,5 +29,6 @@ __all__ = [
     "read_msh",
     "read_with_meshio",
     "read_xdmf",
+    "refilled",
     "silenced",
 ]

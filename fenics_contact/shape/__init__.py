@@ -18,6 +18,7 @@ from fenics_contact.shape.objective import Objective, Partials
 from fenics_contact.shape.path_points import PathPoint
 from fenics_contact.shape.pressures import ContactArea, LargestPressure, PressureNorm, PressureUnevenness
 from fenics_contact.shape.problem import ShapeProblem
+from fenics_contact.shape.remeshed import Remeshed, Remeshing
 from fenics_contact.shape.sums import Largest, Weighable, WeightedSum
 from fenics_contact.shape.tolerance import AdaptiveTolerance
 from fenics_contact.shape.volume_integral import VolumeIntegral
@@ -43,6 +44,8 @@ __all__ = [
     "PathPoint",
     "PressureNorm",
     "PressureUnevenness",
+    "Remeshed",
+    "Remeshing",
     "ShapeProblem",
     "StrainEnergy",
     "SurfaceDesign",

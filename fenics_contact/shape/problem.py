@@ -55,6 +55,7 @@ class ShapeProblem:
         contact: The problem that computes the states.
         scene: The scene in its reference shape.
         geometry: How it moves with a design.
+        tolerance: As given.
         products: F-products of states and adjoints so far.
         evaluations: Number of designs evaluated, without those for `beside`.
 
@@ -86,7 +87,7 @@ class ShapeProblem:
                 balanced state leaves the statuses uncertain on which derivatives depend.
         """
         self.contact, self.objective, self.choice = checked_contact(contact), objective, choice
-        self.scene = contact.scene
+        self.scene, self.tolerance = contact.scene, tolerance
         self._adaptive = tolerance if isinstance(tolerance, AdaptiveTolerance) else None
         self._tightest = tightest_of(contact, tolerance)
         self._timer = contact.timer

@@ -1,0 +1,370 @@
+"""A design problem whose bodies are meshed anew where a design would spoil their cells."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fenics_contact._libraries import MPI
+from fenics_contact.contact import ContactProblem, State
+from fenics_contact.display import displayed
+from fenics_contact.errors import InvalidDesignError, InvalidInputError, calling, tell, together
+from fenics_contact.mesh import BodyMesh, jacobians
+from fenics_contact.scene import Scene
+from fenics_contact.shape.design import SurfaceDesign, checked_variables
+from fenics_contact.shape.design_function import DesignFunction
+from fenics_contact.shape.memory import DesignPoint, joined_memory, parted_memory
+from fenics_contact.shape.objective import Objective
+from fenics_contact.shape.problem import ShapeProblem
+
+#: Takes the mesh of a body in the shape of a design; returns another one with the same named surfaces and
+#: the same nodes on its design surfaces.
+Mesher = Callable[[BodyMesh], BodyMesh]
+
+_OWN = "remeshed."
+
+logger = logging.getLogger(__name__)
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Remeshing:
+    """A change of the mesh.
+
+    Attributes:
+        alpha: The design in whose shape the new mesh was made, shape (size,), [length].
+        before: J there on the mesh before.
+        after: J there on the new mesh: both are off by their discretisation errors.
+    """
+
+    alpha: np.ndarray
+    before: float
+    after: float
+
+    @property
+    def jump(self) -> float:
+        """Change of J by the change of the mesh."""
+        return self.after - self.before
+
+
+@displayed
+class Remeshed:
+    """J(α) of a `ShapeProblem`, on a new mesh wherever a design would spoil the cells of the one before.
+
+    The mesh of a design moves until a cell has lost all but a share of its Jacobian. There the body, in the
+    shape that it has, gets a new mesh, from which the design moves on, again if need be. The variables stay
+    those of the net over the true surface: those of the problem given, also for an optimiser under way. Every
+    design is evaluated on the mesh made nearest to it of those that allow it. Where the mesh changes, J jumps
+    by a difference of two discretisation errors, see `Remeshing`. All meshes are kept with their factors.
+
+    Attributes:
+        problems: A problem for each mesh, the one given first.
+        origins: Design in whose shape each mesh was made, shape (size,).
+        remeshings: The changes so far.
+
+    Example:
+        >>> problem = ShapeProblem(ContactProblem(scene, comm), design, TotalPotential())  # doctest: +SKIP
+        >>> far = Remeshed(problem, refilled)  # doctest: +SKIP
+        >>> result = minimize(far, np.zeros(far.size), bounds=(-3.0, 3.0))  # doctest: +SKIP
+    """
+
+    def __init__(
+        self, problem: ShapeProblem, mesher: Mesher | None = None, *, share: float = 0.1, most: int = 100
+    ) -> None:
+        """Start with the mesh of a problem.
+
+        Args:
+            problem: The problem on its first mesh.
+            mesher: Makes the new meshes, such as `mesh_io.refilled`; by default the cells are kept as they
+                are moved, and the motion of the mesh starts from there.
+            share: Smallest share of its Jacobian that a cell may keep before a new mesh is made.
+            most: Largest number of new meshes; a design that needs more is an `InvalidDesignError`.
+
+        Raises:
+            InvalidInputError: If the share is not between 0 and 1.
+        """
+        if not 0.0 < share < 1.0:
+            raise InvalidInputError(f"share must lie between 0 and 1, got {share}: 0.1 is usual")
+        self._mesher, self.share, self.most = mesher, share, most
+        self.problems, self.origins = [problem], [np.zeros(problem.size)]
+        self.remeshings: list[Remeshing] = []
+        self.objective = problem.objective
+        self._parents, self._last = [0], 0
+
+    def _facts(self) -> dict[str, Any]:
+        return {"problem": self.problems[0], "remeshings": len(self.remeshings)}
+
+    @property
+    def comm(self) -> MPI.Comm:
+        """Communicator over which the subdomains are spread."""
+        return self.problems[0].comm
+
+    @property
+    def size(self) -> int:
+        """Number of design variables."""
+        return self.problems[0].size
+
+    @property
+    def designs(self) -> tuple[SurfaceDesign, ...]:
+        """The moving surfaces on the first mesh."""
+        return self.problems[0].designs
+
+    @property
+    def evaluations(self) -> int:
+        """Number of designs evaluated."""
+        return sum(problem.evaluations for problem in self.problems)
+
+    @property
+    def products(self) -> int:
+        """F-products of states and adjoints so far."""
+        return sum(problem.products for problem in self.problems)
+
+    @products.setter
+    def products(self, value: int) -> None:
+        self.problems[self._last].products += value - self.products
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Wall time of this rank by phase, over all meshes."""
+        phases = {phase for problem in self.problems for phase in problem.seconds}
+        return {
+            phase: sum(problem.seconds.get(phase, 0.0) for problem in self.problems)
+            for phase in sorted(phases)
+        }
+
+    @property
+    def inexact(self) -> bool:
+        """Whether an optimiser may ask for less accuracy: never."""
+        return False
+
+    @property
+    def first(self) -> DesignPoint | None:
+        """The design evaluated first on the first mesh that has one. Collective after a run was resumed."""
+        return next((point for point in self._points("first") if point is not None), None)
+
+    @property
+    def best(self) -> DesignPoint | None:
+        """The design with the smallest objective so far, feasible or not. Collective after a run resumed."""
+        known = [point for point in self._points("best") if point is not None]
+        return min(known, key=lambda point: point.value, default=None)
+
+    @property
+    def last(self) -> DesignPoint | None:
+        """The design evaluated last. Collective after a run was resumed."""
+        return self._points("last")[self._last]
+
+    def _points(self, which: str) -> list[DesignPoint | None]:
+        points = (getattr(problem, which) for problem in self.problems)
+        return [
+            point and replace(point, alpha=point.alpha + origin)
+            for point, origin in zip(points, self.origins, strict=True)
+        ]
+
+    def __call__(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return J(α) and a subgradient; raises as `evaluate` does. Collective."""
+        point = self.evaluate(alpha)
+        return point.value, point.gradient
+
+    def evaluate(self, alpha: np.ndarray) -> DesignPoint:
+        """Solve the state and its adjoint and return value and subgradient. Collective.
+
+        Raises:
+            InvalidDesignError: If the design is out of reach of all meshes, or has no equilibrium.
+        """
+        problem, moved = self._on_mesh(alpha)
+        return replace(problem.evaluate(moved), alpha=np.array(alpha, dtype=float))
+
+    def state_of(self, alpha: np.ndarray) -> State:
+        """Return the equilibrium of a design; raises as `evaluate` does. Collective."""
+        problem, moved = self._on_mesh(alpha)
+        return problem.state_of(moved)
+
+    def scene_of(self, alpha: np.ndarray) -> Scene:
+        """Return the scene in the shape of a design; raises as `evaluate` does. Collective."""
+        problem, moved = self._on_mesh(alpha)
+        return problem.scene_of(moved)
+
+    def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the volume of the designed bodies, in the plane the area, and its gradient. Collective."""
+        problem, moved = self._on_mesh(alpha)
+        return problem.volume(moved)
+
+    def known(self, alpha: np.ndarray) -> DesignPoint | None:
+        """Return a stored design if it is exactly this one. Collective."""
+        found = (
+            problem.known(alpha - origin) for problem, origin in zip(self.problems, self.origins, strict=True)
+        )
+        point = next((point for point in found if point is not None), None)
+        return point and replace(point, alpha=np.array(alpha, dtype=float))
+
+    def at(self, alpha: np.ndarray) -> DesignPoint:
+        """Return a design as evaluated, again unless it is `known`. Collective."""
+        return self.known(alpha) or self.evaluate(alpha)
+
+    def doubtful(self, alpha: np.ndarray) -> bool:
+        """Return whether the last result, at α, may not be a subgradient. Collective."""
+        problem, moved = self._on_mesh(alpha)
+        return problem.doubtful(moved)
+
+    def beside(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """Return a gradient near α, see `ShapeProblem.beside`. Collective."""
+        problem, moved = self._on_mesh(alpha)
+        return _aimed(problem, self.objective).beside(moved, moved + (end - alpha))
+
+    def differentiate(self, state: State) -> DesignPoint:
+        """Return value and subgradient at a state of one of the meshes. Collective."""
+        decomposition = state.torn.decomposition
+        problem = next(one for one in self.problems if one.contact.decomposition is decomposition)
+        return _aimed(problem, self.objective).differentiate(state)
+
+    def function(self, objective: Objective, name: str | None = None) -> DesignFunction:
+        """Return another objective as a function of the same designs, see `ShapeProblem.function`."""
+        own = copy(self)
+        own.objective = objective
+        return DesignFunction(self, own, name or type(objective).__name__)
+
+    def fingerprint(self) -> dict[str, str]:
+        """Identify the problem, for a checkpoint."""
+        mesher = getattr(self._mesher, "__name__", str(type(self._mesher)))
+        return {**self.problems[0].fingerprint(), "remeshing": f"{mesher}, {self.share}, {self.most}"}
+
+    def memory(self) -> dict[str, np.ndarray]:
+        """Return what the next state depends on. Collective."""
+        jumps = np.array([(one.before, one.after) for one in self.remeshings]).reshape(-1, 2)
+        own = {"origins": np.array(self.origins), "parents": np.array(self._parents), "jumps": jumps}
+        own["last"] = np.array(self._last)
+        return {**{_OWN + key: values for key, values in own.items()}, **joined_memory(self.problems)}
+
+    def recall(self, memory: Mapping[str, np.ndarray]) -> None:
+        """Continue from what `memory` returned: the meshes are made again. Collective."""
+        own = {key.removeprefix(_OWN): memory[key] for key in memory if key.startswith(_OWN)}
+        for origin, parent, jump in zip(own["origins"][1:], own["parents"][1:], own["jumps"], strict=True):
+            self._add(int(parent), origin)
+            self.remeshings.append(Remeshing(origin, *(float(value) for value in jump)))
+        self._last = int(own["last"])
+        rest = {key: values for key, values in memory.items() if not key.startswith(_OWN)}
+        for problem, part in zip(self.problems, parted_memory(rest, len(self.problems)), strict=True):
+            problem.recall(part)
+
+    def _on_mesh(self, alpha: np.ndarray) -> tuple[ShapeProblem, np.ndarray]:
+        """Return the problem on the nearest mesh that allows a design, and the design from there."""
+        alpha = checked_variables(alpha, self.size, self.comm)
+        order = np.argsort([np.linalg.norm(alpha - origin) for origin in self.origins], kind="stable")
+        for k in map(int, order):
+            if self._reach(k, alpha) == 1.0:
+                self._last = k
+                break
+        else:
+            self._last = self._approach(int(order[0]), alpha)
+        return self.problems[self._last], alpha - self.origins[self._last]
+
+    def _approach(self, k: int, alpha: np.ndarray) -> int:
+        """Make new meshes on the way from the k-th until one allows the design; return its number."""
+        while (reach := self._reach(k, alpha)) < 1.0:
+            if len(self.remeshings) == self.most or reach < 0.01:
+                raise InvalidDesignError(
+                    f"the design is out of reach of {len(self.problems)} meshes: the next one would allow "
+                    f"{reach:.1%} of the rest of the way (at most {self.most} are made): bound the "
+                    "design, allow more or give another mesher"
+                )
+            k = self._remesh(k, self.origins[k] + reach * (alpha - self.origins[k]))
+        return k
+
+    def _reach(self, k: int, alpha: np.ndarray) -> float:
+        """Return the part of the way from the k-th mesh to a design on which cells keep their share."""
+        problem = self.problems[k]
+        points = problem.points_of(alpha - self.origins[k])
+        meshes = [problem.scene.bodies[name].mesh for name in points]
+        ways = [points[name] - mesh.points for name, mesh in zip(points, meshes, strict=True)]
+
+        def kept(part: float) -> bool:
+            return all(
+                _share(mesh, mesh.points + part * way) >= self.share
+                for mesh, way in zip(meshes, ways, strict=True)
+            )
+
+        if kept(1.0):
+            return 1.0
+        low, high = 0.0, 1.0
+        for _ in range(12):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if kept(middle) else (low, middle)
+        return low
+
+    def _remesh(self, k: int, origin: np.ndarray) -> int:
+        """Make a mesh in the shape of a design of the k-th; measure J on both."""
+        before = self.problems[k].value_of(origin - self.origins[k])
+        self._add(k, origin)
+        after = self.problems[-1].value_of(np.zeros(self.size))
+        self.remeshings.append(Remeshing(origin, before, after))
+        tell(logger.info, "mesh %d: J = %.9g, %.9g before", len(self.remeshings), after, before)
+        return len(self.problems) - 1
+
+    def _add(self, k: int, origin: np.ndarray) -> None:
+        problem = self.problems[k]
+        scene, designs, partitions = problem.scene_of(origin - self.origins[k]), problem.designs, None
+        if self._mesher is None:
+            partitions = problem.contact.partitions
+        else:
+            scene, designs = _meshed(scene, designs, self._mesher, self.comm)
+        old = problem.contact
+        contact = ContactProblem(
+            scene, self.comm, partitions=partitions, solver=old.solver, tolerance=old.tolerance
+        )
+        self.problems.append(
+            ShapeProblem(
+                contact, designs, problem.objective, choice=problem.choice, tolerance=problem.tolerance
+            )
+        )
+        self.origins.append(np.array(origin, dtype=float))
+        self._parents.append(k)
+
+
+def _aimed(problem: ShapeProblem, objective: Objective) -> ShapeProblem:
+    """Return a problem with another objective, or itself if it is the same."""
+    if problem.objective is objective:
+        return problem
+    result = copy(problem)
+    result.objective = objective
+    return result
+
+
+def _share(mesh: BodyMesh, points: np.ndarray) -> float:
+    """Return the smallest Jacobian of a cell at new coordinates relative to that of the mesh."""
+    new, old = (jacobians(at, mesh.cells).min(axis=1) for at in (points, mesh.points))
+    return float((new / old).min())
+
+
+def _meshed(
+    scene: Scene, designs: tuple[SurfaceDesign, ...], mesher: Mesher, comm: MPI.Comm
+) -> tuple[Scene, tuple[SurfaceDesign, ...]]:
+    """Return the scene with new meshes of the designed bodies, made on rank 0, and the designs on them."""
+    names = sorted({design.body for design in designs})
+    made: dict[str, BodyMesh] = {}
+    with together(comm):
+        if comm.rank == 0:
+            with calling("the mesher of a design"):
+                made = {name: mesher(scene.bodies[name].mesh) for name in names}
+    made = comm.bcast(made)
+    bodies = {name: replace(scene.bodies[name], mesh=mesh) for name, mesh in made.items()}
+    found = tuple(_found(design, scene.bodies[design.body].mesh, made[design.body]) for design in designs)
+    return replace(scene, bodies={**scene.bodies, **bodies}), found
+
+
+def _found(design: SurfaceDesign, before: BodyMesh, after: BodyMesh) -> SurfaceDesign:
+    """Return a design with the numbers of its nodes in another mesh."""
+    places = before.points[design.lattice.nodes]
+    distance, nodes = cKDTree(after.points).query(places)
+    lost = int(np.count_nonzero(distance > 1e-9 * np.ptp(places, axis=0).max()))
+    if lost:
+        raise InvalidInputError(
+            f"a new mesh of {design.body!r} must keep the nodes of its design surface, {lost} of "
+            f"{len(places)} are gone: keep the facets of the surface, as mesh_io.refilled does"
+        )
+    return replace(design, surface=replace(design.lattice, nodes=np.asarray(nodes)))
