@@ -52,10 +52,9 @@ class ShapeProblem:
     nearby. Topology, partition and compiled forms are reused; each state starts from the one before.
 
     Attributes:
-        contact: The problem that computes the states.
+        contact: The problem that computes the states, to the tolerance given (`tolerance`).
         scene: The scene in its reference shape.
         geometry: How it moves with a design.
-        tolerance: As given.
         products: F-products of states and adjoints so far.
         evaluations: Number of designs evaluated, without those for `beside`.
 

@@ -69,8 +69,9 @@ class Remeshed:
         remeshings: The changes so far.
 
     Example:
-        >>> problem = ShapeProblem(ContactProblem(scene, comm), design, TotalPotential())  # doctest: +SKIP
-        >>> far = Remeshed(problem, refilled)  # doctest: +SKIP
+        >>> designs = SurfaceDesign("link1", links.first.crown, net=(7, 4))  # doctest: +SKIP
+        >>> problem = ShapeProblem(ContactProblem(scene, comm), designs, TotalPotential())  # doctest: +SKIP
+        >>> far = Remeshed(problem)  # doctest: +SKIP
         >>> result = minimize(far, np.zeros(far.size), bounds=(-3.0, 3.0))  # doctest: +SKIP
     """
 
