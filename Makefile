@@ -30,7 +30,7 @@ help: ## Show this list
 	@echo "Settings:"
 	@echo "  DEMO=hertz_sphere    which demo (chain_links); all are in demos/"
 	@echo "  NOTEBOOKS=\"01 04\"    which notebooks (all)"
-	@echo "  SIZE=small|paper     size of the chain links (paper)"
+	@echo "  SIZE=small|paper     size of the chain links (paper), of the roller small|full (full)"
 	@echo "  OBJECTIVE=pressure   what the shape of the chain links lowers: potential|energy|pressure (potential)"
 	@echo "  NP=2                 MPI ranks of a demo (1)"
 	@echo "  STUDIES=hertz        which studies (all three); NP ranks each"

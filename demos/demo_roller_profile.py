@@ -43,7 +43,10 @@ from fenics_contact.viz import plot_curves
 
 comm = MPI.COMM_WORLD
 output = Path("output/roller_profile")
-small = "small" in sys.argv[1:]
+size = sys.argv[sys.argv.index("--size") + 1] if "--size" in sys.argv[:-1] else "full"
+if size not in ("small", "full"):
+    sys.exit(f"--size must be small or full, got {size!r}")
+small = size == "small"
 
 # ## Dimensions
 #
@@ -142,7 +145,7 @@ def box(depth: float) -> tuple[np.ndarray, np.ndarray]:
     return -depth * unit * np.append(0.0, np.ones(VARIABLES - 1)), np.zeros(VARIABLES)
 
 
-method = BundleTrust(tolerance=1e-2 if small else 1e-4, raise_on_failure=False)
+method = BundleTrust(tolerance=1e-2 if small else 3e-4, raise_on_failure=False)
 starts = {
     "straight": np.zeros(VARIABLES),
     "parabola": -4 * unit * np.linspace(0, 1, VARIABLES) ** 2,

@@ -48,3 +48,8 @@ def test_two_starts_end_with_even_pressure_and_lundbergs_profile(
         assert max(map(abs, errors)) < 0.05
     assert max(more["evaluations"].values()) <= 45
     assert max(more["cases"]["two loads"].values()) < 0.5 * more["cases"]["one load"]["tilted"]
+
+
+def test_an_unknown_size_is_refused(mpirun: Callable[..., str]) -> None:
+    with pytest.raises(pytest.fail.Exception, match=r"--size must be small or full, got 'huge'"):
+        mpirun(DEMO, 1, "--size", "huge")
