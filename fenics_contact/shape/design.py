@@ -76,7 +76,8 @@ class SurfaceDesign:
         """Return the design with the nodes of its surface, where that is given by name.
 
         Raises:
-            InvalidInputError: If the scene has no such body, the surface is no grid, or the net is too fine.
+            InvalidInputError: If the scene has no such body, the surface is no grid, or the net is finer than
+                the mesh.
         """
         if self.body not in scene.bodies:
             raise InvalidInputError(
@@ -84,7 +85,21 @@ class SurfaceDesign:
             )
         mesh, surface = scene.bodies[self.body].mesh, self.surface
         whole = side_of(mesh, surface) if isinstance(surface, str) else surface
-        return replace(self, surface=self._within(whole, mirrored(scene, self.body)))
+        placed = replace(self, surface=self._within(whole, mirrored(scene, self.body)))
+        placed._check_resolved()
+        return placed
+
+    def _check_resolved(self) -> None:
+        """Reject a net of which the nodes do not feel every variable."""
+        _, sizes, ways = np.linalg.svd(self.basis, full_matrices=False)
+        lost = ways[sizes <= LAST_PLACES * sizes[0]]
+        if lost.size:
+            names = ", ".join(map(str, np.flatnonzero(np.abs(lost).max(axis=0) > 0.1)))
+            raise InvalidInputError(
+                f"nodes must tell all control points of a net apart, but those of {self.body!r} feel only "
+                f"{self.size - len(lost)} of {self.size} movements of the net {self.net}, not those of the "
+                f"variables {names} against one another: use fewer control points or a finer mesh"
+            )
 
     def _within(self, surface: DesignSurface, cut: np.ndarray) -> DesignSurface:
         """Return the surface with directions within the planes of symmetry, marks of shape (n_nodes, dim)."""

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block, rectangle, side_of
+from fenics_contact.scene import Body, Scene, Support
 from fenics_contact.shape import SurfaceDesign
 from fenics_contact.shape.bernstein import bernstein, tensor_bernstein
-from tests.shape.blocks import side
+from tests.shape.blocks import RUBBER, side
 from tests.shape.chains import crossed_links
 
 PARAMETERS = np.random.default_rng(1).uniform(0.0, 1.0, (50, 2))
@@ -132,3 +135,14 @@ def test_a_pair_on_a_curve_and_a_number_on_a_surface_are_refused() -> None:
         InvalidInputError, match=r"a surface is a pair of numbers, got 7 on 'brick': give net=\(7, 4\)"
     ):
         SurfaceDesign("brick", top, 7)
+
+
+def test_a_net_that_the_nodes_do_not_feel_is_refused() -> None:
+    scene = Scene({"brick": Body(block((0, 0, 0), (2, 1, 1), (6, 3, 2)), RUBBER)}, [Support("brick", "z0")])
+    top = side(scene.bodies["brick"].mesh, "z1")
+    along = replace(top, parameters=top.parameters[:, [0, 0]])
+    assert SurfaceDesign("brick", top, (3, 3)).on(scene).size == 9
+    with pytest.raises(
+        InvalidInputError, match=r"feel only 5 of 9 movements .*variables 1, 2, .* use fewer control points"
+    ):
+        SurfaceDesign("brick", along, (3, 3)).on(scene)
