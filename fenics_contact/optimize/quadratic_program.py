@@ -145,3 +145,31 @@ def _run_clarabel(program: QuadraticProgram, changes: Mapping[str, Any]) -> clar
     hessian = sparse.csc_matrix(sparse.diags(program.curvature))
     cones = [kind(size) for kind, size in kinds if size]
     return clarabel.DefaultSolver(hessian, program.slope, rows, limits, cones, settings).solve()
+
+
+def shortest(
+    equality_rows: Array, equality_values: Array, rows: Array, limits: Array, *, far: float = 1e6
+) -> Array:
+    """Return the shortest y with E y = e and C y ≤ c, shape (n,).
+
+    Args:
+        equality_rows: E, shape (r, n).
+        equality_values: e, shape (r,).
+        rows: C, shape (m, n).
+        limits: c, shape (m,).
+        far: Distance in units of the largest violation at y = 0 beyond which a limit is moved there, as it
+            cannot matter: violations may be a rounding of the distances to other limits.
+
+    Raises:
+        InvalidInputError: If there is no such y.
+        SubproblemError: If Clarabel cannot solve the programme.
+    """
+    rows, limits = unit_rows(rows, limits)
+    equality_rows, equality_values = unit_rows(equality_rows, equality_values)
+    reach = max(-limits.min(initial=0.0), np.abs(equality_values).max(initial=0.0))
+    n = rows.shape[1]
+    if reach == 0.0:
+        return np.zeros(n)
+    near = np.minimum(limits / reach, far)
+    program = QuadraticProgram(np.ones(n), np.zeros(n), equality_rows, equality_values / reach, rows, near)
+    return np.asarray(reach * solve(program).point)

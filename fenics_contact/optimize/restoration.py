@@ -9,7 +9,7 @@ from fenics_contact.errors import InvalidDesignError, InvalidInputError
 from fenics_contact.optimize.evaluation import Known, evaluate_constraint
 from fenics_contact.optimize.nonlinear import Scaled, scaled_constraints
 from fenics_contact.optimize.problem import PosedProblem
-from fenics_contact.optimize.quadratic_program import QuadraticProgram, SubproblemError, solve, unit_rows
+from fenics_contact.optimize.quadratic_program import SubproblemError, shortest
 
 Array = NDArray[np.float64]
 
@@ -67,16 +67,13 @@ def _values(known: Known) -> Array:
 
 def _corrected(problem: PosedProblem, x: Array, known: Known, missed: Scaled) -> Array:
     """Return the nearest point, in scaled variables, that meets the linearised equalities."""
-    near, n = problem.allowed.around(x, problem.scale), x.size
+    near = problem.allowed.around(x, problem.scale)
     slopes = np.array([one.subgradient for one in known.values()])
-    rows, miss = unit_rows(missed.factors[:, None] * slopes * problem.scale, -missed.excess)
-    reach = float(np.abs(miss).max())
-    program = QuadraticProgram(
-        curvature=np.ones(n),
-        slope=np.zeros(n),
-        equality_rows=np.vstack([near.equality_rows, rows]),
-        equality_values=np.concatenate([near.miss, miss]) / reach,
-        rows=near.rows,
-        limits=np.maximum(near.room, 0.0) / reach,
+    rows = missed.factors[:, None] * slopes * problem.scale
+    step = shortest(
+        np.vstack([near.equality_rows, rows]),
+        np.concatenate([near.miss, -missed.excess]),
+        near.rows,
+        np.maximum(near.room, 0.0),
     )
-    return problem.allowed.clip(x + problem.scale * reach * solve(program).point)
+    return problem.allowed.clip(x + problem.scale * step)

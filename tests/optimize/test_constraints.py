@@ -36,6 +36,16 @@ def test_projection_onto_a_plane_is_the_analytic_one() -> None:
     assert nearest_feasible([9.0, 12.0], None, plane) == pytest.approx([1.2, 1.6], abs=1e-8)
 
 
+@pytest.mark.parametrize("missed", [1e-4, 1e-12, 3e-15])
+def test_misses_far_smaller_than_the_box_are_removed(missed: float) -> None:
+    held = LinearConstraints(np.zeros((0, 28)), np.zeros(0), np.eye(28)[:8], np.zeros(8))
+    x = np.full(28, 0.25 - 130.0 * missed)  # some bounds are much nearer than others
+    x[14:] = 0.05 * np.random.default_rng(0).uniform(-1.0, 1.0, 14)
+    x[:8] = missed * np.array([1.0, -0.3, -0.3, 1.0, 1.0, -0.3, -0.3, 1.0])
+    found = nearest_feasible(x, (-0.25, 0.25), held)
+    np.testing.assert_allclose(found, np.where(np.arange(28) < 8, 0.0, x), atol=1e-9 * missed + 1e-17)
+
+
 def test_feasible_point_is_its_own_projection() -> None:
     x = np.array([0.1, 0.2, -0.05])
     assert (nearest_feasible(x, BOX, ROWS) == x).all()

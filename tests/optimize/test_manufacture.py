@@ -136,6 +136,9 @@ def test_a_fixed_rim_moves_inside_alone() -> None:
     assert np.abs(moved).max() > 1e-3
     wide = made(fixed_rim(CURVE, 2), 1)
     assert np.flatnonzero(np.abs(wide) > 1e-12).tolist() == [2, 3, 4]
+    ends = on_grid(DESIGN, made(fixed_rim(DESIGN, (1, 0)), 1))
+    assert np.abs(ends[[0, -1]]).max() < 1e-12
+    assert min(np.abs(ends[1:-1, column]).max() for column in (0, -1)) > 1e-3
 
 
 def test_constraints_of_several_designs_are_placed_in_all_variables() -> None:
@@ -181,7 +184,9 @@ def test_the_nearest_symmetric_convex_shape_is_found_by_minimising() -> None:
             lambda: smallest_radius(arc(2.0, True)[0], 0, 3.0, arc(2.0, True)[1]),
             "must not exceed those of the reference, got 3 for one of 2: give",
         ),
-        (partial(fixed_rim, DESIGN, 2), r"a rim of 2 control points needs a net of at least 5 each way"),
+        (partial(fixed_rim, DESIGN, 2), r"a rim of 2 control points must leave some of a net of .* inside"),
+        (partial(fixed_rim, DESIGN, (0, 0)), r"a rim of \(0, 0\) control points must leave"),
+        (partial(fixed_rim, DESIGN, (1, 0, 0)), r"a rim of \(1, 0, 0\) control points must leave"),
         (partial(joined, (DESIGN,), (1, symmetric(DESIGN, 0))), "there are 1 designs, got number 1"),
         (partial(joined, (CURVE,), (0, symmetric(DESIGN, 0))), r"design 0 must have 7 columns, .* \(0, 24\)"),
     ],
