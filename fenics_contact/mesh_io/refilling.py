@@ -9,8 +9,6 @@ from fenics_contact.errors import FenicsContactError, InvalidInputError
 from fenics_contact.mesh import BodyMesh, boundary_faces
 from fenics_contact.mesh_io.gmsh_session import gmsh_model
 
-_TRIANGLE, _TETRAHEDRON = 2, 4
-
 
 def refilled(mesh: BodyMesh) -> BodyMesh:
     """Return new tetrahedra behind the boundary of a body, which keeps its nodes, facets and named surfaces.
@@ -66,13 +64,16 @@ def _filled(points: np.ndarray, facets: np.ndarray) -> tuple[np.ndarray, np.ndar
     with gmsh_model("fenics_contact refilled") as gmsh:
         surface = gmsh.model.addDiscreteEntity(2)
         gmsh.model.mesh.addNodes(2, surface, np.arange(1, len(nodes) + 1), points[nodes].ravel())
-        gmsh.model.mesh.addElementsByType(surface, _TRIANGLE, [], triangles.ravel() + 1)
+        gmsh.model.mesh.addElementsByType(
+            surface, gmsh.model.mesh.getElementType("Triangle", 1), [], triangles.ravel() + 1
+        )
         gmsh.model.geo.addVolume([gmsh.model.geo.addSurfaceLoop([surface])])
         gmsh.model.geo.synchronize()
         gmsh.model.mesh.generate(3)
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
         row = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
         row[tags.astype(np.int64)] = np.arange(tags.size)
-        cells = row[gmsh.model.mesh.getElementsByType(_TETRAHEDRON)[1].astype(np.int64)].reshape(-1, 4)
+        found = gmsh.model.mesh.getElementsByType(gmsh.model.mesh.getElementType("Tetrahedron", 1))[1]
+        cells = row[found.astype(np.int64)].reshape(-1, 4)
     used, number = np.unique(cells, return_inverse=True)
     return coordinates.reshape(-1, 3)[used], number.reshape(-1, 4)
