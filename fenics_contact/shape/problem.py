@@ -273,7 +273,7 @@ class ShapeProblem:
         return point.value, point.gradient, point.error
 
     def _recorded(self, point: DesignPoint) -> DesignPoint:
-        if not self.evaluations:
+        if not self.evaluations and not point.weak.count:  # at a kink a branch may be flat
             require_influence(self.objective, self.scene, point.value, point.gradient)
         self.evaluations += 1
         self._memory.record_point(point)
