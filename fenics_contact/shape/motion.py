@@ -97,7 +97,7 @@ class _Component:
 class MeshMotion:
     """Each component of the mesh displacement is as smooth as the mesh allows, in small cells above all.
 
-    It minimises ∫ |∇v|² det(J)^(−χ) dx, J the Jacobian of the cells, prescribed on the design surface, zero
+    It minimises ∫ ∇v·∇v det(J)^(−χ) dx, J the Jacobian of the cells, prescribed on the design surface, zero
     where held: large cells give way and small ones keep their shape. On equal cells it is harmonic. Sides
     along which the surface moves stay flat. All is integrated over the reference mesh: the motion is linear
     in the surface displacement, and one factorisation serves all designs and, transposed, all gradients.
