@@ -9,6 +9,9 @@ from typing import Any
 
 import pytest
 
+#: Takes long: what claims rest on.
+pytestmark = [pytest.mark.slow, pytest.mark.claim]
+
 SCRIPT = Path(__file__).with_name("errors_on_ranks.py")
 Mpirun = Callable[..., str]
 

@@ -20,6 +20,9 @@ SCRIPT = """
 import contextlib, io, json, sys
 from mpi4py import MPI
 from fenics_contact import cli
+
+#: Takes long: what claims rest on.
+pytestmark = [pytest.mark.slow, pytest.mark.claim]
 comm, told = MPI.COMM_WORLD, []
 for arguments in json.loads(sys.argv[1]):
     out, err = io.StringIO(), io.StringIO()

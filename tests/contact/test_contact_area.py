@@ -38,6 +38,8 @@ def ball(force: float, size: int = 12) -> State:
     return solve_scene(scene, MPI.COMM_WORLD, solver=FaceNewton(tolerance=1e-8))
 
 
+@pytest.mark.slow
+@pytest.mark.claim
 def test_the_area_under_a_ball_is_that_of_hertz() -> None:
     found, nodal = [], []
     for force in (100.0, 200.0, 300.0, 400.0, 500.0):

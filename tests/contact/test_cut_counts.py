@@ -17,6 +17,9 @@ from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import Scene
 from fenics_contact.study.scenes.chain_links import chain
 
+#: Takes long: what claims rest on.
+pytestmark = [pytest.mark.slow, pytest.mark.claim]
+
 #: Of the products of the best boxes, as many as there are subdomains; METIS's boundaries are never plane.
 DEFAULT, METIS, METIS_GRADED = 1.15, 1.5, 2.2
 

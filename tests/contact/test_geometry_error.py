@@ -24,6 +24,9 @@ from fenics_contact.scene import (
     TotalForce,
 )
 
+#: Takes long: what claims rest on.
+pytestmark = [pytest.mark.slow, pytest.mark.claim]
+
 STEEL = IsotropicElasticity(1000.0, 0.3)
 
 

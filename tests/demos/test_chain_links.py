@@ -15,6 +15,8 @@ PICTURES = ["decomposition", "control_net", "convergence"]
 PICTURES += [f"{what}_{when}" for what in ("stress", "pressure") for when in ("before", "after")]
 
 
+@pytest.mark.slow
+@pytest.mark.claim
 def test_the_small_demo_lowers_the_energy_and_leaves_pictures_files_and_result(
     mpirun: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

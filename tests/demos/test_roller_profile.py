@@ -24,6 +24,8 @@ def run(mpirun: Callable[..., str], folder: Path, ranks: int, *size: str) -> dic
     return more
 
 
+@pytest.mark.slow
+@pytest.mark.claim
 def test_a_coarse_roller_is_relieved_at_its_ends_and_more_so_where_it_tilts(
     mpirun: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -199,6 +199,8 @@ DISTRIBUTED = """
 """
 
 
+@pytest.mark.slow
+@pytest.mark.claim
 @pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])
 def test_a_distributed_mesh_gives_the_same_bodies_and_gets_its_fields_back(
     cell: str, mpirun: Callable[..., str]

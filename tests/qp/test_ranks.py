@@ -5,6 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
+
+#: Takes long: what claims rest on.
+pytestmark = [pytest.mark.slow, pytest.mark.claim]
 
 SCRIPT = Path(__file__).with_name("solve_on_ranks.py")
 

@@ -7,6 +7,9 @@ import pytest
 from tests.shape.moved_blocks import OBJECTIVES, SCENES, line
 from tests.shape.quotients import check_adjoint, check_statuses
 
+#: Many states: what claims rest on.
+pytestmark = [pytest.mark.slow, pytest.mark.claim]
+
 
 @pytest.mark.parametrize("name", SCENES)
 def test_points_stick_slip_and_lift_off_all_along_the_line(name: str) -> None:

@@ -11,6 +11,9 @@ from tests.shape.chains import REGIMES, line
 from tests.shape.objectives import objectives
 from tests.shape.quotients import Line
 
+#: Many states: what claims rest on.
+pytestmark = [pytest.mark.slow, pytest.mark.claim]
+
 OBJECTIVES = objectives("link1")
 CASES = [
     (regime, objective)

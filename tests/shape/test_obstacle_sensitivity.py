@@ -26,6 +26,9 @@ from tests.shape.blocks import RUBBER, problem
 from tests.shape.objectives import objectives
 from tests.shape.quotients import Line, check_adjoint, check_statuses
 
+#: Many states: what claims rest on.
+pytestmark = [pytest.mark.slow, pytest.mark.claim]
+
 BALL = RigidSphere((0.9, 0.55, -4.0), 4.0)
 #: Obstacle under the block, by how much the block's lower face is crowned, and the law of friction.
 CASES: dict[str, tuple[RigidObstacle, float, Friction]] = {

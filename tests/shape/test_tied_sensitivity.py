@@ -13,6 +13,9 @@ from fenics_contact.shape import tied_derivative
 from tests.shape.quotients import Patch, check_adjoint, check_default_settings, check_statuses, miss_without
 from tests.shape.tied_blocks import OBJECTIVES, SCENES, line
 
+#: Many states: what claims rest on.
+pytestmark = [pytest.mark.slow, pytest.mark.claim]
+
 
 def without(term: str) -> Callable[[Patch], None]:
     """Drop a derivative of the tied points' geometry: by the weights of the master, or by normals."""
