@@ -93,7 +93,8 @@ class Remeshed:
         if not 0.0 < share < 1.0:
             raise InvalidInputError(f"share must lie between 0 and 1, got {share}: 0.1 is usual")
         self._mesher, self.share, self.most = mesher, share, most
-        self.problems, self.origins = [problem], [np.zeros(problem.size)]
+        self.problems = [problem]
+        self.origins: list[np.ndarray] = [np.zeros(problem.size)]
         self.remeshings: list[Remeshing] = []
         self.objective = problem.objective
         self._parents, self._last = [0], 0
