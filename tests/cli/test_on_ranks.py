@@ -15,14 +15,14 @@ from fenics_contact.cli import Ending
 from tests.conftest import LAUNCH, ROOT, launch
 from tests.scene_file.texts import GOOD, changed
 
+#: Takes long: what claims rest on.
+pytestmark = [pytest.mark.slow, pytest.mark.claim]
+
 #: Runs commands one after the other on all ranks and tells how each ended on each rank.
 SCRIPT = """
 import contextlib, io, json, sys
 from mpi4py import MPI
 from fenics_contact import cli
-
-#: Takes long: what claims rest on.
-pytestmark = [pytest.mark.slow, pytest.mark.claim]
 comm, told = MPI.COMM_WORLD, []
 for arguments in json.loads(sys.argv[1]):
     out, err = io.StringIO(), io.StringIO()
