@@ -32,6 +32,7 @@ from fenics_contact._dolfinx.numbering import (
     node_dofs,
     scalar_space,
     update_coordinates,
+    vtk_cell_dofs,
 )
 from fenics_contact._dolfinx.output import has_vtx, write_vtx, write_xdmf
 from fenics_contact._dolfinx.reading import (
@@ -92,6 +93,7 @@ __all__ = [
     "template",
     "update_coordinates",
     "version",
+    "vtk_cell_dofs",
     "write_vtx",
     "write_xdmf",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import ufl
 
-from fenics_contact._dolfinx.cells import cell_type_named, facet_vertices
+from fenics_contact._dolfinx.cells import NODE_ORDER, cell_type_named, facet_vertices
 from fenics_contact._dolfinx.loading import cpp, dolfinx, old, side_effects_undone
 from fenics_contact._dolfinx.templates import cellwise_element, scalar_element, vector_element
 
@@ -98,6 +98,11 @@ def cell_geometry(mesh: dolfinx.mesh.Mesh) -> np.ndarray:
 def cell_dofs(space: dolfinx.fem.FunctionSpace) -> np.ndarray:
     """Return the blocked dofs of this rank's cells, ghosts included, shape (n_cells, n_dofs of a cell)."""
     return table(space.dofmap.list, cell_count(space.mesh))
+
+
+def vtk_cell_dofs(space: dolfinx.fem.FunctionSpace) -> np.ndarray:
+    """Return the blocked dofs of this rank's cells, one for each node, in VTK order, (n_cells, n_nodes)."""
+    return cell_dofs(space)[:, np.argsort(NODE_ORDER[cell_type_of_mesh(space.mesh)])]
 
 
 def input_cells(mesh: dolfinx.mesh.Mesh) -> np.ndarray:

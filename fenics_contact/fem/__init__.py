@@ -13,6 +13,7 @@ from fenics_contact.fem.load_forms import (
     load_parameters,
     load_work,
 )
+from fenics_contact.fem.mechanics import Mechanics, Response
 from fenics_contact.fem.model_checks import check_kernel, kernel_of, stiffness_of_cell
 from fenics_contact.fem.nodal_stiffness import cell_stiffness
 from fenics_contact.fem.spread_force import LinearTraction, as_tractions, spread_traction
@@ -24,6 +25,8 @@ __all__ = [
     "Constants",
     "FormLibrary",
     "LinearTraction",
+    "Mechanics",
+    "Response",
     "Symbol",
     "Temperature",
     "Template",

@@ -10,6 +10,7 @@ from fenics_contact._libraries import MPI
 from fenics_contact.errors import together
 from fenics_contact.fem.composition import Composition, integrate, material_sets
 from fenics_contact.fem.load_forms import Symbol, load_fields, load_key, load_name, load_parameters, load_work
+from fenics_contact.fem.mechanics import Mechanics
 from fenics_contact.fem.model_checks import check_model, unit_cell_stiffness
 from fenics_contact.fem.spread_force import as_tractions
 from fenics_contact.fem.templates import (
@@ -106,6 +107,29 @@ class FormLibrary:
         cells = parts.cells if isinstance(load, ThermalStrain) else None
         functions = load_fields(load, space, points, acted)
         return template.bind([space], load_parameters(load, parts), functions, facets, cells=cells)
+
+    def prepare_mechanics(self, scene: Scene) -> None:
+        """Compile the missing forms of a scene's nonlinear materials. Collective on its communicator."""
+        from fenics_contact.fem.hyperelastic import prepare_mechanics  # linear scenes go without
+
+        prepare_mechanics(self._templates, scene)
+
+    def mechanics(
+        self, parts: Composition, cell_type: str, space: _dolfinx.fem.FunctionSpace, points: np.ndarray
+    ) -> Mechanics:
+        """Return forces and tangent of the materials ``parts``, one of them nonlinear, on one mesh.
+
+        Args:
+            parts: Materials of the mesh.
+            cell_type: Of the mesh.
+            space: Displacements on the mesh.
+            points: Coordinates by input node, shape (n, dim), [length].
+        """
+        from fenics_contact.fem.hyperelastic import HyperelasticMechanics
+
+        if not any(self.varies(material, cell_type) for material in parts.materials):
+            points = points - points[0]  # as exact far from the origin as near it
+        return HyperelasticMechanics(self._templates, parts, cell_type, space, points)
 
     def varies(self, material: Material, cell_type: str) -> bool:
         """Return whether the stiffness of a material depends on position."""

@@ -162,9 +162,14 @@ def volume_measure(cell_type: str, degree: int | None = None) -> ufl.Measure:
 
     The given one is for linear cells; it is doubled on quadratic ones.
     """
-    linear = QUADRATURE_DEGREE[_dolfinx.shape(cell_type)] if degree is None else degree
-    metadata = {"quadrature_degree": linear * _dolfinx.degree(cell_type)}
+    metadata = {"quadrature_degree": quadrature_degree(cell_type, degree)}
     return ufl.dx(domain=_dolfinx.template(cell_type), metadata=metadata)
+
+
+def quadrature_degree(cell_type: str, degree: int | None = None) -> int:
+    """Return the degree of the package's quadrature on cells, or of that given for linear ones."""
+    linear = QUADRATURE_DEGREE[_dolfinx.shape(cell_type)] if degree is None else degree
+    return int(linear * _dolfinx.degree(cell_type))
 
 
 def surface_measure(cell_type: str) -> ufl.Measure:

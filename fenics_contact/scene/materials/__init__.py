@@ -2,7 +2,9 @@
 
 from fenics_contact.scene.materials.elasticity import Elasticity, strain
 from fenics_contact.scene.materials.energy import EnergyModel
+from fenics_contact.scene.materials.hyperelasticity import Hyperelasticity, is_nonlinear
 from fenics_contact.scene.materials.isotropic import IsotropicElasticity
+from fenics_contact.scene.materials.neo_hooke import NeoHooke
 from fenics_contact.scene.materials.orthotropic import (
     OrthotropicElasticity,
     OrthotropicPlaneStress,
@@ -14,8 +16,10 @@ from fenics_contact.scene.materials.protocol import Material, Thermoelastic, Tra
 __all__ = [
     "Elasticity",
     "EnergyModel",
+    "Hyperelasticity",
     "IsotropicElasticity",
     "Material",
+    "NeoHooke",
     "OrthotropicElasticity",
     "OrthotropicPlaneStress",
     "PlaneStrain",
@@ -23,6 +27,7 @@ __all__ = [
     "Thermoelastic",
     "Transverse",
     "can_expand",
+    "is_nonlinear",
     "material_axes",
     "strain",
 ]

@@ -1,0 +1,46 @@
+"""What every mesh with materials of nonlinear stress offers: internal forces and tangent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """What a mesh with nonlinear materials answers to a displacement.
+
+    Where cells are turned inside out, `least_jacobian` says so and the other numbers mean nothing; with most
+    models they are NaN.
+
+    Attributes:
+        force: Internal force f(u), by dof, shape (dim n,), [force].
+        stiffness: Tangent ∂f/∂u, shape (dim n, dim n), [force / length].
+        energy: Stored energy, [force · length]; None where materials dissipate.
+        least_jacobian: Smallest det F at a Gauss point; 0 or less is an inverted cell.
+        history: Internal variables after the displacement; None without any.
+    """
+
+    force: np.ndarray
+    stiffness: sp.csr_matrix
+    energy: float | None
+    least_jacobian: float
+    history: np.ndarray | None = None
+
+
+class Mechanics(Protocol):
+    """Internal forces and tangent of one mesh with nonlinear materials."""
+
+    def at(self, displacement: np.ndarray, history: np.ndarray | None = None) -> Response:
+        """Return the response to a displacement.
+
+        Args:
+            displacement: By dof of the mesh's space, block after block, shape (dim n,), [length].
+            history: Internal variables before it, for materials that have some.
+        """
+
+    def least_jacobian(self, displacement: np.ndarray) -> float:
+        """Return the smallest det F at a Gauss point, which takes no assembly."""
