@@ -16,8 +16,8 @@ class Hyperelasticity(Elasticity):
     """Elasticity for large deformations, given by its energy density W; write `parameters` and `energy`.
 
     W is the energy per undeformed volume, a function of the deformation gradient F = I + ∇u. F has three rows
-    and columns in the plane, too, where F₃₃ = 1 (plane strain). The first Piola-Kirchhoff stress ∂W/∂F and its
-    tangent follow by UFL. W must not change when the deformed body is rotated, and F = I must be free of
+    and columns in the plane, too, where F₃₃ = 1 (plane strain). The first Piola-Kirchhoff stress ∂W/∂F and
+    its tangent follow by UFL. W must not change when the deformed body is rotated, and F = I must be free of
     stress. `stress` and `stiffness` are the model's linear part at F = I.
 
     Example:
