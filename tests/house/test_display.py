@@ -95,8 +95,8 @@ FACES = ("scene", "mesh", "contact", "shape", "optimize", "accuracy")
 MOST_PRINTED = 25
 #: Protocols, and classes to derive from.
 NO_OBJECTS = {
-    "Elasticity", "EnergyModel", "Hyperelasticity", "Inexact", "Kinked", "Material", "Objective", "Pieced", "Resumable",
-    "RigidObstacle", "SurfaceShape", "Thermoelastic", "Transverse", "Weighable",
+    "Elasticity", "EnergyModel", "Hyperelasticity", "Inexact", "Kinked", "Material", "Objective", "Pieced",
+    "Resumable", "RigidObstacle", "SurfaceShape", "Thermoelastic", "Transverse", "Weighable",
 }  # fmt: skip
 
 
