@@ -2,8 +2,11 @@
 
 from fenics_contact.scene.materials.elasticity import Elasticity, strain
 from fenics_contact.scene.materials.energy import EnergyModel
+from fenics_contact.scene.materials.finite_plasticity import FinitePlasticity
+from fenics_contact.scene.materials.history_material import HistoryMaterial, MaterialResponse
 from fenics_contact.scene.materials.hyperelasticity import Hyperelasticity, is_nonlinear
 from fenics_contact.scene.materials.isotropic import IsotropicElasticity
+from fenics_contact.scene.materials.j2_plasticity import J2Plasticity
 from fenics_contact.scene.materials.neo_hooke import NeoHooke
 from fenics_contact.scene.materials.orthotropic import (
     OrthotropicElasticity,
@@ -16,9 +19,13 @@ from fenics_contact.scene.materials.protocol import Material, Thermoelastic, Tra
 __all__ = [
     "Elasticity",
     "EnergyModel",
+    "FinitePlasticity",
+    "HistoryMaterial",
     "Hyperelasticity",
     "IsotropicElasticity",
+    "J2Plasticity",
     "Material",
+    "MaterialResponse",
     "NeoHooke",
     "OrthotropicElasticity",
     "OrthotropicPlaneStress",

@@ -12,6 +12,24 @@ from fenics_contact.errors import InvalidInputError
 PAIRS = {3: ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)), 2: ((0, 0), (1, 1), (0, 1))}
 
 
+def to_vector(tensor: np.ndarray) -> np.ndarray:
+    """Return the entries of symmetric tensors in Voigt order, without factors.
+
+    Args:
+        tensor: Shape (..., 3, 3).
+
+    Returns:
+        Shape (..., 6).
+    """
+    rows, columns = np.transpose(PAIRS[3])
+    return np.asarray(tensor[..., rows, columns])
+
+
+def to_tensor(vector: np.ndarray) -> np.ndarray:
+    """Return the symmetric tensors with the given entries, (..., 6) to (..., 3, 3); undoes `to_vector`."""
+    return np.asarray(vector[..., [[0, 5, 4], [5, 1, 3], [4, 3, 2]]])
+
+
 def strain_vector(strain: Expr, dim: int) -> list[Expr]:
     """Return the entries of a strain tensor (UFL) with engineering shears, γ = 2 ε."""
     return [(1 if i == j else 2) * strain[i, j] for i, j in PAIRS[dim]]

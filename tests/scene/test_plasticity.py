@@ -1,0 +1,185 @@
+"""Plasticity of single points, in small strain and in large deformations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.scene import FinitePlasticity, HistoryMaterial, J2Plasticity
+from tests.scene.material_points import at_rest, in_tension, tangent_error
+
+E, NU, YIELD = 2e5, 0.3, 200.0
+SMALL = J2Plasticity(E, NU, YIELD, 2e3, 5e3, 300.0, 30.0)
+LARGE = FinitePlasticity(E, NU, YIELD, 2e3, 300.0, 30.0)
+EITHER = pytest.mark.parametrize(("material", "size"), [(SMALL, 3e-3), (LARGE, 0.1)], ids=["small", "large"])
+#: A quarter turn about z.
+TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+def deformations(size: float, n: int = 20, seed: int = 1) -> np.ndarray:
+    return size * np.random.default_rng(seed).standard_normal((n, 3, 3))
+
+
+@EITHER
+def test_the_tangent_is_that_of_the_stress_when_loading_unloading_and_reversing(
+    material: HistoryMaterial, size: float
+) -> None:
+    loaded = deformations(size)
+    first = material.answer(loaded, at_rest(material, 20), 0.0)
+    elastic = 1e-4 * deformations(1.0)
+    assert (first.history[:, 6] > 0).all()
+    states = {
+        "elastic": (elastic, at_rest(material, 20), False),
+        "plastic": (loaded, at_rest(material, 20), True),
+        "further": (1.3 * loaded, first.history, True),
+        "turning": (loaded + deformations(size, seed=2), first.history, True),
+        "unloaded": (loaded * (1 - 1e-4 / size), first.history, False),
+        "reversed": (-loaded, first.history, True),
+    }
+    for name, (gradient, history, flows) in states.items():
+        end = material.answer(gradient, history, 0.0)
+        assert ((end.history[:, 6] > history[:, 6]) == flows).all(), name
+        assert tangent_error(material, gradient, history, 1e-5 * size) < 1e-7, name
+
+
+def test_the_tangent_is_exact_where_principal_stretches_are_equal() -> None:
+    for gradient in (np.zeros((3, 3)), np.diag([0.1, 0.1, 0.1]), np.diag([0.2, -0.1, -0.1])):
+        assert tangent_error(LARGE, gradient[None], at_rest(LARGE), 1e-6) < 1e-7
+        nearly = gradient + np.diag([0.0, 1e-9, -1e-9])
+        assert tangent_error(LARGE, nearly[None], at_rest(LARGE), 1e-6) < 1e-7
+
+
+def test_a_bar_in_tension_follows_the_hardening_law() -> None:
+    strains = np.linspace(0.0, 0.02, 21)[1:]
+    linear = J2Plasticity(E, NU, YIELD, 2e3, 5e3)
+    stress, history = in_tension(linear, strains)
+    H = 2e3 + 5e3
+    plastic = np.maximum(strains - YIELD / E, 0.0) * E / (E + H)
+    np.testing.assert_allclose(stress, E * (strains - plastic), rtol=1e-10)
+    np.testing.assert_allclose(history[:, 0], plastic, atol=1e-14)
+    np.testing.assert_allclose(history[:, 6], plastic, atol=1e-14)
+    stress, history = in_tension(SMALL, strains)
+    alpha = history[:, 6]
+    law = YIELD + (2e3 + 5e3) * alpha + 100.0 * (1 - np.exp(-30.0 * alpha))
+    assert (alpha > 0).sum() > 10
+    np.testing.assert_allclose(stress[alpha > 0], law[alpha > 0], rtol=1e-10)
+
+
+def test_perfect_plasticity_and_softening_keep_to_the_yield_stress() -> None:
+    strains = np.array([0.5e-3, 2e-3, 0.01, 0.05, 0.15])
+    stress, _ = in_tension(J2Plasticity(E, NU, YIELD), strains)
+    np.testing.assert_allclose(stress, [100.0, 200.0, 200.0, 200.0, 200.0], rtol=1e-10)
+    soft = J2Plasticity(E, NU, YIELD, isotropic_hardening=-1e3)
+    stress, history = in_tension(soft, strains)
+    np.testing.assert_allclose(stress[1:], YIELD - 1e3 * history[1:, 6], rtol=1e-9)
+    spent = soft.answer(np.diag([0.6, -0.3, -0.3])[None], at_rest(soft), 0.0)
+    assert np.abs(spent.stress).max() < 1e-9
+    assert spent.history[0, 6] == pytest.approx(0.6)
+
+
+def test_large_tension_follows_the_law_in_logarithmic_strain() -> None:
+    stretches = np.array([0.0005, 0.1, 0.3, 0.6])
+    nominal, history = in_tension(LARGE, stretches)
+    alpha = history[:, 6]
+    law = YIELD + 2e3 * alpha + 100.0 * (1 - np.exp(-30.0 * alpha))
+    kirchhoff = nominal * (1 + stretches)
+    assert kirchhoff[0] == pytest.approx(E * np.log(1.0005), rel=1e-9)
+    np.testing.assert_allclose(kirchhoff[1:], law[1:], rtol=1e-9)
+    np.testing.assert_allclose(alpha[1:], np.log(1 + stretches[1:]) - law[1:] / E, rtol=1e-9)
+    volume = np.linalg.det(np.eye(3) + np.diag(history[-1, :3]))
+    assert volume == pytest.approx(1.0, abs=1e-12)
+
+
+def test_kinematic_hardening_yields_earlier_in_the_other_direction() -> None:
+    path = np.concatenate([np.linspace(0, 0.01, 11)[1:], np.linspace(0.01, -0.01, 201)[1:]])
+
+    def yields_back_at(material: J2Plasticity) -> tuple[float, float]:
+        stress, history = in_tension(material, path)
+        flows = np.flatnonzero(np.diff(history[9:, 6]) > 1e-12)
+        return stress[9], stress[9 + flows[0]]
+
+    peak, back = yields_back_at(J2Plasticity(E, NU, YIELD, kinematic_hardening=1e4))
+    assert peak > YIELD + 80
+    assert back == pytest.approx(peak - 2 * YIELD, abs=20.0)  # a step
+    peak, back = yields_back_at(J2Plasticity(E, NU, YIELD, isotropic_hardening=1e4))
+    assert back == pytest.approx(-peak, abs=20.0)  # a step
+
+
+def test_a_rotation_after_yielding_rotates_the_stress_and_nothing_flows() -> None:
+    gradient = deformations(0.2)
+    first = LARGE.answer(gradient, at_rest(LARGE, 20), 0.0)
+    assert (first.history[:, 6] > 0.05).all()
+    turned = TURN @ (np.eye(3) + gradient) - np.eye(3)
+    second = LARGE.answer(turned, first.history, 0.0)
+    np.testing.assert_allclose(second.stress, TURN @ first.stress, atol=1e-9 * np.abs(first.stress).max())
+    np.testing.assert_allclose(second.history, first.history, atol=1e-12)
+    third = LARGE.answer(1.3 * gradient, first.history, 0.0)
+    other = LARGE.answer(TURN @ (np.eye(3) + 1.3 * gradient) - np.eye(3), first.history, 0.0)
+    np.testing.assert_allclose(other.stress, TURN @ third.stress, atol=1e-9 * np.abs(third.stress).max())
+    moved = np.einsum("ia,najkl,kb->nijbl", TURN, third.tangent, TURN.T)
+    np.testing.assert_allclose(other.tangent, moved, atol=1e-9 * np.abs(moved).max())
+
+
+def test_large_and_small_agree_in_the_small() -> None:
+    small = J2Plasticity(E, NU, 0.2, 2e3)
+    large = FinitePlasticity(E, NU, 0.2, 2e3)
+    gradient = deformations(3e-6)
+    one, other = (material.answer(gradient, at_rest(material, 20), 0.0) for material in (small, large))
+    assert (one.history[:, 6] > 0).all()
+    np.testing.assert_allclose(one.stress, other.stress, atol=2e-5 * np.abs(one.stress).max())
+    np.testing.assert_allclose(one.tangent, other.tangent, atol=1e-4 * np.abs(one.tangent).max())
+
+
+@EITHER
+def test_plastic_strain_accumulates(material: HistoryMaterial, size: float) -> None:
+    history, flowed = at_rest(material, 20), 0
+    for seed in range(12):
+        end = material.answer(deformations(size, seed=seed), history, 0.0)
+        assert (end.history[:, 6] >= history[:, 6]).all()
+        flowed += np.count_nonzero(end.history[:, 6] > history[:, 6])
+        history = end.history
+    assert flowed > 100
+
+
+@EITHER
+def test_a_cycle_of_deformation_that_ends_where_it_began_costs_work(
+    material: HistoryMaterial, size: float
+) -> None:
+    steps = np.sin(np.linspace(0, 2 * np.pi, 201))
+    history, work, last, gradient = at_rest(material, 20), np.zeros(20), None, deformations(size)
+    for share, previous in zip(steps[1:], steps, strict=False):
+        end = material.answer(share * gradient, history, 0.0)
+        mean = end.stress if last is None else 0.5 * (end.stress + last)
+        work += (share - previous) * np.einsum("nij,nij->n", mean, gradient)
+        last, history = end.stress, end.history
+    assert (work > 1e-6 * material.moduli[3, 3] * size**2).all()
+
+
+def test_turned_inside_out_there_is_no_stress() -> None:
+    gradient = np.stack([np.diag([-2.0, 0.0, 0.0]), np.diag([0.01, 0.0, 0.0])])
+    end = LARGE.answer(gradient, at_rest(LARGE, 2), 0.0)
+    assert np.isnan(end.stress[0]).all()
+    assert np.isfinite(end.stress[1]).all()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"yield_stress": 0.0}, "yield_stress must be a positive number, got 0.0"),
+        ({"yield_stress": np.inf}, "yield_stress must be a positive number"),
+        ({"isotropic_hardening": -E}, r"isotropic_hardening must be a number above .*= -200000, got"),
+        ({"kinematic_hardening": -1.0}, "kinematic_hardening must be a number of at least 0"),
+        ({"saturation_stress": 100.0}, "saturation_stress must be a number of at least yield_stress 200.0"),
+        ({"saturation_rate": -1.0}, "saturation_rate one of at least 0"),
+        ({"young_modulus": -1.0}, "young_modulus must be a positive number"),
+        ({"poisson_ratio": 0.5}, "poisson_ratio must lie between"),
+    ],
+)
+def test_constants_without_a_unique_answer_are_refused(wrong: dict[str, float], message: str) -> None:
+    right = {"young_modulus": E, "poisson_ratio": NU, "yield_stress": YIELD}
+    with pytest.raises(InvalidInputError, match=message):
+        J2Plasticity(**right | wrong)
+    if "kinematic_hardening" not in wrong:
+        with pytest.raises(InvalidInputError, match=message):
+            FinitePlasticity(**right | wrong)
