@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fenics_contact.fem.composition import Composition, composition, integrate, material_sets
 from fenics_contact.fem.forms import FormLibrary, Template, volume_measure
+from fenics_contact.fem.history import History
 from fenics_contact.fem.load_forms import (
     Symbol,
     is_scalar,
@@ -24,6 +25,7 @@ __all__ = [
     "Composition",
     "Constants",
     "FormLibrary",
+    "History",
     "LinearTraction",
     "Mechanics",
     "Response",

@@ -13,8 +13,8 @@ from fenics_contact.errors import calling
 from fenics_contact.fem.templates import Constants, scalar_constants
 from fenics_contact.scene import Body, Material
 
-#: Builds an integrand (UFL) from a material and its constants.
-OfMaterial = Callable[[Material, Constants], Expr]
+#: Builds an integrand (UFL) from a material and its constants, None for materials that are left out.
+OfMaterial = Callable[[Material, Constants], Expr | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,8 @@ def integrate(
         constants = scalar_constants(cell_type, len(material.parameters))
         with calling(f"the UFL of material {type(material).__name__}"):
             density = integrand(material, constants)
-        part = density * (measure if len(materials) == 1 else measure(number + 1))
-        form = part if form is None else form + part
         all_constants.extend(constants)
+        if density is not None:
+            part = density * (measure if len(materials) == 1 else measure(number + 1))
+            form = part if form is None else form + part
     return form, tuple(all_constants)

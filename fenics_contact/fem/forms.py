@@ -23,7 +23,7 @@ from fenics_contact.fem.templates import (
     surface_measure,
     volume_measure,
 )
-from fenics_contact.scene import Load, Material, Scene, ThermalStrain
+from fenics_contact.scene import HistoryMaterial, Load, Material, Scene, ThermalStrain
 
 __all__ = [
     "LOADED",
@@ -129,7 +129,15 @@ class FormLibrary:
 
         if not any(self.varies(material, cell_type) for material in parts.materials):
             points = points - points[0]  # as exact far from the origin as near it
-        return HyperelasticMechanics(self._templates, parts, cell_type, space, points)
+        remembering = [isinstance(material, HistoryMaterial) for material in parts.materials]
+        others = None
+        if not all(remembering):
+            others = HyperelasticMechanics(self._templates, parts, cell_type, space, points)
+        if others is not None and not any(remembering):
+            return others
+        from fenics_contact.fem.history_mechanics import HistoryMechanics
+
+        return HistoryMechanics(parts, cell_type, space, points, others)
 
     def varies(self, material: Material, cell_type: str) -> bool:
         """Return whether the stiffness of a material depends on position."""

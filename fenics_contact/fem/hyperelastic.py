@@ -15,7 +15,7 @@ from fenics_contact.fem.composition import Composition, integrate, material_sets
 from fenics_contact.fem.deformation import Dilatation
 from fenics_contact.fem.mechanics import Response
 from fenics_contact.fem.templates import Constants, Templates, Written, volume_measure
-from fenics_contact.scene import Material, Scene, is_nonlinear
+from fenics_contact.scene import HistoryMaterial, Material, Scene, is_nonlinear
 
 #: What is compiled for every set of materials with a nonlinear one among them, by number of arguments.
 FORMS = ("energy", "internal force", "tangent")
@@ -46,7 +46,9 @@ class HyperelasticMechanics:
             for number, kind in enumerate(FORMS)
         )
 
-    def at(self, displacement: np.ndarray, history: np.ndarray | None = None) -> Response:
+    def at(
+        self, displacement: np.ndarray, history: np.ndarray | None = None, duration: float = 0.0
+    ) -> Response:
         """Assemble; see `Mechanics.at`."""
         _dolfinx.update_coordinates(self._mesh, self._points)
         self._displacement.x.array[:] = displacement
@@ -67,7 +69,8 @@ def prepare_mechanics(templates: Templates, scene: Scene) -> None:
     """Compile the missing forms of a scene's nonlinear materials. Collective."""
     for body in scene.bodies.values():
         for materials in material_sets(body):
-            if any(map(is_nonlinear, materials)):
+            others = [material for material in materials if not isinstance(material, HistoryMaterial)]
+            if others and any(map(is_nonlinear, materials)):
                 _prepare(templates, materials, body.mesh.cell_type)
 
 
@@ -82,7 +85,9 @@ def _written(kind: str, materials: tuple[Material, ...], cell_type: str) -> Writ
     du, v = ufl.TrialFunction(V), ufl.TestFunction(V)
     (u,) = _dolfinx.field_symbols(cell_type, 1)
 
-    def integrand(material: Material, constants: Constants) -> Expr:
+    def integrand(material: Material, constants: Constants) -> Expr | None:
+        if isinstance(material, HistoryMaterial):
+            return None  # what it answers is added to the assembled forms
         return _energy(material, u, constants) if kind == "energy" else _work(material, u, v, constants)
 
     form, constants = integrate(materials, cell_type, integrand, volume_measure(cell_type))

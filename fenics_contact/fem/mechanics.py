@@ -21,7 +21,7 @@ class Response:
         stiffness: Tangent ∂f/∂u, shape (dim n, dim n), [force / length].
         energy: Stored energy, [force · length]; None where materials dissipate.
         least_jacobian: Smallest det F at a Gauss point; 0 or less is an inverted cell.
-        history: Internal variables after the displacement; None without any.
+        history: Internal variables at the end of the step, shape (n_cells, n_gauss, k); None without any.
     """
 
     force: np.ndarray
@@ -34,12 +34,16 @@ class Response:
 class Mechanics(Protocol):
     """Internal forces and tangent of one mesh with nonlinear materials."""
 
-    def at(self, displacement: np.ndarray, history: np.ndarray | None = None) -> Response:
+    def at(
+        self, displacement: np.ndarray, history: np.ndarray | None = None, duration: float = 0.0
+    ) -> Response:
         """Return the response to a displacement.
 
         Args:
             displacement: By dof of the mesh's space, block after block, shape (dim n,), [length].
-            history: Internal variables before it, for materials that have some.
+            history: Internal variables at the start of the step, for materials that have some, shape
+                (n_cells, n_gauss, k) by the mesh's cells; None for an unloaded body.
+            duration: Of the step, for materials to which it matters.
         """
 
     def least_jacobian(self, displacement: np.ndarray) -> float:

@@ -44,6 +44,8 @@ from fenics_contact.scene import (
     BodyForce,
     Coulomb,
     DistanceObstacle,
+    FinitePlasticity,
+    J2Plasticity,
     LoadStep,
     NeoHooke,
     OrthotropicElasticity,
@@ -95,8 +97,9 @@ FACES = ("scene", "mesh", "contact", "shape", "optimize", "accuracy")
 MOST_PRINTED = 25
 #: Protocols, and classes to derive from.
 NO_OBJECTS = {
-    "Elasticity", "EnergyModel", "Hyperelasticity", "Inexact", "Kinked", "Material", "Objective", "Pieced",
-    "Resumable", "RigidObstacle", "SurfaceShape", "Thermoelastic", "Transverse", "Weighable",
+    "Elasticity", "EnergyModel", "HistoryMaterial", "Hyperelasticity", "Inexact", "Kinked", "Material",
+    "Objective", "Pieced", "Resumable", "RigidObstacle", "SurfaceShape", "Thermoelastic", "Transverse",
+    "Weighable",
 }  # fmt: skip
 
 
@@ -137,7 +140,9 @@ def objects() -> dict[str, Any]:
         Support("block", "z1", (None, lambda x: x[:, 0], 0.0)), LoadStep("push", loads=weights),
         *CELL_TYPES.values(), ThermalStrain("block", 20.0), TotalForce("block", "z1", (0, 0, -1)),
         Pressure("block", "z1", 1.0), Tresca(1.0), Tie(Surface("a", "z0"), Surface("b", "z1")),
-        PlaneStrain(1.0, 0.3), PlaneStress(1.0, 0.3), NeoHooke(1.0, 0.3), Ufl(lambda x: x[0]),
+        PlaneStrain(1.0, 0.3), PlaneStress(1.0, 0.3), NeoHooke(1.0, 0.3), J2Plasticity(1.0, 0.3, 1.0),
+        FinitePlasticity(1.0, 0.3, 1.0),
+        J2Plasticity(1.0, 0.3, 1.0).answer(np.zeros((9, 3, 3)), np.zeros((9, 7)), 0.0), Ufl(lambda x: x[0]),
         DistanceObstacle(lambda x: x[:, 2]), RigidSphere((0, 0, 0), 1.0),
         RigidCylinder((0, 0, 0), (0, 0, 1), 1.0), OrthotropicPlaneStress((2.0, 1.0), 0.1, 1.0),
         OrthotropicElasticity((3.0, 2.0, 1.0), (0.1, 0.1, 0.1), (1.0, 1.0, 1.0)),

@@ -11,6 +11,7 @@ import numpy as np
 import ufl
 from ufl.core.expr import Expr
 
+from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError, calling
 from fenics_contact.scene.materials.elasticity import Elasticity, strain
 from fenics_contact.scene.materials.voigt import (
@@ -22,6 +23,7 @@ from fenics_contact.scene.materials.voigt import (
 )
 
 
+@displayed
 @dataclass(frozen=True, eq=False)
 class MaterialResponse:
     """What a material with a history answers at n points at the end of a step.
