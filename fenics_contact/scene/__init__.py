@@ -43,6 +43,7 @@ from fenics_contact.scene.materials import (
 from fenics_contact.scene.mirrors import mirrored
 from fenics_contact.scene.obstacles import (
     DistanceObstacle,
+    MovingObstacle,
     RigidCylinder,
     RigidObstacle,
     RigidPlane,
@@ -82,6 +83,7 @@ __all__ = [
     "Load",
     "LoadStep",
     "Material",
+    "MovingObstacle",
     "MaterialResponse",
     "NeoHooke",
     "OfPosition",

@@ -1,10 +1,25 @@
-"""Rigid obstacles: bodies that do not move, given by the shapes of their surfaces."""
+"""Rigid obstacles, given by the shapes of their surfaces: they stand still or move as prescribed."""
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeAlias, runtime_checkable
 
-from fenics_contact.surface_shapes import Cylinder, Plane, SignedDistance, Sphere, SurfaceShape
+import numpy as np
+
+from fenics_contact.checks import checked
+from fenics_contact.display import displayed
+from fenics_contact.errors import InvalidInputError, calling
+from fenics_contact.surface_shapes import (
+    Cylinder,
+    Plane,
+    SignedDistance,
+    Sphere,
+    SurfaceShape,
+    asked,
+    placed,
+)
 
 
 @runtime_checkable
@@ -26,3 +41,78 @@ class RigidCylinder(Cylinder):
 
 class DistanceObstacle(SignedDistance):
     """A body that does not move, given by a distance function; arguments as for `SignedDistance`."""
+
+
+#: Returns rotation, shape (dim, dim) or None, and translation, shape (dim,), at a time.
+Path: TypeAlias = Callable[[float], tuple[Any, Any]]
+
+
+@displayed
+@dataclass(frozen=True)
+@checked()
+class MovingObstacle:
+    """A rigid obstacle that moves and turns as prescribed: at a time its points x lie at R x + c.
+
+    Large displacements follow it through the load steps, and friction feels its motion. Small displacements
+    see it where it is at time zero.
+
+    Attributes:
+        obstacle: The obstacle before it moves.
+        path: Returns the rotation R, shape (dim, dim), or None if it does not turn, and the translation c,
+            dim numbers, [length], at a time.
+
+    Example:
+        >>> import numpy as np
+        >>> roll = RigidCylinder((0, 0, 0), (0, 1, 0), 5.0)  # mm
+        >>> def rolling(time):
+        ...     c, s = np.cos(time), np.sin(time)
+        ...     return [[c, 0, s], [0, 1, 0], [-s, 0, c]], (5.0 * time, 0.0, 0.0)
+        >>> MovingObstacle(roll, rolling).at(2.0).distance(np.array([[10.0, 0.0, 6.0]]))
+        array([1.])
+    """
+
+    obstacle: RigidObstacle
+    path: Path
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space in which it moves."""
+        return len(self.frame(0.0)[1])
+
+    def frame(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return rotation, shape (dim, dim), and translation, shape (dim,), at a time.
+
+        Raises:
+            InvalidInputError: If the path returns anything else.
+            UserCodeError: If it raises.
+        """
+        with calling("the path of MovingObstacle"):
+            rotation, translation = self.path(time)
+            shift = np.asarray(translation, dtype=np.float64)
+            turn = np.eye(shift.size) if rotation is None else np.asarray(rotation, dtype=np.float64)
+        dim = shift.size
+        rigid = shift.ndim == 1 and dim in (2, 3) and turn.shape == (dim, dim) and np.isfinite(shift).all()
+        if not rigid or not np.abs(turn @ turn.T - np.eye(dim)).max() <= 1e-9 or np.linalg.det(turn) < 0:
+            raise InvalidInputError(
+                "the path of MovingObstacle must return a rotation matrix of shape (dim, dim), or None, and "
+                f"a translation of dim finite numbers, got {rotation!r}, {translation!r} at time {time:g}: "
+                "give an orthogonal matrix of determinant one"
+            )
+        return turn, shift
+
+    def at(self, time: float) -> SurfaceShape:
+        """Return the obstacle where it is at a time."""
+        turn, shift = self.frame(time)
+        return placed(self.obstacle, turn, [float(entry) for entry in shift])
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """Return the signed distance at time zero, (n, dim) -> (n,), [length]."""
+        return asked(self.at(0.0), "distance", points)
+
+    def normals(self, points: np.ndarray) -> np.ndarray:
+        """Return the gradient of the distance at time zero, (n, dim) -> (n, dim)."""
+        return asked(self.at(0.0), "normals", points)
+
+    def curvatures(self, points: np.ndarray) -> np.ndarray:
+        """Return the second derivatives of the distance at time zero, (n, dim) -> (n, dim, dim)."""
+        return asked(self.at(0.0), "curvatures", points)

@@ -15,6 +15,7 @@ from fenics_contact.surfaces.facets import (
     edge_distance,
     facet_shape_values,
     faceted_surface,
+    outside,
     shape_functions,
 )
 from fenics_contact.surfaces.midpoints import (
@@ -25,8 +26,18 @@ from fenics_contact.surfaces.midpoints import (
     shape_weights,
     share_areas,
 )
-from fenics_contact.surfaces.projection import Projection, interpolated_normal, join, newton_matrix, project
-from fenics_contact.surfaces.relief import corner_normals, edges_at_corners, heights, slopes
+from fenics_contact.surfaces.projection import (
+    Projection,
+    best_projections,
+    facets_in_reach,
+    interpolated_normal,
+    join,
+    nearest_facets,
+    newton_matrix,
+    project,
+)
+from fenics_contact.surfaces.reconstruction import tangent_weights
+from fenics_contact.surfaces.relief import corner_normals, edges_at_corners, height_functions, heights, slopes
 from fenics_contact.surfaces.true_surface import Geometry, height_over, true_surface
 
 __all__ = [
@@ -38,20 +49,25 @@ __all__ = [
     "SurfaceMoments",
     "bearing_pulled_back",
     "bears_on_midpoints",
+    "best_projections",
     "corner_normals",
     "corner_products",
     "edge_distance",
     "edges_at_corners",
     "facet_shape_values",
     "faceted_surface",
+    "facets_in_reach",
     "filled_at_corners",
     "gauss_points",
+    "height_functions",
     "height_over",
     "heights",
     "interpolated_normal",
     "join",
+    "nearest_facets",
     "newton_matrix",
     "nodal_areas",
+    "outside",
     "project",
     "quadrature_areas",
     "shape_functions",
@@ -60,5 +76,6 @@ __all__ = [
     "share_areas",
     "slopes",
     "surface_moments",
+    "tangent_weights",
     "true_surface",
 ]

@@ -109,23 +109,23 @@ def project(points: np.ndarray, normals: np.ndarray, master: FacetedSurface) -> 
     centroids = corners.mean(axis=1)
     radius = np.linalg.norm(corners - centroids[:, None], axis=2).max(axis=1)
     tree, rounding = cKDTree(centroids), coordinate_rounding(master.points)
-    near = _solve(points, normals, master, *_nearest(tree, points), rounding)
-    near = _best(near.part(near.beside == 0.0), rounding)
+    near = _solve(points, normals, master, *nearest_facets(tree, points), rounding)
+    near = best_projections(near.part(near.beside == 0.0), rounding)
     waiting = np.setdiff1d(np.arange(len(points)), near.point)
-    reached = _solve(points, normals, master, *_within_reach(tree, radius, points, waiting), rounding)
-    projection = join([near, _best(reached, rounding)])
+    reached = _solve(points, normals, master, *facets_in_reach(tree, radius, points, waiting), rounding)
+    projection = join([near, best_projections(reached, rounding)])
     gap = projection.gap - heights(master, projection.facet, projection.local).value
     return replace(projection, gap=gap, lost=np.setdiff1d(projection.lost, projection.point))
 
 
-def _nearest(tree: cKDTree, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pair every point with the facets whose centroids are nearest."""
+def nearest_facets(tree: cKDTree, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pair every point with the facets whose centroids are nearest: numbers of points and of facets."""
     ranks = np.arange(min(NEAREST, tree.n)) + 1
     _, facets = tree.query(points, k=ranks)
     return np.repeat(np.arange(len(points)), len(ranks)), facets.ravel()
 
 
-def _within_reach(
+def facets_in_reach(
     tree: cKDTree, radius: np.ndarray, points: np.ndarray, waiting: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pair the remaining points with all facets that can be closest, for any grading of the mesh."""
@@ -208,7 +208,7 @@ def _newton_step(
     return np.where(regular[:, None], -np.linalg.solve(matrix, residual[:, :, None])[:, :, 0], 0.0)
 
 
-def _best(projections: Projection, rounding: float) -> Projection:
+def best_projections(projections: Projection, rounding: float) -> Projection:
     """Keep the projection least beside its facet for each point; then by smallest |gap|, then facet.
 
     Args:

@@ -291,7 +291,8 @@ print(*sys.modules)
 HELD, FLOATING = 'Support("upper", "x0")', 'Support("upper", "x0", (0.0, None, None))'
 NEVER = {
     *(f"fenics_contact.{room}" for room in ("shape", "optimize", "viz", "io", "study")),
-    "pyvista", "matplotlib", "vtk", "vtkmodules", "gmsh", "pymetis", "meshio",
+    "fenics_contact.pairing.sliding", "pyvista", "matplotlib", "vtk", "vtkmodules", "gmsh", "pymetis",
+    "meshio",
 }  # fmt: skip
 AT_NEED = {"fenics_contact.pairing.mortar", "fenics_contact.accuracy", "clarabel"}
 

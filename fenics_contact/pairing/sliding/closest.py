@@ -1,0 +1,189 @@
+"""Closest points on smooth patches by Newton's method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fenics_contact.mesh import coordinate_rounding
+from fenics_contact.pairing.sliding.patch_functions import PatchValues
+from fenics_contact.pairing.sliding.patches import SmoothPatches
+from fenics_contact.surfaces import (
+    Projection,
+    best_projections,
+    facets_in_reach,
+    join,
+    nearest_facets,
+    outside,
+)
+
+
+@dataclass(frozen=True)
+class PatchPoints:
+    """Points of patches.
+
+    Attributes:
+        place: S, shape (n, dim), [length].
+        tangents: S,_a, shape (n, dim − 1, dim).
+        second: S,_ab, shape (n, dim − 1, dim − 1, dim).
+        normal: Outward unit normals, shape (n, dim).
+        functions: The patches' functions there.
+    """
+
+    place: np.ndarray
+    tangents: np.ndarray
+    second: np.ndarray
+    normal: np.ndarray
+    functions: PatchValues
+
+
+def patch_points(patches: SmoothPatches, coefficients: np.ndarray, local: np.ndarray) -> PatchPoints:
+    """Evaluate patches.
+
+    Args:
+        patches: The patches.
+        coefficients: Those of the patch of each point, shape (n, n_functions, dim).
+        local: Local coordinates, shape (n, dim − 1).
+    """
+    at = patches.functions(local)
+    place = np.einsum("nb,nbd->nd", at.value, coefficients)
+    tangents = np.einsum("nba,nbd->nad", at.first, coefficients)
+    second = np.einsum("nbac,nbd->nacd", at.second, coefficients)
+    if local.shape[1] == 1:
+        across = np.stack([tangents[:, 0, 1], -tangents[:, 0, 0]], axis=1)
+    else:
+        across = np.cross(tangents[:, 0], tangents[:, 1])
+    length = np.linalg.norm(across, axis=1)[:, None]
+    normal = across / np.where(length > 0.0, length, 1.0)
+    return PatchPoints(place, tangents, second, normal, at)
+
+
+@dataclass(frozen=True)
+class ClosestPoints:
+    """Search of closest points on a surface as it lies now.
+
+    Attributes:
+        patches: The patches.
+        points: Coordinates of the surface's nodes, shape (n_nodes, dim), [length].
+        coefficients: Coefficients of the patches, shape (n_facets, n_functions, dim), [length].
+        reach: Distance beyond which no point is wanted, [length].
+        margin: Distance beyond the rim at which points count, in half widths of a facet.
+        hold: Distance beyond the last facet up to which it is kept, in local coordinates.
+    """
+
+    patches: SmoothPatches
+    points: np.ndarray
+    coefficients: np.ndarray
+    reach: float = np.inf
+    margin: float = 0.1
+    hold: float = 1e-3
+
+    def find(
+        self, targets: np.ndarray, normals: np.ndarray, facet: np.ndarray, local: np.ndarray
+    ) -> Projection:
+        """Return the closest points of targets that face the surface.
+
+        A target keeps its last facet as long as its closest point is barely outside it: on an edge between
+        two facets it would else change sides for ever.
+
+        Args:
+            targets: Points, shape (n, dim), [length].
+            normals: Outward unit normals there, shape (n, dim).
+            facet: Their last facets, −1 where there is none, shape (n,).
+            local: Last local coordinates, shape (n, dim − 1).
+        """
+        known = np.flatnonzero(facet >= 0)
+        kept = self._solve(targets, normals, known, facet[known], local[known])
+        kept = kept.part((kept.beside <= self.hold) & (np.abs(kept.gap) <= self.reach))
+        waiting = np.setdiff1d(np.arange(len(targets)), kept.point)
+        if len(waiting) == 0:
+            return replace(kept, lost=waiting)
+        found = self._searched(targets, normals, waiting)
+        found = join([kept, found.part(np.abs(found.gap) <= self.reach)])
+        return replace(found, lost=np.setdiff1d(found.lost, found.point))
+
+    def _searched(self, targets: np.ndarray, normals: np.ndarray, waiting: np.ndarray) -> Projection:
+        """Return the closest points among the facets nearest to the waiting targets."""
+        corners = self.points[self.patches.facets]
+        centroids = corners.mean(axis=1)
+        radius = np.linalg.norm(corners - centroids[:, None], axis=2).max(axis=1)
+        tree, rounding = cKDTree(centroids), coordinate_rounding(self.points)
+        distance, _ = tree.query(targets[waiting])
+        waiting = waiting[distance <= self.reach + 2 * radius.max()]
+        pair, facet = nearest_facets(tree, targets[waiting])
+        near = self._from_middles(targets, normals, waiting[pair], facet)
+        near = best_projections(near.part(near.beside == 0.0), rounding)
+        still = np.setdiff1d(waiting, near.point)
+        reached = self._from_middles(targets, normals, *facets_in_reach(tree, radius, targets, still))
+        return join([near, best_projections(reached, rounding)])
+
+    def _from_middles(
+        self, targets: np.ndarray, normals: np.ndarray, point: np.ndarray, facet: np.ndarray
+    ) -> Projection:
+        width = targets.shape[1] - 1
+        middle = np.full((len(point), width), 1 / 3 if self.patches.corners == 3 else 0.0)
+        return self._solve(targets, normals, point, facet, middle)
+
+    def _solve(
+        self,
+        targets: np.ndarray,
+        normals: np.ndarray,
+        point: np.ndarray,
+        facet: np.ndarray,
+        local: np.ndarray,
+    ) -> Projection:
+        """Solve (x − S)·S,_a = 0 for pairs of targets and facets; keep those in or barely beside it."""
+        # Relative to the facet's own corner it is as exact far from the origin as near it.
+        start = self.points[self.patches.facets[facet, 0]]
+        target, coefficients = targets[point] - start, self.coefficients[facet].copy()
+        coefficients[:, : self.patches.corners] -= start[:, None]
+        local = self._iterated(coefficients, target, local.copy())
+        at = patch_points(self.patches, coefficients, local)
+        away = target - at.place
+        slope, length = np.einsum("nad,nd->na", at.tangents, away), np.linalg.norm(at.tangents, axis=2)
+        size, rounding = length.max(axis=1, initial=0.0), coordinate_rounding(self.points)
+        tolerance = 1e-9 * (size + np.linalg.norm(away, axis=1)) + rounding
+        solved = (np.abs(slope) <= tolerance[:, None] * length).all(axis=1)
+        beside = outside(local, self.patches.corners)
+        beside = np.where(beside <= 1e-9 + rounding / np.maximum(size, rounding), 0.0, beside)
+        facing = np.einsum("nd,nd->n", at.normal, normals[point]) < 0
+        near = facing & (beside <= self.margin * (0.5 if self.patches.corners == 3 else 1.0))
+        gap = np.einsum("nd,nd->n", at.normal, away)
+        lost = np.unique(point[near & ~solved])
+        found = Projection(point, facet, local, gap, at.normal, beside, lost)
+        return found.part(near & solved)
+
+    def _iterated(
+        self, coefficients: np.ndarray, target: np.ndarray, local: np.ndarray, steps: int = 25
+    ) -> np.ndarray:
+        """Return local coordinates after Newton steps from given ones."""
+        at = np.arange(len(local))  # the pairs still iterating
+        for count in range(steps):
+            here = patch_points(self.patches, coefficients[at], local[at])
+            step = _step(here, target[at] - here.place)
+            # A target far beyond the facet belongs to another one.
+            local[at] = np.clip(local[at] + step, -3, 3)
+            moving = np.abs(step).max(axis=1) > 1e-9  # quadratic convergence: next comes rounding
+            if count >= 8:
+                moving &= outside(local[at], self.patches.corners) < 1.0
+            at = at[moving]
+            if len(at) == 0:
+                break
+        return local
+
+
+def _step(here: PatchPoints, away: np.ndarray) -> np.ndarray:
+    """Return Newton's step towards the closest point, that of Gauss and Newton where it is not convex."""
+    metric = np.einsum("nad,nbd->nab", here.tangents, here.tangents)
+    matrix = metric - np.einsum("nabd,nd->nab", here.second, away)
+    floor = np.trace(metric, axis1=1, axis2=2)
+    least = np.linalg.eigvalsh(matrix)[:, 0]
+    sound = least > 1e-3 * np.linalg.eigvalsh(metric)[:, 0]
+    matrix = np.where(sound[:, None, None], matrix, metric)
+    regular = np.linalg.det(matrix) > 1e-24 * np.maximum(floor, np.finfo(float).tiny) ** matrix.shape[1]
+    matrix[~regular] = np.eye(matrix.shape[1])
+    right = np.einsum("nad,nd->na", here.tangents, away)
+    step = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
+    return np.clip(np.where(regular[:, None], step, 0.0), -1.0, 1.0)

@@ -1,0 +1,219 @@
+"""Contact points of a scene whose bodies have moved far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._libraries import MPI
+from fenics_contact.errors import InvalidInputError, together
+from fenics_contact.fingerprint import described, require_alike
+from fenics_contact.pairing.contact_points import (
+    ContactPoints,
+    in_free_frames,
+    join_points,
+    reference_axes,
+    tangent_frames,
+)
+from fenics_contact.pairing.sliding.closest import patch_points
+from fenics_contact.pairing.sliding.differential import Differential, join_differentials
+from fenics_contact.pairing.sliding.meeting import Meeting, meetings_of
+from fenics_contact.pairing.sliding.points import SlidingPoints
+from fenics_contact.scene import MovingObstacle, Scene
+from fenics_contact.surface_shapes import asked
+from fenics_contact.surfaces import shape_functions
+
+
+@dataclass(frozen=True)
+class SlidingContact:
+    """The contact pairs of a scene, whose points are found wherever the bodies lie.
+
+    The gap is the distance to the closest point of a smooth surface through the master's nodes, see
+    `SmoothPatches`; to rigid obstacles it is theirs. Nodes may slide over any number of facets, leave the
+    master and come back. Facets are searched anew only for nodes that leave theirs.
+
+    Attributes:
+        scene: The scene in its reference configuration.
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+        comm: Communicator of the ranks; all have all points.
+        reach: Distance beyond which nodes have no point, [length].
+        meetings: What of each pair stays the same.
+
+    Example:
+        >>> sliding = SlidingContact.of(scene, fixed)  # doctest: +SKIP
+        >>> now = sliding.at(coordinates)  # doctest: +SKIP
+        >>> then = sliding.at(coordinates + increment, now)  # doctest: +SKIP
+    """
+
+    scene: Scene
+    fixed: np.ndarray
+    comm: MPI.Comm
+    reach: float
+    meetings: tuple[Meeting, ...]
+
+    @classmethod
+    def of(
+        cls, scene: Scene, fixed: np.ndarray, comm: MPI.Comm | None = None, *, reach: float = np.inf
+    ) -> SlidingContact:
+        """Prepare the pairs of a scene. Collective on ``comm``.
+
+        Args:
+            scene: The scene in its reference configuration.
+            fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+            comm: Communicator of the ranks that share the work; this rank alone by default.
+            reach: Distance beyond which nodes need no point, [length].
+
+        Raises:
+            InvalidInputError: If a pair uses mortar contact.
+        """
+        comm = comm or MPI.COMM_SELF
+        for index, pair in enumerate(scene.contacts):
+            if pair.discretisation == "mortar":
+                raise InvalidInputError(
+                    f"contact in the current configuration needs discretisation='node', ContactPair {index} "
+                    f"({pair.place}) has 'mortar': leave it out"
+                )
+        return cls(scene, fixed, comm, reach, meetings_of(scene, fixed, comm))
+
+    def at(
+        self, coordinates: np.ndarray, last: SlidingPoints | None = None, time: float = 0.0
+    ) -> SlidingPoints:
+        """Return the contact points of the bodies where they lie now. Collective.
+
+        Args:
+            coordinates: Present coordinates of the nodes of all bodies, shape (n_nodes, dim), [length].
+            last: Points at nearby coordinates: nodes stay on the facets that they had as long as they can.
+            time: Time at which moving obstacles are asked.
+
+        Raises:
+            InvalidInputError: If the coordinates have another shape or are not finite.
+        """
+        coordinates = np.asarray(coordinates, dtype=np.float64)
+        needed = self.scene.points.shape
+        with together(self.comm):
+            if coordinates.shape != needed or not np.isfinite(coordinates).all():
+                given = f"shape {coordinates.shape}" if coordinates.shape != needed else "NaN or infinity"
+                raise InvalidInputError(
+                    f"coordinates must be finite numbers of shape {needed}, one row for each node of all "
+                    f"bodies, got {given}: add the displacements to scene.points"
+                )
+        places = tuple(
+            m.obstacle.frame(time) if isinstance(m.obstacle, MovingObstacle) else None for m in self.meetings
+        )
+        parts = [self._pair(index, coordinates, last, time) for index in range(len(self.meetings))]
+        points = join_points([part[0] for part in parts], self.scene.dim, len(coordinates))
+        differential = join_differentials([part[1] for part in parts], self.scene.dim, len(coordinates))
+        lost = np.concatenate([np.zeros(0, dtype=np.int64), *[part[2] for part in parts]])
+        return SlidingPoints(
+            points, coordinates, tuple(m.patches for m in self.meetings),
+            tuple(m.master_nodes for m in self.meetings), places, differential, lost,
+        )  # fmt: skip
+
+    def _pair(
+        self, index: int, coordinates: np.ndarray, last: SlidingPoints | None, time: float
+    ) -> tuple[ContactPoints, Differential, np.ndarray]:
+        """Return the points of one pair, their differential, and nodes without one. Collective."""
+        meeting = self.meetings[index]
+        if meeting.patches is None:
+            with together(self.comm):
+                points, differential = self._on_obstacle(meeting, coordinates, time)
+            name = f"what ContactPair {index} asks its obstacle, {type(meeting.obstacle).__name__}"
+            require_alike(self.comm, described((points.slave, points.normal, points.gap), name))
+            lost = np.zeros(0, dtype=np.int64)
+        else:
+            points, differential, lost = self._on_patches(index, meeting, coordinates, last)
+        points = replace(points, pair=np.full(points.count, index))
+        axes = points.axes if last is None else _kept_axes(points, last.points, index)
+        points = replace(points, axes=axes, tangents=tangent_frames(points.normal, axes))
+        return in_free_frames(points, self.fixed), differential, lost
+
+    def _on_obstacle(
+        self, meeting: Meeting, coordinates: np.ndarray, time: float
+    ) -> tuple[ContactPoints, Differential]:
+        obstacle = meeting.obstacle
+        assert obstacle is not None
+        shape = obstacle.at(time) if isinstance(obstacle, MovingObstacle) else obstacle
+        place = coordinates[meeting.nodes]
+        gap, normal = asked(shape, "distance", place), asked(shape, "normals", place)
+        facing = np.einsum("nd,nd->n", meeting.normals(coordinates), normal) < 0
+        chosen = np.flatnonzero(facing & (gap <= self.reach))
+        curvature = asked(shape, "curvatures", place[chosen])
+        none = sp.csr_matrix((len(chosen), len(coordinates)))
+        width, dim = self.scene.dim - 1, self.scene.dim
+        points = _points(meeting, chosen, normal[chosen], gap[chosen], none)
+        points = replace(points, symmetric=meeting.slave.mirrored[meeting.candidates[chosen]])
+        empty = np.zeros((len(chosen), width, dim)), np.zeros((len(chosen), width, width))
+        return points, Differential(*empty, (none,) * width, curvature)
+
+    def _on_patches(
+        self, index: int, meeting: Meeting, coordinates: np.ndarray, last: SlidingPoints | None
+    ) -> tuple[ContactPoints, Differential, np.ndarray]:
+        patches = meeting.patches
+        assert patches is not None
+        known = _last_facets(meeting, index, last, self.scene.dim - 1)
+        hit = meeting.closest(coordinates, known, self.reach, self.comm)
+        own = coordinates[meeting.master_nodes]
+        at = patch_points(patches, patches.coefficients(own)[hit.facet], hit.local)
+        count = len(coordinates), len(meeting.master_nodes)
+        spread = sp.csr_matrix((np.ones(count[1]), (np.arange(count[1]), meeting.master_nodes)), count[::-1])
+        weights, *slopes = (
+            (patches.weights(hit.facet, values) @ spread).tocsr()
+            for values in (at.functions.value, *np.moveaxis(at.functions.first, 2, 0))
+        )
+        points = _points(meeting, hit.point, at.normal, hit.gap, weights)
+        points = replace(
+            points,
+            facet=hit.facet,
+            local=hit.local,
+            symmetric=_symmetric(meeting, points, hit.facet, hit.local),
+        )
+        bend = np.einsum("nabd,nd->nab", at.second, at.normal)
+        curvature = np.zeros((points.count, self.scene.dim, self.scene.dim))
+        return points, Differential(at.tangents, bend, tuple(slopes), curvature), meeting.nodes[hit.lost]
+
+
+def _points(
+    meeting: Meeting, chosen: np.ndarray, normal: np.ndarray, distance: np.ndarray, weights: sp.csr_matrix
+) -> ContactPoints:
+    """Return points at candidates, not yet numbered by pair and without facets."""
+    count, axes = len(chosen), reference_axes(normal)
+    area = meeting.slave.areas[meeting.candidates[chosen]]
+    return ContactPoints(
+        np.zeros(count, dtype=np.int64), meeting.nodes[chosen], weights, normal, tangent_frames(normal, axes),
+        distance + meeting.offset[chosen], area, np.full(count, -1), np.zeros((count, normal.shape[1] - 1)),
+        axes, np.zeros(normal.shape, dtype=bool), distance, meeting.given[chosen],
+    )  # fmt: skip
+
+
+def _last_facets(
+    meeting: Meeting, index: int, last: SlidingPoints | None, width: int
+) -> tuple[np.ndarray, np.ndarray]:
+    facet, local = np.full(len(meeting.candidates), -1), np.zeros((len(meeting.candidates), width))
+    if last is not None:
+        mine = last.points.pair == index
+        place = np.searchsorted(meeting.nodes, last.points.slave[mine])
+        facet[place], local[place] = last.points.facet[mine], last.points.local[mine]
+    return facet, local
+
+
+def _kept_axes(points: ContactPoints, last: ContactPoints, index: int, steepest: float = 0.9) -> np.ndarray:
+    """Return the axes nearest to the first tangents: the last ones, unless they come near the normal."""
+    axes, before = points.axes.copy(), np.flatnonzero(last.pair == index)
+    _, now, then = np.intersect1d(points.slave, last.slave[before], return_indices=True)
+    old = last.axes[before[then]]
+    stays = np.abs(np.einsum("nd,nd->n", old, points.normal[now])) < steepest
+    axes[now[stays]] = old[stays]
+    return axes
+
+
+def _symmetric(meeting: Meeting, points: ContactPoints, facet: np.ndarray, local: np.ndarray) -> np.ndarray:
+    """Return the components normal to symmetry planes that cut both surfaces at a point, (n, dim)."""
+    assert meeting.patches is not None
+    corners = meeting.patches.facets[facet]
+    shares, _ = shape_functions(local, corners.shape[1])
+    there = np.einsum("nk,nkd->nd", np.abs(shares), ~meeting.master_cut[corners]) < 0.05
+    own = np.zeros((int(meeting.slave_nodes.max(initial=-1)) + 1, there.shape[1]), dtype=bool)
+    own[meeting.slave_nodes] = meeting.slave.mirrored
+    return np.asarray(there & own[points.slave])

@@ -1,0 +1,116 @@
+"""What of a contact pair stays the same while its bodies move: nodes, facets, the weights of the patches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fenics_contact._libraries import MPI
+from fenics_contact.errors import together
+from fenics_contact.pairing.contact_search import find_contact_points
+from fenics_contact.pairing.node_numbers import NodeNumbers
+from fenics_contact.pairing.sliding.closest import ClosestPoints
+from fenics_contact.pairing.sliding.patches import SmoothPatches
+from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, surface_of
+from fenics_contact.surfaces import FacetedSurface, Projection, corner_products, join
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """A contact pair.
+
+    Attributes:
+        slave: The slave surface in the reference configuration.
+        slave_nodes: Its nodes among those of all bodies, shape (n_slave,).
+        candidates: Positions in them of the nodes that may carry a multiplier, shape (n_candidates,).
+        offset: What is added to the gap of each of them, as the pair gives it, shape (n_candidates,),
+            [length].
+        given: Whether it is, shape (n_candidates,).
+        patches: The smooth surface of the master; None for a rigid obstacle.
+        master_nodes: Nodes of the master among those of all bodies; none for a rigid obstacle.
+        master_cut: Components that the normals of these lack on planes of symmetry, shape (n_master, dim).
+        obstacle: The rigid obstacle; None for a body.
+    """
+
+    slave: FacetedSurface
+    slave_nodes: np.ndarray
+    candidates: np.ndarray
+    offset: np.ndarray
+    given: np.ndarray
+    patches: SmoothPatches | None
+    master_nodes: np.ndarray
+    master_cut: np.ndarray
+    obstacle: RigidObstacle | None
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Nodes that may carry a multiplier among those of all bodies, ascending, shape (n_candidates,)."""
+        return np.asarray(self.slave_nodes[self.candidates])
+
+    def normals(self, coordinates: np.ndarray) -> np.ndarray:
+        """Return the outward normals of the candidates as the bodies lie now, shape (n_candidates, dim)."""
+        slave = self.slave
+        summed = np.zeros_like(slave.points)
+        np.add.at(summed, slave.facets, corner_products(coordinates[self.slave_nodes], slave.facets))
+        summed[slave.mirrored] = 0.0
+        length = np.linalg.norm(summed, axis=1)
+        return np.asarray(summed / np.where(length > 0.0, length, 1.0)[:, None])[self.candidates]
+
+    def closest(
+        self, coordinates: np.ndarray, last: tuple[np.ndarray, np.ndarray], reach: float, comm: MPI.Comm
+    ) -> Projection:
+        """Return the closest points of the candidates on the master. Collective.
+
+        Args:
+            coordinates: Of all nodes, shape (n_nodes, dim), [length].
+            last: Last facets, −1 where there is none, shape (n_candidates,), and local coordinates.
+            reach: Distance beyond which no point is wanted, [length].
+            comm: Communicator of the ranks, each of which projects a share.
+        """
+        assert self.patches is not None
+        mine = np.arange(comm.rank, len(self.candidates), comm.size)
+        found: Projection | None = None
+        with together(comm):
+            points = coordinates[self.master_nodes]
+            search = ClosestPoints(self.patches, points, self.patches.coefficients(points), reach)
+            normals, (facet, local) = self.normals(coordinates), last
+            hit = search.find(coordinates[self.nodes[mine]], normals[mine], facet[mine], local[mine])
+            found = replace(hit, point=mine[hit.point], lost=mine[hit.lost])
+        return join([part for part in comm.allgather(found) if part is not None])
+
+
+def meetings_of(scene: Scene, fixed: np.ndarray, comm: MPI.Comm) -> tuple[Meeting, ...]:
+    """Return the pairs of a scene in its reference configuration. Collective.
+
+    Args:
+        scene: The scene.
+        fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
+        comm: Communicator of the ranks.
+    """
+    first = find_contact_points(scene, fixed, comm) if any(p.given_gap for p in scene.contacts) else None
+    with together(comm):
+        meetings = [_meeting(scene, pair, fixed) for pair in scene.contacts]
+    for index, pair in enumerate(scene.contacts):
+        if first is not None and pair.given_gap:
+            mine = first.pair == index
+            place = np.searchsorted(meetings[index].nodes, first.slave[mine])
+            offset, given = meetings[index].offset.copy(), meetings[index].given.copy()
+            offset[place], given[place] = (first.gap - first.distance)[mine], first.given[mine]
+            meetings[index] = replace(meetings[index], offset=offset, given=given)
+    return tuple(meetings)
+
+
+def _meeting(scene: Scene, pair: ContactPair, fixed: np.ndarray) -> Meeting:
+    numbers, dim = NodeNumbers.of(scene), scene.dim
+    slave = surface_of(scene, pair.slave, "faceted")
+    slave_nodes = numbers.global_nodes(pair.slave.body, slave.nodes)
+    candidates = np.flatnonzero(~fixed[slave_nodes].all(axis=1) & (slave.areas > 0.0))
+    offset, given = np.zeros(len(candidates)), np.zeros(len(candidates), dtype=bool)
+    if not isinstance(pair.master, Surface):
+        none = np.zeros(0, dtype=np.int64), np.zeros((0, dim), dtype=bool)
+        return Meeting(slave, slave_nodes, candidates, offset, given, None, *none, pair.master)
+    master = surface_of(scene, pair.master, "faceted")
+    patches = SmoothPatches.of(master, smooth=pair.geometry != "faceted")
+    nodes = numbers.global_nodes(pair.master.body, master.nodes)
+    return Meeting(slave, slave_nodes, candidates, offset, given, patches, nodes, master.mirrored, None)

@@ -1,0 +1,154 @@
+"""The contact points of moved bodies with their derivatives and slip."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact.pairing.contact_points import ContactPoints
+from fenics_contact.pairing.sliding.differential import Differential, frame_changes, point_motion, spread
+from fenics_contact.pairing.sliding.patches import SmoothPatches
+from fenics_contact.pairing.sliding.slip import MaterialPoints
+from fenics_contact.pairing.sliding.stiffness import (
+    GeometricStiffness,
+    LowRank,
+    friction_stiffness,
+    geometric_stiffness,
+)
+
+
+@dataclass(frozen=True)
+class SlidingPoints:
+    """Contact points of bodies where they lie now, replicated.
+
+    Attributes:
+        points: The points; gap, normal and weights are those of the present coordinates, areas those of the
+            reference configuration. The weights reach the nodes around a facet.
+        coordinates: Present coordinates of all nodes, shape (n_nodes, dim), [length].
+        patches: The smooth surface of each pair's master; None for rigid obstacles.
+        master_nodes: Its nodes among those of all bodies.
+        placements: Rotation and translation of each pair's moving obstacle; None for other masters.
+        differential: What derivatives need.
+        lost: Slave nodes that face a facet but for which no closest point was found.
+    """
+
+    points: ContactPoints
+    coordinates: np.ndarray
+    patches: tuple[SmoothPatches | None, ...]
+    master_nodes: tuple[np.ndarray, ...]
+    placements: tuple[tuple[np.ndarray, np.ndarray] | None, ...]
+    differential: Differential
+    lost: np.ndarray
+
+    @cached_property
+    def key(self) -> np.ndarray:
+        """Number of each point that stays the same from call to call, ascending, shape (n,)."""
+        return np.asarray(self.points.pair * len(self.coordinates) + self.points.slave)
+
+    def carry(self, values: np.ndarray, other: SlidingPoints) -> np.ndarray:
+        """Return values of another set of points at these, zero where it has no such point.
+
+        Args:
+            values: Values at the other points, shape (n_other, ...).
+            other: The other points.
+        """
+        result = np.zeros((self.points.count, *values.shape[1:]), dtype=values.dtype)
+        _, here, there = np.intersect1d(self.key, other.key, assume_unique=True, return_indices=True)
+        result[here] = values[there]
+        return result
+
+    def carry_tangential(self, friction: np.ndarray, other: SlidingPoints) -> np.ndarray:
+        """Return tangential forces of another set of points in these points' frames, shape (n, dim − 1).
+
+        They turn with the normals, by the smallest rotation.
+
+        Args:
+            friction: Forces in the other points' tangents, shape (n_other, dim − 1).
+            other: The other points.
+        """
+        vectors = np.einsum("na,nad->nd", friction, other.points.tangents)
+        vectors, before = self.carry(vectors, other), self.carry(other.points.normal, other)
+        normal = self.points.normal
+        cosine = np.einsum("nd,nd->n", before, normal)
+        along = np.einsum("nd,nd->n", vectors, normal) / np.maximum(1.0 + cosine, 1e-12)
+        turned = vectors - along[:, None] * (before + normal)
+        return np.asarray(np.einsum("nd,nad->na", turned, self.points.tangents))
+
+    def stiffness(self, multiplier: np.ndarray) -> GeometricStiffness:
+        """Return the derivative of the normal forces by the coordinates, see `geometric_stiffness`."""
+        return geometric_stiffness(self.points, self.differential, multiplier)
+
+    def friction_stiffness(self, friction: np.ndarray) -> LowRank:
+        """Return the derivative of the friction forces by the coordinates, see `friction_stiffness`."""
+        return friction_stiffness(self.points, self.differential, friction)
+
+    def material_points(self) -> MaterialPoints:
+        """Return where the nodes stand on their masters, for the slip from now on."""
+        points = self.points
+        foot = self.coordinates[points.slave] - points.distance[:, None] * points.normal
+        foot[points.facet >= 0] = 0.0
+        for index, placement in enumerate(self.placements):
+            if placement is not None:
+                rotation, translation = placement
+                mine = points.pair == index
+                foot[mine] = (foot[mine] - translation) @ rotation
+        return MaterialPoints(self.key, points.pair, points.facet, points.local, foot)
+
+    def slip(self, start: MaterialPoints) -> np.ndarray:
+        """Return t_a·(x_s − x_m), x_m where the node stood at the start, carried along by the master.
+
+        Unchanged when everything moves as one rigid piece. Nodes without a point at the start have no slip,
+        see `MaterialPoints.extended`.
+
+        Args:
+            start: Where the nodes stood, see `material_points`.
+
+        Returns:
+            Slip in the present tangents, shape (n, dim − 1), [length].
+        """
+        way, _ = self._way(start)
+        return np.asarray(np.einsum("nd,nad->na", way, self.points.tangents))
+
+    def slip_rows(self, start: MaterialPoints) -> sp.csr_matrix:
+        """Return the derivative of `slip` by all coordinates, (n · (dim − 1), n_dofs), dof dim · node + a.
+
+        It differs from the rows t_a·(δx_s − Σ W_j δx_j) of the friction forces, by the weights at the start
+        and by the turning of the tangents, as far as nodes slip.
+        """
+        points, (way, weights) = self.points, self._way(start)
+        motion = point_motion(points, self.differential)
+        turned = frame_changes(points.normal, points.axes, motion.directions)
+        count, width = points.count, points.normal.shape[1] - 1
+        slave = sp.csr_matrix(
+            (np.ones(count), (np.arange(count), points.slave)), shape=(count, len(self.coordinates))
+        )
+        jump, parts = (slave - weights).tocsr(), []
+        for c in range(width):
+            rows = spread(points.tangents[:, c], jump)
+            for a in range(width):
+                rows = rows + sp.diags(np.einsum("nd,nd->n", turned[:, c, a], way)) @ motion.turn[a]
+            parts.append(rows)
+        order = np.arange(width * count).reshape(width, count).T.ravel()
+        return sp.vstack(parts, format="csr")[order]
+
+    def _way(self, start: MaterialPoints) -> tuple[np.ndarray, sp.csr_matrix]:
+        """Return x_s − x_m, shape (n, dim), and the weights of nodes in x_m, shape (n, n_nodes)."""
+        start = start.extended(self.material_points())
+        start = start.part(np.searchsorted(start.key, self.key))
+        place, count = start.place.copy(), len(self.coordinates)
+        weights = sp.csr_matrix((self.points.count, count))
+        for index, patches in enumerate(self.patches):
+            mine = np.flatnonzero(start.pair == index)
+            if patches is not None:
+                values = patches.functions(start.local[mine]).value
+                own, nodes = patches.weights(start.facet[mine], values).tocoo(), self.master_nodes[index]
+                entries = (own.data, (mine[own.row], nodes[own.col]))
+                weights = weights + sp.csr_matrix(entries, shape=weights.shape)
+            elif (placement := self.placements[index]) is not None:
+                rotation, translation = placement
+                place[mine] = place[mine] @ rotation.T + translation
+        way = self.coordinates[self.points.slave] - place - weights @ self.coordinates
+        return np.asarray(way), weights.tocsr()

@@ -1,0 +1,141 @@
+"""Stiffness of contact forces whose directions and places change with the geometry, in factors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact.pairing.contact_points import ContactPoints
+from fenics_contact.pairing.sliding.differential import (
+    Differential,
+    frame_changes,
+    inverse_metrics,
+    point_motion,
+    spread,
+)
+
+
+@dataclass(frozen=True)
+class GeometricStiffness:
+    """−λ_N times the second derivatives of gaps, K = V diag(D) Vᵀ and blocks of single nodes.
+
+    Attributes:
+        columns: V, orthonormal at each point, shape (n_dofs, m); dof dim · node + component of all nodes.
+        values: D, of both signs, shape (m,), [force / length].
+        point: Contact point of each column, ascending, shape (m,).
+        blocks: −λ_N times the curvature of rigid obstacles, shape (n_blocks, dim, dim), [force / length].
+        block_node: The slave node on which each block acts, shape (n_blocks,).
+    """
+
+    columns: sp.csr_matrix
+    values: np.ndarray
+    point: np.ndarray
+    blocks: np.ndarray
+    block_node: np.ndarray
+
+    def assembled(self) -> sp.csr_matrix:
+        """Return K, shape (n_dofs, n_dofs)."""
+        dim, size = self.blocks.shape[1], self.columns.shape[0]
+        dof = dim * self.block_node[:, None] + np.arange(dim)
+        row, column = np.repeat(dof, dim, axis=1).ravel(), np.tile(dof, dim).ravel()
+        own = sp.csr_matrix((self.blocks.ravel(), (row, column)), shape=(size, size))
+        return (self.columns @ sp.diags(self.values) @ self.columns.T + own).tocsr()
+
+
+def geometric_stiffness(
+    points: ContactPoints, differential: Differential, multiplier: np.ndarray, rounding: float = 1e-14
+) -> GeometricStiffness:
+    """Return the derivative of the normal forces Σ −λ_N δg by the coordinates, at fixed λ_N.
+
+    With p_a = S,_a·δv, q_a = n·δS,_a, m = S,_a·S,_b, k = n·S,_ab and H = m − r k,
+    −δ²g = pᵀ m⁻¹ k H⁻¹ p + pᵀ H⁻¹ q + qᵀ H⁻¹ p + r qᵀ H⁻¹ q: rank 2 (dim − 1) at each point.
+
+    Args:
+        points: Contact points.
+        differential: Their differential.
+        multiplier: λ_N, shape (n,), [force]; points where it is not positive contribute nothing.
+        rounding: Values of D below this fraction of the largest are left out.
+
+    References:
+        P. Wriggers, Computational Contact Mechanics, 2nd ed., Springer 2006, chapters 4 and 6.
+    """
+    pressed = np.flatnonzero((multiplier > 0.0) & (points.facet >= 0))
+    core, gram = _core(points, differential, multiplier, pressed)
+    lower = np.linalg.cholesky(gram)
+    values, vectors = np.linalg.eigh(np.swapaxes(lower, 1, 2) @ core @ lower)
+    mixed = np.linalg.solve(np.swapaxes(lower, 1, 2), vectors)
+    width, jump = points.normal.shape[1] - 1, points.jump[pressed]
+    rows = [spread(differential.tangents[pressed, a], jump) for a in range(width)]
+    rows += [spread(points.normal[pressed], differential.slopes[a][pressed]) for a in range(width)]
+    kept = np.abs(values) > rounding * np.abs(values).max(initial=0.0)
+    place, column = np.nonzero(kept)
+    chosen = mixed[place, :, column]
+    total = sum(sp.diags(chosen[:, r]) @ rows[r][place] for r in range(2 * width))
+    pushed = np.flatnonzero((multiplier > 0.0) & (points.facet < 0))
+    blocks = -multiplier[pushed, None, None] * differential.curvature[pushed]
+    return GeometricStiffness(
+        total.T.tocsr(), values[place, column], pressed[place], blocks, points.slave[pushed]
+    )
+
+
+def _core(
+    points: ContactPoints, differential: Differential, multiplier: np.ndarray, chosen: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the matrix between the rows p and q of chosen points, and the inner products of these rows."""
+    inverse, solved = (each[chosen] for each in inverse_metrics(points, differential))
+    distance, bend = points.distance[chosen, None, None], differential.bend[chosen]
+    upper = np.concatenate([inverse @ bend @ solved, solved], axis=2)
+    lower = np.concatenate([solved, distance * solved], axis=2)
+    core = multiplier[chosen, None, None] * np.concatenate([upper, lower], axis=1)
+    tangents, jump, width = differential.tangents[chosen], points.jump[chosen], bend.shape[1]
+    gram = np.zeros_like(core)
+    length = np.asarray(jump.multiply(jump).sum(axis=1)).ravel()
+    gram[:, :width, :width] = length[:, None, None] * np.einsum("nad,nbd->nab", tangents, tangents)
+    for a in range(width):
+        for b in range(width):
+            product = differential.slopes[a][chosen].multiply(differential.slopes[b][chosen])
+            gram[:, width + a, width + b] = np.asarray(product.sum(axis=1)).ravel()
+    return 0.5 * (core + np.swapaxes(core, 1, 2)), gram
+
+
+@dataclass(frozen=True)
+class LowRank:
+    """An unsymmetric matrix L Rᵀ of few columns a point.
+
+    Attributes:
+        left: L, shape (n_dofs, m).
+        right: R, shape (n_dofs, m).
+        point: Contact point of each column, shape (m,).
+    """
+
+    left: sp.csr_matrix
+    right: sp.csr_matrix
+    point: np.ndarray
+
+
+def friction_stiffness(points: ContactPoints, differential: Differential, friction: np.ndarray) -> LowRank:
+    """Return the derivative of the friction forces Σ τ_a t_a (δx_s − Σ W_j δx_j) at fixed τ.
+
+    The tangents turn with the normal, and the force on the master moves over its nodes. Both depend on the
+    coordinates through δn and δξ, see `point_motion`: rank 2 (dim − 1) at each point, unsymmetric.
+
+    Args:
+        points: Contact points.
+        differential: Their differential.
+        friction: τ in the points' tangents, shape (n, dim − 1), [force].
+    """
+    rubbed = np.flatnonzero(friction.any(axis=1))
+    motion, jump = point_motion(points, differential), points.jump
+    turned = frame_changes(points.normal, points.axes, motion.directions)
+    turning = np.einsum("nc,ncad->nad", friction, turned)
+    force = np.einsum("nc,ncd->nd", friction, points.tangents)
+    left = [spread(turning[:, a], jump) for a in range(turning.shape[1])]
+    left += [spread(-force, slope) for slope in differential.slopes]
+    right = [*motion.turn, *motion.local]
+    return LowRank(
+        sp.vstack([each[rubbed] for each in left]).T.tocsr(),
+        sp.vstack([each[rubbed] for each in right]).T.tocsr(),
+        np.tile(rubbed, len(left)),
+    )

@@ -1,0 +1,70 @@
+"""Bodies that meet on a curved surface, pushed out of shape: for tests of contact where they lie now."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.pairing.sliding import SlidingContact, SlidingPoints
+from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, PlaneStrain, Scene, Surface
+
+KINDS = ("hexahedron", "tetrahedron", "quadrilateral", "triangle")
+
+
+def arched(points: np.ndarray, radius: float = 1.5) -> np.ndarray:
+    """Return the points of a flat piece, its top at zero height, bent to a cylinder."""
+    angle, r = points[:, 0] / radius, radius + points[:, -1]
+    bent = points.copy()
+    bent[:, 0], bent[:, -1] = r * np.sin(angle), r * np.cos(angle) - radius
+    return bent
+
+
+def on_arch(kind: str, *, master_cells: int = 8, radius: float = 1.5, geometry: str = "best") -> Scene:
+    """Return a small slave above an arched master that is longer and wider."""
+    if kind in ("hexahedron", "tetrahedron"):
+        low = block((-1.0, -0.6, -0.5), (1.0, 0.6, 0.0), (master_cells, 5, 1), kind)
+        high = block((-0.43, -0.35, 0.03), (0.37, 0.33, 0.4), (5, 4, 1), kind)
+        material, top, under = IsotropicElasticity(10.0, 0.3), "z1", "z0"
+    else:
+        low = rectangle((-1.0, -0.5), (1.0, 0.0), (master_cells, 1), kind)
+        high = rectangle((-0.43, 0.03), (0.37, 0.4), (5, 1), kind)
+        material, top, under = PlaneStrain(10.0, 0.3), "y1", "y0"
+    low = BodyMesh(arched(low.points, radius), low.cells, low.surfaces)
+    high = BodyMesh(arched(high.points, radius), high.cells, high.surfaces)
+    bodies = {"high": Body(high, material), "low": Body(low, material)}
+    pair = ContactPair(Surface("high", under), Surface("low", top), geometry=geometry)
+    return Scene(bodies, contacts=[pair])
+
+
+def free(scene: Scene) -> np.ndarray:
+    """Return that nothing is held."""
+    return np.zeros(scene.points.shape, dtype=bool)
+
+
+def sliding(scene: Scene, reach: float = np.inf) -> SlidingContact:
+    """Return the contact of a scene without supports."""
+    return SlidingContact.of(scene, free(scene), reach=reach)
+
+
+def shaken(scene: Scene, amount: float = 0.02, seed: int = 3) -> np.ndarray:
+    """Return coordinates of the nodes pushed out of shape."""
+    x = scene.points
+    wave = np.column_stack([np.sin(3 * x[:, (a + 1) % scene.dim] + a) for a in range(scene.dim)])
+    return np.asarray(x + amount * wave + 0.2 * amount * np.random.default_rng(seed).standard_normal(x.shape))
+
+
+def rotation(dim: int, angle: float, axis: int = 1) -> np.ndarray:
+    """Return a rotation, in space about one of the axes."""
+    c, s = np.cos(angle), np.sin(angle)
+    if dim == 2:
+        return np.array([[c, -s], [s, c]])
+    turn = np.eye(3)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    turn[i, i], turn[i, j], turn[j, i], turn[j, j] = c, -s, s, c
+    return turn
+
+
+def same_points(one: SlidingPoints, other: SlidingPoints) -> bool:
+    """Return whether two sets consist of the same nodes on the same facets."""
+    return np.array_equal(one.key, other.key) and np.array_equal(one.points.facet, other.points.facet)

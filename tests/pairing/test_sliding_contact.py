@@ -1,0 +1,225 @@
+"""Contact points of bodies that slide far: smooth, held on their facets, lost and found at rims."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.pairing import find_contact_points, sliding_contact
+from fenics_contact.pairing.sliding.closest import ClosestPoints
+from fenics_contact.pairing.sliding.patches import SmoothPatches
+from fenics_contact.scene import Body, ContactPair, MovingObstacle, RigidCylinder, RigidPlane, Scene, Surface
+from fenics_contact.surfaces import Projection, faceted_surface
+from tests.pairing.sliding_scenes import (
+    KINDS,
+    arched,
+    free,
+    on_arch,
+    rotation,
+    same_points,
+    shaken,
+    sliding,
+)
+
+RADIUS = 1.5
+#: Largest jump of the normal at an edge, in radians, where facets turn by 0.17.
+JUMPS = {"hexahedron": 1e-8, "tetrahedron": 3e-4, "quadrilateral": 1e-8, "triangle": 1e-8}
+
+
+def slid_over(kind: str, cells: int, geometry: str = "best") -> tuple[Projection, np.ndarray]:
+    """Slide a node along an arched master: closest points, and the true normals of the cylinder."""
+    meeting = sliding(on_arch(kind, master_cells=cells, geometry=geometry)).meetings[0]
+    scene = on_arch(kind, master_cells=cells)
+    points, patches = scene.points[meeting.master_nodes], meeting.patches
+    assert patches is not None
+    path = np.linspace(-0.5, 0.5, 1001)
+    way = np.zeros((len(path), scene.dim))
+    way[:, 0] = path
+    way[:, 1:-1] = 0.11 + 0.07 * path[:, None]
+    normals = np.zeros_like(way)
+    normals[:, 0], normals[:, -1] = np.sin(path / RADIUS), np.cos(path / RADIUS)
+    search = ClosestPoints(patches, points, patches.coefficients(points))
+    none = np.full(len(path), -1), np.zeros((len(path), scene.dim - 1))
+    found = search.find(arched(way), -normals, *none)
+    assert np.array_equal(found.point, np.arange(len(path)))
+    return found, normals
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_node_that_slides_over_an_arch_meets_no_edges(kind: str) -> None:
+    errors = []
+    for cells in (8, 16):
+        found, normals = slid_over(kind, cells)
+        across = np.diff(found.facet) != 0
+        assert np.count_nonzero(across) >= 3
+        turns = np.linalg.norm(np.diff(found.normal, axis=0), axis=1) - 1e-3 / RADIUS
+        if cells == 8:
+            assert turns[across].max() < JUMPS[kind]
+            assert np.abs(found.gap).max() < 5e-6
+        errors.append(np.linalg.norm(found.normal - normals, axis=1).max())
+    assert errors[0] > 4 * errors[1]
+    facets, _ = slid_over(kind, 8, "faceted")
+    across = np.diff(facets.facet) != 0
+    assert np.linalg.norm(np.diff(facets.normal, axis=0), axis=1)[across].max() > 0.15
+    assert np.abs(facets.gap).max() > 5e-3
+
+
+def test_a_crease_stays_a_crease() -> None:
+    """A roof keeps its ridge: the normals on its two sides are those of the sides."""
+    points = np.array([[float(x), abs(float(x) - 4.0) * -0.9] for x in range(9)])
+    roof = faceted_surface(points, np.column_stack([np.arange(1, 9), np.arange(8)]))
+    patches = SmoothPatches.of(roof)
+    assert np.abs(patches.coefficients(roof.points)[:, 2:]).max() < 1e-12
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_rigid_motions_change_nothing(kind: str) -> None:
+    scene = on_arch(kind)
+    contact, x = sliding(scene), shaken(scene)
+    now = contact.at(x)
+    for axis in range(3 if scene.dim == 3 else 1):
+        turn = rotation(scene.dim, np.pi / 2, axis)
+        then = contact.at(x @ turn.T + 0.3, now)
+        assert same_points(now, then)
+        assert then.points.gap == pytest.approx(now.points.gap, abs=1e-13)
+        assert then.points.normal == pytest.approx(now.points.normal @ turn.T, abs=1e-12)
+
+
+def test_the_gaps_are_those_of_small_displacements_before_anything_moves() -> None:
+    scene = on_arch("hexahedron")
+    first = find_contact_points(scene, free(scene))
+    now = sliding(scene).at(scene.points)
+    assert np.array_equal(now.points.slave, first.slave)
+    assert now.points.gap == pytest.approx(first.gap, abs=1e-5)
+    assert now.points.gap == pytest.approx(0.03, abs=1e-5)
+    assert np.array_equal(now.points.area, first.area)
+
+
+def test_a_node_keeps_its_facet_until_it_is_well_beyond_the_edge() -> None:
+    scene = on_arch("quadrilateral")
+    contact = sliding(scene)
+    now, x, changes = contact.at(scene.points), scene.points.copy(), 0
+    high = slice(0, scene.bodies["high"].mesh.n_nodes)
+    edges = []
+    for step in range(80):
+        x[high, 0] += 0.005 * (1 if step < 40 else -1)
+        then = contact.at(x, now)
+        flipped = then.points.facet != now.carry(now.points.facet, now)
+        edges.append(np.abs(then.points.local[~flipped]).max())
+        changes, now = changes + np.count_nonzero(flipped), then
+    assert 4 <= changes <= 12
+    assert max(edges) <= 1.001
+    # On the edge itself, a hair to either side changes nothing.
+    node = int(np.argmax(np.abs(now.points.local[:, 0])))
+    way = now.points.tangents[node, 0] * np.sign(now.points.local[node, 0])
+    x[now.points.slave[node]] += way * 1e-6 * np.array([1.0, 1.0])
+    assert contact.at(x, now).points.facet[node] == now.points.facet[node]
+
+
+def test_a_node_between_two_facets_does_not_change_sides_for_ever() -> None:
+    scene = on_arch("quadrilateral")
+    contact, x = sliding(scene), scene.points.copy()
+    meeting = contact.meetings[0]
+    ridge = meeting.master_nodes[np.argmax(x[meeting.master_nodes, 1])]
+    slave = meeting.nodes[2]
+    sides: dict[bool, set[int]] = {True: set(), False: set()}
+    now = None
+    for side in (1, -1, 1, -1):
+        x[slave] = x[ridge] + [side * 2e-5, 0.01]
+        now = contact.at(x, now)
+        for held, points in ((True, now.points), (False, contact.at(x).points)):
+            sides[held].add(int(points.facet[points.slave == slave][0]))
+    assert len(sides[True]) == 1
+    assert len(sides[False]) == 2
+
+
+def test_nodes_leave_the_rim_and_come_back() -> None:
+    scene = on_arch("hexahedron")
+    contact, x = sliding(scene), scene.points.copy()
+    high = slice(0, scene.bodies["high"].mesh.n_nodes)
+    all_there = contact.at(x)
+    x[high, 1] += 0.5
+    partly = contact.at(x, all_there)
+    assert 0 < partly.points.count < all_there.points.count
+    assert set(partly.key) < set(all_there.key)
+    carried = partly.carry(np.arange(all_there.points.count) + 1.0, all_there)
+    assert np.array_equal(carried - 1.0, np.searchsorted(all_there.key, partly.key))
+    x[high, 1] += 5.0
+    gone = contact.at(x, partly)
+    assert gone.points.count == 0
+    assert gone.stiffness(np.zeros(0)).assembled().nnz == 0
+    x[high, 1] -= 5.5
+    back = contact.at(x, gone)
+    assert same_points(back, all_there)
+
+
+def test_nodes_beyond_the_reach_need_no_point() -> None:
+    scene = on_arch("hexahedron")
+    x = scene.points.copy()
+    high = slice(0, scene.bodies["high"].mesh.n_nodes)
+    x[high, 2] += 0.1 * x[high, 0]
+    near, every = sliding(scene, reach=0.03).at(x), sliding(scene).at(x)
+    assert 0 < near.points.count < every.points.count
+    assert np.array_equal(near.key, every.key[every.points.gap <= 0.03])
+    x[high, 2] += 3.0
+    assert sliding(scene, reach=0.03).at(x, near).points.count == 0
+
+
+def test_given_gaps_are_kept_while_bodies_slide() -> None:
+    scene = on_arch("hexahedron")
+    given = replace(scene, contacts=[replace(scene.contacts[0], gap=0.005)])
+    measured, moved = sliding(scene).at(shaken(scene)), sliding(given).at(shaken(given))
+    assert moved.points.distance == pytest.approx(measured.points.gap, abs=1e-14)
+    assert moved.points.gap == pytest.approx(measured.points.gap - 0.03 + 0.005, abs=2e-5)
+    assert moved.points.given.all()
+
+
+def on_obstacle(obstacle: RigidPlane | RigidCylinder | MovingObstacle) -> Scene:
+    body = on_arch("hexahedron").bodies["high"]
+    return Scene(
+        {"high": Body(body.mesh, body.material)}, contacts=[ContactPair(Surface("high", "z0"), obstacle)]
+    )
+
+
+def test_a_moving_obstacle_is_met_where_it_is() -> None:
+    plane = RigidPlane((0, 0, -1.0), (0, 0, 1))
+    rising = MovingObstacle(plane, lambda time: (rotation(3, 0.3 * time), (0.0, 0.0, time)))
+    scene = on_obstacle(rising)
+    contact = sliding(scene)
+    before, after = contact.at(scene.points), contact.at(scene.points, time=0.5)
+    assert before.points.gap == pytest.approx(scene.points[before.points.slave, 2] + 1.0)
+    normal = rotation(3, 0.15) @ [0.0, 0.0, 1.0]
+    assert after.points.normal == pytest.approx(np.tile(normal, (after.points.count, 1)))
+    top = np.array([0, 0, 0.5]) - normal
+    assert after.points.gap == pytest.approx((scene.points[after.points.slave] - top) @ normal)
+    first = find_contact_points(scene, free(scene))
+    assert first.gap == pytest.approx(before.points.gap)
+
+
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        (lambda time: (2 * np.eye(3), np.zeros(3)), "a rotation matrix of shape"),
+        (lambda time: (-np.eye(3), np.zeros(3)), "determinant one"),
+        (lambda time: (None, (0.0, np.nan, 0.0)), "3|dim finite numbers"),
+        (lambda time: (np.eye(2), np.zeros(3)), "a rotation matrix of shape"),
+    ],
+)
+def test_a_path_that_is_no_rigid_motion_is_refused(path: object, message: str) -> None:
+    obstacle = MovingObstacle(RigidPlane((0, 0, -1.0), (0, 0, 1)), path)  # type: ignore[arg-type]
+    with pytest.raises(InvalidInputError, match=message):
+        obstacle.at(1.0)
+
+
+def test_mortar_pairs_and_coordinates_that_are_none_are_refused() -> None:
+    scene = on_arch("hexahedron")
+    with pytest.raises(InvalidInputError, match="finite numbers of shape"):
+        sliding(scene).at(scene.points[:-1])
+    with pytest.raises(InvalidInputError, match="got NaN or infinity"):
+        sliding(scene).at(np.where(scene.points == scene.points.max(), np.nan, scene.points))
+    mortar = replace(scene, contacts=[replace(scene.contacts[0], discretisation="mortar")])
+    with pytest.raises(InvalidInputError, match="needs discretisation='node'"):
+        sliding_contact(mortar, free(mortar))
