@@ -42,9 +42,16 @@ class SlidingContact:
         meetings: What of each pair stays the same.
 
     Example:
-        >>> sliding = SlidingContact.of(scene, fixed)  # doctest: +SKIP
-        >>> now = sliding.at(coordinates)  # doctest: +SKIP
-        >>> then = sliding.at(coordinates + increment, now)  # doctest: +SKIP
+        >>> from fenics_contact.gallery import block
+        >>> from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, RigidPlane, Surface
+        >>> body = Body(block((0, 0, 0), (2, 2, 1), (4, 4, 2)), IsotropicElasticity(10.0, 0.3))
+        >>> pair = ContactPair(Surface("block", "z0"), RigidPlane((0, 0, -1), (0, 0, 1)))
+        >>> scene = Scene({"block": body}, contacts=[pair])
+        >>> sliding = SlidingContact.of(scene, np.zeros(scene.points.shape, dtype=bool))
+        >>> now = sliding.at(scene.points)
+        >>> then = sliding.at(scene.points + [0.0, 3.0, -0.5], last=now)
+        >>> float(then.points.gap[0]), np.abs(then.slip(now.material_points())[0]).round(12).tolist()
+        (0.5, [0.0, 3.0])
     """
 
     scene: Scene
