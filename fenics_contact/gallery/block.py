@@ -12,6 +12,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery.memory import require_room
 from fenics_contact.gallery.structured import check_cell_type, split_hexahedra, structured_cells
 from fenics_contact.mesh import BodyMesh, boundary_faces, vector_areas
+from fenics_contact.surface_shapes import tensor_grid
 
 SIDES = ("x0", "x1", "y0", "y1", "z0", "z1")
 
@@ -150,7 +151,7 @@ def box_lattice(ticks: Sequence[np.ndarray], cell: str = "hexahedron") -> BodyMe
     """
     check_cell_type(cell)
     require_room(*(len(tick) - 1 for tick in ticks))
-    points = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 3)
+    points = tensor_grid(ticks)
     n1, n2, n3 = (len(t) - 1 for t in ticks)
     cells, grid = structured_cells((n1, n2, n3))
     mesh = BodyMesh(points, cells, box_sides(points, cells), grid)

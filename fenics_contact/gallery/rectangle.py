@@ -11,6 +11,7 @@ from fenics_contact.gallery.block import box_sides, checked_ticks
 from fenics_contact.gallery.memory import require_room
 from fenics_contact.gallery.structured import check_cell_type, repeated_regions, structured_cells
 from fenics_contact.mesh import BodyMesh
+from fenics_contact.surface_shapes import tensor_grid
 
 
 def rectangle(
@@ -54,7 +55,7 @@ def rectangle_lattice(ticks: Sequence[np.ndarray], cell: str = "quadrilateral") 
     """
     check_cell_type(cell, 2)
     require_room(*(len(tick) - 1 for tick in ticks))
-    points = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 2)
+    points = tensor_grid(ticks)
     cells, grid = structured_cells((len(ticks[0]) - 1, len(ticks[1]) - 1))
     mesh = BodyMesh(points, cells, box_sides(points, cells), grid)
     return mesh if cell == "quadrilateral" else split_quadrilaterals(mesh)

@@ -7,6 +7,7 @@ import numpy as np
 from fenics_contact.checks import brief
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import CELL_TYPES, BodyMesh, boundary_faces, match_faces, orient
+from fenics_contact.surface_shapes import tensor_grid
 
 KUHN_TETRAHEDRA = np.array(
     [[0, 1, 2, 6], [0, 3, 7, 6], [0, 4, 5, 6], [0, 5, 1, 6], [0, 2, 3, 6], [0, 7, 4, 6]], dtype=np.int64
@@ -48,7 +49,7 @@ def structured_cells(counts: tuple[int, ...], closed: bool = False) -> tuple[np.
         for layer, j in ((low, 0), (high, 0), (high, 1), (low, 1))
     ]
     cells = np.stack(vertices, axis=-1).reshape(-1, len(vertices))
-    grid = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1).reshape(-1, len(counts))
+    grid = tensor_grid(map(np.arange, counts))
     return cells.astype(np.int64), grid.astype(np.int64)
 
 

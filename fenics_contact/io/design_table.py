@@ -11,6 +11,7 @@ import numpy as np
 from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.io.moved_bodies import moved_surfaces
 from fenics_contact.io.replacing import write_text
+from fenics_contact.surface_shapes import tensor_grid
 
 if TYPE_CHECKING:
     from fenics_contact.shape import LoadPath, MovedSurface, ShapeProblem
@@ -70,7 +71,7 @@ def _places(surface: MovedSurface, lines: tuple[int, ...] | None) -> np.ndarray:
             f"got {lines}: give a tuple such as {(51, 11)[: len(surface.ticks)]}"
         )
     ticks = [np.linspace(0.0, 1.0, count) for count in lines]
-    return np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, len(ticks))
+    return tensor_grid(ticks)
 
 
 def _table(surface: MovedSurface, places: np.ndarray, length: str) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from fenics_contact.errors import InvalidDesignError
+from fenics_contact.surface_shapes import tensor_grid
 
 if TYPE_CHECKING:
     from fenics_contact.shape import MovedSurface
@@ -78,8 +79,7 @@ def _sampled(surface: MovedSurface, count: int) -> np.ndarray:
 
 
 def _places(count: int, axes: int) -> np.ndarray:
-    ticks = [np.linspace(0.0, 1.0, count)] * axes
-    return np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, axes)
+    return tensor_grid([np.linspace(0.0, 1.0, count)] * axes)
 
 
 def _interpolated(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -10,8 +10,9 @@ import numpy as np
 
 from fenics_contact.mesh.cell_types import CellType, cell_type_of
 from fenics_contact.mesh.shape_functions import quadrature, shape_gradients
+from fenics_contact.surface_shapes import tensor_grid
 
-HEXAHEDRON_LATTICE = np.stack(np.meshgrid(*3 * [[0.0, 0.5, 1.0]], indexing="ij"), axis=-1).reshape(-1, 3)
+HEXAHEDRON_LATTICE = tensor_grid(3 * [[0.0, 0.5, 1.0]])
 """Vertices, edge and face midpoints and centre: points at which the Jacobian of a hexahedron is evaluated.
 
 The determinant is quadratic in each coordinate, so these 27 values determine it everywhere."""

@@ -7,7 +7,7 @@ from types import ModuleType
 
 import numpy as np
 
-from fenics_contact.surface_shapes import SplinePatch, SurfaceShape, recognised
+from fenics_contact.surface_shapes import SplinePatch, SurfaceShape, recognised, tensor_grid
 
 #: Smallest and largest number of points along each parameter, doubled until the spline through them is this
 #: close to the face, relative to its extent.
@@ -77,8 +77,7 @@ def _grid(gmsh: ModuleType, entity: tuple[int, int]) -> np.ndarray:
 
 
 def _counts(count: int, directions: int) -> np.ndarray:
-    axes = np.meshgrid(*[np.arange(float(count))] * directions, indexing="ij")
-    return np.stack(axes, axis=-1).reshape(-1, directions)
+    return tensor_grid([np.arange(float(count))] * directions)
 
 
 def _parameters(gmsh: ModuleType, entity: tuple[int, int], count: int) -> np.ndarray:

@@ -17,6 +17,7 @@ from fenics_contact.linalg import LAST_PLACES
 from fenics_contact.mesh import BodyMesh, boundary_faces
 from fenics_contact.scene import Scene, mirrored
 from fenics_contact.shape.bernstein import tensor_bernstein
+from fenics_contact.surface_shapes import tensor_grid
 
 #: Default width of the transition strip, relative to the extent of the design surface.
 TRANSITION = 0.15
@@ -195,7 +196,7 @@ class SurfaceDesign:
             alpha: Design variables, shape (size,), [length].
         """
         ticks = [np.linspace(0, 1, count) if count > 1 else np.array([0.5]) for count in self.counts]
-        wanted = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, len(ticks))
+        wanted = tensor_grid(ticks)
         distance = np.linalg.norm(self.lattice.parameters[None] - wanted[:, None], axis=2)
         nearest = np.argmin(distance, axis=1)
         moved = points[self.lattice.nodes[nearest]] + alpha[:, None] * self.lattice.directions[nearest]

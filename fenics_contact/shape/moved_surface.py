@@ -15,7 +15,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.shape.bernstein import tensor_bernstein
 from fenics_contact.shape.design import SurfaceDesign
-from fenics_contact.surface_shapes import SurfaceShape
+from fenics_contact.surface_shapes import SurfaceShape, tensor_grid
 from fenics_contact.surfaces import height_over
 
 
@@ -55,7 +55,7 @@ class MovedSurface:
                 f"got {np.shape(self.alpha)}: give its part of alpha"
             )
         counts = self.design.lattice.counts
-        grid = np.stack(np.meshgrid(*self.ticks, indexing="ij"), axis=-1).reshape(-1, len(counts))
+        grid = tensor_grid(self.ticks)
         rising = all((np.diff(ticks) > 0).all() for ticks in self.ticks)
         if not rising or not np.allclose(grid, self.design.lattice.parameters, rtol=0.0, atol=1e-9):
             raise InvalidInputError(

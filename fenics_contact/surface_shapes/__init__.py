@@ -15,6 +15,7 @@ from fenics_contact.surface_shapes.revolved import Revolved
 from fenics_contact.surface_shapes.round import Cylinder, Sphere
 from fenics_contact.surface_shapes.signed_distance import SignedDistance
 from fenics_contact.surface_shapes.spline_patch import SplinePatch
+from fenics_contact.surface_shapes.tensor_grid import tensor_grid
 from fenics_contact.surface_shapes.torus import Torus
 
 __all__ = [
@@ -37,4 +38,5 @@ __all__ = [
     "principal_curvatures",
     "recognised",
     "tangent_bases",
+    "tensor_grid",
 ]

@@ -11,6 +11,7 @@ import numpy as np
 from fenics_contact.checks import GivenVector, checked
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.surface_shapes.patch import Patch
+from fenics_contact.surface_shapes.tensor_grid import tensor_grid
 
 Map = Callable[[np.ndarray], np.ndarray]
 
@@ -89,7 +90,7 @@ class Parametric(Patch):
     def _starts(self) -> np.ndarray:
         low, high, _ = self._range
         axes = [np.linspace(a, b, self.samples) for a, b in zip(low, high, strict=True)]
-        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(low))
+        return tensor_grid(axes)
 
     @cached_property
     def _rounding(self) -> float:

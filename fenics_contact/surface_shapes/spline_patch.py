@@ -9,6 +9,7 @@ import numpy as np
 from scipy.interpolate import BSpline, RectBivariateSpline, make_interp_spline
 
 from fenics_contact.surface_shapes.patch import Patch
+from fenics_contact.surface_shapes.tensor_grid import tensor_grid
 
 DEGREE = 5
 #: Distance, relative to the range, from sides that degenerate to a point (poles) at which normals are
@@ -64,7 +65,7 @@ class SplinePatch(Patch):
     def _starts(self) -> np.ndarray:
         # Between the points: at poles one of two parameters is arbitrary.
         axes = [np.arange(count - 1) + 0.5 for count in self.grid.shape[:-1]]
-        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, self.dim - 1)
+        return tensor_grid(axes)
 
     @cached_property
     def _spline(self) -> BSpline | list[RectBivariateSpline]:
