@@ -41,10 +41,11 @@ class DesignGeometry:
         self.motions = [motion_of(decomposition, scene, design) for design in self.designs]
         self.moving = moving_nodes(scene, self.designs, self.motions)
         self.forms = ShapeForms(decomposition.comm, np.concatenate(list(self.moving.values())))
+        self._points: tuple[np.ndarray, dict[str, np.ndarray]] | None = None
         self._last: tuple[np.ndarray, dict[str, Body]] | None = None
 
     def points_of(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the coordinates of the designed bodies. Collective.
+        """Return the coordinates of the designed bodies; of the last design they are known. Collective.
 
         Args:
             alpha: Design variables, shape (size,), [length].
@@ -56,6 +57,11 @@ class DesignGeometry:
             InvalidInputError: If alpha has another shape or is not finite.
         """
         alpha = checked_variables(alpha, self.size, self._decomposition.comm)
+        if self._points is None or not np.array_equal(self._points[0], alpha):
+            self._points = alpha.copy(), self._moved(alpha)
+        return {name: points.copy() for name, points in self._points[1].items()}
+
+    def _moved(self, alpha: np.ndarray) -> dict[str, np.ndarray]:
         points: dict[str, np.ndarray] = {}
         parts = np.split(alpha, np.cumsum([design.size for design in self.designs])[:-1])
         for design, motion, part in zip(self.designs, self.motions, parts, strict=True):

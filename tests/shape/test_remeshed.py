@@ -15,7 +15,7 @@ from fenics_contact.mesh import BodyMesh, boundary_faces
 from fenics_contact.mesh_io import refilled
 from fenics_contact.optimize import BundleTrust, NonlinearConstraint, minimize
 from fenics_contact.scene import Scene
-from fenics_contact.shape import Remeshed, TotalPotential
+from fenics_contact.shape import MeshMotion, Remeshed, TotalPotential
 from tests.shape.bridges import COUNTS, FAR, bridge, bridge_problem, farthest
 
 
@@ -93,6 +93,23 @@ def test_a_run_that_goes_on_makes_the_same_meshes() -> None:
     near = FAR - 1e-3
     assert again(near)[0] == pytest.approx(remeshed(near)[0], rel=1e-9)
     assert len(again.problems) == len(remeshed.problems)
+
+
+def test_the_mesh_motion_of_a_design_is_computed_once_for_each_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
+    remeshed = far("hexahedron")
+    asked: list[int] = []
+    extend = MeshMotion.extend
+
+    def counted(motion: MeshMotion, displacement: np.ndarray) -> np.ndarray:
+        asked.append(id(motion))
+        return extend(motion, displacement)
+
+    monkeypatch.setattr(MeshMotion, "extend", counted)
+    near = FAR - 2e-3
+    remeshed(near)
+    remeshed.volume(near)
+    remeshed(near)
+    assert 0 < len(asked) == len(set(asked)) <= len(remeshed.problems)
 
 
 def test_a_design_out_of_reach_is_refused_in_words() -> None:
