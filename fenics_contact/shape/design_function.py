@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from copy import copy
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -41,6 +42,16 @@ class Designs(Protocol):
         """Return a gradient near a design. Collective."""
 
 
+AnyDesigns = TypeVar("AnyDesigns", bound=Designs)
+
+
+def aimed(designs: AnyDesigns, objective: Objective) -> AnyDesigns:
+    """Return a copy of a problem with another objective, which counts products on its own."""
+    other = copy(designs)
+    other.objective = objective
+    return other
+
+
 @displayed
 class DesignFunction:
     """c(α) of another objective, with a subgradient, at the states of a `ShapeProblem`.
@@ -54,16 +65,16 @@ class DesignFunction:
         objective: The objective.
     """
 
-    def __init__(self, problem: Designs, own: Designs, name: str) -> None:
+    def __init__(self, problem: Designs, objective: Objective, name: str | None = None) -> None:
         """Use `ShapeProblem.function`.
 
         Args:
             problem: The problem whose states are used.
-            own: A copy of it with the other objective.
-            name: Name of the function.
+            objective: The other objective.
+            name: Name of the function; by default that of the objective's class.
         """
-        self._problem, self._own = problem, own
-        self.name, self.objective = name, own.objective
+        self._problem, self._own = problem, aimed(problem, objective)
+        self.name, self.objective = name or type(objective).__name__, objective
         self._last: tuple[np.ndarray, DesignPoint] | None = None
 
     def _facts(self) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from functools import partial
 
 from fenics_contact.contact import ContactProblem, State
 from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidDesignError, tell
@@ -32,15 +33,9 @@ def design_state(
         InvalidDesignError: If the design has no equilibrium.
         ConvergenceError: If the first one is not found.
     """
+    solve = partial(contact.solve, scene, slip_from=slip_from, tolerance=tolerance, sensitivity=True)
     try:
-        return contact.solve(
-            scene,
-            start=start,
-            slip_from=slip_from,
-            tolerance=tolerance,
-            overlap=start is not None,
-            sensitivity=True,
-        )
+        return solve(start=start, overlap=start is not None)
     except InfeasibleError as error:
         raise InvalidDesignError(f"the design has no equilibrium: {error}") from error
     except ConvergenceError as error:
@@ -48,8 +43,6 @@ def design_state(
             raise
         tell(logger.warning, "a warm start failed, a cold one follows: %s", error)
     try:
-        return contact.solve(
-            scene, start=None, slip_from=slip_from, tolerance=tolerance, overlap=True, sensitivity=True
-        )
+        return solve(start=None, overlap=True)
     except (ConvergenceError, InfeasibleError) as error:
         raise InvalidDesignError(f"no equilibrium of the design was found: {error}") from error

@@ -11,7 +11,7 @@ from fenics_contact._libraries import MPI
 from fenics_contact.contact import State
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError, together
-from fenics_contact.shape.memory import joined_memory, parted_memory
+from fenics_contact.shape.memory import joined_fingerprint, joined_memory, recall_joined
 from fenics_contact.shape.problem import ShapeProblem
 
 
@@ -158,12 +158,7 @@ class LoadCases:
 
     def fingerprint(self) -> dict[str, str]:
         """Identify the problem, for a checkpoint."""
-        parts = {
-            f"{name}.{key}": text
-            for name, problem in self.problems.items()
-            for key, text in problem.fingerprint().items()
-        }
-        return parts | {"weights": str(self.weights)}
+        return {**joined_fingerprint(self.problems), "weights": str(self.weights)}
 
     def memory(self) -> dict[str, np.ndarray]:
         """Return what the next states depend on. Collective."""
@@ -171,9 +166,7 @@ class LoadCases:
 
     def recall(self, memory: Mapping[str, np.ndarray]) -> None:
         """Continue from what `memory` returned, also on another number of ranks. Collective."""
-        parts = parted_memory(memory, len(self.problems))
-        for problem, part in zip(self.problems.values(), parts, strict=True):
-            problem.recall(part)
+        recall_joined(self.problems.values(), memory)
 
     def _joined(self, answers: Mapping[str, tuple[float, np.ndarray]]) -> tuple[float, np.ndarray]:
         if self.weights is None:
@@ -191,10 +184,10 @@ class LoadCases:
         """Return the cases of which the subgradient at α is made. Collective."""
         if self.weights is not None:
             return self.problems
-        known = {name: each.known(alpha) for name, each in self.problems.items()}
-        values = {
-            name: each.value_of(alpha) if point is None else point.value
-            for (name, each), point in zip(self.problems.items(), known.values(), strict=True)
-        }
-        name = max(values, key=values.__getitem__)
+
+        def value(name: str) -> float:
+            known = self.problems[name].known(alpha)
+            return self.problems[name].value_of(alpha) if known is None else known.value
+
+        name = max(self.problems, key=value)
         return {name: self.problems[name]}

@@ -19,7 +19,7 @@ from fenics_contact.shape.beside import with_fewest_weak_points
 from fenics_contact.shape.design import SurfaceDesign
 from fenics_contact.shape.forms import ShapeForms
 from fenics_contact.shape.linearised_face import WeakPoints
-from fenics_contact.shape.memory import DesignPoint, joined_memory, parted_memory
+from fenics_contact.shape.memory import DesignPoint, joined_fingerprint, joined_memory, recall_joined
 from fenics_contact.shape.objective import Objective, Partials, asking, finite_value
 from fenics_contact.shape.path_points import PathPoint, PathPoints
 from fenics_contact.shape.problem import ShapeProblem
@@ -103,6 +103,10 @@ class LoadPath:
         return next(iter(self.problems.values()))
 
     @property
+    def _final(self) -> ShapeProblem:
+        return next(reversed(self.problems.values()))
+
+    @property
     def size(self) -> int:
         """Number of design variables."""
         return self._first.size
@@ -115,7 +119,7 @@ class LoadPath:
     @property
     def scene(self) -> Scene:
         """The scene after the last step, in its reference shape."""
-        return list(self.problems.values())[-1].scene
+        return self._final.scene
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -181,7 +185,7 @@ class LoadPath:
 
     def scene_of(self, alpha: np.ndarray) -> Scene:
         """Return the scene after the last step in the shape of a design. Collective; raises as `evaluate`."""
-        return list(self.problems.values())[-1].scene_of(alpha)
+        return self._final.scene_of(alpha)
 
     @collectively("LoadPath.states_of", _comm)
     def states_of(self, alpha: np.ndarray) -> dict[str, State]:
@@ -229,12 +233,7 @@ class LoadPath:
 
     def fingerprint(self) -> dict[str, str]:
         """Identify the problem, for a checkpoint."""
-        parts = {
-            f"{name}.{key}": text
-            for name, problem in self.problems.items()
-            for key, text in problem.fingerprint().items()
-        }
-        return parts | described(self.objectives, "objectives")
+        return joined_fingerprint(self.problems) | described(self.objectives, "objectives")
 
     def memory(self) -> dict[str, np.ndarray]:
         """Return what the next states depend on. Collective."""
@@ -248,9 +247,7 @@ class LoadPath:
         self.evaluations, self._states.products = (int(count) for count in stored.pop("counts"))
         names = [name for name in stored if name.startswith("design.")]
         self._points.recall({name.removeprefix("design."): stored.pop(name) for name in names})
-        parts = parted_memory(stored, len(self.problems))
-        for problem, part in zip(self.problems.values(), parts, strict=True):
-            problem.recall(part)
+        recall_joined(self.problems.values(), stored)
 
     def _point_at(self, alpha: np.ndarray) -> PathPoint:
         """Solve the adjoints from the last step to the first. Collective."""

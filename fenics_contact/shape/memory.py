@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -152,10 +152,25 @@ class DesignMemory:
 
 
 class Remembers(Protocol):
-    """What has a memory, such as a `ShapeProblem`."""
+    """What a checkpoint stores, such as a `ShapeProblem`."""
+
+    def fingerprint(self) -> dict[str, str]:
+        """Identify it."""
 
     def memory(self) -> Stored:
-        """Return it. Collective."""
+        """Return what its next state depends on. Collective."""
+
+    def recall(self, memory: Mapping[str, np.ndarray]) -> None:
+        """Continue from what `memory` returned. Collective."""
+
+
+def joined_fingerprint(problems: Mapping[str, Remembers]) -> dict[str, str]:
+    """Identify several problems, under keys that begin with their names."""
+    return {
+        f"{name}.{key}": text
+        for name, problem in problems.items()
+        for key, text in problem.fingerprint().items()
+    }
 
 
 def joined_memory(problems: Iterable[Remembers]) -> Stored:
@@ -167,13 +182,14 @@ def joined_memory(problems: Iterable[Remembers]) -> Stored:
     }
 
 
-def parted_memory(memory: Mapping[str, np.ndarray], count: int) -> list[Stored]:
-    """Return the memory of each of several problems from what `joined_memory` returned."""
-    parts: list[Stored] = [{} for _ in range(count)]
+def recall_joined(problems: Collection[Remembers], memory: Mapping[str, np.ndarray]) -> None:
+    """Let several problems continue from what `joined_memory` returned. Collective."""
+    parts: list[Stored] = [{} for _ in problems]
     for key, values in memory.items():
         number, _, name = key.partition("/")
         parts[int(number)][name] = values
-    return parts
+    for problem, part in zip(problems, parts, strict=True):
+        problem.recall(part)
 
 
 def _stored_point(point: DesignPoint) -> Stored:

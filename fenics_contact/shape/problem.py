@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
-from copy import copy
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
 from fenics_contact.shape.beside import with_fewest_weak_points
 from fenics_contact.shape.contact_derivative import contact_by_shape
 from fenics_contact.shape.design import SurfaceDesign
-from fenics_contact.shape.design_function import DesignFunction
+from fenics_contact.shape.design_function import DesignFunction, aimed
 from fenics_contact.shape.design_state import design_state
 from fenics_contact.shape.geometry import DesignGeometry
 from fenics_contact.shape.linearised_face import LinearisedFace, WeakChoice, linearise_face
@@ -87,7 +86,6 @@ class ShapeProblem:
         """
         self.contact, self.objective, self.choice = checked_contact(contact), objective, choice
         self.scene, self.tolerance = contact.scene, tolerance
-        self._adaptive = tolerance if isinstance(tolerance, AdaptiveTolerance) else None
         self._tightest = tightest_of(contact, tolerance)
         self._timer = contact.timer
         self.evaluations, self.products = 0, 0
@@ -140,7 +138,7 @@ class ShapeProblem:
             "designs": self.designs,
             "objective": self.objective,
             "solver": self.contact.solver,
-            "tolerance": self._adaptive or self._tightest,
+            "tolerance": self.tolerance if self.inexact else self._tightest,
             "choice": self.choice,
         }
         return {key: text for name, part in parts.items() for key, text in described(part, name).items()}
@@ -230,9 +228,7 @@ class ShapeProblem:
 
         At a design evaluated before it uses the state and costs one adjoint.
         """
-        own = copy(self)
-        own.objective = objective
-        return DesignFunction(self, own, name or type(objective).__name__)
+        return DesignFunction(self, objective, name)
 
     def known(self, alpha: np.ndarray) -> DesignPoint | None:
         """Return the first, best or last design if it is exactly this one. Collective."""
@@ -245,7 +241,7 @@ class ShapeProblem:
     @property
     def inexact(self) -> bool:
         """Whether an optimiser may ask for less accuracy, see `within`."""
-        return self._adaptive is not None
+        return isinstance(self.tolerance, AdaptiveTolerance)
 
     @collectively("ShapeProblem.within", _comm)
     def within(self, alpha: np.ndarray, value: float, subgradient: float) -> tuple[float, np.ndarray, float]:
@@ -259,8 +255,8 @@ class ShapeProblem:
         Raises:
             InvalidDesignError: If the design inverts a cell or has no equilibrium.
         """
-        policy = self._adaptive
-        if policy is None:
+        policy = self.tolerance
+        if not isinstance(policy, AdaptiveTolerance):
             point = self.evaluate(alpha)
             return point.value, point.gradient, 0.0
         known = self._memory.of_design(alpha)
@@ -369,8 +365,8 @@ class ShapeProblem:
                 loads have no derivative by the designs.
         """
         check_case(self.scene, scene)
-        other = copy(self)
-        other.scene, other.objective, other._beside = scene, objective or self.objective, self
+        other = aimed(self, objective or self.objective)
+        other.scene, other._beside = scene, self
         other.evaluations, other.products = 0, 0
         other._memory = DesignMemory(other._restored)
         return other

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping
-from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,8 +17,8 @@ from fenics_contact.errors import InvalidDesignError, InvalidInputError, calling
 from fenics_contact.mesh import BodyMesh, jacobians
 from fenics_contact.scene import Scene
 from fenics_contact.shape.design import SurfaceDesign, checked_variables
-from fenics_contact.shape.design_function import DesignFunction
-from fenics_contact.shape.memory import DesignPoint, joined_memory, parted_memory
+from fenics_contact.shape.design_function import DesignFunction, aimed
+from fenics_contact.shape.memory import DesignPoint, joined_memory, recall_joined
 from fenics_contact.shape.objective import Objective
 from fenics_contact.shape.problem import ShapeProblem
 
@@ -217,19 +216,17 @@ class Remeshed:
     def beside(self, alpha: np.ndarray, end: np.ndarray) -> np.ndarray:
         """Return a gradient near α, see `ShapeProblem.beside`. Collective."""
         problem, moved = self._on_mesh(alpha)
-        return _aimed(problem, self.objective).beside(moved, moved + (end - alpha))
+        return self._aimed(problem).beside(moved, moved + (end - alpha))
 
     def differentiate(self, state: State) -> DesignPoint:
         """Return value and subgradient at a state of one of the meshes. Collective."""
         decomposition = state.torn.decomposition
         problem = next(one for one in self.problems if one.contact.decomposition is decomposition)
-        return _aimed(problem, self.objective).differentiate(state)
+        return self._aimed(problem).differentiate(state)
 
     def function(self, objective: Objective, name: str | None = None) -> DesignFunction:
         """Return another objective as a function of the same designs, see `ShapeProblem.function`."""
-        own = copy(self)
-        own.objective = objective
-        return DesignFunction(self, own, name or type(objective).__name__)
+        return DesignFunction(self, objective, name)
 
     def fingerprint(self) -> dict[str, str]:
         """Identify the problem, for a checkpoint."""
@@ -251,8 +248,11 @@ class Remeshed:
             self.remeshings.append(Remeshing(origin, *(float(value) for value in jump)))
         self._last = int(own["last"])
         rest = {key: values for key, values in memory.items() if not key.startswith(_OWN)}
-        for problem, part in zip(self.problems, parted_memory(rest, len(self.problems)), strict=True):
-            problem.recall(part)
+        recall_joined(self.problems, rest)
+
+    def _aimed(self, problem: ShapeProblem) -> ShapeProblem:
+        """Return a problem with the objective of this one; itself, which counts products, if it has it."""
+        return problem if problem.objective is self.objective else aimed(problem, self.objective)
 
     def _on_mesh(self, alpha: np.ndarray) -> tuple[ShapeProblem, np.ndarray]:
         """Return the problem on the nearest mesh that allows a design, and the design from there."""
@@ -326,15 +326,6 @@ class Remeshed:
         )
         self.origins.append(np.array(origin, dtype=float))
         self._parents.append(k)
-
-
-def _aimed(problem: ShapeProblem, objective: Objective) -> ShapeProblem:
-    """Return a problem with another objective, or itself if it is the same."""
-    if problem.objective is objective:
-        return problem
-    result = copy(problem)
-    result.objective = objective
-    return result
 
 
 def _share(mesh: BodyMesh, points: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""Which scenes can be designed, and which are load cases of one design."""
+"""Which scenes and objectives can be designed, and which scenes are load cases of one design."""
 
 from __future__ import annotations
 
