@@ -95,10 +95,11 @@ def plot_before_after(
 
 
 def _retreat(first: State, best: State, pair: int) -> float:
-    """Return how much farther the slave may travel against the contact force on it."""
+    """Return how much farther the slave may travel against the contact force; 0 where it is rounding."""
     resultant = first.contact.force[first.contact.on_pair(pair)].sum(axis=0)
     way = -resultant / np.linalg.norm(resultant)
-    return best.contact.travel(way, pair) - first.contact.travel(way, pair)
+    found = best.contact.travel(way, pair) - first.contact.travel(way, pair)
+    return 0.0 if abs(found) < 1e-9 * float(np.ptp(first.scene.points)) else found
 
 
 def _check(first: State, best: State, pair: int) -> None:

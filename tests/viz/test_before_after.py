@@ -118,10 +118,20 @@ def test_the_title_says_by_how_much_the_objective_fell(monkeypatch: pytest.Monke
     best = SimpleNamespace(value=-112.0, state=raised(2))
     plot_before_after(first, best, label="energy (N mm)", title="Block", width=WIDTH)  # type: ignore[arg-type]
     assert titles[0].startswith("Block: energy (N mm) −100.000 → −112.000, 12.00 % lower; largest pressure")
+    assert "; seat gives way by 0.0056 mm" in titles[0]
     for point in (first, best):
         point.value = point.state.contact.pressure.max()
     plot_before_after(first, best, label="peak (MPa)", title="Block", width=WIDTH)  # type: ignore[arg-type]
     assert "largest pressure" not in titles[1], "the objective says it already"
+
+
+def test_a_seat_that_moved_by_rounding_does_not_give_way() -> None:
+    first, contact = plane_block(), plane_block().contact
+    for change, expected in ((1.8e-11, 0.0), (1e-6, 1e-6)):
+        points = replace(contact.points, gap=contact.points.gap - change)
+        after: Any = SimpleNamespace(contact=replace(contact, points=points), scene=first.scene)
+        retreat = before_after._retreat(first, after, 0)  # type: ignore[attr-defined]
+        assert -retreat == pytest.approx(expected, rel=0.1, abs=0.0)
 
 
 def test_what_does_not_belong_together_is_refused() -> None:
