@@ -28,7 +28,7 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 
 from fenics_contact.contact import ContactProblem
-from fenics_contact.gallery import DesignSurface, rectangle_lattice
+from fenics_contact.gallery import DesignSurface, growing_ticks, rectangle_lattice
 from fenics_contact.io import write_design_table, write_optimisation_result, write_vtu
 from fenics_contact.optimize import BundleTrust, NonlinearConstraint, convex, minimize, monotone
 from fenics_contact.progress import show_progress
@@ -50,9 +50,8 @@ overlap = 0.02  # mm
 steel = PlaneStrain(young_modulus=2.1e5, poisson_ratio=0.3)  # N/mm²
 
 
-def spaced(first, length, ratio=1.25):
-    count = int(np.ceil(np.log(1 + length * (ratio - 1) / first) / np.log(ratio)))
-    return length * (ratio ** np.arange(count + 1) - 1) / (ratio**count - 1)
+def spaced(first, length):
+    return growing_ticks(length, first, 1.25)
 
 
 def along_seat(cell):

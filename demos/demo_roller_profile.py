@@ -22,7 +22,7 @@ from mpi4py import MPI
 from scipy.interpolate import BPoly
 
 from fenics_contact.contact import ContactProblem
-from fenics_contact.gallery import box_lattice, side_of
+from fenics_contact.gallery import box_lattice, growing_ticks, side_of
 from fenics_contact.io import write_optimisation_result, write_vtu
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.optimize import BundleTrust, minimize
@@ -70,22 +70,15 @@ assert np.isclose(hertz.half_width, half_width)
 CELLS, GROWTH, FAR = (2, 2.2, 2 * length) if small else (3, 1.8, 3 * length)
 
 
-def growing(end: float, first: float, growth: float) -> np.ndarray:
-    """Return places from 0 to ``end`` [mm], the first cell about as long as ``first``."""
-    count = int(np.ceil(np.log1p(end * (growth - 1) / first) / np.log(growth)))
-    places = np.cumsum(np.append(0.0, growth ** np.arange(count)))
-    return end * places / places[-1]
-
-
 def crowned(sides: int) -> BodyMesh:
     """Mesh a quarter (one side, y ≥ 0) or a half (two sides) of the block; "track" is what may touch."""
     cell = half_width / CELLS
     strip = half_width * np.append(np.linspace(0, 1.5, 3 * CELLS // 2 + 1), [2.0, 2.75, 3.75])
-    x = np.append(strip, strip[-1] + growing(FAR, half_width, GROWTH)[1:])
-    y = length / 2 - growing(length / 2, 1.5 * half_width, 2.0 if small else 1.4)[::-1]
-    y = np.append(y, length / 2 + growing(FAR, 2.5 * half_width, GROWTH)[1:])
+    x = np.append(strip, strip[-1] + growing_ticks(FAR, half_width, GROWTH)[1:])
+    y = length / 2 - growing_ticks(length / 2, 1.5 * half_width, 2.0 if small else 1.4)[::-1]
+    y = np.append(y, length / 2 + growing_ticks(FAR, 2.5 * half_width, GROWTH)[1:])
     y = np.append(-y[:0:-1], y) if sides == 2 else y
-    mesh = box_lattice([x, y, -growing(FAR, cell * GROWTH, GROWTH)[::-1]])
+    mesh = box_lattice([x, y, -growing_ticks(FAR, cell * GROWTH, GROWTH)[::-1]])
     points, top = mesh.points.copy(), mesh.surfaces["z1"]
     on = np.unique(top)[points[np.unique(top), 0] <= strip[-1] + 1e-9]
     points[on, 2] -= points[on, 0] ** 2 / (2 * radius)
@@ -276,7 +269,7 @@ assert max(cases["two loads"].values()) < (0.67 if small else 0.5) * cases["one 
 
 # ## What to try next
 #
-# - `length = 20 * half_width`, with cells along it of `growing(length / 2, 0.75 * half_width, 1.15)`: from
+# - `length = 20 * half_width`, with cells of `growing_ticks(length / 2, 0.75 * half_width, 1.15)`: from
 #   the straight roller the optimum leaves Lundberg's profile by 12 % and some 15 %, for a reason. His
 #   strip is as wide at the ends as in the middle; the true one narrows there, and its middle is pressed more.
 # - `monotone` or `smallest_radius` (from `fenics_contact.optimize`): rules of the grinding wheel.

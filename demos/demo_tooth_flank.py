@@ -24,7 +24,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, solve_scene
-from fenics_contact.gallery import rectangle_lattice
+from fenics_contact.gallery import growing_ticks, rectangle_lattice
 from fenics_contact.io import write_design_table, write_optimisation_result, write_step, write_vtu
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.optimize import BundleTrust, convex, minimize, monotone
@@ -70,9 +70,8 @@ middle = np.pi / (2 * teeth) + angle_at(np.array(pitch))  # from the start of th
 # side of the point of contact, and under the flank. No fillet: the stress of the root is not asked for.
 
 
-def spaced(first, length, ratio=1.2):
-    count = int(np.ceil(np.log(1 + length * (ratio - 1) / first) / np.log(ratio)))
-    return length * (ratio ** np.arange(1, count + 1) - 1) / (ratio**count - 1)
+def spaced(first, length):
+    return growing_ticks(length, first, 1.2)[1:]
 
 
 def lattice_of(curvature, cell):

@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem
-from fenics_contact.gallery import box_lattice, side_of
+from fenics_contact.gallery import box_lattice, growing_ticks, side_of
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene import (
     Body,
@@ -33,21 +33,14 @@ PEAK = hertz_line(LINE_LOAD, 1 / ROLLER[0], MODULUS).peak_pressure
 RELIEF = LINE_LOAD / (np.pi * MODULUS)
 
 
-def _growing(end: float, first: float, growth: float) -> np.ndarray:
-    """Return places from 0 to an end, the first cell about as long as ``first``."""
-    count = int(np.ceil(np.log1p(end * (growth - 1) / first) / np.log(growth)))
-    places = np.cumsum(np.append(0.0, growth ** np.arange(count)))
-    return np.asarray(end * places / places[-1], dtype=np.float64)
-
-
 def _quarter() -> BodyMesh:
     """Mesh a quarter of a block under a cylindrical crown; "track" is what may touch."""
     radius, half_width, length = ROLLER
     far, wide = 2 * length, 1.5 * half_width
-    x = np.append(np.linspace(0, wide, 4), wide + _growing(far, half_width, 2.0)[1:])
-    y = length / 2 - _growing(length / 2, 1.5 * half_width, 1.4)[::-1]
-    y = np.append(y, length / 2 + _growing(far, 2.5 * half_width, 2.0)[1:])
-    mesh = box_lattice([x, y, -_growing(far, half_width, 2.0)[::-1]])
+    x = np.append(np.linspace(0, wide, 4), wide + growing_ticks(far, half_width, 2.0)[1:])
+    y = length / 2 - growing_ticks(length / 2, 1.5 * half_width, 1.4)[::-1]
+    y = np.append(y, length / 2 + growing_ticks(far, 2.5 * half_width, 2.0)[1:])
+    mesh = box_lattice([x, y, -growing_ticks(far, half_width, 2.0)[::-1]])
     points, top = mesh.points.copy(), mesh.surfaces["z1"]
     on = np.unique(top)[points[np.unique(top), 0] <= wide + 1e-9]
     points[on, 2] -= points[on, 0] ** 2 / (2 * radius)

@@ -13,6 +13,7 @@ from fenics_contact.gallery.rectangle import rectangle, rectangle_lattice, split
 from fenics_contact.gallery.ring import LinkShape
 from fenics_contact.gallery.side import side_of
 from fenics_contact.gallery.structured import split_hexahedra
+from fenics_contact.gallery.ticks import growing_ticks
 from fenics_contact.gallery.touch import PULL_AXIS, TwoLinks, two_links
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "chain_link",
     "drilled_plate",
     "extrude",
+    "growing_ticks",
     "half_cylinder",
     "half_disc",
     "hemisphere",

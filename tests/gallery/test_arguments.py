@@ -47,6 +47,7 @@ BUILDERS: list[tuple[Callable[..., object], dict[str, Any], list[str]]] = [
         {"shank": 0.9, "head": 1.6, "head_height": 0.5, "n": 1},
         ["n"],
     ),
+    (gallery.growing_ticks, {"length": 2.0, "first": 0.1, "ratio": 1.2}, []),
     (
         link,
         {"inner_radius": 11.0, "straight": 26.0, "thickness": 16.0, "width": 16.0, "grading": 1.0, "n_a": 3},
@@ -99,6 +100,7 @@ def test_what_are_no_corners_of_a_block_is_refused(value: Any) -> None:
         ),
         (lambda: gallery.block((0,) * 3, (1,) * 3, (9999,) * 3, "tetrahedron"), r"which take 1\.2 PB"),
         (lambda: gallery.rectangle((0, 0), (1, 1), (10**6, 10**6)), "must fit into the memory"),
+        (lambda: gallery.growing_ticks(1e20, 1e-3, 1.0 + 1e-15), "must fit into the memory"),
         (lambda: gallery.hemisphere(1.0, 10**5), "must fit into the memory"),
         (lambda: gallery.half_disc(1.0, 10**6), "must fit into the memory"),
         (

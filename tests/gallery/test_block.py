@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.gallery import block, box_lattice, rectangle, split_hexahedra
+from fenics_contact.gallery import block, box_lattice, growing_ticks, rectangle, split_hexahedra
 from fenics_contact.mesh import BodyMesh, vector_areas
 from fenics_contact.mesh.quality import scaled_jacobian
 
@@ -51,6 +51,17 @@ def test_planes_may_be_spaced_as_one_likes() -> None:
     mesh = box_lattice([np.array([0.0, 1.0, 4.0]), np.array([0.0, 1.0]), np.array([0.0, 2.0])])
     assert sorted(np.unique(mesh.points[:, 0])) == [0.0, 1.0, 4.0]
     assert mesh.volume == pytest.approx(8.0)
+
+
+def test_ticks_grow_from_the_first_cell_by_their_ratio_to_the_end() -> None:
+    ticks = growing_ticks(7.0, 0.1, 1.25)
+    cells = np.diff(ticks)
+    np.testing.assert_allclose(cells[1:] / cells[:-1], 1.25)
+    assert (ticks[0], ticks[-1]) == (0.0, 7.0)
+    assert 0.1 / 1.25 < cells[0] <= 0.1
+    for wrong in ((0.0, 0.1, 1.2), (1.0, -0.1, 1.2), (1.0, 0.1, 1.0)):
+        with pytest.raises(InvalidInputError, match=r"ratio greater than 1, got .*take numpy.linspace"):
+            growing_ticks(*wrong)
 
 
 def test_a_grading_makes_cells_small_at_one_corner() -> None:
