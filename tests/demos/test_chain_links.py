@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
+from typing import Any
 
 import pytest
 import pyvista as pv
 
-from fenics_contact.io import read_result
-
-ROOT = Path(__file__).parents[2]
 PICTURES = ["decomposition", "control_net", "convergence"]
 PICTURES += [f"{what}_{when}" for what in ("stress", "pressure") for when in ("before", "after")]
 
@@ -18,12 +15,9 @@ PICTURES += [f"{what}_{when}" for what in ("stress", "pressure") for when in ("b
 @pytest.mark.slow
 @pytest.mark.claim
 def test_the_small_demo_lowers_the_energy_and_leaves_pictures_files_and_result(
-    mpirun: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    demo: Callable[..., Any],
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    printed = mpirun(ROOT / "demos" / "demo_chain_links.py", 2, "--size", "small", timeout=300.0)
-    output = tmp_path / "output" / "chain_links"
-    result = read_result(output)
+    result, output, printed = demo("chain_links", "--size", "small", ranks=2, timeout=300.0)
     told, counts = result["optimisation"], result["counts"]
     assert result["ranks"] == 2
     assert (counts["torn_unknowns"], counts["subdomains"], told["design"]["variables"]) == (29568, 32, 28)
@@ -59,18 +53,11 @@ def test_the_small_demo_lowers_the_energy_and_leaves_pictures_files_and_result(
     [("energy", "strain_energy", 16073.7, 15134.6), ("pressure", "peak_pressure", 4386.6, 3042.6)],
 )
 def test_shapes_that_fit_lower_pressure_or_energy_and_keep_the_volume(
-    objective: str,
-    quantity: str,
-    before: float,
-    after: float,
-    mpirun: Callable[..., str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    objective: str, quantity: str, before: float, after: float, demo: Callable[..., Any]
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    demo = ROOT / "demos" / "demo_chain_links.py"
-    mpirun(demo, 2, "--size", "small", "--objective", objective, timeout=300.0)
-    result = read_result(tmp_path / "output" / f"chain_links_{objective}")
+    given = "--size", "small", "--objective", objective
+    result, output, _ = demo("chain_links", *given, ranks=2, timeout=300.0)
+    assert output.name == f"chain_links_{objective}"
     more = result["more"]
     assert more["volume_final"] == pytest.approx(more["volume_initial"], rel=1e-8)
     assert more[f"{quantity}_initial"] == pytest.approx(before, rel=1e-4)
@@ -78,6 +65,6 @@ def test_shapes_that_fit_lower_pressure_or_energy_and_keep_the_volume(
     assert result["optimisation"]["stop"]["evaluations"] <= 30
 
 
-def test_an_unknown_size_is_refused(mpirun: Callable[..., str]) -> None:
+def test_an_unknown_size_is_refused(demo: Callable[..., Any]) -> None:
     with pytest.raises(pytest.fail.Exception, match=r"--size: invalid choice: 'huge'"):
-        mpirun(ROOT / "demos" / "demo_chain_links.py", 1, "--size", "huge")
+        demo("chain_links", "--size", "huge")

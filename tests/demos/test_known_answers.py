@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-
-from fenics_contact.io import read_result
-
-ROOT = Path(__file__).parents[2]
 
 #: Of each demo: what its result holds, on any number of ranks, and its pictures. That the numbers are those
 #: of theory is for the demos to assert; they end with an error otherwise.
@@ -75,16 +71,13 @@ SLOW = {"uncertain_friction"}
     "name", [name if name in SLOW else pytest.param(name, marks=pytest.mark.claim) for name in DEMOS]
 )
 def test_a_demo_finds_its_number_on_one_rank_and_on_two(
-    name: str, ranks: int, mpirun: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, ranks: int, demo: Callable[..., Any]
 ) -> None:
     numbers, pictures = DEMOS[name]
-    monkeypatch.chdir(tmp_path)
-    printed = mpirun(ROOT / "demos" / f"demo_{name}.py", ranks, timeout=120.0)
+    result, output, printed = demo(name, ranks=ranks)
     assert printed.count("pictures and files in") == 1, "one rank prints"
     assert ("1 rank\n" if ranks == 1 else "2 ranks\n") in printed
-    output = tmp_path / "output" / name
-    result = read_result(output)
-    assert result["ranks"] == ranks
+    assert (output.name, result["ranks"]) == (name, ranks)
     for key, value in numbers.items():
         np.testing.assert_allclose(result["more"][key], value, rtol=2e-4, err_msg=key)
     assert {path.stem for path in output.glob("*.png")} == pictures
