@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
@@ -26,6 +26,7 @@ from tests.shape.blocks import block_on_block, block_on_floor, designs_of
 from tests.shape.chains import SOLVER
 from tests.shape.mortar_lines import by_mortar
 from tests.shape.plane_blocks import on_block, on_obstacle
+from tests.shape.quotients import Way
 
 Steps = Sequence[tuple[str, tuple[float, ...]]]
 #: Loads on the top of plane blocks: pressed, pushed until some points slip, pulled back, half unloaded.
@@ -90,50 +91,32 @@ def moved(scene: Scene) -> tuple[SurfaceDesign, ...]:
     return tuple(SurfaceDesign(side.body, side.name, 5) for side in sides)
 
 
-@dataclass(frozen=True)
-class PathLine:
-    """Designs α + s v of one path.
-
-    Attributes:
-        path: Solves them.
-        alpha: α, the design in the middle.
-        direction: v.
-        step: s of the difference quotients; Taylor remainders are taken at multiples of it.
-    """
-
-    path: LoadPath
-    alpha: np.ndarray
-    direction: np.ndarray
-    step: float = 1e-5
-
-    def at(self, multiple: float) -> np.ndarray:
-        return self.alpha + multiple * self.step * self.direction
+class PathLine(Way[LoadPath]):
+    """Designs of one path, judged by its objectives."""
 
     def value(self, multiple: float) -> float:
-        return self.path.value_of(self.at(multiple))
+        return self.problem.value_of(self.at(multiple))
 
     def slope(self) -> float:
         """The adjoints' directional derivative."""
-        return float(self.path(self.alpha)[1] @ self.direction)
+        return float(self.problem(self.alpha)[1] @ self.direction)
 
     def quotient(self) -> float:
         """The central difference quotient."""
-        return (self.value(1.0) - self.value(-1.0)) / (2.0 * self.step)
+        return self.quotient_of(self.value)
 
     def taylor_rate(self) -> float:
         """Order at which J(α + s v) − J(α) − s J'(α; v) vanishes with s."""
-        start, slope = self.value(0.0), self.slope()
-        near, far = (abs(self.value(m) - start - m * self.step * slope) for m in (4.0, 8.0))
-        return float(np.log2(far / near))
+        return self.rate_of(self.value, self.slope())
 
 
 def line_of(path: LoadPath) -> PathLine:
     alpha = 0.004 * np.random.default_rng(1).standard_normal(path.size)
-    return PathLine(path, alpha, np.random.default_rng(6).standard_normal(path.size))
+    return PathLine(path, alpha, np.random.default_rng(6).standard_normal(path.size), 1e-5)
 
 
 if __name__ == "__main__":
     here = line_of(path_of(sys.argv[1], MPI.COMM_WORLD))
-    value, gradient = here.path(here.alpha)
+    value, gradient = here.problem(here.alpha)
     if MPI.COMM_WORLD.rank == 0:
         print(value, *gradient)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, State, Status
 from fenics_contact.shape import DesignPoint, Objective, ShapeProblem
+
+Problem = TypeVar("Problem")
 
 
 class Remembering(ShapeProblem):
@@ -43,17 +46,18 @@ class Remembering(ShapeProblem):
 
 
 @dataclass(frozen=True)
-class Line:
+class Way(Generic[Problem]):
     """Designs α + s v of one problem.
 
     Attributes:
         problem: Solves them.
         alpha: α, the design in the middle.
         direction: v.
-        step: s of the difference quotients; Taylor remainders are taken at multiples of it.
+        step: s of the difference quotients.
+        taylor: Multiples of it at which Taylor remainders are taken.
     """
 
-    problem: Remembering
+    problem: Problem
     alpha: np.ndarray
     direction: np.ndarray
     step: float = 1e-3
@@ -61,6 +65,20 @@ class Line:
 
     def at(self, multiple: float) -> np.ndarray:
         return self.alpha + multiple * self.step * self.direction
+
+    def quotient_of(self, value: Callable[[float], float]) -> float:
+        """The central difference quotient of values at multiples of the step."""
+        return (value(1.0) - value(-1.0)) / (2.0 * self.step)
+
+    def rate_of(self, value: Callable[[float], float], slope: float) -> float:
+        """Order at which J(α + s v) − J(α) − s J'(α; v) vanishes with s."""
+        start = value(0.0)
+        near, far = (abs(value(m) - start - m * self.step * slope) for m in self.taylor)
+        return float(np.log(far / near) / np.log(self.taylor[1] / self.taylor[0]))
+
+
+class Line(Way[Remembering]):
+    """Designs of one problem, judged by several objectives."""
 
     def state(self, multiple: float = 0.0) -> State:
         return self.problem.state_of(self.at(multiple))
@@ -77,7 +95,7 @@ class Line:
 
     def quotient(self, objective: Objective) -> float:
         """The central difference quotient."""
-        return (self.value(objective, 1.0) - self.value(objective, -1.0)) / (2 * self.step)
+        return self.quotient_of(partial(self.value, objective))
 
     def miss(self, objective: Objective) -> float:
         """Relative difference of the two."""
@@ -86,9 +104,7 @@ class Line:
 
     def taylor_rate(self, objective: Objective) -> float:
         """Order at which J(α + s v) − J(α) − s J'(α; v) vanishes with s."""
-        start, slope = self.value(objective), self.slope(objective)
-        near, far = (abs(self.value(objective, m) - start - m * self.step * slope) for m in self.taylor)
-        return float(np.log(far / near) / np.log(self.taylor[1] / self.taylor[0]))
+        return self.rate_of(partial(self.value, objective), self.slope(objective))
 
     def steepness(self, objective: Objective) -> float:
         """Slope along v relative to the steepest: zero if the derivative says nothing."""

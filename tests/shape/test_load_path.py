@@ -47,7 +47,7 @@ def line(name: str) -> PathLine:
 
 
 def counts(here: PathLine, multiple: float = 0.0) -> list[list[int]]:
-    states = here.path.states_of(here.at(multiple))
+    states = here.problem.states_of(here.at(multiple))
     return [state.contact.status.tolist() for state in states.values()]
 
 
@@ -58,7 +58,7 @@ def test_the_adjoints_agree_with_central_differences(name: str) -> None:
     assert all(any(status in step for step in middle) for status in Status)
     assert counts(here, 1.0) == middle == counts(here, -1.0)
     assert here.slope() == pytest.approx(here.quotient(), rel=1e-5)
-    assert abs(here.slope()) > 0.01 * np.linalg.norm(here.path(here.alpha)[1])
+    assert abs(here.slope()) > 0.01 * np.linalg.norm(here.problem(here.alpha)[1])
 
 
 @pytest.mark.parametrize("name", ["floor", "space, mortar"])
@@ -67,7 +67,7 @@ def test_taylor_remainders_are_quadratic(name: str) -> None:
 
 
 def test_points_open_and_close_again_and_slip_in_both_directions() -> None:
-    states = list(line("floor").path.states_of(line("floor").alpha).values())
+    states = list(line("floor").problem.states_of(line("floor").alpha).values())
     opened = [state.contact.status == Status.OPEN for state in states]
     assert np.any(opened[1] & ~opened[2])
     slips = [state.contact.slip[state.contact.status == Status.SLIP, 0] for state in states]
@@ -119,7 +119,7 @@ def test_the_states_are_those_of_load_steps_and_the_value_is_what_friction_dissi
 
 
 def test_steps_of_a_design_share_matrices_and_factors() -> None:
-    states = list(line("floor").path.states_of(line("floor").alpha).values())
+    states = list(line("floor").problem.states_of(line("floor").alpha).values())
     for state in states[1:]:
         assert state.torn.points is states[0].torn.points
         pairs = zip(state.dual.inverse.operators, states[0].dual.inverse.operators, strict=True)
@@ -201,14 +201,14 @@ def test_ranks_find_the_same(name: str, ranks: tuple[int, ...], mpirun: Callable
 
 def test_a_gradient_beside_a_weak_design_is_that_of_a_design_nearby() -> None:
     here = line("floor")
-    assert not here.path.doubtful(here.alpha)
-    beside = here.path.beside(here.alpha, here.at(1.0))
-    near = here.path(here.alpha + 1e-2 * (here.at(1.0) - here.alpha))[1]
+    assert not here.problem.doubtful(here.alpha)
+    beside = here.problem.beside(here.alpha, here.at(1.0))
+    near = here.problem(here.alpha + 1e-2 * (here.at(1.0) - here.alpha))[1]
     np.testing.assert_allclose(beside, near, rtol=1e-8)
 
 
 def test_a_later_step_alone_has_no_derivative() -> None:
-    path = line("floor").path
+    path = line("floor").problem
     states = list(path.states_of(line("floor").alpha).values())
     first = path.problems["press"]
     assert first.differentiate(states[0]).value > 0.0
