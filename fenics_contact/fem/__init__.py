@@ -5,6 +5,7 @@ from __future__ import annotations
 from fenics_contact.fem.composition import Composition, composition, integrate, material_sets
 from fenics_contact.fem.forms import FormLibrary, Template, volume_measure
 from fenics_contact.fem.history import History
+from fenics_contact.fem.history_checks import check_history_material
 from fenics_contact.fem.load_forms import (
     Symbol,
     is_scalar,
@@ -36,6 +37,7 @@ __all__ = [
     "Written",
     "as_tractions",
     "cell_stiffness",
+    "check_history_material",
     "check_kernel",
     "composition",
     "integrate",
