@@ -35,7 +35,8 @@ def friction_of(system: DualSystem) -> tuple[np.ndarray, np.ndarray | None]:
         The part of the slip bound that is given, shape (n_friction,), [force], and the friction coefficient,
         shape (n_friction,), None if it is zero everywhere.
     """
-    discs, torn = system.owned_discs(), system.torn
+    torn = system.torn
+    discs = torn.owned_discs
     coefficient = torn.friction_coefficient[discs] if np.any(torn.friction_coefficient > 0) else None
     return torn.tresca_bound[discs], coefficient
 

@@ -51,5 +51,5 @@ def _matches(before: ContactPoints, after: ContactPoints) -> np.ndarray:
 
 
 def _put(system: DualSystem, vector: np.ndarray, rows: np.ndarray, values: np.ndarray) -> None:
-    position = system.positions(rows)
+    position = system.torn.numbering.owned_index(rows)
     vector[position[position >= 0]] = values[position >= 0]

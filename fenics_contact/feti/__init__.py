@@ -1,29 +1,39 @@
 """Total FETI: torn systems, contact rows, the dual problem and its operators."""
 
+from fenics_contact.feti.condensation import Condensations
 from fenics_contact.feti.decomposition import Decomposition, decompose
 from fenics_contact.feti.direct import DirectSolution, DirectSystem
 from fenics_contact.feti.dual import DualSystem
-from fenics_contact.feti.inverse import LocalKind
+from fenics_contact.feti.factor import Factor, fixing_nodes
+from fenics_contact.feti.inverse import LocalKind, TornInverse, kernel_matrix
+from fenics_contact.feti.local import LocalOperator
 from fenics_contact.feti.nodal_mean import nodal_mean, nodal_mean_at, nodal_mean_transposed
 from fenics_contact.feti.nodal_sum import nodal_sum
 from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.feti.sharing import Sharing
-from fenics_contact.feti.subdomain import Subdomain, common_kernel
+from fenics_contact.feti.subdomain import CachedMatrix, Subdomain, common_kernel
 from fenics_contact.feti.torn import TornSystem, build_torn_system
 
 __all__ = [
+    "CachedMatrix",
+    "Condensations",
     "Decomposition",
     "DirectSolution",
     "DirectSystem",
     "DualSystem",
+    "Factor",
     "LocalKind",
+    "LocalOperator",
     "Sharing",
     "Subdomain",
+    "TornInverse",
     "TornSystem",
     "build_torn_system",
     "check_same_input",
     "common_kernel",
     "decompose",
+    "fixing_nodes",
+    "kernel_matrix",
     "nodal_mean",
     "nodal_mean_at",
     "nodal_mean_transposed",

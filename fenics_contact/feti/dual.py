@@ -16,7 +16,7 @@ from fenics_contact.feti.inverse import LocalKind, TornInverse, kernel_matrix
 from fenics_contact.feti.kernel_basis import whole_motions
 from fenics_contact.feti.torn import TornSystem
 from fenics_contact.linalg import ROUNDING, sweep
-from fenics_contact.qp import EVEN, CoarseSpace, ContactLayout, DualProblem, Scaling
+from fenics_contact.qp import EVEN, CoarseSpace, DualProblem, Scaling
 from fenics_contact.timing import PhaseTimer
 
 #: Substitute flexibility of rows that have none, relative to the mean of all contact rows.
@@ -74,7 +74,7 @@ class DualSystem:
             known = None if previous is None else previous.inverse
             condensations = torn.decomposition.condensations
             with together(comm):
-                self.inverse = TornInverse(torn.subdomains, torn.B, condensations, kind=kind, previous=known)
+                self.inverse = self._inverse(torn, condensations, kind, known)
         if previous is not None and self._is_that_of(previous):
             self._take_over(previous, timer)
         else:
@@ -82,6 +82,12 @@ class DualSystem:
         bent = self.inverse(torn.load)
         self._bent = bent[self.inverse.interface]
         self.problem = replace(self.problem, rhs=self.jump(bent) - torn.right)
+
+    def _inverse(
+        self, torn: TornSystem, condensations: Condensations, kind: LocalKind, known: TornInverse | None
+    ) -> TornInverse:
+        """Factor the subdomains."""
+        return TornInverse(torn.subdomains, torn.B, condensations, kind=kind, previous=known)
 
     def _is_that_of(self, previous: DualSystem) -> bool:
         """Return whether F and G are those of an earlier system. Collective."""
@@ -125,7 +131,7 @@ class DualSystem:
             self.apply,
             nothing,
             coarse,
-            self._layout(),
+            self.torn.layout,
             diagonal,
             preconditioner,
             scaling,
@@ -213,17 +219,6 @@ class DualSystem:
         sewn = self.sewn(self.torn.right - self.jump(displacement))
         return self._at_rest(displacement + self.inverse.extend(sewn))
 
-    def positions(self, rows: np.ndarray) -> np.ndarray:
-        """Return the positions of rows in this rank's owned vector, −1 for rows of other ranks."""
-        numbering = self.torn.numbering
-        index = np.searchsorted(numbering.owned, rows)
-        index = np.minimum(index, max(len(numbering.owned) - 1, 0))
-        return (
-            np.where(numbering.owned[index] == rows, index, -1)
-            if len(numbering.owned)
-            else np.full(rows.shape, -1)
-        )
-
     def _kernel(self, comm: MPI.Comm) -> sp.csr_matrix:
         counts = np.zeros(self.torn.decomposition.tearing.n_subdomains, dtype=np.int64)
         for subdomain in self.torn.subdomains:
@@ -295,21 +290,6 @@ class DualSystem:
         columns.eliminate_zeros()
         return columns
 
-    def _layout(self) -> ContactLayout:
-        torn = self.torn
-        normal = self.positions(torn.normal_rows)
-        tangential = self.positions(torn.tangential_rows)
-        owned = normal >= 0
-        index = np.cumsum(owned) - 1
-        discs = tangential[:, 0] >= 0
-        return ContactLayout(
-            len(torn.numbering.owned), normal[owned], tangential[discs], index[torn.frictional[discs]]
-        )
-
-    def owned_discs(self) -> np.ndarray:
-        """Return which frictional points' discs this rank owns, positions in ``torn.frictional``."""
-        return np.flatnonzero(self.positions(self.torn.tangential_rows)[:, 0] >= 0)
-
     def _compliance(self) -> np.ndarray:
         """Return 1 / the typical stiffness at each interface dof."""
         decomposition = self.torn.decomposition
@@ -326,7 +306,7 @@ class DualSystem:
             numbering.to_owned(np.asarray(squares @ weight)).clip(np.finfo(float).tiny)
             for weight in (np.ones(B.shape[1]), self._compliance())
         )
-        factor, layout = np.sqrt(plain / weighted), self._layout()
+        factor, layout = np.sqrt(plain / weighted), self.torn.layout
         factor[layout.tangential] = factor[layout.tangential_frictional, None]
         low = numbering.comm.allreduce(factor.min(initial=np.inf), op=MPI.MIN)
         high = numbering.comm.allreduce(factor.max(initial=0.0), op=MPI.MAX)
@@ -350,7 +330,7 @@ class DualSystem:
         Returns:
             The diagonal, and marks of the rows that got a small one, both owned.
         """
-        layout, comm = self._layout(), self.torn.numbering.comm
+        layout, comm = self.torn.layout, self.torn.numbering.comm
         total, count = comm.allreduce(
             np.array([diagonal[layout.contact].sum(), np.count_nonzero(diagonal[layout.contact])])
         )

@@ -27,14 +27,18 @@ class Factor:
         pc = PETSc.PC().create(PETSc.COMM_SELF)
         pc.setOperators(given)
         pc.setType(PETSc.PC.Type.CHOLESKY)
-        pc.setFactorSolverType(_solver())
-        pc.setUp()
+        self._set_up(pc, given)
         self._factor = pc.getFactorMatrix()
         self._right, self._left = given.createVecs()
         # Only the factor is stored: the copy of the matrix would take another third of its memory.
         pc.destroy()
         given.destroy()
         dispose_with(self, self._factor, self._right, self._left)
+
+    def _set_up(self, pc: PETSc.PC, given: PETSc.Mat) -> None:
+        """Choose a library and factor."""
+        pc.setFactorSolverType(_solver())
+        pc.setUp()
 
     def solve(self, right: np.ndarray, out: np.ndarray) -> None:
         """Write the solution for one right side, shape (n,), into ``out``."""

@@ -70,7 +70,7 @@ class TornInverse:
             local = interface_dofs(marks, subdomain.kernel, subdomain.points)
             known = None if previous is None else previous._operator_of(index, subdomain, local, kind)
             self.factored += known is None
-            self.operators.append(known or _factored(subdomain, local, condensations, kind))
+            self.operators.append(known or self._factor(subdomain, local, condensations))
             subdomain.matrix.forget()
             self._local.append(local)
         starts = np.cumsum([0] + [len(local) for local in self._local])
@@ -137,6 +137,12 @@ class TornInverse:
             if len(touched):
                 flexibility[touched] += operator.row_flexibility(block[touched])
         return flexibility
+
+    def _factor(
+        self, subdomain: Subdomain, interface: np.ndarray, condensations: Condensations
+    ) -> LocalOperator:
+        """Factor one subdomain."""
+        return _factored(subdomain, interface, condensations, self._kind)
 
     def _each(
         self,

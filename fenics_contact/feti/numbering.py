@@ -66,6 +66,13 @@ class DualNumbering:
         """Return the positions of rows in the concatenation of all ranks' owned parts."""
         return self._position[rows]
 
+    def owned_index(self, rows: np.ndarray) -> np.ndarray:
+        """Return the positions of rows in this rank's owned vector, −1 for rows of other ranks."""
+        if len(self.owned) == 0:
+            return np.full(rows.shape, -1)
+        index = np.minimum(np.searchsorted(self.owned, rows), len(self.owned) - 1)
+        return np.where(self.owned[index] == rows, index, -1)
+
     def to_local(self, owned: np.ndarray) -> np.ndarray:
         """Return the local vector (owned, then ghosts) of an owned one. Collective."""
         self._vector.array_w[:] = owned

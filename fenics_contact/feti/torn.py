@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -32,6 +33,7 @@ from fenics_contact.pairing import (
     friction_data,
     join_points,
 )
+from fenics_contact.qp import ContactLayout
 from fenics_contact.scene import Scene
 
 _LOG = logging.getLogger(__name__)
@@ -197,6 +199,19 @@ class TornSystem:
         """Row numbers of every frictional point's tangential multipliers, shape (n_friction, dim - 1)."""
         start, width = self.n_equality + self.points.count, self.dim - 1
         return start + np.arange(width * len(self.frictional)).reshape(-1, width)
+
+    @cached_property
+    def layout(self) -> ContactLayout:
+        """Positions of this rank's contact multipliers."""
+        normal, tangential = map(self.numbering.owned_index, (self.normal_rows, self.tangential_rows))
+        owned, discs = normal >= 0, self.owned_discs
+        contact = (np.cumsum(owned) - 1)[self.frictional[discs]]
+        return ContactLayout(len(self.numbering.owned), normal[owned], tangential[discs], contact)
+
+    @cached_property
+    def owned_discs(self) -> np.ndarray:
+        """The frictional points whose discs this rank owns, positions in `frictional`."""
+        return np.flatnonzero(self.numbering.owned_index(self.tangential_rows[:, 0]) >= 0)
 
     @property
     def load(self) -> np.ndarray:

@@ -14,11 +14,11 @@ from fenics_contact.qp.face_newton import FaceNewton, ProjectedCG
 from fenics_contact.qp.face_system import CoupledSystem, FaceSystem, FaceSystems
 from fenics_contact.qp.feasible import FeasibleSet
 from fenics_contact.qp.iterate import Start, apply_unless_zero, iterate_at
-from fenics_contact.qp.krylov import FaceStep, Stop, projected_cg, projected_gmres
+from fenics_contact.qp.krylov import FaceStep, Kept, Stop, gmres, projected_cg, projected_gmres
 from fenics_contact.qp.layout import ContactLayout
 from fenics_contact.qp.mpgp import Mpgp
 from fenics_contact.qp.problem import EVEN, CountedOperator, DualProblem, Scaling
-from fenics_contact.qp.reductions import Vector, global_max, global_sum
+from fenics_contact.qp.reductions import Vector, global_max, global_min, global_sum
 from fenics_contact.qp.slip_law import CoulombLaw, SlipLaw, TrescaLaw
 from fenics_contact.qp.smalse import Smalse
 from fenics_contact.qp.solution import (
@@ -49,6 +49,7 @@ __all__ = [
     "FaceSystem",
     "FaceSystems",
     "FeasibleSet",
+    "Kept",
     "Marks",
     "Mpgp",
     "ProjectedCG",
@@ -68,7 +69,9 @@ __all__ = [
     "face_basis",
     "find_equilibrium",
     "global_max",
+    "global_min",
     "global_sum",
+    "gmres",
     "iterate_at",
     "measure",
     "projected_cg",

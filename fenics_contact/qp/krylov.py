@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from typing import TypeAlias
 
 import numpy as np
 
@@ -185,24 +187,87 @@ def projected_gmres(
         Y. Saad, Iterative Methods for Sparse Linear Systems, 2nd ed. (2003), algorithms 6.9 and 9.5.
     """
     comm, operator = coupled.system.comm, coupled.system.operator
+
+    def expand(vector: Vector) -> tuple[Vector, Kept]:
+        direction = coupled.precondition(vector / weights)
+        full = operator(coupled.moving @ direction)
+        return weights * coupled.image(direction, full), (direction, full)
+
     first = -weights * coupled.oblique(gradient)
+    found = gmres(comm, first, expand, tolerance, max_iterations, coupled.system.patience)
+    step, product = found.combined(0, len(gradient)), found.combined(1, coupled.moving.shape[0])
+    residual = coupled.oblique(gradient + coupled.operate(step, product))
+    left = float(np.sqrt(global_sum(comm, (weights * residual) @ (weights * residual))[0]))
+    stop = found.stop
+    if stop is Stop.CONVERGED and left > FALSE_HOPE * tolerance:
+        # Rounding was taken for the image of a direction that has none.
+        stop = Stop.NO_CURVATURE
+    return FaceStep(step, product, residual, found.iterations, max(left, found.residual), stop)
+
+
+#: What is kept of each direction of GMRES: vectors whose combination is the solution.
+Kept: TypeAlias = tuple[Vector, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Krylov:
+    """The outcome of GMRES: factors of the directions, and what was kept of each.
+
+    Attributes:
+        factors: One for each direction, replicated.
+        kept: The vectors of every direction.
+        residual: Norm of the residual, by recursion.
+        stop: Why the iteration ended.
+    """
+
+    factors: Vector
+    kept: tuple[Kept, ...]
+    residual: float
+    stop: Stop
+
+    @property
+    def iterations(self) -> int:
+        """Number of directions."""
+        return len(self.kept)
+
+    def combined(self, kind: int, length: int) -> Vector:
+        """Return the sum of factor times vector, of one kind of vectors of a given length."""
+        if not self.kept:
+            return np.zeros(length)
+        return np.asarray(self.factors @ np.array([vectors[kind] for vectors in self.kept]))
+
+
+def gmres(
+    comm: MPI.Comm,
+    first: Vector,
+    expand: Callable[[Vector], tuple[Vector, Kept]],
+    tolerance: float,
+    max_iterations: int,
+    patience: int,
+) -> Krylov:
+    """Combine directions whose images sum up to ``first``, by GMRES without restart. Collective.
+
+    Args:
+        comm: Communicator over which vectors are distributed.
+        first: The right side, owned.
+        expand: Maps a Krylov vector to the image of its preconditioned direction, and what to keep of that.
+        tolerance: Stop when the norm of the residual is at most this.
+        max_iterations: Largest number of directions.
+        patience: Directions without progress after which to give up.
+    """
     size = float(np.sqrt(global_sum(comm, first @ first)[0]))
-    # Krylov vectors v, preconditioned directions z and products F Z z.
-    basis = _Rows(len(gradient), len(gradient), coupled.moving.shape[0])
-    small = _LeastSquares(size)
-    stop = Stop.CONVERGED
+    basis, kept, small, stop = _Rows(len(first)), list[Kept](), _LeastSquares(size), Stop.CONVERGED
     vector: Vector = np.asarray(first / (size or 1.0), dtype=np.float64)
     while not small.residual <= tolerance:
         if basis.count == max_iterations:
             stop = Stop.ITERATION_LIMIT
             break
-        direction = coupled.precondition(vector / weights)
-        full = operator(coupled.moving @ direction)
-        image = weights * coupled.image(direction, full)
-        basis.append(vector, direction, full)
+        image, vectors = expand(vector)
+        basis.append(vector)
+        kept.append(vectors)
         image, column = _orthogonalised(comm, basis[0], image)
         small.append(column)
-        if basis.count - small.last_progress > coupled.system.patience:
+        if basis.count - small.last_progress > patience:
             stop = Stop.STAGNATION
             break
         if column[-1] == 0.0:
@@ -210,14 +275,7 @@ def projected_gmres(
             stop = Stop.CONVERGED if small.residual <= tolerance else Stop.NO_CURVATURE
             break
         vector = image / column[-1]
-    factors = small.solution()
-    step, product = factors @ basis[1], factors @ basis[2]
-    residual = coupled.oblique(gradient + coupled.operate(step, product))
-    left = float(np.sqrt(global_sum(comm, (weights * residual) @ (weights * residual))[0]))
-    if stop is Stop.CONVERGED and left > FALSE_HOPE * tolerance:
-        # Rounding was taken for the image of a direction that has none.
-        stop = Stop.NO_CURVATURE
-    return FaceStep(step, product, residual, basis.count, max(left, small.residual), stop)
+    return Krylov(small.solution(), tuple(kept), small.residual, stop)
 
 
 def _orthogonalised(comm: MPI.Comm, vectors: Vector, image: Vector) -> tuple[Vector, Vector]:

@@ -86,7 +86,7 @@ def on_rows(state: State, normal: np.ndarray | None, tangential: np.ndarray | No
     if tangential is not None:
         parts.append((torn.tangential_rows.ravel(), tangential[torn.frictional].ravel()))
     for rows, values in parts:
-        position = state.dual.positions(rows)
+        position = state.torn.numbering.owned_index(rows)
         result[position[position >= 0]] = values[position >= 0]
     return result
 

@@ -20,7 +20,7 @@ def bound_sensitivity(
     force = partials.by_multiplier - system.jump(adjoint.displacement)
     mine = np.einsum("na,na->n", linearised.slip_direction, force[system.problem.layout.tangential])
     result = np.zeros(len(system.torn.frictional))
-    result[system.owned_discs()] = mine
+    result[system.torn.owned_discs] = mine
     return np.asarray(system.problem.comm.allreduce(result))
 
 

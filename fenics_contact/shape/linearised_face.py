@@ -102,7 +102,7 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
     layout, bound = system.problem.layout, solution.slip_bound
     step = contact_step(layout, system.problem.diagonal)
     trial = solution.multiplier - step * solution.residual
-    coefficient = system.torn.friction_coefficient[system.owned_discs()]
+    coefficient = system.torn.friction_coefficient[system.torn.owned_discs]
     length = np.linalg.norm(trial[layout.tangential], axis=1)
     # Two slacks: every point that may be weak is counted, but only one that leans to no side is reassigned.
     uncertainty, closest = _uncertainty(system.problem, solution, step)

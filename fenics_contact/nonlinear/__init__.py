@@ -1,0 +1,6 @@
+"""Large deformations and nonlinear materials: Newton's method on the torn system."""
+
+from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation
+from fenics_contact.nonlinear.newton import Equilibrium, TangentNewton
+
+__all__ = ["Configuration", "Equations", "Equilibrium", "Evaluation", "TangentNewton"]

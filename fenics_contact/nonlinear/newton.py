@@ -1,0 +1,232 @@
+"""Newton's method for one load step: geometry, materials and contact in one loop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fenics_contact.display import displayed
+from fenics_contact.errors import ConvergenceError
+from fenics_contact.feti import TornSystem
+from fenics_contact.nonlinear.equations import (
+    Configuration,
+    Equations,
+    Evaluation,
+    advanced,
+    law_of,
+    natural_step,
+    tangent_problem,
+)
+from fenics_contact.nonlinear.tangent_step import TangentStep, tangent_step
+from fenics_contact.nonlinear.tangent_system import TangentSystem
+from fenics_contact.qp import CoulombLaw, FaceNewton, SlipLaw, SolverStep, Stop, Vector, classify, global_sum, solve
+from fenics_contact.timing import PhaseTimer
+
+#: Part of the smallest det F that a step must leave.
+ROOM = 0.2
+#: Steps without half the residual after which the natural map becomes more cautious, and by how much.
+PATIENCE, CAUTION = 4, 0.2
+#: Residual of contact problems that are solved as a whole, at the start of a history.
+NESTED = 1e-4
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """The end of a load step.
+
+    Attributes:
+        evaluation: The equations there; all residuals are below the tolerance.
+        system: The last linearisation, from a little before.
+        history: One line for each Newton step.
+        products: Applications of F.
+        factorisations: Factored tangents, counting all subdomains as one.
+    """
+
+    evaluation: Evaluation
+    system: TangentSystem
+    history: tuple[SolverStep, ...]
+    products: int
+    factorisations: int
+
+    @property
+    def configuration(self) -> Configuration:
+        """The configuration, with the history of its materials up to date."""
+        return replace(self.evaluation.at, history=self.evaluation.history)
+
+
+@displayed
+@dataclass(frozen=True)
+class TangentNewton:
+    """Newton's method with exact tangents; every step solves one face of the linearised contact problem.
+
+    The face is that which the natural map selects at the present displacement; its linear system is solved
+    as accurately as progress warrants. A step is shortened where it would invert cells.
+
+    Attributes:
+        tolerance: All relative residuals end below it: forces out of balance, openings of glued rows and
+            supports, contact.
+        max_steps: Largest number of Newton steps of a load step.
+        max_products: Largest number of F-products of one Newton step.
+        forcing: Largest residual of a linear system, relative to its start.
+
+    References:
+        S. C. Eisenstat, H. F. Walker, Choosing the forcing terms in an inexact Newton method, SIAM J. Sci.
+        Comput. 17 (1996), choice 2.
+    """
+
+    tolerance: float = 1e-8
+    max_steps: int = 25
+    max_products: int = 400
+    forcing: float = 0.1
+
+    def solve(
+        self, equations: Equations, torn: TornSystem, start: Configuration, timer: PhaseTimer, known: TangentSystem | None
+    ) -> Equilibrium:
+        """Return the equilibrium next to a configuration. Collective.
+
+        Args:
+            equations: Internal forces.
+            torn: The system with loads, supports and origin of slip.
+            start: The configuration before, with the history of its materials.
+            timer: Collects the wall time.
+            known: An earlier linearisation with the same rows, or None.
+
+        Raises:
+            ConvergenceError: With the history, which ends with the reason.
+        """
+        run = _Run(self, equations, torn, law_of(torn), timer)
+        return run.to_equilibrium(start, known)
+
+
+class _Run:
+    """One load step."""
+
+    def __init__(
+        self, method: TangentNewton, equations: Equations, torn: TornSystem, law: SlipLaw, timer: PhaseTimer
+    ) -> None:
+        self._method, self._equations, self._torn, self._law = method, equations, torn, law
+        self._timer, self._comm = timer, torn.numbering.comm
+        self._caution = 1.0
+        self.history: list[SolverStep] = []
+        self._residuals: list[float] = []
+        self._forcing = method.forcing
+        self.products = self.factorisations = 0
+
+    def to_equilibrium(self, at: Configuration, known: TangentSystem | None) -> Equilibrium:
+        method, system = self._method, known
+        while True:
+            step = np.zeros(self._torn.layout.size) if system is None else natural_step(system, self._caution)
+            with self._timer.phase("assemble"):
+                evaluation = self._equations.evaluate(self._torn, self._law, at, step)
+            residuals = evaluation.residuals
+            if self.history:
+                self.history[-1] = replace(self.history[-1], residuals=residuals)
+            if system is not None and residuals.within(method.tolerance):
+                return Equilibrium(evaluation, system, tuple(self.history), self.products, self.factorisations)
+            self._require_progress(evaluation)
+            system = evaluation.linearised(self._timer, system)
+            self.factorisations += 1
+            with self._timer.phase("solve"):
+                at = self._advanced(evaluation, system)
+
+    def _require_progress(self, evaluation: Evaluation) -> None:
+        """Adapt the forcing term and ρ. Collective.
+
+        Raises:
+            ConvergenceError: Steps are used up, or residuals grow without bound.
+        """
+        worst, method = evaluation.residuals.worst, self._method
+        previous = self._residuals[-1] if self._residuals else None
+        self._residuals.append(worst)
+        if len(self.history) >= method.max_steps or not worst < 1e6:
+            last = self.history[-1] if self.history else "no step"
+            raise ConvergenceError(
+                f"Newton's method needs residuals below {method.tolerance:.1e}, got after "
+                f"{len(self.history)} steps: {last}: take smaller load steps",
+                self.history,
+            )
+        if previous is None or previous >= 1.0:
+            self._forcing = method.forcing
+        else:
+            chosen = 0.9 * (worst / previous) ** 2
+            careful = 0.9 * self._forcing**2
+            self._forcing = min(method.forcing, max(chosen, careful if careful > 0.1 else 0.0))
+        self._forcing = max(self._forcing, 0.3 * method.tolerance / max(worst, method.tolerance))
+        late = self._residuals[-PATIENCE - 1 :]
+        if len(late) > PATIENCE and min(late[1:]) > 0.5 * late[0]:
+            self._caution *= CAUTION
+            self._residuals = [worst]
+
+    def _advanced(self, evaluation: Evaluation, system: TangentSystem) -> Configuration:
+        """Take one step. Collective."""
+        at, step = evaluation.at, natural_step(system, self._caution)
+        floor = 0.1 * self._method.tolerance * evaluation.residuals.gluing_scale
+        problem = tangent_problem(system, self._law, evaluation)
+        new = self._torn.points.count > 0 and not self._touching(at.multiplier)
+        taken = None
+        if not new:
+            taken = tangent_step(problem, step, self._forcing, floor, self._method.max_products)
+        whole = taken is None
+        if taken is None:
+            taken = self._whole(system, evaluation, step)
+        self.products += taken.products
+        change = taken.multiplier - at.multiplier
+        moved = system.displacement(change, taken.motions)
+        part = self._room(evaluation, moved)
+        self._record(evaluation, system, taken, part, whole)
+        return advanced(at, at.displacement + part * moved, at.multiplier + part * change)
+
+    def _touching(self, multiplier: Vector) -> bool:
+        contact = self._torn.layout.contact
+        return float(global_sum(self._comm, np.count_nonzero(multiplier[contact]))[0]) > 0.0
+
+    def _whole(self, system: TangentSystem, evaluation: Evaluation, step: Vector) -> TangentStep:
+        """Solve the linearised contact problem as a whole, its rigid motions without stiffness. Collective.
+
+        At the start of a history nothing is known of the active set, and without stress they have none.
+        """
+        at, torn, before = evaluation.at, self._torn, system.products
+        problem = system.problem
+        flexed = system.apply(at.multiplier) if self._touching(at.multiplier) or np.any(at.multiplier) else 0.0
+        load = problem.coarse.load + problem.coarse.apply(at.multiplier)
+        coarse = problem.coarse.with_load(load)
+        scaling = None if problem.scaling is None else problem.scaling.with_load(load)
+        problem = replace(problem, rhs=problem.rhs + flexed, coarse=coarse, scaling=scaling, reach=None)
+        discs = torn.owned_discs
+        coefficient = torn.friction_coefficient[discs] if np.any(torn.friction_coefficient > 0) else None
+        solution = solve(
+            problem, torn.tresca_bound[discs], FaceNewton(NESTED), at.multiplier, friction_coefficient=coefficient
+        )
+        bound = self._law.bound(solution.multiplier)
+        face = classify(problem.layout, bound, solution.multiplier, solution.residual, step)
+        return TangentStep(solution.multiplier, solution.alpha, face, system.products - before, Stop.CONVERGED)
+
+    def _room(self, evaluation: Evaluation, moved: Vector) -> float:
+        """Return the part of a step that keeps cells from being inverted. Collective."""
+        part, wanted = 1.0, ROOM * evaluation.least_jacobian
+        while part > 1e-3:
+            if self._equations.least_jacobian(evaluation.at.displacement + part * moved) > wanted:
+                return part
+            part *= 0.5
+        raise ConvergenceError(
+            "a Newton step must not turn cells inside out, but every part of this one does: take smaller load "
+            "steps, or refine the mesh where cells are flattened",
+            self.history,
+        )
+
+    def _record(
+        self, evaluation: Evaluation, system: TangentSystem, taken: TangentStep, part: float, whole: bool
+    ) -> None:
+        face = taken.face
+        counts = global_sum(self._comm, *(np.count_nonzero(m) for m in (face.closed, face.stick, face.slip)))
+        closed, stick, slip = (round(float(count)) for count in counts)
+        notes = ["contact solved as a whole"] if whole else [f"forcing {self._forcing:.1e}"]
+        notes += [f"cut to {part:g} of the step"] if part < 1.0 else []
+        notes += [taken.stop.value] if taken.stop is not Stop.CONVERGED else []
+        notes += [f"{system.softened} soft motions held"] if system.softened else []
+        line = SolverStep(
+            "Newton", len(self.history), self.products, evaluation.residuals, closed, stick, slip, ", ".join(notes)
+        )
+        self.history.append(line)

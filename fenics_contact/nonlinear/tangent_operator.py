@@ -1,0 +1,173 @@
+"""A subdomain under stress: its tangent may be indefinite, and rigid motions have a stiffness."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact.feti import Subdomain, fixing_nodes
+from fenics_contact.nonlinear.indefinite_factor import IndefiniteFactor
+
+#: Fixing nodes relative to the cube root of the number of nodes: held at its corners alone, a body under
+#: stress buckles around them.
+SPREAD = 4.0
+#: Motions softer than this fraction of the softest one without stress are held by columns of their own: these
+#: by a multiple of their negative stiffness, and by a fraction of a typical entry of the stiffness at least.
+SOFT, GRIP, LEAST_GRIP = 0.5, 3.0, 0.1
+#: New vectors in the search for soft motions, and iterations of the first search and of later ones.
+PROBES, FIRST_SWEEPS, SWEEPS = 4, 6, 2
+
+
+class TangentOperator:
+    """K_ρ⁻¹ and the Schur complement of K_ρ = K + C Cᵀ on the interface, for a symmetric tangent K.
+
+    C holds the rigid motions at some nodes and, where these leave motions that stress has made soft or
+    unstable, approximate eigenvectors for them. The modes Φ = K_ρ⁻¹C, with factors that make them
+    displacements, and their stiffness S keep the dual problem exact for any C.
+
+    Attributes:
+        modes: Φ, shape (n, m).
+        stiffness: S with K Φ = Ĉ S, Ĉ the orthonormal columns of C, shape (m, m), symmetric.
+        softened: Number of columns for motions that stress has softened.
+    """
+
+    def __init__(self, subdomain: Subdomain, interface: np.ndarray, earlier: TangentOperator | None) -> None:
+        """Factor a subdomain.
+
+        Args:
+            subdomain: Its tangent and the rigid motions of its present shape, as kernel.
+            interface: Interface dofs b, shape (n_b,).
+            earlier: That of an earlier shape, whose soft motions are a start; None for the first.
+        """
+        K, size = subdomain.stiffness, subdomain.mesh.size
+        typical = float(np.abs(K.diagonal()).max())
+        dofs, basis = _fixing_columns(subdomain)
+        block = typical * (basis @ basis.T)
+        entries = (block.ravel(), (np.repeat(dofs, len(dofs)), np.tile(dofs, len(dofs))))
+        held = (K + sp.coo_matrix(entries, shape=K.shape)).tocsr()
+        factor = IndefiniteFactor(held)
+        columns = np.zeros((size, basis.shape[1]))
+        columns[dofs] = basis
+        weights = np.full(basis.shape[1], typical)
+        soft, grip = self._soft_motions(held, factor, earlier, typical)
+        self.softened = soft.shape[1]
+        self._factor = _Updated(factor, soft, grip)
+        columns, weights = np.hstack([columns, soft]), np.concatenate([weights, grip])
+        self.modes = self._factor.solve_many(columns * weights)
+        self.stiffness = _symmetric(np.linalg.lstsq(columns, K @ self.modes, rcond=None)[0])
+        self._interface, self._right, self._left = interface, np.zeros(size), np.zeros(size)
+        self._rest = rest = np.setdiff1d(np.arange(size), interface, assume_unique=True)
+        rows = held[interface]
+        self._K_bb, self._K_bi = rows[:, interface].tocsr(), rows[:, rest].tocsr()
+        self._K_ib = self._K_bi.T
+        self._at_interface, self._at_rest, self._grip = soft[interface], soft[rest], grip
+        inside = IndefiniteFactor(held[rest][:, rest].tocsr()) if len(rest) else None
+        self._inside = None if inside is None else _Updated(inside, soft[rest], grip)
+        self._inner = np.zeros(len(rest))
+
+    def _soft_motions(
+        self, held: sp.csr_matrix, factor: IndefiniteFactor, earlier: TangentOperator | None, typical: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the motions that need columns of their own, shape (n, k), and the stiffness of each column."""
+        probes = np.random.default_rng(0).standard_normal((factor.size, PROBES))
+        sweeps = SWEEPS
+        if earlier is not None:
+            probes, self._softest = np.hstack([earlier._searched, probes]), earlier._softest
+        else:
+            sweeps = FIRST_SWEEPS
+        values, vectors = _softest(held, factor, probes, sweeps)
+        if earlier is None:
+            self._softest = float(np.abs(values).min())
+        soft = values < SOFT * self._softest
+        self._searched = vectors[:, soft]
+        return self._searched, GRIP * np.maximum(-values[soft], 0.0) + LEAST_GRIP * typical
+
+    def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
+        """Write (K_ρ⁻¹)_bb times an interface force into ``displacement``."""
+        self._right[self._interface] = force
+        self._factor.solve(self._right, self._left)
+        displacement[:] = self._left[self._interface]
+
+    def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
+        """Write the Schur complement of K_ρ times an interface displacement into ``force``."""
+        moved = self._grip * (self._at_interface.T @ displacement)
+        force[:] = self._K_bb @ displacement + self._at_interface @ moved
+        if self._inside is not None:
+            self._inside.solve(self._K_ib @ displacement + self._at_rest @ moved, self._inner)
+            force -= self._K_bi @ self._inner
+            force -= self._at_interface @ (self._grip * (self._at_rest.T @ self._inner))
+
+    def extend(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the displacement in equilibrium inside for one of the interface, and its force there."""
+        self.stiffen(displacement, force := np.empty_like(displacement))
+        whole = np.empty(len(self._right))
+        whole[self._interface] = displacement
+        whole[self._rest] = -self._inner
+        return whole, force
+
+    def invert(self, right: np.ndarray) -> np.ndarray:
+        """Return K_ρ⁻¹ times a vector, shape (n,)."""
+        solution = np.empty_like(right)
+        self._factor.solve(right, solution)
+        return solution
+
+    def row_flexibility(self, rows: sp.csr_matrix) -> np.ndarray:
+        """Return bᵀ (K_ρ⁻¹)_bb b for each row b of a matrix with interface columns, shape (n_rows,)."""
+        right = np.zeros((len(self._right), rows.shape[0]))
+        right[self._interface] = rows.toarray().T
+        return np.asarray(np.einsum("nk,nk->k", right, self._factor.solve_many(right)))
+
+
+class _Updated:
+    """The inverse of A + V D Vᵀ with factors of A, by Woodbury's formula."""
+
+    def __init__(self, factor: IndefiniteFactor, columns: np.ndarray, weights: np.ndarray) -> None:
+        """Prepare for V, shape (n, k), and the diagonal D, shape (k,)."""
+        self._factor, self._columns = factor, columns
+        self._moved = factor.solve_many(columns)
+        self._small = np.linalg.inv(np.diag(1.0 / weights) + columns.T @ self._moved)
+
+    def solve(self, right: np.ndarray, out: np.ndarray) -> None:
+        """Write the solution for one right side, shape (n,), into ``out``."""
+        self._factor.solve(right, out)
+        if len(self._small):
+            out -= self._moved @ (self._small @ (self._columns.T @ out))
+
+    def solve_many(self, right: np.ndarray) -> np.ndarray:
+        """Return the solutions for the columns of ``right``, shape (n, k)."""
+        solution = self._factor.solve_many(right)
+        if len(self._small):
+            solution = solution - self._moved @ (self._small @ (self._columns.T @ solution))
+        return solution
+
+
+def _fixing_columns(subdomain: Subdomain) -> tuple[np.ndarray, np.ndarray]:
+    """Return the dofs of well-spread nodes and orthonormal rigid motions on them, shape (n_dofs, m)."""
+    points, dim = subdomain.points, subdomain.mesh.dim
+    count = max(4, round(SPREAD * len(points) ** (1.0 / dim)))
+    nodes = np.sort(fixing_nodes(points, count))
+    dofs = (dim * nodes[:, None] + np.arange(dim)).ravel()
+    basis, _ = np.linalg.qr(subdomain.kernel[dofs])
+    return dofs, basis
+
+
+def _softest(
+    held: sp.csr_matrix, factor: IndefiniteFactor, start: np.ndarray, sweeps: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return approximate eigenvalues next to zero, ascending, and their vectors, by inverse iteration.
+
+    Args:
+        held: The matrix, shape (n, n).
+        factor: Its factors.
+        start: Vectors to start from, shape (n, k).
+        sweeps: Number of iterations.
+    """
+    basis = start
+    for _ in range(sweeps):
+        basis, _ = np.linalg.qr(factor.solve_many(basis))
+    values, factors = np.linalg.eigh(_symmetric(basis.T @ (held @ basis)))
+    return values, basis @ factors
+
+
+def _symmetric(matrix: np.ndarray) -> np.ndarray:
+    return np.asarray(0.5 * (matrix + matrix.T))
