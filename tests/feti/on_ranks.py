@@ -41,7 +41,7 @@ def collect(comm: MPI.Comm) -> dict[str, np.ndarray]:
         "exchange": exchange_error(numbering),
         "owned": np.array(comm.allgather(len(numbering.owned))),
         "ghosts": np.array(comm.allgather(len(numbering.ghosts))),
-        "discs": np.array(comm.allgather(len(system.owned_discs()))),
+        "discs": np.array(comm.allgather(len(system.torn.owned_discs))),
     }
 
 

@@ -246,4 +246,4 @@ def test_contact_and_frictional_multipliers_have_their_places_in_the_layout() ->
     np.testing.assert_array_equal(layout.normal, torn.normal_rows)
     np.testing.assert_array_equal(layout.tangential, torn.tangential_rows)
     np.testing.assert_array_equal(layout.friction_of, torn.frictional)
-    np.testing.assert_array_equal(system.owned_discs(), np.arange(len(torn.frictional)))
+    np.testing.assert_array_equal(system.torn.owned_discs, np.arange(len(torn.frictional)))

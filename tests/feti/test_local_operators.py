@@ -165,8 +165,8 @@ def test_both_kinds_give_the_same_contact_forces() -> None:
     answers = []
     for kind in (LocalKind.IMPLICIT, LocalKind.EXPLICIT):
         system = DualSystem(torn, kind=kind)
-        coefficient = torn.friction_coefficient[system.owned_discs()]
-        bound = torn.tresca_bound[system.owned_discs()]
+        coefficient = torn.friction_coefficient[system.torn.owned_discs]
+        bound = torn.tresca_bound[system.torn.owned_discs]
         answers.append(
             solve(system.problem, bound, FaceNewton(tolerance=1e-9), friction_coefficient=coefficient)
         )
