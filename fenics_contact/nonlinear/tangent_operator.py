@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from fenics_contact.feti import Subdomain, fixing_nodes
 from fenics_contact.nonlinear.indefinite_factor import IndefiniteFactor
@@ -16,6 +17,8 @@ SPREAD = 4.0
 SOFT, GRIP, LEAST_GRIP = 0.5, 3.0, 0.1
 #: New vectors in the search for soft motions, and iterations of the first search and of later ones.
 PROBES, FIRST_SWEEPS, SWEEPS = 4, 6, 2
+#: Accuracy of eigenvectors: any columns will do.
+ROUGH = 1e-2
 
 
 class TangentOperator:
@@ -166,7 +169,23 @@ def _softest(
     for _ in range(sweeps):
         basis, _ = np.linalg.qr(factor.solve_many(basis))
     values, factors = np.linalg.eigh(_symmetric(basis.T @ (held @ basis)))
+    if np.count_nonzero(values < 0.0) < factor.negative:
+        basis, _ = np.linalg.qr(np.hstack([basis, _negative(factor, start.sum(axis=1))]))
+        values, factors = np.linalg.eigh(_symmetric(basis.T @ (held @ basis)))
     return values, basis @ factors
+
+
+def _negative(factor: IndefiniteFactor, start: np.ndarray) -> np.ndarray:
+    """Return approximate eigenvectors of all negative eigenvalues, shape (n, k)."""
+
+    def invert(right: np.ndarray) -> np.ndarray:
+        factor.solve(np.ascontiguousarray(right, dtype=np.float64).ravel(), out := np.empty(factor.size))
+        return out
+
+    inverse = LinearOperator((factor.size, factor.size), matvec=invert, dtype=np.float64)
+    count = min(factor.negative, factor.size - 1)
+    _, vectors = eigsh(inverse, k=count, which="SA", v0=start, tol=ROUGH)
+    return np.asarray(vectors)
 
 
 def _symmetric(matrix: np.ndarray) -> np.ndarray:
