@@ -1,0 +1,150 @@
+"""Automatic load steps: from one load to the next as fast as Newton's method follows."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fenics_contact.display import displayed
+from fenics_contact.errors import ConvergenceError, tell
+from fenics_contact.feti import TornSystem
+from fenics_contact.nonlinear.equations import Configuration, Equations
+from fenics_contact.nonlinear.newton import Equilibrium, TangentNewton
+from fenics_contact.nonlinear.tangent_system import TangentSystem
+from fenics_contact.qp import SolverStep
+from fenics_contact.timing import PhaseTimer
+
+_LOG = logging.getLogger(__name__)
+
+#: Newton steps of an easy load step: the next one is twice as long.
+EASY = 6
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The equilibria from one load to the next.
+
+    Attributes:
+        torn: The system at the end, with the origin of slip of the last part.
+        end: The last equilibrium.
+        fractions: Parts of the load at which equilibria were found, the last one being 1.
+        history: One line for each Newton step of all parts, those of parts that were cut included.
+        products: Applications of F.
+        factorisations: Factored tangents, counting all subdomains as one.
+    """
+
+    torn: TornSystem
+    end: Equilibrium
+    fractions: tuple[float, ...]
+    history: tuple[SolverStep, ...]
+    products: int
+    factorisations: int
+
+
+class LoadStepError(ConvergenceError):
+    """A load step that cannot be cut any further.
+
+    Attributes:
+        fraction: Part of the step's load up to which there are equilibria.
+        configuration: The last of them; None if there was none after the start.
+        torn: The system of that equilibrium.
+    """
+
+    def __init__(
+        self, message: str, history: tuple[SolverStep, ...], fraction: float, reached: tuple[TornSystem, Equilibrium] | None
+    ) -> None:
+        """Store how far the path went."""
+        super().__init__(message, history)
+        self.fraction, self.reached = fraction, reached
+
+
+@displayed
+@dataclass(frozen=True)
+class AutomaticSteps:
+    """Load steps that are halved where Newton's method fails, and doubled after easy ones.
+
+    Attributes:
+        newton: Solves each of them.
+        first: First part of the load that is tried, in (0, 1].
+        smallest: Smallest part of the load; a step that fails there ends the path.
+    """
+
+    newton: TangentNewton = TangentNewton()
+    first: float = 1.0
+    smallest: float = 1.0 / 256
+
+    def follow(
+        self,
+        equations: Equations,
+        before: TornSystem | None,
+        target: TornSystem,
+        start: Configuration,
+        timer: PhaseTimer,
+        known: TangentSystem | None = None,
+    ) -> Path:
+        """Return the equilibrium at a load, with the path to it. Collective.
+
+        Args:
+            equations: Internal forces.
+            before: The system at the start; None for bodies at rest without loads.
+            target: The system with the loads and supports at the end.
+            start: The configuration at the start.
+            timer: Collects the wall time.
+            known: A linearisation near the start, or None.
+
+        Raises:
+            LoadStepError: The smallest step fails.
+        """
+        first = unloaded(target) if before is None else before
+        at, torn, end = start, first, None
+        reached, part = 0.0, self.first
+        fractions, history, products, factorisations = list[float](), list[SolverStep](), 0, 0
+        while reached < 1.0:
+            part = min(part, 1.0 - reached)
+            fraction = 1.0 if reached + part > 1.0 - 1e-12 else reached + part
+            trial = _between(first, target, fraction)
+            trial = trial.with_slip_from(torn.relative(at.displacement), torn.sliding(at.displacement))
+            try:
+                found = self.newton.solve(equations, trial, at, timer, known)
+            except ConvergenceError as failure:
+                history += [replace(line, outer=len(fractions)) for line in failure.history]
+                part *= 0.5
+                if part < self.smallest:
+                    raise LoadStepError(
+                        f"the load can be followed up to {reached:.3g} of this step, but a further "
+                        f"{2 * part:.1e} of it fails: {failure}",
+                        tuple(history), reached, None if end is None else (torn, end),
+                    ) from failure
+                tell(_LOG.info, "load step cut to %.3g: %s", part, failure)
+                continue
+            history += [replace(line, outer=len(fractions)) for line in found.history]
+            products, factorisations = products + found.products, factorisations + found.factorisations
+            fractions.append(fraction)
+            at, torn, end, known, reached = found.configuration, trial, found, found.system, fraction
+            part *= 2.0 if len(found.history) <= EASY else 1.0
+        assert end is not None
+        return Path(torn, end, tuple(fractions), tuple(history), products, factorisations)
+
+
+def unloaded(torn: TornSystem) -> TornSystem:
+    """Return a system without loads, whose supports prescribe no movement."""
+    equality = torn.numbering.owned < torn.n_equality
+    right = np.where(equality, 0.0, torn.right + torn.supported)
+    subdomains = tuple(replace(part, load=np.zeros_like(part.load)) for part in torn.subdomains)
+    return replace(torn, subdomains=subdomains, right=right, supported=np.zeros_like(torn.supported))
+
+
+def _between(first: TornSystem, last: TornSystem, fraction: float) -> TornSystem:
+    """Return the system at a part of the way from one load to another."""
+    if fraction == 1.0:
+        return last
+    parts = zip(first.subdomains, last.subdomains, strict=True)
+    subdomains = tuple(replace(b, load=(1.0 - fraction) * a.load + fraction * b.load) for a, b in parts)
+
+    def mixed(name: str) -> np.ndarray:
+        return np.asarray((1.0 - fraction) * getattr(first, name) + fraction * getattr(last, name))
+
+    return replace(last, subdomains=subdomains, right=mixed("right"), supported=mixed("supported"))
