@@ -4,6 +4,7 @@ from fenics_contact.contact.area import contact_area
 from fenics_contact.contact.balance import Balance
 from fenics_contact.contact.cell_stress import STRESS_COMPONENTS
 from fenics_contact.contact.coulomb import FixedPoint
+from fenics_contact.contact.deformed_state import DeformedState
 from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.equilibrium import default_solver
 from fenics_contact.contact.fields import body_mesh
@@ -29,6 +30,7 @@ __all__ = [
     "ContactProblem",
     "ContactResult",
     "Damping",
+    "DeformedState",
     "Energies",
     "FixedPoint",
     "GatheredFields",

@@ -18,6 +18,7 @@ from fenics_contact.contact.cell_stress import COMPONENTS, CellStress, tensors
 from fenics_contact.contact.fields import cells_of_body, displacement_function
 from fenics_contact.fem import temperature_of
 from fenics_contact.feti import TornSystem
+from fenics_contact.scene import is_nonlinear
 
 
 def nodal_stress(
@@ -40,29 +41,40 @@ def nodal_stress(
         gradients = recovered_gradients(sites, displacement[sites.node])
         for name, body in torn.scene.bodies.items():
             if body.mesh.order == order:
-                own = _at_sites(torn, name, sites, gradients, meshes[name])
+                nodes = torn.decomposition.tearing.global_nodes(name, np.arange(body.mesh.n_nodes))
+                own = _at_sites(torn, name, sites, gradients, displacement[nodes], meshes[name])
                 found[name] = _gathered(torn, name, sites, own)
     return found
 
 
 def _at_sites(
-    torn: TornSystem, name: str, sites: Sites, gradients: np.ndarray, mesh: _dolfinx.mesh.Mesh
+    torn: TornSystem,
+    name: str,
+    sites: Sites,
+    gradients: np.ndarray,
+    displacement: np.ndarray,
+    mesh: _dolfinx.mesh.Mesh,
 ) -> np.ndarray:
     """Return the components of the stress at the sites of a body, shape (n_sites, 6). Collective.
 
-    The stress is affine in the gradient. Its coefficients are the stresses of unit gradients, averaged over
-    the cells around a site; they are the same in all of them unless the material or the temperature varies.
+    Of nonlinear materials it is the mean over the cells around a site. Else it is affine in the gradient: its
+    coefficients are the stresses of unit gradients, averaged over the cells around a site; they are the same
+    in all of them unless the material or the temperature varies.
     """
     body, dim = torn.scene.bodies[name], torn.dim
     temperature = temperature_of(torn.scene.loads, name)
     means = CellStress(mesh, body, torn.decomposition.comm, temperature)
+    number = cells_of_body(mesh, body.mesh.cells)
+    if any(map(is_nonlinear, body.materials)):
+        moved = displacement_function(mesh, displacement)
+        return _around_sites(torn, name, sites, means.components(moved), number)
     places = body.mesh.points - body.mesh.points.mean(axis=0)
     # A rotation has no stress: the gradients (i, j) and (j, i) have the same.
     pairs = [(i, j) for i in range(dim) for j in range(i, dim)]
     units = np.zeros((1 + len(pairs), dim, dim))
     units[np.arange(1, len(units)), [i for i, _ in pairs], [j for _, j in pairs]] = 1.0
     on_cells = [means.components(displacement_function(mesh, places @ unit.T)) for unit in units]
-    around = _around_sites(torn, name, sites, np.hstack(on_cells), cells_of_body(mesh, body.mesh.cells))
+    around = _around_sites(torn, name, sites, np.hstack(on_cells), number)
     at_rest, *strained = np.split(around, len(units), axis=1)
     total = at_rest.copy()
     for (i, j), stress in zip(pairs, strained, strict=True):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from fenics_contact.contact.static_admissibility import check_held
 from fenics_contact.contact.stored import Stored, restored_solution, with_stored_slip
 from fenics_contact.contact.tolerance import Tolerance, checked_tolerance
 from fenics_contact.display import displayed
-from fenics_contact.errors import collectively, together
+from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.feti import (
     Decomposition,
     DualSystem,
@@ -33,6 +33,10 @@ from fenics_contact.feti import (
 from fenics_contact.qp import DualSolver
 from fenics_contact.scene import Load, RigidSurface, Scene, SolverKind, choose_solver
 from fenics_contact.timing import PhaseTimer
+
+if TYPE_CHECKING:
+    from fenics_contact.contact.deformed_equilibria import DeformedEquilibria
+    from fenics_contact.nonlinear import AutomaticSteps
 
 
 @displayed
@@ -47,6 +51,7 @@ class ContactProblem:
         comm: Communicator over which the subdomains are spread.
         solver: Dual solver with its tolerance; None: the one that `Scene.plan` names.
         tolerance: Largest relative residual of the solutions, see `solve_scene`.
+        steps: How loads on nonlinear materials are followed; None: `nonlinear.AutomaticSteps()`.
         timer: Wall time of this rank by phase, over all solutions.
         state: The last solution, None before the first.
 
@@ -63,10 +68,11 @@ class ContactProblem:
         partitions: Mapping[str, np.ndarray] | None = None,
         solver: DualSolver | None = None,
         tolerance: Tolerance = None,
+        steps: AutomaticSteps | None = None,
     ) -> None:
         """Prepare; nothing is computed yet. Arguments as for `solve_scene`."""
         self.scene, self.comm = scene, comm
-        self.solver, self.tolerance = solver, tolerance
+        self.solver, self.tolerance, self.steps = solver, tolerance, steps
         self.timer = PhaseTimer()
         self.state = None
         self._partitions, self._decomposition = partitions, None
@@ -74,6 +80,7 @@ class ContactProblem:
 
     state: State | None
     _decomposition: Decomposition | None
+    _deformed_equilibria: DeformedEquilibria | None = None
 
     def _facts(self) -> dict[str, Any]:
         return {
@@ -150,6 +157,14 @@ class ContactProblem:
         check_not_forked()
         scene = self.scene if scene is None else scene
         wanted = self.tolerance if tolerance is None else tolerance
+        if scene.is_nonlinear:
+            if sensitivity or overlap:
+                raise InvalidInputError(
+                    "sensitivities and designs need linear materials, this scene has others: optimise it "
+                    "with a tool that takes plain functions, see fenics_contact.outer"
+                )
+            self.state = self._deformed(scene, slip_from, wanted)
+            return self.state
         previous = self.state if start == "last" else start
         decomposition = self._decomposed(scene)
         check_same_input(self.comm, scene, solver=self.solver, tolerance=wanted)
@@ -177,6 +192,15 @@ class ContactProblem:
             with self.timer.phase("state"):
                 self._contact_doubts.warn(self.state)
         return self.state
+
+    def _deformed(self, scene: Scene, origin: State | None, tolerance: Tolerance) -> State:
+        """Compute an equilibrium of nonlinear materials. Collective."""
+        from fenics_contact.contact.deformed_equilibria import DeformedEquilibria
+
+        if self._deformed_equilibria is None:
+            decomposition = self._decomposed(scene)
+            self._deformed_equilibria = DeformedEquilibria(scene, decomposition, self.steps, self.timer)
+        return self._deformed_equilibria.solve(scene, origin, tolerance)
 
     @collectively("ContactProblem.restore", lambda self, *_, **__: self.comm)
     def restore(self, stored: Stored, scene: Scene | None = None) -> State:
@@ -228,6 +252,7 @@ def solve_scene(
     partitions: Mapping[str, np.ndarray] | None = None,
     solver: DualSolver | None = None,
     tolerance: Tolerance = None,
+    steps: AutomaticSteps | None = None,
 ) -> State:
     """Compute the equilibrium of a scene. Collective on ``comm``.
 
@@ -240,7 +265,8 @@ def solve_scene(
         tolerance: Largest relative residual of the solution, or `fenics_contact.accuracy.Balanced`, which
             solves as accurately as the mesh deserves. By default the solver's own, and without a solver
             `Balanced`. Give a number, 1e-6 or less, where the status of single contact points matters, or
-            small differences between states.
+            small differences between states. Where materials are nonlinear a number, 1e-8 by default.
+        steps: How loads on nonlinear materials are followed; None: `nonlinear.AutomaticSteps()`.
 
     Raises:
         InvalidInputError: If scene or partition cannot be used.
@@ -252,7 +278,10 @@ def solve_scene(
         >>> parts = {"block": box_partition(mesh, (2, 1, 1))}  # doctest: +SKIP
         >>> state = solve_scene(scene, MPI.COMM_SELF, partitions=parts)  # doctest: +SKIP
     """
-    return ContactProblem(scene, comm, partitions=partitions, solver=solver, tolerance=tolerance).solve()
+    problem = ContactProblem(
+        scene, comm, partitions=partitions, solver=solver, tolerance=tolerance, steps=steps
+    )
+    return problem.solve()
 
 
 def _loads_of(scene: Scene) -> tuple[list[Load], list[RigidSurface]]:

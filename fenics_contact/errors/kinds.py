@@ -46,6 +46,20 @@ class ConvergenceError(FenicsContactError, RuntimeError):
         self.history = tuple(history)
 
 
+class LoadStepError(ConvergenceError):
+    """A load that cannot be followed to its end, however small its steps.
+
+    Attributes:
+        state: The last equilibrium (`fenics_contact.contact.DeformedState`); None if there was none after the
+            start of the step.
+    """
+
+    def __init__(self, message: str, history: Sequence[Any], state: Any) -> None:
+        """Store the last equilibrium with the message."""
+        super().__init__(message, history)
+        self.state = state
+
+
 class UserCodeError(FenicsContactError, RuntimeError):
     """A function, material or obstacle that was given to this package failed.
 

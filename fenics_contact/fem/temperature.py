@@ -13,7 +13,7 @@ from ufl.core.expr import Expr
 from fenics_contact import _dolfinx
 from fenics_contact.fem.load_forms import FIRST_COUNT, from_ufl
 from fenics_contact.fem.templates import Constants, scalar_constants
-from fenics_contact.scene import Load, Material, ThermalStrain, Transverse, Ufl, evaluate
+from fenics_contact.scene import Hyperelasticity, Load, Material, ThermalStrain, Transverse, Ufl, evaluate
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,12 @@ def stress_left(material: Any, u: Expr, constants: Constants, temperature: Expr 
 
 
 def stress_in_space(material: Material, u: Expr, constants: Constants, temperature: Expr | None) -> Expr:
-    """Return the stress (3 x 3, UFL), in the plane including the component normal to it."""
+    """Return the stress (3 x 3, UFL), in the plane including the component normal to it.
+
+    Where the material is nonlinear it is Cauchy's.
+    """
+    if isinstance(material, Hyperelasticity):
+        return material.cauchy(u, constants)
     stress = stress_left(material, u, constants, temperature)
     if stress.ufl_shape == (3, 3):
         return stress

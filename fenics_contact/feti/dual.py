@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import InfeasibleError, together
+from fenics_contact.feti.condensation import Condensations
 from fenics_contact.feti.dirichlet import DirichletPreconditioner
 from fenics_contact.feti.inverse import LocalKind, TornInverse, kernel_matrix
 from fenics_contact.feti.kernel_basis import whole_motions

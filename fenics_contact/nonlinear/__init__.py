@@ -1,17 +1,20 @@
 """Large deformations and nonlinear materials: Newton's method on the torn system."""
 
-from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation
-from fenics_contact.nonlinear.load_steps import AutomaticSteps, LoadStepError, Path, unloaded
-from fenics_contact.nonlinear.newton import Equilibrium, TangentNewton
+from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, law_of
+from fenics_contact.nonlinear.load_steps import AutomaticSteps, Path, PathEndsError, unloaded
+from fenics_contact.nonlinear.newton import NonlinearEquilibrium, TangentNewton
+from fenics_contact.nonlinear.tangent_system import TangentSystem
 
 __all__ = [
     "AutomaticSteps",
     "Configuration",
     "Equations",
-    "Equilibrium",
+    "NonlinearEquilibrium",
     "Evaluation",
-    "LoadStepError",
     "Path",
+    "PathEndsError",
     "TangentNewton",
+    "TangentSystem",
+    "law_of",
     "unloaded",
 ]

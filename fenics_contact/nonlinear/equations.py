@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -111,7 +112,7 @@ class Equations:
     @cached_property
     def _parts(self) -> list[slice]:
         ends = self.decomposition.tearing.dim * self.decomposition.block_offset
-        return [slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        return [slice(int(a), int(b)) for a, b in pairwise(ends)]
 
     def at_rest(self, torn: TornSystem) -> Configuration:
         """Return the undeformed configuration without forces."""
@@ -163,7 +164,9 @@ def _residuals(
     mapped = law.feasible(at.multiplier).project(at.multiplier - step * lacking)
     error, u = (at.multiplier - mapped)[contact], at.displacement
     sums = global_sum(
-        comm, *(x @ x for x in (*forces, torn.load, u, lacking[~contact], torn.right[~contact], error)), len(u)
+        comm,
+        *(x @ x for x in (*forces, torn.load, u, lacking[~contact], torn.right[~contact], error)),
+        len(u),
     )
     unbalanced, internal, bound, load, moved, open_, given, natural = np.sqrt(sums[:8])
     moved = max(moved, given)
@@ -172,7 +175,12 @@ def _residuals(
     violation = global_max(comm, law.feasible(at.multiplier).violation(at.multiplier))
     ratio = 1.0 / force if force > 0.0 else 0.0
     return Residuals(
-        natural * ratio, open_ / moved if moved > 0.0 else 0.0, unbalanced * ratio, violation * ratio, force, moved
+        natural * ratio,
+        open_ / moved if moved > 0.0 else 0.0,
+        unbalanced * ratio,
+        violation * ratio,
+        force,
+        moved,
     )
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from fenics_contact.display import displayed
 from fenics_contact.errors import ConvergenceError, tell
 from fenics_contact.feti import TornSystem
 from fenics_contact.nonlinear.equations import Configuration, Equations
-from fenics_contact.nonlinear.newton import Equilibrium, TangentNewton
+from fenics_contact.nonlinear.newton import NonlinearEquilibrium, TangentNewton
 from fenics_contact.nonlinear.tangent_system import TangentSystem
 from fenics_contact.qp import SolverStep
 from fenics_contact.timing import PhaseTimer
@@ -37,28 +38,24 @@ class Path:
     """
 
     torn: TornSystem
-    end: Equilibrium
+    end: NonlinearEquilibrium
     fractions: tuple[float, ...]
     history: tuple[SolverStep, ...]
     products: int
     factorisations: int
 
 
-class LoadStepError(ConvergenceError):
+class PathEndsError(ConvergenceError):
     """A load step that cannot be cut any further.
 
     Attributes:
-        fraction: Part of the step's load up to which there are equilibria.
-        configuration: The last of them; None if there was none after the start.
-        torn: The system of that equilibrium.
+        path: The way up to there; None if there is no equilibrium after the start.
     """
 
-    def __init__(
-        self, message: str, history: tuple[SolverStep, ...], fraction: float, reached: tuple[TornSystem, Equilibrium] | None
-    ) -> None:
+    def __init__(self, message: str, history: Sequence[SolverStep], path: Path | None) -> None:
         """Store how far the path went."""
         super().__init__(message, history)
-        self.fraction, self.reached = fraction, reached
+        self.path = path
 
 
 @displayed
@@ -72,7 +69,7 @@ class AutomaticSteps:
         smallest: Smallest part of the load; a step that fails there ends the path.
     """
 
-    newton: TangentNewton = TangentNewton()
+    newton: TangentNewton = field(default_factory=TangentNewton)
     first: float = 1.0
     smallest: float = 1.0 / 256
 
@@ -96,12 +93,18 @@ class AutomaticSteps:
             known: A linearisation near the start, or None.
 
         Raises:
-            LoadStepError: The smallest step fails.
+            PathEndsError: The smallest step fails.
         """
         first = unloaded(target) if before is None else before
-        at, torn, end = start, first, None
+        at, torn = start, first
+        end: NonlinearEquilibrium | None = None
         reached, part = 0.0, self.first
         fractions, history, products, factorisations = list[float](), list[SolverStep](), 0, 0
+
+        def walked() -> Path:
+            assert end is not None
+            return Path(torn, end, tuple(fractions), tuple(history), products, factorisations)
+
         while reached < 1.0:
             part = min(part, 1.0 - reached)
             fraction = 1.0 if reached + part > 1.0 - 1e-12 else reached + part
@@ -113,10 +116,11 @@ class AutomaticSteps:
                 history += [replace(line, outer=len(fractions)) for line in failure.history]
                 part *= 0.5
                 if part < self.smallest:
-                    raise LoadStepError(
+                    raise PathEndsError(
                         f"the load can be followed up to {reached:.3g} of this step, but a further "
                         f"{2 * part:.1e} of it fails: {failure}",
-                        tuple(history), reached, None if end is None else (torn, end),
+                        history,
+                        None if end is None else walked(),
                     ) from failure
                 tell(_LOG.info, "load step cut to %.3g: %s", part, failure)
                 continue
@@ -125,8 +129,7 @@ class AutomaticSteps:
             fractions.append(fraction)
             at, torn, end, known, reached = found.configuration, trial, found, found.system, fraction
             part *= 2.0 if len(found.history) <= EASY else 1.0
-        assert end is not None
-        return Path(torn, end, tuple(fractions), tuple(history), products, factorisations)
+        return walked()
 
 
 def unloaded(torn: TornSystem) -> TornSystem:

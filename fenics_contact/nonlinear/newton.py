@@ -20,7 +20,16 @@ from fenics_contact.nonlinear.equations import (
 )
 from fenics_contact.nonlinear.tangent_step import TangentStep, tangent_step
 from fenics_contact.nonlinear.tangent_system import TangentSystem
-from fenics_contact.qp import CoulombLaw, FaceNewton, SlipLaw, SolverStep, Stop, Vector, classify, global_sum, solve
+from fenics_contact.qp import (
+    FaceNewton,
+    SlipLaw,
+    SolverStep,
+    Stop,
+    Vector,
+    classify,
+    global_sum,
+    solve,
+)
 from fenics_contact.timing import PhaseTimer
 
 #: Part of the smallest det F that a step must leave.
@@ -33,7 +42,7 @@ NESTED = 1e-4
 
 @displayed
 @dataclass(frozen=True, eq=False)
-class Equilibrium:
+class NonlinearEquilibrium:
     """The end of a load step.
 
     Attributes:
@@ -82,8 +91,13 @@ class TangentNewton:
     forcing: float = 0.1
 
     def solve(
-        self, equations: Equations, torn: TornSystem, start: Configuration, timer: PhaseTimer, known: TangentSystem | None
-    ) -> Equilibrium:
+        self,
+        equations: Equations,
+        torn: TornSystem,
+        start: Configuration,
+        timer: PhaseTimer,
+        known: TangentSystem | None,
+    ) -> NonlinearEquilibrium:
         """Return the equilibrium next to a configuration. Collective.
 
         Args:
@@ -114,7 +128,7 @@ class _Run:
         self._forcing = method.forcing
         self.products = self.factorisations = 0
 
-    def to_equilibrium(self, at: Configuration, known: TangentSystem | None) -> Equilibrium:
+    def to_equilibrium(self, at: Configuration, known: TangentSystem | None) -> NonlinearEquilibrium:
         method, system = self._method, known
         while True:
             step = np.zeros(self._torn.layout.size) if system is None else natural_step(system, self._caution)
@@ -124,7 +138,9 @@ class _Run:
             if self.history:
                 self.history[-1] = replace(self.history[-1], residuals=residuals)
             if system is not None and residuals.within(method.tolerance):
-                return Equilibrium(evaluation, system, tuple(self.history), self.products, self.factorisations)
+                return NonlinearEquilibrium(
+                    evaluation, system, tuple(self.history), self.products, self.factorisations
+                )
             self._require_progress(evaluation)
             system = evaluation.linearised(self._timer, system)
             self.factorisations += 1
@@ -189,7 +205,9 @@ class _Run:
         """
         at, torn, before = evaluation.at, self._torn, system.products
         problem = system.problem
-        flexed = system.apply(at.multiplier) if self._touching(at.multiplier) or np.any(at.multiplier) else 0.0
+        flexed = (
+            system.apply(at.multiplier) if self._touching(at.multiplier) or np.any(at.multiplier) else 0.0
+        )
         load = problem.coarse.load + problem.coarse.apply(at.multiplier)
         coarse = problem.coarse.with_load(load)
         scaling = None if problem.scaling is None else problem.scaling.with_load(load)
@@ -197,11 +215,17 @@ class _Run:
         discs = torn.owned_discs
         coefficient = torn.friction_coefficient[discs] if np.any(torn.friction_coefficient > 0) else None
         solution = solve(
-            problem, torn.tresca_bound[discs], FaceNewton(NESTED), at.multiplier, friction_coefficient=coefficient
+            problem,
+            torn.tresca_bound[discs],
+            FaceNewton(NESTED),
+            at.multiplier,
+            friction_coefficient=coefficient,
         )
         bound = self._law.bound(solution.multiplier)
         face = classify(problem.layout, bound, solution.multiplier, solution.residual, step)
-        return TangentStep(solution.multiplier, solution.alpha, face, system.products - before, Stop.CONVERGED)
+        return TangentStep(
+            solution.multiplier, solution.alpha, face, system.products - before, Stop.CONVERGED
+        )
 
     def _room(self, evaluation: Evaluation, moved: Vector) -> float:
         """Return the part of a step that keeps cells from being inverted. Collective."""
@@ -211,8 +235,8 @@ class _Run:
                 return part
             part *= 0.5
         raise ConvergenceError(
-            "a Newton step must not turn cells inside out, but every part of this one does: take smaller load "
-            "steps, or refine the mesh where cells are flattened",
+            "a Newton step must not turn cells inside out, but every part of this one does: take smaller "
+            "load steps, or refine the mesh where cells are flattened",
             self.history,
         )
 
@@ -227,6 +251,13 @@ class _Run:
         notes += [taken.stop.value] if taken.stop is not Stop.CONVERGED else []
         notes += [f"{system.softened} soft motions held"] if system.softened else []
         line = SolverStep(
-            "Newton", len(self.history), self.products, evaluation.residuals, closed, stick, slip, ", ".join(notes)
+            "Newton",
+            len(self.history),
+            self.products,
+            evaluation.residuals,
+            closed,
+            stick,
+            slip,
+            ", ".join(notes),
         )
         self.history.append(line)

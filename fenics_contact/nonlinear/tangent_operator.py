@@ -34,6 +34,9 @@ class TangentOperator:
         softened: Number of columns for motions that stress has softened.
     """
 
+    _searched: np.ndarray
+    _softest: float
+
     def __init__(self, subdomain: Subdomain, interface: np.ndarray, earlier: TangentOperator | None) -> None:
         """Factor a subdomain.
 
@@ -71,7 +74,7 @@ class TangentOperator:
     def _soft_motions(
         self, held: sp.csr_matrix, factor: IndefiniteFactor, earlier: TangentOperator | None, typical: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the motions that need columns of their own, shape (n, k), and the stiffness of each column."""
+        """Return motions that need columns of their own, shape (n, k), and the stiffness of each."""
         probes = np.random.default_rng(0).standard_normal((factor.size, PROBES))
         sweeps = SWEEPS
         if earlier is not None:

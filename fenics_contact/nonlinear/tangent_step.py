@@ -166,7 +166,7 @@ class _StiffFace:
         size = float(np.sqrt(global_sum(comm, gradient @ gradient)[0]))
         across = coupled.oblique(gradient)
         seen = float(np.sqrt(global_sum(comm, across @ across)[0]))
-        tolerance = max(forcing * seen, floor, np.finfo(float).eps * size)
+        tolerance = max(forcing * seen, floor, float(np.finfo(float).eps) * size)
         found = gmres(comm, -gradient, expand, tolerance, max_products, coupled.system.patience)
         change = change + coupled.moving @ found.combined(0, len(gradient))
         return np.asarray(change, dtype=np.float64), found.combined(1, m), found.stop

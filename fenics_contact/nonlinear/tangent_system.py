@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -138,7 +139,13 @@ def linearised(
         part = slice(start, start + subdomain.mesh.size)
         points = subdomain.points + displacement[part].reshape(subdomain.points.shape)
         kernel = rigid_body_modes(points).reshape(subdomain.mesh.size, -1)
-        matrix = CachedMatrix(lambda tangent=tangent: tangent)
-        subdomains.append(replace(subdomain, points=points, kernel=kernel, load=unbalanced[part], matrix=matrix))
+        matrix = CachedMatrix(partial(_itself, tangent))
+        subdomains.append(
+            replace(subdomain, points=points, kernel=kernel, load=unbalanced[part], matrix=matrix)
+        )
         start = part.stop
     return replace(torn, subdomains=tuple(subdomains), right=lacking)
+
+
+def _itself(matrix: sp.csr_matrix) -> sp.csr_matrix:
+    return matrix

@@ -8,6 +8,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from fenics_contact.scene.loads import BodyForce, ThermalStrain
+from fenics_contact.scene.materials import is_nonlinear
 from fenics_contact.scene.pairs import Coulomb, Tresca
 from fenics_contact.scene.rigid_surfaces import RigidSurface
 
@@ -19,6 +20,7 @@ class EffectName(StrEnum):
     """The effects that a scene can contain."""
 
     ELASTICITY = "elasticity"
+    NONLINEAR_MATERIAL = "nonlinear material"
     PRESCRIBED_DISPLACEMENT = "prescribed displacement"
     RIGID_SURFACE = "rigid surface"
     BODY_FORCE = "body force"
@@ -51,6 +53,9 @@ def effects_of(scene: SceneParts) -> tuple[Effect, ...]:
 def _effects_in(scene: SceneParts) -> Iterator[Effect]:
     names = EffectName
     yield Effect(names.ELASTICITY, _count(len(scene.bodies), "elastic body", "elastic bodies"))
+    nonlinear = sum(any(map(is_nonlinear, body.materials)) for body in scene.bodies.values())
+    if nonlinear:
+        yield Effect(names.NONLINEAR_MATERIAL, _count(nonlinear, "body deforms much or yields", "bodies do"))
     rigid = sum(isinstance(support, RigidSurface) for support in scene.supports)
     if len(scene.supports) > rigid:
         yield Effect(

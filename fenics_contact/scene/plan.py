@@ -32,6 +32,7 @@ class SolverKind(StrEnum):
     DIRECT = "sparse factorisation of one body"
     PROJECTED_CG = "projected conjugate gradients"
     FACE_NEWTON = "semismooth Newton on faces"
+    TANGENT_NEWTON = "Newton's method with tangents of the deformed bodies"
 
 
 class ConeKind(StrEnum):
@@ -140,7 +141,10 @@ def choose_solver(scene: SceneParts, subdomains: int, *, sensitivity: bool = Fal
         subdomains: Subdomains of all bodies.
         sensitivity: Whether derivatives are wanted, which need the dual system.
     """
-    if EffectName.CONTACT in {effect.name for effect in effects_of(scene)}:
+    effects = {effect.name for effect in effects_of(scene)}
+    if EffectName.NONLINEAR_MATERIAL in effects:
+        return SolverKind.TANGENT_NEWTON
+    if EffectName.CONTACT in effects:
         return SolverKind.FACE_NEWTON
     # A body that its supports alone do not hold has a singular stiffness.
     loose = any(isinstance(support, RigidSurface) and support.free.any() for support in scene.supports)

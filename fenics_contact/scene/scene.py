@@ -11,6 +11,7 @@ import numpy as np
 from fenics_contact.display import displayed
 from fenics_contact.partition import default_partition
 from fenics_contact.scene.effects import Effect, effects_of
+from fenics_contact.scene.materials import is_nonlinear
 from fenics_contact.scene.parts import SceneParts
 from fenics_contact.scene.plan import Plan, make_plan
 
@@ -57,6 +58,11 @@ class Scene(SceneParts):
         """
         each = -(-ranks // len(self.bodies))
         return {name: default_partition(body.mesh, each, body=name) for name, body in self.bodies.items()}
+
+    @property
+    def is_nonlinear(self) -> bool:
+        """Whether some material's stress is no linear function of the displacement."""
+        return any(is_nonlinear(each) for body in self.bodies.values() for each in body.materials)
 
     def _facts(self) -> dict[str, Any]:
         return {

@@ -17,7 +17,7 @@ FLOORS = [
     {"fem"},
     {"pairing"},
     {"feti"},
-    {"accuracy"},
+    {"accuracy", "nonlinear"},
     {"contact"},
     {"shape"},
     {"optimize", "outer"},

@@ -154,6 +154,7 @@ def objects() -> dict[str, Any]:
         LargestStress("block"), Movement("block", "z1", (1, 0, 0)), Largest((LargestPressure(),)),
         MovedSurface(shape.designs[0], scene.bodies["block"].mesh, np.zeros(shape.size)),
     ]  # fmt: skip
+    roots.append(solve_scene(pressed(rounded(2), 0.1), MPI.COMM_SELF))
     found: dict[str, Any] = {}
     for root in roots:
         _collect(root, found)

@@ -56,6 +56,11 @@ class Hyperelasticity(Elasticity):
         gradient = ufl.variable(F)
         return ufl.diff(self.density(gradient, parameters), gradient)
 
+    def cauchy(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return Cauchy's stress P Fᵀ / det F of a displacement (3 x 3, UFL), [force / length²]."""
+        F = ufl.variable(in_space(ufl.Identity(len(u)) + ufl.grad(u)))
+        return ufl.diff(self.energy(F, parameters), F) * F.T / ufl.det(F)
+
     def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return the linear part of the stress, ∂²W/∂F² at F = I times ε(u)."""
         dim = len(u)

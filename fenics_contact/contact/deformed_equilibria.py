@@ -1,0 +1,130 @@
+"""Equilibria of scenes with nonlinear materials: found along a path of loads, each with its history."""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+
+from fenics_contact.contact.deformed_state import DeformedState
+from fenics_contact.contact.dual_solve import contact_result
+from fenics_contact.contact.energies import Energies
+from fenics_contact.contact.result import ContactResult
+from fenics_contact.contact.state import State
+from fenics_contact.contact.static_admissibility import check_held
+from fenics_contact.contact.tolerance import Tolerance
+from fenics_contact.errors import InvalidInputError, LoadStepError
+from fenics_contact.feti import Decomposition, build_torn_system
+from fenics_contact.nonlinear import (
+    AutomaticSteps,
+    Equations,
+    Evaluation,
+    Path,
+    PathEndsError,
+    law_of,
+)
+from fenics_contact.qp import DualSolution
+from fenics_contact.scene import RigidSurface, Scene
+from fenics_contact.timing import PhaseTimer
+
+
+class DeformedEquilibria:
+    """Successive equilibria of a scene with nonlinear materials, on the subdomains of one decomposition."""
+
+    def __init__(
+        self, scene: Scene, decomposition: Decomposition, steps: AutomaticSteps | None, timer: PhaseTimer
+    ) -> None:
+        """Prepare the forms of all materials. Collective.
+
+        Args:
+            scene: The scene.
+            decomposition: Its subdomains.
+            steps: How loads are followed; None for the default.
+            timer: Collects the wall time.
+
+        Raises:
+            InvalidInputError: If the scene has a rigid surface that is free to move.
+        """
+        if any(isinstance(support, RigidSurface) and support.free.any() for support in scene.supports):
+            raise InvalidInputError(
+                "rigid surfaces need linear materials where they are free to move, this scene has others: "
+                "prescribe their displacement and rotation"
+            )
+        self._steps = steps or AutomaticSteps()
+        self._decomposition, self._timer = decomposition, timer
+        self._equations = Equations(scene, decomposition)
+
+    def solve(self, scene: Scene, origin: State | None, tolerance: Tolerance) -> DeformedState:
+        """Compute the equilibrium of a scene. Collective.
+
+        Args:
+            scene: The scene with its loads.
+            origin: The state before, whose history goes on; None for bodies at rest.
+            tolerance: Of all residuals; None for that of the solver.
+
+        Raises:
+            InvalidInputError: If the tolerance is no number.
+            LoadStepError: If the load cannot be followed; has the last equilibrium.
+        """
+        steps = self._steps
+        if tolerance is not None:
+            if not isinstance(tolerance, float):
+                raise InvalidInputError(
+                    f"the tolerance of nonlinear materials must be a number, got {tolerance!r}: their errors "
+                    "are not estimated; leave it out for 1e-8"
+                )
+            steps = replace(steps, newton=replace(steps.newton, tolerance=tolerance))
+        equations, timer = self._equations, self._timer
+        before, start, known, earlier = None, None, None, None
+        if isinstance(origin, DeformedState):
+            before, known, earlier = origin.torn, origin.equilibrium.system, origin.torn
+            start = origin.equilibrium.configuration
+        with timer.phase("assemble"):
+            torn = build_torn_system(scene, self._decomposition, previous=earlier)
+            if earlier is None:
+                check_held(torn)
+        try:
+            path = steps.follow(equations, before, torn, start or equations.at_rest(torn), timer, known)
+        except PathEndsError as failure:
+            last = None if failure.path is None else _state_after(failure.path, timer)
+            raise LoadStepError(str(failure), failure.history, last) from failure
+        return _state_after(path, timer)
+
+
+def _state_after(path: Path, timer: PhaseTimer) -> DeformedState:
+    """Return the state at the end of a path. Collective."""
+    end = path.end
+    evaluation, at = end.evaluation, end.evaluation.at
+    system = copy(end.system)
+    system.torn = evaluation.torn
+    law = law_of(evaluation.torn)
+    solution = DualSolution(
+        problem=system.problem.with_law(law),
+        multiplier=at.multiplier,
+        residual=evaluation.lacking,
+        product=np.zeros_like(at.multiplier),
+        alpha=np.zeros(system.kernel.shape[1]),
+        slip_bound=law.bound(at.multiplier),
+        residuals=evaluation.residuals,
+        iterations=len(path.history),
+        products=path.products,
+        history=path.history,
+        reason="every residual is below the tolerance",
+    )
+    with timer.phase("state"):
+        contact = contact_result(system, solution, at.displacement)
+        energies = _energies(evaluation, contact)
+    return DeformedState(
+        system, solution, at.displacement, contact, energies, dict(timer.seconds), equilibrium=end,
+        fractions=path.fractions, factorisations=path.factorisations,
+    )  # fmt: skip
+
+
+def _energies(evaluation: Evaluation, contact: ContactResult) -> Energies:
+    """Return the stored energy, the work of dead loads and the friction of the last step. Collective."""
+    stored = [np.nan if response.energy is None else response.energy for response in evaluation.responses]
+    strain = float(evaluation.torn.numbering.comm.allreduce(float(np.sum(stored))))
+    work = evaluation.torn.load_work(evaluation.at.displacement)
+    friction = float(np.sum(contact.slip_bound * np.linalg.norm(contact.slip, axis=1)))
+    return Energies(strain, work, friction, np.nan)
