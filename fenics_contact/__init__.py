@@ -11,6 +11,7 @@ subdomains, * `fenics_contact.scene`: bodies, materials, supports, loads, contac
 `fenics_contact.qp`: dual solvers for bounds and friction discs, * `fenics_contact.fem`: forms of elasticity
 and loads, * `fenics_contact.pairing`: contact search and mortar coupling, * `fenics_contact.feti`:
 subdomains, gluing, contact rows, the dual problem, * `fenics_contact.accuracy`: errors of states, *
+`fenics_contact.nonlinear`: Newton's method on deformed bodies, *
 `fenics_contact.contact`: scene → state, * `fenics_contact.shape`: design → value and subgradient, *
 `fenics_contact.optimize`: the bundle trust method; `fenics_contact.outer`: plain functions for other tools.
 

@@ -58,7 +58,10 @@ FLOORS = [
     [Room("fem", "forms of elasticity and loads on templates", "model")],
     [Room("pairing", "which slave node meets the master where", "model")],
     [Room("feti", "subdomains, gluing, contact rows, coarse space, dual operator", "model", "2")],
-    [Room("accuracy", "error estimates and certificates", "model")],
+    [
+        Room("accuracy", "error estimates and certificates", "model"),
+        Room("nonlinear", "Newton on deformed bodies", "model"),
+    ],
     [Room("contact", "scene → state: friction laws, load steps", "model", "4")],
     [Room("shape", "design → mesh → adjoint → subgradient", "model", "5")],
     [

@@ -92,6 +92,7 @@ from fenics_contact.shape import (
     solve_adjoint,
 )
 from tests.contact.gallery import partitions
+from tests.nonlinear.scenes import pressed, rounded
 from tests.shape.blocks import block_on_floor, designs_of
 
 FACES = ("scene", "mesh", "contact", "shape", "optimize", "accuracy")
