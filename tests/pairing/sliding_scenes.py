@@ -7,7 +7,7 @@ import numpy as np
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.pairing.sliding import SlidingContact, SlidingPoints
-from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, PlaneStrain, Scene, Surface
+from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, PlaneStrain, Scene, Support, Surface
 
 KINDS = ("hexahedron", "tetrahedron", "quadrilateral", "triangle")
 
@@ -35,6 +35,18 @@ def on_arch(kind: str, *, master_cells: int = 8, radius: float = 1.5, geometry: 
     bodies = {"high": Body(high, material), "low": Body(low, material)}
     pair = ContactPair(Surface("high", under), Surface("low", top), geometry=geometry)
     return Scene(bodies, contacts=[pair])
+
+
+def half_on_arch(kind: str) -> Scene:
+    """Return half of such a scene, cut at x = 0 by a plane of symmetry."""
+    low = block((0.0, -0.6, -0.5), (1.0, 0.6, 0.0), (4, 5, 1), kind)
+    high = block((0.0, -0.35, 0.03), (0.4, 0.33, 0.4), (3, 4, 1), kind)
+    bodies = {
+        name: Body(BodyMesh(arched(mesh.points), mesh.cells, mesh.surfaces), IsotropicElasticity(10.0, 0.3))
+        for name, mesh in (("high", high), ("low", low))
+    }
+    rollers = [Support(name, "x0", (0.0, None, None)) for name in bodies]
+    return Scene(bodies, rollers, contacts=[ContactPair(Surface("high", "z0"), Surface("low", "z1"))])
 
 
 def free(scene: Scene) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.pairing import find_contact_points, sliding_contact
+from fenics_contact.pairing import find_contact_points, movable, sliding_contact
 from fenics_contact.pairing.sliding.closest import ClosestPoints
 from fenics_contact.pairing.sliding.patches import SmoothPatches
 from fenics_contact.scene import Body, ContactPair, MovingObstacle, RigidCylinder, RigidPlane, Scene, Surface
@@ -17,6 +17,7 @@ from tests.pairing.sliding_scenes import (
     KINDS,
     arched,
     free,
+    half_on_arch,
     on_arch,
     rotation,
     same_points,
@@ -154,6 +155,22 @@ def test_nodes_leave_the_rim_and_come_back() -> None:
     x[high, 1] -= 5.5
     back = contact.at(x, gone)
     assert same_points(back, all_there)
+
+
+@pytest.mark.parametrize("kind", ["hexahedron", "tetrahedron"])
+def test_nodes_on_a_plane_of_symmetry_do_not_slip_across_it(kind: str) -> None:
+    scene = half_on_arch(kind)
+    fixed = np.concatenate([scene.fixed(name) for name in scene.body_names])
+    contact = sliding_contact(scene, fixed)
+    x = scene.points * [1.0, 1.1, 1.0]
+    x[: scene.bodies["high"].mesh.n_nodes, 1] += 0.07
+    now = contact.at(x).points
+    cut = np.abs(x[now.slave, 0]) < 1e-12
+    assert np.count_nonzero(cut) >= 4
+    assert np.array_equal(now.symmetric, np.column_stack([cut, 0 * cut, 0 * cut]).astype(bool))
+    assert np.abs(now.normal[cut, 0]).max() < 0.01
+    assert movable(now, fixed)[cut, 0].sum() == 0
+    assert (np.abs(now.tangents[cut, 1]) @ [1.0, 0.0, 0.0]).max() < 0.01
 
 
 def test_nodes_beyond_the_reach_need_no_point() -> None:

@@ -106,9 +106,10 @@ class SlidingContact:
                     f"coordinates must be finite numbers of shape {needed}, one row for each node of all "
                     f"bodies, got {given}: add the displacements to scene.points"
                 )
-        places = tuple(
-            m.obstacle.frame(time) if isinstance(m.obstacle, MovingObstacle) else None for m in self.meetings
-        )
+            places = tuple(
+                each.obstacle.frame(time) if isinstance(each.obstacle, MovingObstacle) else None
+                for each in self.meetings
+            )
         parts = [self._pair(index, coordinates, last, time) for index in range(len(self.meetings))]
         points = join_points([part[0] for part in parts], self.scene.dim, len(coordinates))
         differential = join_differentials([part[1] for part in parts], self.scene.dim, len(coordinates))
