@@ -19,7 +19,7 @@ _NEIGHBOURS = 8
 
 
 def near_surfaces(
-    meshes: Mapping[str, BodyMesh], distance: float
+    meshes: Mapping[str, BodyMesh], distance: float, along: float = 0.0
 ) -> tuple[dict[str, BodyMesh], list[tuple[str, str]]]:
     """Name the facets of bodies that face another body within a distance.
 
@@ -35,6 +35,7 @@ def near_surfaces(
     Args:
         meshes: Name to body.
         distance: Largest distance across the gap, [length].
+        along: How far beyond these facets the surfaces reach, for bodies that slide, [length].
 
     Returns:
         The bodies with a surface "near B" on A and "near A" on B for every pair, and the pairs of names, each
@@ -56,6 +57,7 @@ def near_surfaces(
         if not (near[one].any() and near[other].any()):
             continue
         pairs.append((one, other))
+        near = {name: sides[name].grown(mask, along) for name, mask in near.items()}
         for a, b in ((one, other), (other, one)):
             if f"near {b}" in surfaces[a]:
                 raise InvalidInputError(
@@ -80,6 +82,15 @@ class _Side:
     def may_meet(self, other: _Side, distance: float) -> bool:
         """Whether the bounding boxes of both are near each other."""
         return bool(np.all((self.low <= other.high + distance) & (other.low <= self.high + distance)))
+
+    def grown(self, mask: np.ndarray, along: float) -> np.ndarray:
+        """Return a mask of facets and of those around them that face the same way, within a distance."""
+        if along <= 0.0:
+            return mask
+        chosen = np.flatnonzero(mask)
+        away, nearest = cKDTree(self.centre[chosen]).query(self.centre)
+        alike = np.einsum("nd,nd->n", self.normal, self.normal[chosen[nearest]]) > -OPPOSED
+        return np.asarray(mask | (alike & (away <= along + self.radius)))
 
     def over(self, other: _Side, distance: float) -> tuple[np.ndarray, np.ndarray]:
         """Return masks of the facets whose centre lies over one of the other body's, and of the latter."""

@@ -1,6 +1,7 @@
 """Scenes: bodies, materials, supports, loads and contact pairs."""
 
 from fenics_contact.scene.approach import master_share
+from fenics_contact.scene.automatic import Automatic
 from fenics_contact.scene.bodies import bodies_from
 from fenics_contact.scene.body import Body
 from fenics_contact.scene.effects import Effect, EffectName
@@ -63,6 +64,7 @@ from fenics_contact.scene.values import OfPosition, ScalarValue, Ufl, VectorValu
 __all__ = [
     "RANK_TOLERANCE",
     "AnySupport",
+    "Automatic",
     "Body",
     "BodyForce",
     "ConeKind",

@@ -10,6 +10,7 @@ import numpy as np
 
 from fenics_contact.display import displayed
 from fenics_contact.partition import default_partition
+from fenics_contact.scene.automatic import Automatic
 from fenics_contact.scene.effects import Effect, effects_of
 from fenics_contact.scene.materials import is_nonlinear
 from fenics_contact.scene.parts import SceneParts
@@ -25,7 +26,7 @@ class Scene(SceneParts):
         bodies: Bodies by name.
         supports: Prescribed displacements.
         loads: Forces.
-        contacts: Pairs of surfaces that may touch.
+        contacts: Pairs of surfaces that may touch; `Automatic` finds them, and names the surfaces.
         ties: Pairs of surfaces that stay together.
 
     Raises:
@@ -46,6 +47,15 @@ class Scene(SceneParts):
         >>> [effect.name.value for effect in scene.effects()]
         ['elasticity', 'prescribed displacement', 'surface load', 'contact', 'Coulomb friction']
     """
+
+    def __post_init__(self) -> None:
+        """Check the parts, and find the contact pairs if that is wanted."""
+        super().__post_init__()
+        if isinstance(self.contacts, Automatic):
+            bodies, pairs = self.contacts.found(self)
+            object.__setattr__(self, "bodies", bodies)
+            object.__setattr__(self, "contacts", pairs)
+            super().__post_init__()
 
     def partition(self, ranks: int = 1) -> dict[str, np.ndarray]:
         """Cut every body into subdomains of a suitable size.

@@ -41,6 +41,7 @@ from fenics_contact.optimize import (
 )
 from fenics_contact.qp import FaceNewton
 from fenics_contact.scene import (
+    Automatic,
     BodyForce,
     Coulomb,
     DistanceObstacle,
@@ -146,7 +147,7 @@ def objects() -> dict[str, Any]:
         FinitePlasticity(1.0, 0.3, 1.0),
         J2Plasticity(1.0, 0.3, 1.0).answer(np.zeros((9, 3, 3)), np.zeros((9, 7)), 0.0), Ufl(lambda x: x[0]),
         DistanceObstacle(lambda x: x[:, 2]), RigidSphere((0, 0, 0), 1.0),
-        MovingObstacle(RigidSphere((0, 0, 0), 1.0), lambda time: (None, (time, 0, 0))),
+        Automatic(), MovingObstacle(RigidSphere((0, 0, 0), 1.0), lambda time: (None, (time, 0, 0))),
         RigidCylinder((0, 0, 0), (0, 0, 1), 1.0), OrthotropicPlaneStress((2.0, 1.0), 0.1, 1.0),
         OrthotropicElasticity((3.0, 2.0, 1.0), (0.1, 0.1, 0.1), (1.0, 1.0, 1.0)),
         ContactForces(lambda contact: (0.0, np.zeros(1), np.zeros((1, 2)))),

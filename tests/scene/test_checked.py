@@ -12,6 +12,7 @@ import fenics_contact.scene as package
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.scene import (
+    Automatic,
     Body,
     BodyForce,
     ContactPair,
@@ -54,7 +55,7 @@ SAMPLES: dict[type, Any] = {
         Support("a", "b"), Traction("a", "b", DOWN), TotalForce("a", "b", DOWN), Pressure("a", "b", 1),
         BodyForce("a", DOWN), ThermalStrain("a", 1.0), Ufl(lambda x: x), LoadStep("a"), Scene({"a": BODY}),
         RigidSphere((0, 0, 0), 1.0), RigidCylinder((0, 0, 0), (0, 0, 1), 1.0),
-        MovingObstacle(FLOOR, lambda time: (None, DOWN)),
+        Automatic(Coulomb(0.3)), MovingObstacle(FLOOR, lambda time: (None, DOWN)),
         DistanceObstacle(lambda x: x[:, 0]), PlaneStrain(1.0, 0.3), PlaneStress(1.0, 0.3),
         OrthotropicPlaneStress((1.0, 1.0), 0.3, 1.0),
         OrthotropicElasticity((1.0,) * 3, (0.1,) * 3, (1.0,) * 3),  # type: ignore[arg-type]

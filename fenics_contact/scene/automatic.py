@@ -1,0 +1,158 @@
+"""Contact pairs that a scene finds itself: surfaces of different bodies that may meet."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fenics_contact.checks import checked
+from fenics_contact.display import displayed
+from fenics_contact.errors import InvalidInputError, tell
+from fenics_contact.mesh import BodyMesh, boundary_faces, corners_of, near_surfaces
+from fenics_contact.scene.approach import master_share
+from fenics_contact.scene.body import Body
+from fenics_contact.scene.pairs import ContactPair, Discretisation, Friction, Surface
+from fenics_contact.surfaces import Geometry
+
+if TYPE_CHECKING:
+    from fenics_contact.scene.parts import SceneParts
+
+_LOG = logging.getLogger(__name__)
+
+
+@displayed
+@dataclass(frozen=True)
+@checked()
+class Automatic(Sequence[ContactPair]):
+    """Contact wherever boundaries of different bodies face each other, in place of a scene's contact pairs.
+
+    The scene looks for facets that face another body within a distance, names them "near B" on A and "near
+    A" on B, and makes a pair of them; look at ``scene.contacts`` and at pictures before trusting it. The
+    slave is the side with the smaller facets; between facets alike to a tenth, that of the softer body. A
+    side whose nodes are all held is the master. A body does not meet itself: split it if its parts may touch.
+
+    Attributes:
+        friction: The law of all pairs, see `ContactPair`.
+        distance: Largest distance across the gap, and how far beyond the facets found so the surfaces reach,
+            [length]; by default the size of a facet and the largest displacement that supports prescribe.
+            Bodies that loads move farther need more.
+        discretisation: As in `ContactPair`.
+        geometry: As in `ContactPair`.
+
+    Raises:
+        InvalidInputError: If the distance is not positive; when the scene is made, if it finds no pair.
+
+    Example:
+        >>> from fenics_contact.gallery import block
+        >>> from fenics_contact.scene import Coulomb, IsotropicElasticity, Scene, Support
+        >>> steel = IsotropicElasticity(2.1e5, 0.3)  # N/mm²
+        >>> bodies = {
+        ...     "plate": Body(block((0, 0, 0), (3, 3, 1), (3, 3, 1)), steel),  # mm
+        ...     "punch": Body(block((1, 1, 1), (2, 2, 2), (4, 4, 4)), steel),
+        ... }
+        >>> scene = Scene(bodies, [Support("plate", "z0")], contacts=Automatic(Coulomb(0.2)))
+        >>> [pair.place for pair in scene.contacts]
+        ['punch near plate on plate near punch']
+    """
+
+    friction: Friction = None
+    distance: float | None = None
+    discretisation: Discretisation = "node"
+    geometry: Geometry = "best"
+
+    def __post_init__(self) -> None:
+        """Reject a distance that is none."""
+        if self.distance is not None and not 0.0 < self.distance < np.inf:
+            raise InvalidInputError(
+                f"Automatic.distance must be positive and finite, got {self.distance!r}: give the largest "
+                "gap that may close, or None"
+            )
+
+    def __len__(self) -> int:
+        """Return zero: a scene replaces it by the pairs that it finds."""
+        return 0
+
+    @overload
+    def __getitem__(self, index: int) -> ContactPair: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[ContactPair]: ...
+    def __getitem__(self, index: Any) -> Any:
+        """Return a pair; there are none before a scene finds them."""
+        return ()[index]
+
+    def found(self, scene: SceneParts) -> tuple[dict[str, Body], tuple[ContactPair, ...]]:
+        """Return the bodies of a scene with the surfaces that may meet, and the pairs of these.
+
+        Raises:
+            InvalidInputError: If there are none.
+        """
+        meshes = {name: body.mesh for name, body in scene.bodies.items()}
+        size, motion = max(map(_facet_size, meshes.values())), _largest_motion(scene)
+        distance = size + motion if self.distance is None else self.distance
+        named, near = near_surfaces(meshes, distance, along=distance)
+        if not near:
+            raise InvalidInputError(_nothing_found(meshes, distance))
+        bodies = {name: replace(body, mesh=named[name]) for name, body in scene.bodies.items()}
+        with_surfaces = replace(scene, bodies=bodies, contacts=())
+        pairs = tuple(self._pair(with_surfaces, *names) for names in near)
+        words = "%d contact pairs are found within a distance of %.4g: %s"
+        tell(_LOG.info, words, len(pairs), distance, "; ".join(pair.place for pair in pairs))
+        return bodies, pairs
+
+    def _pair(self, scene: SceneParts, one: str, other: str) -> ContactPair:
+        """Return the pair of two bodies with the better slave."""
+        sides = Surface(one, f"near {other}"), Surface(other, f"near {one}")
+        pair = ContactPair(*sides, self.friction, self.discretisation, self.geometry)
+        sizes = [_size(scene.bodies[side.body].mesh, side.name) for side in sides]
+        held = [bool(scene.fixed(side.body)[np.unique(scene.facets(side))].all()) for side in sides]
+        alike = max(sizes) <= 1.1 * min(sizes)
+        other_is_better = master_share(scene, pair) > 0.5 if alike else sizes[1] < sizes[0]
+        if held[0] != held[1]:  # nodes that cannot move carry no multipliers
+            other_is_better = held[0]
+        return replace(pair, slave=sides[1], master=sides[0]) if other_is_better else pair
+
+
+def _facet_size(mesh: BodyMesh) -> float:
+    """Return the mean size of the facets of a body's boundary, [length]."""
+    return _mean_size(mesh.points[corners_of(boundary_faces(mesh.cells, mesh.dim)[0], mesh.dim)])
+
+
+def _size(mesh: BodyMesh, surface: str) -> float:
+    """Return the mean size of the facets of a surface, [length]."""
+    return _mean_size(mesh.points[corners_of(mesh.surfaces[surface], mesh.dim)])
+
+
+def _mean_size(corners: np.ndarray) -> float:
+    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
+
+
+def _largest_motion(scene: SceneParts) -> float:
+    """Return the largest displacement that supports prescribe, [length]."""
+    sizes = [0.0]
+    for support in scene.supports:
+        mesh = scene.bodies[support.body].mesh
+        values = np.nan_to_num(support.values(mesh.points[np.unique(mesh.surfaces[support.surface])]))
+        sizes.append(float(np.linalg.norm(values, axis=1).max(initial=0.0)))
+    return max(sizes)
+
+
+def _nothing_found(meshes: dict[str, BodyMesh], distance: float) -> str:
+    if len(meshes) < 2:
+        return (
+            "Automatic contact needs two bodies, the scene has one: split the body if its parts may touch, "
+            "or name pairs with obstacles"
+        )
+    names, gaps = list(meshes), []
+    for n, name in enumerate(names):
+        tree = cKDTree(meshes[name].points)
+        gaps += [float(tree.query(meshes[other].points)[0].min()) for other in names[n + 1 :]]
+    return (
+        f"Automatic contact needs bodies that face each other within its distance, {distance:.6g}, and finds "
+        f"none; the nearest nodes of two bodies are {min(gaps):.6g} apart: give a larger distance, name the "
+        "pairs, or leave contacts out"
+    )

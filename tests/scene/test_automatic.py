@@ -1,0 +1,110 @@
+"""Contact pairs that scenes find themselves."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.contact import solve_scene
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import block, rectangle
+from fenics_contact.mesh import near_surfaces
+from fenics_contact.scene import (
+    Automatic,
+    Body,
+    ContactPair,
+    Coulomb,
+    IsotropicElasticity,
+    PlaneStrain,
+    Scene,
+    Support,
+    Surface,
+)
+from tests.contact.gallery import partitions
+
+STEEL, RUBBER = IsotropicElasticity(2.1e5, 0.3), IsotropicElasticity(10.0, 0.3)
+LOW = block((0.0, 0.0, 0.0), (3.0, 3.0, 1.0), (3, 3, 1))
+
+
+def scene(high: tuple[int, int, int] = (2, 2, 2), *, gap: float = 0.0, material: IsotropicElasticity = STEEL,
+          shift: float = 0.0, push: float = 0.0, automatic: Automatic | None = None) -> Scene:  # fmt: skip
+    """Return a block over a wider plate of three cells a side."""
+    low_left = (0.5 + shift, 0.5, 1.0 + gap)
+    upper = block(low_left, (2.5 + shift, 2.5, 2.0 + gap), high)
+    bodies = {"plate": Body(LOW, STEEL), "punch": Body(upper, material)}
+    supports = [Support("plate", "z0"), Support("punch", "z1", (push, 0.0, -0.01))]
+    return Scene(bodies, supports, contacts=Automatic(Coulomb(0.3)) if automatic is None else automatic)
+
+
+def test_the_surfaces_that_face_each_other_are_found_and_solved() -> None:
+    found = scene((4, 4, 2))
+    assert [pair.place for pair in found.contacts] == ["punch near plate on plate near punch"]
+    assert found.contacts[0].friction == Coulomb(0.3)
+    punch, plate = found.bodies["punch"].mesh, found.bodies["plate"].mesh
+    assert len(punch.surfaces["near plate"]) == 16
+    assert len(plate.surfaces["near punch"]) == 9
+    assert "pair 0" in str(found.plan())
+    named = Scene(
+        {"plate": Body(LOW, STEEL), "punch": found.bodies["punch"]}, found.supports,
+        contacts=[ContactPair(Surface("punch", "z0"), Surface("plate", "z1"), Coulomb(0.3))],
+    )  # fmt: skip
+    forces = []
+    for each in (found, named):
+        state = solve_scene(each, MPI.COMM_SELF, partitions=partitions(each), tolerance=1e-9)
+        forces.append(state.contact.normal_force)
+    assert forces[0].sum() > 100.0
+    assert forces[0] == pytest.approx(forces[1], rel=1e-6)
+
+
+def test_the_finer_side_is_the_slave_then_the_softer_one() -> None:
+    assert scene((4, 4, 2)).contacts[0].slave.body == "punch"
+    assert scene((1, 1, 1)).contacts[0].slave.body == "plate"
+    assert scene((2, 2, 2)).contacts[0].slave.body == "plate"  # alike: as named
+    assert scene((2, 2, 2), material=RUBBER).contacts[0].slave.body == "punch"
+
+
+def test_a_side_whose_nodes_are_all_held_is_the_master() -> None:
+    fine = block((0.5, 0.5, 1.0), (2.5, 2.5, 2.0), (8, 8, 2))
+    bodies = {"plate": Body(LOW, STEEL), "punch": Body(fine, STEEL)}
+    supports = [Support("punch", "z0"), Support("plate", "z0", (None, None, 0.1))]
+    assert Scene(bodies, supports, contacts=Automatic()).contacts[0].slave.body == "plate"
+
+
+def test_bodies_that_supports_bring_together_are_near() -> None:
+    with pytest.raises(InvalidInputError, match=r"finds none; the nearest nodes of two bodies are 1\.6"):
+        scene(gap=1.5)
+    assert scene(gap=1.5, push=2.0).contacts
+    assert scene(gap=1.5, automatic=Automatic(distance=1.6)).contacts
+
+
+def test_surfaces_reach_as_far_as_bodies_slide() -> None:
+    meshes = {"plate": LOW, "punch": block((0.0, 0.0, 1.0), (1.0, 1.0, 2.0), (1, 1, 1))}
+    assert len(near_surfaces(meshes, 0.1)[0]["plate"].surfaces["near punch"]) == 1
+    assert len(near_surfaces(meshes, 0.1, along=0.6)[0]["plate"].surfaces["near punch"]) == 3
+    # The sides of the plate face another way.
+    assert len(near_surfaces(meshes, 0.1, along=9.0)[0]["plate"].surfaces["near punch"]) == 9
+
+
+def test_three_plane_bodies_meet_in_two_pairs(caplog: pytest.LogCaptureFixture) -> None:
+    bodies = {
+        name: Body(rectangle((x, 0.0), (x + 1.0, 1.0), (4, 4)), PlaneStrain(1.0, 0.3))
+        for name, x in (("a", 0.0), ("b", 1.0), ("c", 2.0))
+    }
+    with caplog.at_level(logging.INFO, logger="fenics_contact"):
+        found = Scene(bodies, contacts=Automatic(distance=0.1))
+    assert {frozenset((pair.slave.body, pair.master.body)) for pair in found.contacts} == {  # type: ignore[union-attr]
+        frozenset("ab"), frozenset("bc"),
+    }  # fmt: skip
+    assert "2 contact pairs are found within a distance of 0.1" in caplog.text
+
+
+def test_one_body_and_distances_that_are_none_are_refused() -> None:
+    with pytest.raises(InvalidInputError, match="needs two bodies"):
+        Scene({"plate": Body(LOW, STEEL)}, contacts=Automatic())
+    for distance in (0.0, -1.0, np.inf, np.nan):
+        with pytest.raises(InvalidInputError, match=r"Automatic\.distance must be positive and finite"):
+            Automatic(distance=distance)
+    assert list(Automatic()) == []
