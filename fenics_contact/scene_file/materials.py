@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import AfterValidator, Field, PositiveFloat
+from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
 
 from fenics_contact import scene
 from fenics_contact.errors import InvalidInputError, running
@@ -66,6 +66,29 @@ class OrthotropicPlate(_Material):
     shear_modulus: PositiveFloat
 
 
+@keys_of(scene.J2Plasticity)
+class J2Material(_Material):
+    """Elastic-plastic metals in small strain: von Mises' yield function with hardening."""
+
+    model: Literal["j2_plasticity"]
+    young_modulus: PositiveFloat
+    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)]
+    yield_stress: PositiveFloat
+    kinematic_hardening: NonNegativeFloat = 0.0
+    saturation_rate: NonNegativeFloat = 0.0
+
+
+@keys_of(scene.FinitePlasticity)
+class FinitePlasticityMaterial(_Material):
+    """Elastic-plastic metals in large deformations: von Mises' yield function with hardening."""
+
+    model: Literal["finite_plasticity"]
+    young_modulus: PositiveFloat
+    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)]
+    yield_stress: PositiveFloat
+    saturation_rate: NonNegativeFloat = 0.0
+
+
 def _frozen(value: Any) -> Any:
     """Convert lists to tuples: materials are hashable."""
     return tuple(map(_frozen, value)) if isinstance(value, list) else value
@@ -105,6 +128,8 @@ AnyMaterial: TypeAlias = Annotated[
         IsotropicMaterial,
         OrthotropicMaterial,
         OrthotropicPlate,
+        J2Material,
+        FinitePlasticityMaterial,
         default="isotropic",
         other=OwnMaterial,
         when=lambda table: is_reference(table.get("model")),

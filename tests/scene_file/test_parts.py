@@ -17,6 +17,7 @@ from tests.scene_file.texts import changed
 SELF = MPI.COMM_SELF
 BLOCK = {"shape": "block", "lower": [0, 0, 0], "upper": [2, 1, 1], "counts": [4, 2, 2]}
 STEEL = {"young_modulus": 2.1e5, "poisson_ratio": 0.3, "thermal_expansion": 1.2e-5}
+YIELDING = {"young_modulus": 2.1e5, "poisson_ratio": 0.3, "yield_stress": 235, "isotropic_hardening": 2e3}
 FLOOR = {"obstacle": "plane", "point": [0, 0, 0], "normal": [0, 0, 1]}
 
 
@@ -86,8 +87,16 @@ def test_the_parts_of_a_chain_are_its_links() -> None:
                 (3, 2, 1), (0.1, 0.2, 0.3), (1, 1, 1), scene.material_axes((0, 1, 0), (-1, 0, 0))
             ),
         ),
+        (
+            YIELDING | {"model": "j2_plasticity", "kinematic_hardening": 1e3},
+            scene.J2Plasticity(2.1e5, 0.3, 235, 2e3, 1e3),
+        ),
+        (
+            YIELDING | {"model": "finite_plasticity", "saturation_stress": 300, "saturation_rate": 9},
+            scene.FinitePlasticity(2.1e5, 0.3, 235, 2e3, 300, 9),
+        ),
     ],
-    ids=["isotropic", "orthotropic"],
+    ids=["isotropic", "orthotropic", "j2", "finite"],
 )  # fmt: skip
 def test_materials_are_those_of_the_package(given: dict[str, Any], built: scene.Material) -> None:
     assert file_of(material=given).scene.bodies["a"].material == built
