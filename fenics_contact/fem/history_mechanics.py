@@ -10,6 +10,7 @@ from fenics_contact.fem.composition import Composition
 from fenics_contact.fem.deformation import Dilatation
 from fenics_contact.fem.gauss_points import GaussPoints
 from fenics_contact.fem.mechanics import Mechanics, Response
+from fenics_contact.mesh import determinants
 from fenics_contact.scene import HistoryMaterial
 
 
@@ -62,7 +63,7 @@ class HistoryMechanics:
             UserCodeError: If a material raises.
         """
         before, gradient = self._before(history), self._gauss.gradient(displacement)
-        after = before.copy()
+        after, stress = before.copy(), np.full(gradient.shape, np.nan)
         force, entries = np.zeros(displacement.size), np.zeros(self._gauss.entries)
         for material, cells in self._parts:
             if not len(cells):
@@ -72,7 +73,9 @@ class HistoryMechanics:
                 gradient[cells].reshape(-1, 3, 3), before[cells, :, :size].reshape(-1, size), duration
             )
             after[cells, :, :size] = end.history.reshape(*shape, size)
-            force += self._gauss.force(end.stress.reshape(*shape, 3, 3), cells)
+            nominal = end.stress.reshape(*shape, 3, 3)
+            stress[cells] = cauchy(nominal, gradient[cells]) if material.finite else nominal
+            force += self._gauss.force(nominal, cells)
             entries += self._gauss.stiffness(end.tangent.reshape(*shape, 3, 3, 3, 3), cells)
         rest = None if self._others is None else self._others.at(displacement)
         return Response(
@@ -81,6 +84,7 @@ class HistoryMechanics:
             energy=None,
             least_jacobian=self.least_jacobian(displacement),
             history=after,
+            stress=stress,
         )
 
     def least_jacobian(self, displacement: np.ndarray) -> float:
@@ -97,3 +101,9 @@ class HistoryMechanics:
                 "start with None"
             )
         return history
+
+
+def cauchy(nominal: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+    """Return P Fᵀ / det F by the first Piola-Kirchhoff stress and the displacement gradient, (..., 3, 3)."""
+    F = np.eye(3) + gradient
+    return np.asarray(nominal @ F.swapaxes(-1, -2) / determinants(F)[..., None, None])

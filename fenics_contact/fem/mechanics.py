@@ -22,6 +22,8 @@ class Response:
         energy: Stored energy, [force · length]; None where materials dissipate.
         least_jacobian: Smallest det F at a Gauss point; 0 or less is an inverted cell.
         history: Internal variables at the end of the step, shape (n_cells, n_gauss, k); None without any.
+        stress: Cauchy stress at the Gauss points of materials with a history, [force / length²], shape
+            (n_cells, n_gauss, 3, 3), NaN in cells of other materials; None without any.
     """
 
     force: np.ndarray
@@ -29,6 +31,7 @@ class Response:
     energy: float | None
     least_jacobian: float
     history: np.ndarray | None = None
+    stress: np.ndarray | None = None
 
 
 class Mechanics(Protocol):

@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.fem import FormLibrary, History, Mechanics, Response, composition
+from fenics_contact.fem.gauss_points import GaussPoints
 from fenics_contact.feti.subdomain import SubdomainMesh, cut_out
 from fenics_contact.scene import (
     Body,
@@ -72,6 +73,13 @@ def test_forces_are_in_equilibrium_and_turn_with_the_body() -> None:
     turned = answer(patch, (patch.points + u) @ Q.T - patch.points, first.history)
     np.testing.assert_allclose(turned.force.reshape(-1, 3), forces @ Q.T, atol=1e-10 * size)
     np.testing.assert_allclose(turned.history, first.history, atol=1e-12)
+    np.testing.assert_allclose(turned.stress, Q @ first.stress @ Q.T, atol=1e-9 * np.abs(first.stress).max())
+    np.testing.assert_allclose(first.stress, first.stress.swapaxes(2, 3), atol=1e-12)
+    deviator = first.stress - np.trace(first.stress, axis1=2, axis2=3)[..., None, None] / 3 * np.eye(3)
+    F = np.eye(3) + GaussPoints(patch.mesh.space, "hexahedron", patch.points).gradient(u.ravel())
+    equivalent = np.sqrt(1.5) * np.linalg.norm(deviator, axis=(2, 3)) * np.linalg.det(F)
+    law = LARGE.yield_stress + LARGE.isotropic_hardening * first.history[..., 6]
+    np.testing.assert_allclose(equivalent, law, rtol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -88,6 +96,8 @@ def test_bodies_of_several_materials_add_them_up(other: IsotropicElasticity | Ne
     assert 0 < here.sum() < len(here)
     np.testing.assert_allclose(found.history[here], alone[here], atol=1e-14)
     assert not found.history[~here].any()
+    assert np.isnan(found.stress[~here]).all()
+    assert np.isfinite(found.stress[here]).all()
     direction = np.cos(np.arange(u.size) ** 1.5)
     ahead, behind = (answer(mixed, u.ravel() + s * 1e-6 * direction) for s in (1, -1))
     exact = found.stiffness @ direction
