@@ -89,7 +89,7 @@ class HistoryMechanics:
 
     def least_jacobian(self, displacement: np.ndarray) -> float:
         """Return the smallest det F; see `Mechanics.least_jacobian`."""
-        return float(self._dilatation.at(displacement).min())
+        return self._dilatation.least(displacement)
 
     def _before(self, history: np.ndarray | None) -> np.ndarray:
         if history is None:

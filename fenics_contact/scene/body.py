@@ -10,8 +10,8 @@ import numpy as np
 from fenics_contact.checks import checked
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.mesh import BodyMesh
-from fenics_contact.scene.materials import Material
+from fenics_contact.mesh import CELL_TYPES, BodyMesh
+from fenics_contact.scene.materials import Material, has_mean_dilatation
 
 
 @displayed
@@ -34,6 +34,7 @@ class Body:
             _check_regions(self.mesh, self.material)
         for material in self.materials:
             _check_material(material, self.mesh.dim)
+            _check_mean_dilatation(material, self.mesh)
 
     @property
     def materials(self) -> tuple[Material, ...]:
@@ -95,3 +96,13 @@ def _check_material(material: Material, dim: int) -> None:
             f"a material must be hashable, {name} is not ({error}): write it as a frozen dataclass of "
             "numbers and tuples"
         ) from error
+
+
+def _check_mean_dilatation(material: Material, mesh: BodyMesh) -> None:
+    if has_mean_dilatation(material) and CELL_TYPES[mesh.cell_type].is_affine:
+        cells = CELL_TYPES[mesh.cell_type].plural
+        raise InvalidInputError(
+            f"mean_dilatation of {type(material).__name__} needs cells in which the volume change varies, got a "
+            f"mesh of {cells}, in which it is constant and locks all the same: use hexahedra (quadrilaterals in "
+            "the plane) or quadratic cells, fenics_contact.mesh.quadratic"
+        )

@@ -49,7 +49,9 @@ from fenics_contact.scene import (
     J2Plasticity,
     LoadStep,
     MovingObstacle,
+    MooneyRivlin,
     NeoHooke,
+    Ogden,
     OrthotropicElasticity,
     OrthotropicPlaneStress,
     PlaneStrain,
@@ -60,6 +62,7 @@ from fenics_contact.scene import (
     RigidSphere,
     RigidSurface,
     Sampled,
+    StVenantKirchhoff,
     Support,
     Surface,
     ThermalStrain,
@@ -101,8 +104,8 @@ MOST_PRINTED = 25
 #: Protocols, and classes to derive from.
 NO_OBJECTS = {
     "Elasticity", "EnergyModel", "HistoryMaterial", "Hyperelasticity", "Inexact", "Kinked", "Material",
-    "Objective", "Pieced", "Resumable", "RigidObstacle", "SurfaceShape", "Thermoelastic", "Transverse",
-    "Weighable",
+    "NearlyIncompressible", "Objective", "Pieced", "Resumable", "RigidObstacle", "SurfaceShape",
+    "Thermoelastic", "Transverse", "Weighable",
 }  # fmt: skip
 
 
@@ -143,6 +146,7 @@ def objects() -> dict[str, Any]:
         Support("block", "z1", (None, lambda x: x[:, 0], 0.0)), LoadStep("push", loads=weights),
         *CELL_TYPES.values(), ThermalStrain("block", 20.0), TotalForce("block", "z1", (0, 0, -1)),
         Pressure("block", "z1", 1.0), Tresca(1.0), Tie(Surface("a", "z0"), Surface("b", "z1")),
+        MooneyRivlin(1.0, 0.0, 9.0), Ogden((1.0,), (2.0,), 9.0), StVenantKirchhoff(1.0, 0.3),
         PlaneStrain(1.0, 0.3), PlaneStress(1.0, 0.3), NeoHooke(1.0, 0.3), J2Plasticity(1.0, 0.3, 1.0),
         FinitePlasticity(1.0, 0.3, 1.0),
         J2Plasticity(1.0, 0.3, 1.0).answer(np.zeros((9, 3, 3)), np.zeros((9, 7)), 0.0), Ufl(lambda x: x[0]),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse.linalg as spl
 from mpi4py import MPI
 
 from fenics_contact.fem import FormLibrary, Mechanics, Response, composition
@@ -88,3 +89,19 @@ def derivative_errors(patch: Patch, u: np.ndarray, step: float = 1e-5) -> tuple[
         abs(force - here.force @ direction) / (np.abs(here.force) @ np.abs(direction)),
         float(np.abs(stiffness - exact).max() / np.abs(exact).max()),
     )
+
+
+def equilibrium(patch: Patch, u: np.ndarray, free: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """Displacement by Newton's method from ``u``, which is kept where it is not free; no step empties a cell."""
+    u, scale = u.copy(), 1e-7 * (np.abs(load).max() + np.abs(patch.at(u).force).max())
+    for _ in range(25):
+        found = patch.at(u)
+        residual = (load - found.force)[free]
+        if np.abs(residual).max() < scale:
+            return u
+        du = np.zeros(u.size)
+        du[free] = spl.spsolve(found.stiffness[free][:, free].tocsc(), residual)
+        while patch.mechanics.least_jacobian(u + du) < 0.4 * found.least_jacobian:
+            du /= 2
+        u += du
+    raise AssertionError("Newton's method did not converge")

@@ -4,9 +4,19 @@ from fenics_contact.scene.materials.elasticity import Elasticity, strain
 from fenics_contact.scene.materials.energy import EnergyModel
 from fenics_contact.scene.materials.finite_plasticity import FinitePlasticity
 from fenics_contact.scene.materials.history_material import HistoryMaterial, MaterialResponse
-from fenics_contact.scene.materials.hyperelasticity import Hyperelasticity, is_nonlinear
+from fenics_contact.scene.materials.hyperelasticity import (
+    Hyperelasticity,
+    deformation_gradient,
+    in_space,
+    is_nonlinear,
+)
 from fenics_contact.scene.materials.isotropic import IsotropicElasticity
 from fenics_contact.scene.materials.j2_plasticity import J2Plasticity
+from fenics_contact.scene.materials.nearly_incompressible import (
+    NearlyIncompressible,
+    has_mean_dilatation,
+    volume_change,
+)
 from fenics_contact.scene.materials.neo_hooke import NeoHooke
 from fenics_contact.scene.materials.orthotropic import (
     OrthotropicElasticity,
@@ -15,6 +25,8 @@ from fenics_contact.scene.materials.orthotropic import (
 )
 from fenics_contact.scene.materials.plane import PlaneStrain, PlaneStress
 from fenics_contact.scene.materials.protocol import Material, Thermoelastic, Transverse, can_expand
+from fenics_contact.scene.materials.rubber import MooneyRivlin, Ogden
+from fenics_contact.scene.materials.st_venant_kirchhoff import StVenantKirchhoff
 
 __all__ = [
     "Elasticity",
@@ -26,15 +38,23 @@ __all__ = [
     "J2Plasticity",
     "Material",
     "MaterialResponse",
+    "MooneyRivlin",
+    "NearlyIncompressible",
     "NeoHooke",
+    "Ogden",
     "OrthotropicElasticity",
     "OrthotropicPlaneStress",
     "PlaneStrain",
     "PlaneStress",
+    "StVenantKirchhoff",
     "Thermoelastic",
     "Transverse",
     "can_expand",
+    "deformation_gradient",
+    "has_mean_dilatation",
+    "in_space",
     "is_nonlinear",
     "material_axes",
     "strain",
+    "volume_change",
 ]

@@ -58,8 +58,16 @@ class Hyperelasticity(Elasticity):
 
     def cauchy(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return Cauchy's stress P Fᵀ / det F of a displacement (3 x 3, UFL), [force / length²]."""
-        F = ufl.variable(in_space(ufl.Identity(len(u)) + ufl.grad(u)))
-        return ufl.diff(self.energy(F, parameters), F) * F.T / ufl.det(F)
+        F = in_space(deformation_gradient(u))
+        return self.first_piola(F, parameters) * F.T / ufl.det(F)
+
+    def work(self, u: Expr, v: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return the work ∂W/∂F : ∇v of the stresses of ``u`` on ``v`` per undeformed volume."""
+        return ufl.inner(self.first_piola(deformation_gradient(u), parameters), ufl.grad(v))
+
+    def tangent(self, u: Expr, du: Expr, v: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
+        """Return the growth of `work` with the displacement along ``du``."""
+        return ufl.derivative(self.work(u, v, parameters), u, du)
 
     def stress(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return the linear part of the stress, ∂²W/∂F² at F = I times ε(u)."""
@@ -82,6 +90,11 @@ class Hyperelasticity(Elasticity):
         # The variable keeps UFL from simplifying the identity away before it has differentiated.
         F = ufl.variable(ufl.Identity(dim))
         return expand_derivatives(ufl.diff(ufl.diff(self.density(F, parameters), F), F))
+
+
+def deformation_gradient(u: Expr) -> Expr:
+    """Return F = I + ∇u."""
+    return ufl.Identity(len(u)) + ufl.grad(u)
 
 
 def in_space(F: Expr) -> Expr:

@@ -1,0 +1,69 @@
+"""Volume energies of the mean dilatation of each cell, against locking of nearly incompressible bodies."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact import _dolfinx
+from fenics_contact.fem.composition import Composition
+from fenics_contact.fem.deformation import Dilatation
+from fenics_contact.fem.deformed_forms import MEAN_FORMS
+from fenics_contact.fem.templates import Templates
+
+
+def assembled(form: _dolfinx.fem.Form, shape: tuple[int, int]) -> sp.csr_matrix:
+    """Assemble a bilinear form on one rank."""
+    indptr, indices, data = _dolfinx.assemble_csr(form)
+    return sp.csr_matrix((data, indices, indptr), shape=shape)
+
+
+class MeanDilatation:
+    """The mean dilatations θ of the cells of one mesh, and their part of the tangent.
+
+    With θ_c = ∫ J dV / V_c and D v = ∫ cof F : ∇v dV on each cell, the tangent at fixed θ lacks
+    Σ_c U''(θ_c) / V_c (D u)_c (D v)_c.
+
+    References:
+        J. C. Simo, R. L. Taylor, K. S. Pister, Variational and projection methods for the volume constraint
+        in finite deformation elasto-plasticity, Comput. Methods Appl. Mech. Eng. 51 (1985) 177-208.
+    """
+
+    def __init__(
+        self,
+        templates: Templates,
+        parts: Composition,
+        cell_type: str,
+        fields: tuple[_dolfinx.fem.Function, _dolfinx.fem.Function],
+        dilatation: Dilatation,
+    ) -> None:
+        """Bind the forms.
+
+        Args:
+            templates: With the prepared forms.
+            parts: Materials of the mesh.
+            cell_type: Of the mesh.
+            fields: Displacement and mean dilatations, which `follow` sets.
+            dilatation: Changes of volume on the mesh.
+        """
+        self._means, self._dilatation = fields[1], dilatation
+        self._size = fields[0].x.array.size
+        space, cellwise = (field.function_space for field in fields)
+        self._dofs = _dolfinx.cell_dofs(cellwise).ravel()
+        self._change, self._modulus = (
+            templates[kind, parts.materials, cell_type].bind(
+                spaces, parts.parameters, fields, cells=parts.cells
+            )
+            for kind, spaces in zip(MEAN_FORMS, ([cellwise, space], [cellwise]), strict=True)
+        )
+
+    def follow(self, displacement: np.ndarray) -> None:
+        """Set the mean dilatations to those of a displacement."""
+        self._means.x.array[self._dofs] = self._dilatation.means(displacement)
+
+    def stiffness(self) -> sp.csr_matrix:
+        """Return the growth of the mean dilatations' stresses, shape (dim n, dim n)."""
+        D = assembled(self._change, (len(self._dofs), self._size))
+        volumes = np.empty(len(self._dofs))
+        volumes[self._dofs] = self._dilatation.volumes
+        return (D.T @ sp.diags(_dolfinx.assemble_vector(self._modulus) / volumes**2) @ D).tocsr()
