@@ -16,8 +16,8 @@ from fenics_contact.scene import (
     HistoryMaterial,
     Material,
     deformation_gradient,
+    gradient_in_space,
     has_mean_dilatation,
-    in_space,
     is_nonlinear,
     volume_change,
 )
@@ -52,7 +52,9 @@ def _energy(material: Any, u: Expr, mean: Expr, constants: Constants) -> Expr:
     """Return the energy per undeformed volume."""
     F = deformation_gradient(u)
     if has_mean_dilatation(material):
-        return material.shape_energy(in_space(F), constants) + material.volume_energy(mean, constants)
+        return material.shape_energy(gradient_in_space(F), constants) + material.volume_energy(
+            mean, constants
+        )
     return (
         material.density(F, constants) if is_nonlinear(material) else material.stiffness(u, u, constants) / 2
     )

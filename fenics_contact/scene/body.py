@@ -102,7 +102,7 @@ def _check_mean_dilatation(material: Material, mesh: BodyMesh) -> None:
     if has_mean_dilatation(material) and CELL_TYPES[mesh.cell_type].is_affine:
         cells = CELL_TYPES[mesh.cell_type].plural
         raise InvalidInputError(
-            f"mean_dilatation of {type(material).__name__} needs cells in which the volume change varies, got a "
-            f"mesh of {cells}, in which it is constant and locks all the same: use hexahedra (quadrilaterals in "
-            "the plane) or quadratic cells, fenics_contact.mesh.quadratic"
+            f"mean_dilatation of {type(material).__name__} needs cells in which the volume change varies, "
+            f"got a mesh of {cells}, in which it is constant and locks all the same: use hexahedra "
+            "(quadrilaterals in the plane) or quadratic cells, fenics_contact.mesh.quadratic"
         )

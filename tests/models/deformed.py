@@ -92,7 +92,7 @@ def derivative_errors(patch: Patch, u: np.ndarray, step: float = 1e-5) -> tuple[
 
 
 def equilibrium(patch: Patch, u: np.ndarray, free: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """Displacement by Newton's method from ``u``, which is kept where it is not free; no step empties a cell."""
+    """Displacement by Newton's method from ``u``, kept where it is not free; no step collapses a cell."""
     u, scale = u.copy(), 1e-7 * (np.abs(load).max() + np.abs(patch.at(u).force).max())
     for _ in range(25):
         found = patch.at(u)

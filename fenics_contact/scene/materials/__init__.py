@@ -7,7 +7,7 @@ from fenics_contact.scene.materials.history_material import HistoryMaterial, Mat
 from fenics_contact.scene.materials.hyperelasticity import (
     Hyperelasticity,
     deformation_gradient,
-    in_space,
+    gradient_in_space,
     is_nonlinear,
 )
 from fenics_contact.scene.materials.isotropic import IsotropicElasticity
@@ -51,8 +51,8 @@ __all__ = [
     "Transverse",
     "can_expand",
     "deformation_gradient",
+    "gradient_in_space",
     "has_mean_dilatation",
-    "in_space",
     "is_nonlinear",
     "material_axes",
     "strain",

@@ -49,7 +49,7 @@ class Hyperelasticity(Elasticity):
 
     def density(self, F: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return W of a deformation gradient in the plane (2 x 2, in plane strain) or in space (3 x 3)."""
-        return self.energy(in_space(F), parameters)
+        return self.energy(gradient_in_space(F), parameters)
 
     def first_piola(self, F: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return the first Piola-Kirchhoff stress ∂W/∂F (as large as F, UFL), [force / length²]."""
@@ -58,7 +58,7 @@ class Hyperelasticity(Elasticity):
 
     def cauchy(self, u: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return Cauchy's stress P Fᵀ / det F of a displacement (3 x 3, UFL), [force / length²]."""
-        F = in_space(deformation_gradient(u))
+        F = gradient_in_space(deformation_gradient(u))
         return self.first_piola(F, parameters) * F.T / ufl.det(F)
 
     def work(self, u: Expr, v: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
@@ -97,7 +97,7 @@ def deformation_gradient(u: Expr) -> Expr:
     return ufl.Identity(len(u)) + ufl.grad(u)
 
 
-def in_space(F: Expr) -> Expr:
+def gradient_in_space(F: Expr) -> Expr:
     """Return a deformation gradient as 3 x 3 tensor; one in the plane is that of plane strain."""
     if F.ufl_shape == (3, 3):
         return F

@@ -7,7 +7,7 @@ from abc import abstractmethod
 import ufl
 from ufl.core.expr import Expr
 
-from fenics_contact.scene.materials.hyperelasticity import deformation_gradient, in_space
+from fenics_contact.scene.materials.hyperelasticity import deformation_gradient, gradient_in_space
 from fenics_contact.scene.materials.nearly_incompressible import NearlyIncompressible
 
 
@@ -29,14 +29,14 @@ class IsotropicRubber(NearlyIncompressible):
     def shape_stress(self, F: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return the derivative of the shape energy by F, 2 x 2 or 3 x 3."""
         gradient = ufl.variable(F)
-        own = [ufl.variable(invariant) for invariant in isochoric_invariants(in_space(gradient))]
+        own = [ufl.variable(invariant) for invariant in isochoric_invariants(gradient_in_space(gradient))]
         energy = self.invariant_energy(own[0], own[1], parameters)
         return sum(ufl.diff(energy, one) * ufl.diff(one, gradient) for one in own)
 
     def shape_tangent(self, u: Expr, du: Expr, v: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return the growth of the work of the shape stress on ``v`` with the displacement along ``du``."""
         F = ufl.variable(deformation_gradient(u))
-        own = [ufl.variable(invariant) for invariant in isochoric_invariants(in_space(F))]
+        own = [ufl.variable(invariant) for invariant in isochoric_invariants(gradient_in_space(F))]
         energy = self.invariant_energy(own[0], own[1], parameters)
         slopes = [ufl.diff(energy, one) for one in own]
         along_v, along_du = ([ufl.inner(ufl.diff(one, F), ufl.grad(w)) for one in own] for w in (v, du))

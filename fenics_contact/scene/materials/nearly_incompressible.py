@@ -7,7 +7,11 @@ from abc import abstractmethod
 import ufl
 from ufl.core.expr import Expr
 
-from fenics_contact.scene.materials.hyperelasticity import Hyperelasticity, deformation_gradient, in_space
+from fenics_contact.scene.materials.hyperelasticity import (
+    Hyperelasticity,
+    deformation_gradient,
+    gradient_in_space,
+)
 
 
 class NearlyIncompressible(Hyperelasticity):
@@ -35,7 +39,7 @@ class NearlyIncompressible(Hyperelasticity):
     def shape_stress(self, F: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return the derivative of the shape energy by F, 2 x 2 or 3 x 3."""
         gradient = ufl.variable(F)
-        return ufl.diff(self.shape_energy(in_space(gradient), parameters), gradient)
+        return ufl.diff(self.shape_energy(gradient_in_space(gradient), parameters), gradient)
 
     def first_piola(self, F: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
         """Return the first Piola-Kirchhoff stress ∂W/∂F (as large as F, UFL), [force / length²]."""
