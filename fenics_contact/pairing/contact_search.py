@@ -118,6 +118,8 @@ def _points_of_pairs(
 ) -> ContactPoints:
     parts = []
     for index, pair in enumerate(pairs):
+        if isinstance(pair, ContactPair) and pair.within_body:
+            continue  # no part of an undeformed body is near another one
         points = _measured(scene, pair, index, fixed, comm, finer)
         if isinstance(pair, ContactPair) and pair.given_gap:
             origin, mesh = scene.origin, scene.bodies[pair.slave.body].mesh.origin

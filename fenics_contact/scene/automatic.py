@@ -34,7 +34,7 @@ class Automatic(Sequence[ContactPair]):
     The scene looks for facets that face another body within a distance, names them "near B" on A and "near
     A" on B, and makes a pair of them; look at ``scene.contacts`` and at pictures before trusting it. The
     slave is the side with the smaller facets; between facets alike to a tenth, that of the softer body. A
-    side whose nodes are all held is the master. A body does not meet itself: split it if its parts may touch.
+    side whose nodes are all held is the master. Where a body meets itself, name the pair.
 
     Attributes:
         friction: The law of all pairs, see `ContactPair`.
@@ -144,8 +144,8 @@ def _largest_motion(scene: SceneParts) -> float:
 def _nothing_found(meshes: dict[str, BodyMesh], distance: float) -> str:
     if len(meshes) < 2:
         return (
-            "Automatic contact needs two bodies, the scene has one: split the body if its parts may touch, "
-            "or name pairs with obstacles"
+            "Automatic contact needs two bodies, the scene has one: name the pairs in which it meets "
+            "obstacles or itself"
         )
     names, gaps = list(meshes), []
     for n, name in enumerate(names):

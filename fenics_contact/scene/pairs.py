@@ -89,7 +89,8 @@ class ContactPair:
 
     Attributes:
         slave: Surface whose nodes carry the contact forces: the finer or softer one.
-        master: Surface of another body, or a rigid obstacle.
+        master: Surface of another body, or a rigid obstacle; of the same body, or the same surface, where it
+            deforms so much that its parts meet.
         friction: Law of friction; without one (None) contact is frictionless.
         discretisation: ``"node"`` keeps the gap of every slave node non-negative; ``"mortar"`` does so for
             weighted means of the gap. The former is simple. The latter (dual basis, integration over the
@@ -108,8 +109,8 @@ class ContactPair:
             measured gap. None: no point is put in touch, and ``gap`` and ``interference`` hold at all points.
 
     Raises:
-        InvalidInputError: If a body is paired with itself, the discretisation or geometry is unknown, or
-            both gap and interference, or negative lengths, are given.
+        InvalidInputError: If the discretisation or geometry is unknown, or both gap and interference, or
+            negative lengths, are given.
 
     Example:
         >>> pair = ContactPair(Surface("punch", "bottom"), Surface("block", "z1"), Coulomb(0.3), "mortar")
@@ -127,7 +128,7 @@ class ContactPair:
     adjust: float | None = None
 
     def __post_init__(self) -> None:
-        """Reject self-contact, and gaps that contradict each other or are no lengths."""
+        """Reject gaps that contradict each other or are no lengths."""
         if self.gap is not None and self.interference is not None:
             raise InvalidInputError(
                 f"a contact pair has a gap or an interference, got gap={self.gap!r} and interference="
@@ -136,11 +137,11 @@ class ContactPair:
             )
         for name in ("gap", "interference", "adjust"):
             _check_length(f"ContactPair.{name}", getattr(self, name))
-        if isinstance(self.master, Surface) and self.master.body == self.slave.body:
-            raise InvalidInputError(
-                f"contact of body {self.slave.body!r} with itself is not supported: "
-                "slave and master must belong to different bodies; split the body if its parts may touch"
-            )
+
+    @property
+    def within_body(self) -> bool:
+        """Whether a body meets itself, which needs large deformations."""
+        return isinstance(self.master, Surface) and self.master.body == self.slave.body
 
     @property
     def place(self) -> str:

@@ -14,7 +14,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene.body import Body
 from fenics_contact.scene.loads import Load, SurfaceLoad, ThermalStrain, TotalForce
-from fenics_contact.scene.materials import can_expand
+from fenics_contact.scene.materials import Material, can_expand, is_nonlinear
 from fenics_contact.scene.obstacles import RigidObstacle
 from fenics_contact.scene.pairs import ContactPair, Surface, Tie
 from fenics_contact.scene.rigid_surfaces import AnySupport, RigidSurface
@@ -53,6 +53,8 @@ class SceneParts:
         for pair in pairs:
             kind = type(pair).__name__
             self._require(pair.slave.body, pair.slave.name, f"{kind}.slave")
+            if isinstance(pair, ContactPair) and pair.within_body:
+                self._require_deforming(pair)
             if isinstance(pair.master, Surface):
                 self._require(pair.master.body, pair.master.name, f"{kind}.master")
                 self._require_linear(pair.slave, pair.master, pair.discretisation, kind)
@@ -120,6 +122,19 @@ class SceneParts:
                 f"dimensions and the bodies have {self.dim}: give it {self.dim} coordinates, or in the plane "
                 "a RigidSphere for a round bar"
             )
+
+    def _require_deforming(self, pair: ContactPair) -> None:
+        """Reject contact of a body with itself unless it may deform much."""
+        deforming = (is_nonlinear(m) and getattr(m, "finite", True) for m in self._materials(pair.slave))
+        if pair.discretisation == "mortar" or pair.given_gap or not any(deforming):
+            raise InvalidInputError(
+                f"contact of body {pair.slave.body!r} with itself needs a material for large deformations, "
+                "discretisation='node' and gaps as they are: change the material, such as to NeoHooke, or "
+                "split the body where its parts may touch"
+            )
+
+    def _materials(self, surface: Surface) -> tuple[Material, ...]:
+        return self.bodies[surface.body].materials
 
     def _require_linear(self, slave: Surface, master: Surface, discretisation: str, kind: str) -> None:
         """Reject mortar coupling of quadratic facets."""

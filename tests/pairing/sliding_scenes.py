@@ -7,7 +7,16 @@ import numpy as np
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.pairing.sliding import SlidingContact, SlidingPoints
-from fenics_contact.scene import Body, ContactPair, IsotropicElasticity, PlaneStrain, Scene, Support, Surface
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    IsotropicElasticity,
+    NeoHooke,
+    PlaneStrain,
+    Scene,
+    Support,
+    Surface,
+)
 
 KINDS = ("hexahedron", "tetrahedron", "quadrilateral", "triangle")
 
@@ -47,6 +56,22 @@ def half_on_arch(kind: str) -> Scene:
     }
     rollers = [Support(name, "x0", (0.0, None, None)) for name in bodies]
     return Scene(bodies, rollers, contacts=[ContactPair(Surface("high", "z0"), Surface("low", "z1"))])
+
+
+def ring(kind: str, sides: tuple[str, str] = ("inner", "inner")) -> Scene:
+    """Return a ring of radius one and thickness 0.2, cut open, whose sides may meet."""
+    if kind in ("hexahedron", "tetrahedron"):
+        mesh = block((-3.1, -0.2, 0.0), (3.1, 0.2, 0.2), (40, 2, 1), kind)
+        under, over = "z0", "z1"
+    else:
+        mesh = rectangle((-3.1, 0.0), (3.1, 0.2), (40, 1), kind)
+        under, over = "y0", "y1"
+    angle, radius = mesh.points[:, 0], 0.9 + mesh.points[:, -1]
+    points = mesh.points.copy()
+    points[:, 0], points[:, -1] = radius * np.sin(angle), radius * np.cos(angle)
+    bent = BodyMesh(points, mesh.cells, {"inner": mesh.surfaces[under], "outer": mesh.surfaces[over]})
+    pair = ContactPair(Surface("ring", sides[0]), Surface("ring", sides[1]))
+    return Scene({"ring": Body(bent, NeoHooke(1.0, 0.3))}, contacts=[pair])
 
 
 def free(scene: Scene) -> np.ndarray:

@@ -19,6 +19,7 @@ from tests.pairing.sliding_scenes import (
     free,
     half_on_arch,
     on_arch,
+    ring,
     rotation,
     same_points,
     shaken,
@@ -192,6 +193,30 @@ def test_given_gaps_are_kept_while_bodies_slide() -> None:
     assert moved.points.distance == pytest.approx(measured.points.gap, abs=1e-14)
     assert moved.points.gap == pytest.approx(measured.points.gap - 0.03 + 0.005, abs=2e-5)
     assert moved.points.given.all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_squashed_ring_meets_itself_inside_and_never_through_its_wall(kind: str) -> None:
+    scene = ring(kind)
+    contact = sliding(scene)
+    round_ring = contact.at(scene.points)
+    assert round_ring.points.gap.min(initial=np.inf) > 0.5
+    flat = scene.points * ([1.2, 0.2] if scene.dim == 2 else [1.2, 1.0, 0.2])
+    now = contact.at(flat, round_ring)
+    middle = np.abs(flat[now.points.slave, 0]) < 0.4
+    assert np.count_nonzero(middle) >= 10
+    assert now.points.gap.min() > 0.0
+    opposite = 2 * np.abs(flat[now.points.slave[middle], -1])
+    assert now.points.gap[middle] == pytest.approx(opposite, rel=0.05)
+    assert same_points(contact.at(flat), now)
+    pushed = flat.copy()
+    top = pushed[:, -1] > 0
+    pushed[top, -1] -= 0.38
+    through = contact.at(pushed, now)
+    crown = np.abs(pushed[through.points.slave, 0]) < 0.1
+    assert through.points.gap[crown] == pytest.approx(0.36 - 0.38, abs=0.01)
+    for sides in (("inner", "outer"), ("outer", "inner"), ("outer", "outer")):
+        assert sliding(ring(kind, sides)).at(flat).points.count == 0
 
 
 def on_obstacle(obstacle: RigidPlane | RigidCylinder | MovingObstacle) -> Scene:

@@ -18,7 +18,7 @@ from fenics_contact.scene import (
     Scene,
     Surface,
 )
-from tests.pairing.sliding_scenes import KINDS, on_arch, same_points, shaken, sliding
+from tests.pairing.sliding_scenes import KINDS, on_arch, ring, same_points, shaken, sliding
 
 STEP = 2e-6
 OBSTACLES = {
@@ -26,12 +26,18 @@ OBSTACLES = {
     "sphere": RigidSphere((0.1, 0.0, -2.0), 2.0),
     "distance": DistanceObstacle(lambda x: np.linalg.norm(x - np.array([0.0, 0.0, -2.0]), axis=1) - 2.0),
 }
-CASES = (*KINDS, *OBSTACLES, "facets")
+#: Larger errors of difference quotients: the curvatures of a distance given by a function are differences
+#: themselves, and where a body meets itself some points lie near the centre of a patch's curvature.
+LIMITS = {"distance": 1e-4, "itself": 1e-5}
+CASES = (*KINDS, *OBSTACLES, "facets", "itself")
 
 
 @cache
 def case(name: str) -> tuple[SlidingContact, np.ndarray]:
     """Return contact, and coordinates of bodies out of shape."""
+    if name == "itself":
+        scene = ring("hexahedron")
+        return sliding(scene), shaken(scene, 0.005) * [1.2, 1.0, 0.3]
     if name in OBSTACLES:
         body = on_arch("hexahedron").bodies["high"]
         pair = ContactPair(Surface("high", "z0"), OBSTACLES[name])
@@ -88,7 +94,7 @@ def test_stiffness_is_the_derivative_of_the_normal_forces(name: str) -> None:
     now, plus, minus, way = beside(name)
     multiplier = np.random.default_rng(2).uniform(-0.3, 1.0, now.points.count)
     found = now.stiffness(multiplier)
-    limit = 1e-4 if name == "distance" else 1e-7
+    limit = LIMITS.get(name, 1e-7)
     product = found.assembled() @ way
     assert error(product, normal_force(plus, multiplier), normal_force(minus, multiplier)) < limit
 
@@ -121,7 +127,7 @@ def test_friction_stiffness_is_the_derivative_of_the_friction_forces(name: str) 
     now, plus, minus, way = beside(name)
     friction = np.random.default_rng(4).standard_normal((now.points.count, now.points.normal.shape[1] - 1))
     found = now.friction_stiffness(friction)
-    limit = 1e-4 if name == "distance" else 1e-7
+    limit = LIMITS.get(name, 1e-7)
     product = found.left @ (found.right.T @ way)
     assert error(product, friction_force(plus, friction), friction_force(minus, friction)) < limit
 
@@ -131,9 +137,12 @@ def test_slip_rows_are_the_derivative_of_slip(name: str) -> None:
     now, plus, minus, way = beside(name)
     contact, x = case(name)
     aside = x.copy()
-    aside[: contact.scene.bodies["high"].mesh.n_nodes, 0] -= 0.1
+    if name == "itself":
+        aside[:, 0] -= 0.1 * (aside[:, 2] > 0)
+    else:
+        aside[: contact.scene.bodies["high"].mesh.n_nodes, 0] -= 0.1
     start = contact.at(aside).material_points().extended(now.material_points())
-    assert np.linalg.norm(now.slip(start), axis=1) == pytest.approx(0.1, rel=0.2)
-    limit = 1e-4 if name == "distance" else 1e-7
+    assert np.median(np.linalg.norm(now.slip(start), axis=1)) == pytest.approx(0.1, rel=0.2)
+    limit = LIMITS.get(name, 1e-7)
     found = now.slip_rows(start) @ way
     assert error(found, plus.slip(start).ravel(), minus.slip(start).ravel()) < limit

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import block
 from fenics_contact.scene import (
+    Body,
     BodyForce,
     ContactPair,
     Coulomb,
     IsotropicElasticity,
     Material,
+    NeoHooke,
     RigidPlane,
+    Scene,
     Support,
     Surface,
     TotalForce,
@@ -99,10 +104,19 @@ def test_the_normal_of_a_plane_gets_unit_length() -> None:
     assert RigidPlane((1, 2, 3), (0, 3, 4)).normal == pytest.approx((0, 0.6, 0.8))
 
 
-def test_a_body_cannot_touch_itself() -> None:
-    message = "contact of body 'ring' with itself is not supported: .* must belong to different bodies"
-    with pytest.raises(InvalidInputError, match=message):
-        ContactPair(Surface("ring", "inside"), Surface("ring", "outside"))
+def test_only_a_body_that_may_deform_much_can_touch_itself() -> None:
+    mesh = block((0, 0, 0), (1, 1, 1), (2, 2, 2))
+    pair = ContactPair(Surface("seal", "z0"), Surface("seal", "z1"))
+    assert pair.within_body
+    Scene({"seal": Body(mesh, NeoHooke(1.0, 0.3))}, contacts=[pair])
+    message = "contact of body 'seal' with itself needs a material for large deformations"
+    for material, wrong in (
+        (IsotropicElasticity(1.0, 0.3), pair),
+        (NeoHooke(1.0, 0.3), replace(pair, discretisation="mortar")),
+        (NeoHooke(1.0, 0.3), replace(pair, gap=0.1)),
+    ):
+        with pytest.raises(InvalidInputError, match=message):
+            Scene({"seal": Body(mesh, material)}, contacts=[wrong])
 
 
 def test_elasticity_hands_out_the_parameters_of_lame() -> None:

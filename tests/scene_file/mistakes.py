@@ -107,8 +107,9 @@ MISTAKES: dict[str, tuple[str, str, str]] = {
     "a body touches itself": (
         'master = { body = "lower", surface = "z1" }',
         'master = { body = "upper", surface = "z1" }',
-        "scene.toml, line 37: contacts.0: contact of body 'upper' with itself is not supported: slave and "
-        "master must belong to different bodies; split the body if its parts may touch",
+        "scene.toml, line 37: contacts.0: contact of body 'upper' with itself needs a material for large "
+        "deformations, discretisation='node' and gaps as they are: change the material, such as to NeoHooke, "
+        "or split the body where its parts may touch",
     ),
     "a tolerance is no tolerance": (
         "tolerance = 1e-8",

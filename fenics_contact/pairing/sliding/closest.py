@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from fenics_contact.mesh import coordinate_rounding
@@ -69,6 +70,7 @@ class ClosestPoints:
         points: Coordinates of the surface's nodes, shape (n_nodes, dim), [length].
         coefficients: Coefficients of the patches, shape (n_facets, n_functions, dim), [length].
         reach: Distance beyond which no point is wanted, [length].
+        apart: Facets on which each target has no point, shape (n_targets, n_facets); None for other bodies.
         margin: Distance beyond the rim at which points count, in half widths of a facet.
         hold: Distance beyond the last facet up to which it is kept, in local coordinates.
     """
@@ -77,6 +79,7 @@ class ClosestPoints:
     points: np.ndarray
     coefficients: np.ndarray
     reach: float = np.inf
+    apart: sp.csr_matrix | None = None
     margin: float = 0.1
     hold: float = 1e-3
 
@@ -100,16 +103,26 @@ class ClosestPoints:
         waiting = np.setdiff1d(np.arange(len(targets)), kept.point)
         if len(waiting) == 0:
             return replace(kept, lost=waiting)
-        found = self._searched(targets, normals, waiting)
+        found = self._searched(targets, normals, waiting, facet >= 0)
         found = join([kept, found.part(np.abs(found.gap) <= self.reach)])
         return replace(found, lost=np.setdiff1d(found.lost, found.point))
 
-    def _searched(self, targets: np.ndarray, normals: np.ndarray, waiting: np.ndarray) -> Projection:
-        """Return the closest points among the facets nearest to the waiting targets."""
+    def _searched(
+        self, targets: np.ndarray, normals: np.ndarray, waiting: np.ndarray, met: np.ndarray
+    ) -> Projection:
+        """Return the closest points among the facets nearest to the waiting targets.
+
+        Where a body meets itself, only targets that had a point, ``met``, may lie behind a facet: others are
+        apart from it by walls of the body.
+        """
         corners = self.points[self.patches.facets]
         centroids = corners.mean(axis=1)
         radius = np.linalg.norm(corners - centroids[:, None], axis=2).max(axis=1)
         tree, rounding = cKDTree(centroids), coordinate_rounding(self.points)
+        if self.apart is not None:
+            pair, facet = self._allowed(tree, targets, waiting, radius.max())
+            found = self._from_middles(targets, normals, pair, facet)
+            return best_projections(found.part(met[found.point] | (found.gap > -0.05 * self.reach)), rounding)
         distance, _ = tree.query(targets[waiting])
         waiting = waiting[distance <= self.reach + 2 * radius.max()]
         pair, facet = nearest_facets(tree, targets[waiting])
@@ -118,6 +131,17 @@ class ClosestPoints:
         still = np.setdiff1d(waiting, near.point)
         reached = self._from_middles(targets, normals, *facets_in_reach(tree, radius, targets, still))
         return join([near, best_projections(reached, rounding)])
+
+    def _allowed(
+        self, tree: cKDTree, targets: np.ndarray, waiting: np.ndarray, radius: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Pair the waiting targets with all facets within reach that are allowed to them."""
+        lists = tree.query_ball_point(targets[waiting], self.reach + radius)
+        pair = np.repeat(waiting, [len(each) for each in lists])
+        facet = np.concatenate([np.zeros(0, dtype=np.int64), *map(np.asarray, lists)]).astype(np.int64)
+        assert self.apart is not None
+        allowed = ~np.asarray(self.apart[pair, facet], dtype=bool).ravel()
+        return pair[allowed], facet[allowed]
 
     def _from_middles(
         self, targets: np.ndarray, normals: np.ndarray, point: np.ndarray, facet: np.ndarray

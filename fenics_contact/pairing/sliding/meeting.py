@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
 from fenics_contact._libraries import MPI
 from fenics_contact.errors import together
@@ -31,6 +33,9 @@ class Meeting:
         master_nodes: Nodes of the master among those of all bodies; none for a rigid obstacle.
         master_cut: Components that the normals of these lack on planes of symmetry, shape (n_master, dim).
         obstacle: The rigid obstacle; None for a body.
+        apart: Facets on which each candidate never has a point, where a body meets itself, shape
+            (n_candidates, n_facets); None where bodies meet others.
+        reach: Distance beyond which no candidate needs a point, [length].
     """
 
     slave: FacetedSurface
@@ -42,6 +47,8 @@ class Meeting:
     master_nodes: np.ndarray
     master_cut: np.ndarray
     obstacle: RigidObstacle | None
+    apart: sp.csr_matrix | None = None
+    reach: float = np.inf
 
     @property
     def nodes(self) -> np.ndarray:
@@ -73,7 +80,9 @@ class Meeting:
         found: Projection | None = None
         with together(comm):
             points = coordinates[self.master_nodes]
-            search = ClosestPoints(self.patches, points, self.patches.coefficients(points), reach)
+            apart = None if self.apart is None else self.apart[mine]
+            reach = min(reach, self.reach)
+            search = ClosestPoints(self.patches, points, self.patches.coefficients(points), reach, apart)
             normals, (facet, local) = self.normals(coordinates), last
             hit = search.find(coordinates[self.nodes[mine]], normals[mine], facet[mine], local[mine])
             found = replace(hit, point=mine[hit.point], lost=mine[hit.lost])
@@ -113,4 +122,39 @@ def _meeting(scene: Scene, pair: ContactPair, fixed: np.ndarray) -> Meeting:
     master = surface_of(scene, pair.master, "faceted")
     patches = SmoothPatches.of(master, smooth=pair.geometry != "faceted")
     nodes = numbers.global_nodes(pair.master.body, master.nodes)
-    return Meeting(slave, slave_nodes, candidates, offset, given, patches, nodes, master.mirrored, None)
+    met = Meeting(slave, slave_nodes, candidates, offset, given, patches, nodes, master.mirrored, None)
+    return _within_body(met, master) if pair.within_body else met
+
+
+def _within_body(meeting: Meeting, master: FacetedSurface, facets: float = 3.0) -> Meeting:
+    """Return a meeting of a body with itself.
+
+    Candidates have no points on patches on which they lie, nor on facets behind them in the undeformed body:
+    those on the other side of a thin wall.
+
+    Args:
+        meeting: The meeting.
+        master: The master surface.
+        facets: Reach of the contact in sizes of facets.
+    """
+    assert meeting.patches is not None
+    corners = master.points[master.facets]
+    centres = corners.mean(axis=1)
+    size = float(np.linalg.norm(corners - centres[:, None], axis=2).mean())
+    reach = 2.0 * facets * size
+    place = meeting.slave.points[meeting.candidates]
+    lists = cKDTree(centres).query_ball_point(place, 2.0 * reach)
+    row = np.repeat(np.arange(len(place)), [len(each) for each in lists])
+    column = np.concatenate([np.zeros(0, dtype=np.int64), *map(np.asarray, lists)]).astype(np.int64)
+    normals = meeting.slave.normals[meeting.candidates[row]]
+    behind = np.einsum("nd,nd->n", centres[column] - place[row], normals) < 0.0
+    shape = len(place), len(centres)
+    behind_it = sp.csr_matrix((np.ones(behind.sum()), (row[behind], column[behind])), shape=shape)
+    carried = meeting.patches.control.tocoo()
+    facet = carried.row // (meeting.patches.control.shape[0] // len(centres))
+    own = sp.csr_matrix(
+        (np.ones(len(facet)), (facet, meeting.master_nodes[carried.col])),
+        shape=(len(centres), int(max(meeting.slave_nodes.max(), meeting.master_nodes.max())) + 1),
+    )
+    apart = ((behind_it + own[:, meeting.nodes].T) > 0).tocsr()
+    return replace(meeting, apart=apart, reach=reach)
