@@ -18,9 +18,14 @@ from fenics_contact.scene import (
     ContactPair,
     Coulomb,
     DistanceObstacle,
+    FinitePlasticity,
     IsotropicElasticity,
+    J2Plasticity,
     LoadStep,
+    MooneyRivlin,
     MovingObstacle,
+    NeoHooke,
+    Ogden,
     OrthotropicElasticity,
     OrthotropicPlaneStress,
     PlaneStrain,
@@ -32,6 +37,7 @@ from fenics_contact.scene import (
     RigidSurface,
     Sampled,
     Scene,
+    StVenantKirchhoff,
     Support,
     Surface,
     ThermalStrain,
@@ -59,10 +65,12 @@ SAMPLES: dict[type, Any] = {
         DistanceObstacle(lambda x: x[:, 0]), PlaneStrain(1.0, 0.3), PlaneStress(1.0, 0.3),
         OrthotropicPlaneStress((1.0, 1.0), 0.3, 1.0),
         OrthotropicElasticity((1.0,) * 3, (0.1,) * 3, (1.0,) * 3),  # type: ignore[arg-type]
+        NeoHooke(1.0, 0.3), MooneyRivlin(1.0, 0.5, 10.0), StVenantKirchhoff(1.0, 0.3),
+        Ogden((1.0,), (2.0,), 10.0), J2Plasticity(1.0, 0.3, 0.1), FinitePlasticity(1.0, 0.3, 0.1),
     )
 }  # fmt: skip
 #: What the package hands out and nobody gives it.
-TOLD = {package.Effect, package.PairGeometry, package.Plan}
+TOLD = {package.Effect, package.MaterialResponse, package.PairGeometry, package.Plan}
 
 
 def test_every_part_of_a_scene_has_a_sample_here() -> None:
