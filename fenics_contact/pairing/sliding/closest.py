@@ -173,7 +173,11 @@ class ClosestPoints:
         beside = outside(local, self.patches.corners)
         beside = np.where(beside <= 1e-9 + rounding / np.maximum(size, rounding), 0.0, beside)
         facing = np.einsum("nd,nd->n", at.normal, normals[point]) < 0
-        near = facing & (beside <= self.margin * (0.5 if self.patches.corners == 3 else 1.0))
+        near = (
+            _second(at, away)[2]
+            & facing
+            & (beside <= self.margin * (0.5 if self.patches.corners == 3 else 1.0))
+        )
         gap = np.einsum("nd,nd->n", at.normal, away)
         lost = np.unique(point[near & ~solved])
         found = Projection(point, facet, local, gap, at.normal, beside, lost)
@@ -200,14 +204,22 @@ class ClosestPoints:
 
 def _step(here: PatchPoints, away: np.ndarray) -> np.ndarray:
     """Return Newton's step towards the closest point, that of Gauss and Newton where it is not convex."""
-    metric = np.einsum("nad,nbd->nab", here.tangents, here.tangents)
-    matrix = metric - np.einsum("nabd,nd->nab", here.second, away)
-    floor = np.trace(metric, axis1=1, axis2=2)
-    least = np.linalg.eigvalsh(matrix)[:, 0]
-    sound = least > 1e-3 * np.linalg.eigvalsh(metric)[:, 0]
-    matrix = np.where(sound[:, None, None], matrix, metric)
-    regular = np.linalg.det(matrix) > 1e-24 * np.maximum(floor, np.finfo(float).tiny) ** matrix.shape[1]
+    metric, matrix, convex = _second(here, away)
+    matrix = np.where(convex[:, None, None], matrix, metric)
+    size = np.maximum(np.trace(metric, axis1=1, axis2=2), np.finfo(float).tiny)
+    regular = np.linalg.det(matrix) > 1e-24 * size ** matrix.shape[1]
     matrix[~regular] = np.eye(matrix.shape[1])
     right = np.einsum("nad,nd->na", here.tangents, away)
     step = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
     return np.clip(np.where(regular[:, None], step, 0.0), -1.0, 1.0)
+
+
+def _second(here: PatchPoints, away: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return S,_a·S,_b, H of half the squared distance, and whether that is clearly convex.
+
+    Where it is not, a target lies beyond the centre of a patch's curvature: the place is not the closest.
+    """
+    metric = np.einsum("nad,nbd->nab", here.tangents, here.tangents)
+    matrix = metric - np.einsum("nabd,nd->nab", here.second, away)
+    least = np.linalg.eigvalsh(matrix)[:, 0]
+    return metric, matrix, least > 1e-3 * np.linalg.eigvalsh(metric)[:, 0]
