@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fenics_contact.contact.cell_stress import von_mises_of
+from fenics_contact.contact.history_stress import put_history_stress
 from fenics_contact.contact.nodal_forces import NodalForces, nodal_forces
 from fenics_contact.contact.state import State
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.scene import HistoryMaterial
 
 if TYPE_CHECKING:
+    import dolfinx
+
     from fenics_contact.accuracy import StateErrors
     from fenics_contact.nonlinear import NonlinearEquilibrium
 
@@ -35,6 +41,30 @@ class DeformedState(State):
     equilibrium: NonlinearEquilibrium = field(kw_only=True)
     fractions: tuple[float, ...] = field(kw_only=True)
     factorisations: int = field(kw_only=True)
+
+    @cached_property
+    def stress(self) -> dict[str, dolfinx.fem.Function]:  # type: ignore[override]
+        """Cauchy stress of each body, its mean on each cell, shape (3, 3), [force / length²].
+
+        Plane bodies have the component normal to the plane, too. Collective on first use.
+        """
+        return self._with_history(super().stress, lambda tensor: tensor)
+
+    @cached_property
+    def von_mises(self) -> dict[str, dolfinx.fem.Function]:  # type: ignore[override]
+        """Von Mises stress of each body, constant on cells, [force / length²]. Collective on first use."""
+        return self._with_history(super().von_mises, von_mises_of)
+
+    def _with_history(
+        self, fields: dict[str, dolfinx.fem.Function], quantity: Callable[[np.ndarray], np.ndarray]
+    ) -> dict[str, dolfinx.fem.Function]:
+        """Return fields of stresses with those of materials with a history in their places. Collective."""
+        for name, body in self.scene.bodies.items():
+            if any(isinstance(material, HistoryMaterial) for material in body.materials):
+                put_history_stress(
+                    fields[name], self.torn, name, self.equilibrium.evaluation.responses, quantity
+                )
+        return fields
 
     @cached_property
     def errors(self) -> StateErrors:  # type: ignore[override]

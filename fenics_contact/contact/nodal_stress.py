@@ -14,7 +14,7 @@ import scipy.sparse as sp
 
 from fenics_contact import _dolfinx
 from fenics_contact.accuracy import Sites, find_sites, recovered_gradients
-from fenics_contact.contact.cell_stress import COMPONENTS, CellStress, tensors
+from fenics_contact.contact.cell_stress import COMPONENTS, CellStress, components_of, tensors
 from fenics_contact.contact.fields import cells_of_body, displacement_function
 from fenics_contact.fem import temperature_of
 from fenics_contact.feti import TornSystem
@@ -22,7 +22,10 @@ from fenics_contact.scene import is_nonlinear
 
 
 def nodal_stress(
-    torn: TornSystem, displacement: np.ndarray, meshes: Mapping[str, _dolfinx.mesh.Mesh]
+    torn: TornSystem,
+    displacement: np.ndarray,
+    meshes: Mapping[str, _dolfinx.mesh.Mesh],
+    stresses: Mapping[str, _dolfinx.fem.Function],
 ) -> dict[str, np.ndarray]:
     """Return the stress of all bodies at their nodes, material by material. Collective.
 
@@ -30,6 +33,7 @@ def nodal_stress(
         torn: The torn system.
         displacement: Displacement of all nodes, valid on those of this rank, shape (n_nodes, dim), [length].
         meshes: The bodies' meshes by name, see `body_mesh`.
+        stresses: Mean stress of the cells of at least the bodies with nonlinear materials, by name.
 
     Returns:
         For each body, shape (n_materials, n_nodes, 3, 3), NaN where a node has no cell of the material,
@@ -41,33 +45,34 @@ def nodal_stress(
         gradients = recovered_gradients(sites, displacement[sites.node])
         for name, body in torn.scene.bodies.items():
             if body.mesh.order == order:
-                nodes = torn.decomposition.tearing.global_nodes(name, np.arange(body.mesh.n_nodes))
-                own = _at_sites(torn, name, sites, gradients, displacement[nodes], meshes[name])
+                if any(map(is_nonlinear, body.materials)):
+                    own = _from_cells(torn, name, sites, stresses[name])
+                else:
+                    own = _at_sites(torn, name, sites, gradients, meshes[name])
                 found[name] = _gathered(torn, name, sites, own)
     return found
 
 
+def _from_cells(torn: TornSystem, name: str, sites: Sites, stress: _dolfinx.fem.Function) -> np.ndarray:
+    """Return the components of the mean stress around the sites of a body, shape (n_sites, 6). Collective."""
+    space = stress.function_space
+    number = cells_of_body(space.mesh, torn.scene.bodies[name].mesh.cells)
+    own = _dolfinx.cell_dofs(space).ravel()[: len(number)]
+    return _around_sites(torn, name, sites, components_of(stress.x.array.reshape(-1, 3, 3)[own]), number)
+
+
 def _at_sites(
-    torn: TornSystem,
-    name: str,
-    sites: Sites,
-    gradients: np.ndarray,
-    displacement: np.ndarray,
-    mesh: _dolfinx.mesh.Mesh,
+    torn: TornSystem, name: str, sites: Sites, gradients: np.ndarray, mesh: _dolfinx.mesh.Mesh
 ) -> np.ndarray:
     """Return the components of the stress at the sites of a body, shape (n_sites, 6). Collective.
 
-    Of nonlinear materials it is the mean over the cells around a site. Else it is affine in the gradient: its
-    coefficients are the stresses of unit gradients, averaged over the cells around a site; they are the same
-    in all of them unless the material or the temperature varies.
+    It is affine in the gradient. Its coefficients are the stresses of unit gradients, averaged over the cells
+    around a site; they are the same in all of them unless the material or the temperature varies.
     """
     body, dim = torn.scene.bodies[name], torn.dim
     temperature = temperature_of(torn.scene.loads, name)
     means = CellStress(mesh, body, torn.decomposition.comm, temperature)
     number = cells_of_body(mesh, body.mesh.cells)
-    if any(map(is_nonlinear, body.materials)):
-        moved = displacement_function(mesh, displacement)
-        return _around_sites(torn, name, sites, means.components(moved), number)
     places = body.mesh.points - body.mesh.points.mean(axis=0)
     # A rotation has no stress: the gradients (i, j) and (j, i) have the same.
     pairs = [(i, j) for i in range(dim) for j in range(i, dim)]

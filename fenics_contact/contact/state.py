@@ -273,7 +273,8 @@ class State:
         from fenics_contact.contact.nodal_stress import nodal_stress
 
         meshes = {name: u.function_space.mesh for name, u in self.displacement.items()}
-        return nodal_stress(self.torn, self._nodal_displacement, meshes)
+        on_cells = self.stress if self.scene.is_nonlinear else {}
+        return nodal_stress(self.torn, self._nodal_displacement, meshes, on_cells)
 
     @collectively("State.gather_fields", _comm)
     def gather_fields(self, body: str) -> GatheredFields:

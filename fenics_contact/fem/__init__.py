@@ -20,7 +20,7 @@ from fenics_contact.fem.model_checks import check_kernel, kernel_of, stiffness_o
 from fenics_contact.fem.nodal_stiffness import cell_stiffness
 from fenics_contact.fem.spread_force import LinearTraction, as_tractions, spread_traction
 from fenics_contact.fem.temperature import Temperature, stress_in_space, stress_left, temperature_of
-from fenics_contact.fem.templates import Constants, Templates, Written, scalar_constants
+from fenics_contact.fem.templates import Constants, Templates, Written, quadrature_degree, scalar_constants
 
 __all__ = [
     "Composition",
@@ -49,6 +49,7 @@ __all__ = [
     "load_parameters",
     "load_work",
     "material_sets",
+    "quadrature_degree",
     "scalar_constants",
     "spread_traction",
     "stiffness_of_cell",

@@ -54,7 +54,7 @@ class HistoryMechanics:
         return *self._gauss.shape, self._size
 
     def at(
-        self, displacement: np.ndarray, history: np.ndarray | None = None, duration: float = 0.0
+        self, displacement: np.ndarray, history: np.ndarray | None = None, duration: float = np.nan
     ) -> Response:
         """Evaluate the materials and assemble; see `Mechanics.at`.
 

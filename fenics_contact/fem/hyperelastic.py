@@ -45,7 +45,7 @@ class HyperelasticMechanics:
             self._mean = MeanDilatation(templates, parts, cell_type, fields, self._dilatation)
 
     def at(
-        self, displacement: np.ndarray, history: np.ndarray | None = None, duration: float = 0.0
+        self, displacement: np.ndarray, history: np.ndarray | None = None, duration: float = np.nan
     ) -> Response:
         """Assemble; see `Mechanics.at`."""
         _dolfinx.update_coordinates(self._mesh, self._points)

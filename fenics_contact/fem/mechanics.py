@@ -38,7 +38,7 @@ class Mechanics(Protocol):
     """Internal forces and tangent of one mesh with nonlinear materials."""
 
     def at(
-        self, displacement: np.ndarray, history: np.ndarray | None = None, duration: float = 0.0
+        self, displacement: np.ndarray, history: np.ndarray | None = None, duration: float = np.nan
     ) -> Response:
         """Return the response to a displacement.
 
@@ -46,7 +46,7 @@ class Mechanics(Protocol):
             displacement: By dof of the mesh's space, block after block, shape (dim n,), [length].
             history: Internal variables at the start of the step, for materials that have some, shape
                 (n_cells, n_gauss, k) by the mesh's cells; None for an unloaded body.
-            duration: Of the step, for materials to which it matters.
+            duration: Of the step; NaN where it is not known, which materials that need it refuse.
         """
 
     def least_jacobian(self, displacement: np.ndarray) -> float:

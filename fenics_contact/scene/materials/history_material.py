@@ -90,7 +90,8 @@ class HistoryMaterial(Elasticity):
         Args:
             gradient: Displacement gradients ∂u_i/∂X_j at the end of the step, shape (n, 3, 3).
             history: Internal variables at its start, shape (n, k); must not be changed.
-            duration: Of the step, in the unit of time of the material's constants.
+            duration: Of the step, in the unit of time of the material's constants; NaN where it is not known,
+                with which a model that depends on it shall compute, so that it ends in NaN, too.
         """
 
     def answer(self, gradient: np.ndarray, history: np.ndarray, duration: float) -> MaterialResponse:
@@ -113,6 +114,11 @@ class HistoryMaterial(Elasticity):
                     f"{self.history_size} internal variables, got {arrays[part].shape}: return a "
                     "MaterialResponse(stress, tangent, history) with one row per point"
                 )
+        if np.isnan(duration) and not np.isfinite(arrays["stress"]).any():
+            raise InvalidInputError(
+                f"the answer of {name} depends on the duration of the step, none was given: load steps of "
+                "scenes have none; use a material that does not depend on it"
+            )
         upright = np.linalg.det(np.eye(3) + gradient) > 0 if self.finite else np.ones(n, dtype=bool)
         for part, values in arrays.items():
             bad = ~np.isfinite(values.reshape(n, -1)).all(axis=1) & upright
