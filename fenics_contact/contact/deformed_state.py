@@ -15,6 +15,7 @@ from fenics_contact.contact.nodal_forces import NodalForces, nodal_forces
 from fenics_contact.contact.state import State
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
+from fenics_contact.fem import History
 from fenics_contact.scene import HistoryMaterial
 
 if TYPE_CHECKING:
@@ -41,6 +42,14 @@ class DeformedState(State):
     equilibrium: NonlinearEquilibrium = field(kw_only=True)
     fractions: tuple[float, ...] = field(kw_only=True)
     factorisations: int = field(kw_only=True)
+
+    @cached_property
+    def history(self) -> History:
+        """Internal variables of the bodies' materials, on every rank. Collective on first use."""
+        decomposition, found = self.torn.decomposition, self.equilibrium.configuration.history
+        pairs = zip(decomposition.meshes, found, strict=True)
+        parts = [(mesh.body, mesh.cells, values) for mesh, values in pairs if values is not None]
+        return History.unloaded(self.scene).advanced(decomposition.comm, parts)
 
     @cached_property
     def stress(self) -> dict[str, dolfinx.fem.Function]:  # type: ignore[override]

@@ -23,7 +23,7 @@ from fenics_contact.fem.templates import (
     surface_measure,
     volume_measure,
 )
-from fenics_contact.scene import HistoryMaterial, Load, Material, Scene, ThermalStrain
+from fenics_contact.scene import HistoryMaterial, Load, Material, Scene, ThermalStrain, is_nonlinear
 
 __all__ = [
     "LOADED",
@@ -117,7 +117,7 @@ class FormLibrary:
     def mechanics(
         self, parts: Composition, cell_type: str, space: _dolfinx.fem.FunctionSpace, points: np.ndarray
     ) -> Mechanics:
-        """Return forces and tangent of the materials ``parts``, one of them nonlinear, on one mesh.
+        """Return forces and tangent of the materials ``parts`` on one mesh of a scene with nonlinear ones.
 
         Args:
             parts: Materials of the mesh.
@@ -126,9 +126,12 @@ class FormLibrary:
             points: Coordinates by input node, shape (n, dim), [length].
         """
         from fenics_contact.fem.hyperelastic import HyperelasticMechanics
+        from fenics_contact.fem.linear_mechanics import LinearMechanics
 
         if not any(self.varies(material, cell_type) for material in parts.materials):
             points = points - points[0]  # as exact far from the origin as near it
+        if not any(map(is_nonlinear, parts.materials)):
+            return LinearMechanics(self.stiffness(parts, cell_type, space), space.mesh, points)
         remembering = [isinstance(material, HistoryMaterial) for material in parts.materials]
         others = None
         if not all(remembering):
