@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from fenics_contact.errors import together
+from fenics_contact.errors import InvalidInputError, together
 from fenics_contact.scene import Body, Material, Scene
 from fenics_contact.scene_file.document import Document
 from fenics_contact.scene_file.evaluation import check_formulas, check_pair
@@ -109,7 +109,17 @@ class Builder:
                         with self._at(key, number, name):
                             check_pair(one, name, bodies)
         self._check()
-        return Scene(bodies, **built)
+        if document.automatic_contact is None:
+            return Scene(bodies, **built)
+        with self._at("automatic_contact"):
+            if built["contacts"]:
+                raise InvalidInputError(
+                    f"a scene has [automatic_contact] or [[contacts]], got both, {len(built['contacts'])} of "
+                    "the latter: leave one of them out"
+                )
+            scene = Scene(bodies, **{**built, "contacts": document.automatic_contact.made()})
+        self._check()
+        return scene
 
     def _made(self, part: Any, dim: int) -> Any:
         """Return a part, as it is before the first load step if there are any."""

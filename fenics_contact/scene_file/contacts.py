@@ -122,6 +122,14 @@ class ContactPart(Part):
     adjust: NonNegativeFloat | None
 
 
+@keys_of(scene.Automatic)
+class AutomaticPart(Part):
+    """Contact wherever boundaries of different bodies face each other."""
+
+    friction: AnyFriction | None
+    distance: PositiveFloat | None
+
+
 @keys_of(Tie)
 class TiePart(Part):
     """Two surfaces that stay together."""

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field
 
-from fenics_contact.scene_file.contacts import ContactPart, TiePart
+from fenics_contact.scene_file.contacts import AutomaticPart, ContactPart, TiePart
 from fenics_contact.scene_file.design import DesignPart
 from fenics_contact.scene_file.loads import AnyLoad, AnySupportPart
 from fenics_contact.scene_file.materials import AnyMaterial
@@ -83,6 +83,9 @@ class Document(Part):
     supports: list[AnySupportPart] = Field([], description="prescribed displacements")
     loads: list[AnyLoad] = Field([], description="forces and changes of temperature")
     contacts: list[ContactPart] = Field([], description="pairs that may touch")
+    automatic_contact: AutomaticPart | None = Field(
+        None, description="pairs that are found where boundaries face each other, in place of [[contacts]]"
+    )
     ties: list[TiePart] = Field([], description="pairs that stay together")
     steps: list[StepPart] = Field([], description="load steps; without them all acts at once")
     solver: SolverPart = Field(SolverPart(), description="how it is solved")

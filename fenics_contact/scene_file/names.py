@@ -81,6 +81,8 @@ def surface_parts(document: Document) -> Iterator[tuple[Path, Any]]:
 def _wrong_pairs(source: Source, document: Document) -> Iterator[Mistake]:
     """Yield numbers of contact pairs that are not there."""
     count = len(document.contacts)
+    if document.automatic_contact is not None:
+        return  # they are not known yet
     for path, part in branches(document):
         pair = getattr(part, "pair", None) if isinstance(part, Part) else None
         if pair is not None and pair >= count:
