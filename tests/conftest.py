@@ -48,6 +48,13 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
+@pytest.fixture(autouse=True, scope="module")
+def exempted_leftovers() -> None:
+    """Exempt what earlier modules keep, libraries loaded late above all, as every collection looks at it."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.fixture(autouse=True)
 def collected_garbage() -> Iterator[None]:
     """Destroy what a test leaves behind at one moment on all ranks: PETSc's destructors are collective."""

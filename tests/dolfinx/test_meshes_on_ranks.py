@@ -15,11 +15,16 @@ Found = dict[str, list[dict[str, Any]]]
 
 
 @pytest.fixture(scope="module", params=[2, 4])
-def found(request: pytest.FixtureRequest) -> Found:
+def ranks(request: pytest.FixtureRequest) -> int:
+    return int(request.param)
+
+
+@pytest.fixture(scope="module")
+def found(ranks: int) -> Found:
     """What every rank found, by the way in which the cells were dealt out."""
-    answer: Found = json.loads(run_on_ranks(SCRIPT, request.param, timeout=60))
+    answer: Found = json.loads(run_on_ranks(SCRIPT, ranks, timeout=60))
     assert len(answer) == 20
-    assert all(len(reports) == request.param for reports in answer.values())
+    assert all(len(reports) == ranks for reports in answer.values())
     return answer
 
 

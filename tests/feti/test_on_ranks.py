@@ -32,12 +32,17 @@ def serial() -> Numbers:
 
 
 @pytest.fixture(scope="module", params=[2, 4])
-def parallel(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Numbers:
+def ranks(request: pytest.FixtureRequest) -> int:
+    return int(request.param)
+
+
+@pytest.fixture(scope="module")
+def parallel(ranks: int, tmp_path_factory: pytest.TempPathFactory) -> Numbers:
     path = tmp_path_factory.mktemp("ranks") / "numbers.npz"
-    run_on_ranks(SCRIPT, request.param, path, timeout=60)
+    run_on_ranks(SCRIPT, ranks, path, timeout=60)
     with np.load(path) as stored:
         numbers = dict(stored)
-    assert len(numbers["owned"]) == request.param
+    assert len(numbers["owned"]) == ranks
     return numbers
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -22,17 +23,22 @@ class Import:
 
 @dataclass(frozen=True)
 class Module:
-    """One file of the package: its dotted name and its syntax tree."""
+    """One file of the package and its dotted name."""
 
     name: str
     path: Path
-    tree: ast.Module
+
+    @property
+    def tree(self) -> ast.Module:
+        """Its syntax tree, parsed anew: those of all files would make every collection of garbage slow."""
+        return ast.parse(self.path.read_text(), str(self.path))
 
     @property
     def room(self) -> str:
         """The part of the house it belongs to: "feti" for ``fenics_contact.feti.rows``."""
         return room_of(self.name) or ""
 
+    @cache
     def imports(self) -> list[Import]:
         """Return all imports, also those inside functions, with relative ones resolved.
 
@@ -69,10 +75,10 @@ def room_of(target: str) -> str | None:
 
 
 def modules(root: Path = ROOT) -> list[Module]:
-    """Parse every file of the package below ``root``."""
+    """List every file of the package below ``root``."""
     found = []
     for path in sorted((root / PACKAGE).rglob("*.py")):
         parts = path.relative_to(root).with_suffix("").parts
         name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-        found.append(Module(name, path, ast.parse(path.read_text(), str(path))))
+        found.append(Module(name, path))
     return found

@@ -18,9 +18,14 @@ SCRIPT = Path(__file__).with_name("on_ranks.py")
 
 
 @pytest.fixture(scope="module", params=[2, 4])
-def answer(request: pytest.FixtureRequest) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(run_on_ranks(SCRIPT, request.param, timeout=100).splitlines()[-1])
-    found["ranks"] = request.param
+def ranks(request: pytest.FixtureRequest) -> int:
+    return int(request.param)
+
+
+@pytest.fixture(scope="module")
+def answer(ranks: int) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(run_on_ranks(SCRIPT, ranks, timeout=100).splitlines()[-1])
+    found["ranks"] = ranks
     return found
 
 

@@ -119,14 +119,14 @@ def test_the_file_of_a_result_has_the_design_that_meets_the_constraints(tmp_path
     assert told["history"]["violation"][-1] == result.history[-1].violation
 
 
-def test_two_and_four_ranks_take_the_same_steps(mpirun: Callable[..., str]) -> None:
+@pytest.mark.parametrize("ranks", [2, 4])
+def test_several_ranks_take_the_same_steps(ranks: int, mpirun: Callable[..., str]) -> None:
     script = Path(__file__).with_name("constrained_blocks.py")
     _, _, whole = solved()
-    for ranks in (2, 4):
-        alike, evaluations, value, *x = (float(word) for word in mpirun(script, ranks).split())
-        assert (alike, evaluations) == (1, whole.evaluations)
-        assert value == pytest.approx(whole.value, rel=1e-7)
-        assert x == pytest.approx(whole.x.tolist(), abs=1e-6)
+    alike, evaluations, value, *x = (float(word) for word in mpirun(script, ranks).split())
+    assert (alike, evaluations) == (1, whole.evaluations)
+    assert value == pytest.approx(whole.value, rel=1e-7)
+    assert x == pytest.approx(whole.x.tolist(), abs=1e-6)
 
 
 def test_a_run_in_pieces_ends_at_the_same_design(tmp_path: Path) -> None:
