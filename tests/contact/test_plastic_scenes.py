@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, DeformedState, solve_scene
+from fenics_contact.checkpoint import Checkpoint
+from fenics_contact.contact import ContactProblem, DeformedState, LoadSequence, solve_scene
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.partition import box_partition
@@ -96,6 +98,12 @@ def test_a_plastic_body_in_contact_does_not_depend_on_how_it_is_cut() -> None:
     assert np.count_nonzero(remembered) > 50
     assert stress[left].max() < 0.1 + 0.5 * remembered.max() + 1e-9
     assert np.isnan(one.gather_nodal_stress("base")[0]).any(), "materials keep their own nodal stresses"
+
+
+def test_steps_of_plastic_bodies_have_no_checkpoint(tmp_path: Path) -> None:
+    problem = ContactProblem(pulled(SMALL, 0.0), MPI.COMM_SELF)
+    with pytest.raises(InvalidInputError, match="checkpoints of load steps need linear materials"):
+        LoadSequence(problem, checkpoint=Checkpoint(tmp_path / "steps.npz"))
 
 
 @dataclass(frozen=True)
