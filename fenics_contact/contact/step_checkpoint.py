@@ -40,8 +40,8 @@ class StepCheckpoint:
             return
         if problem.scene.is_nonlinear:
             raise InvalidInputError(
-                "checkpoints of load steps need linear materials, this scene has others, whose states are not "
-                "stored: leave the checkpoint out"
+                "checkpoints of load steps need linear materials, this scene has others, whose states are "
+                "not stored: leave the checkpoint out"
             )
         for name in ("scene", "partitions", "solver", "tolerance"):
             self._fingerprint.update(described(getattr(problem, name), name))

@@ -102,6 +102,9 @@ def test_bodies_of_several_materials_add_them_up(other: IsotropicElasticity | Ne
     ahead, behind = (answer(mixed, u.ravel() + s * 1e-6 * direction) for s in (1, -1))
     exact = found.stiffness @ direction
     assert np.abs((ahead.force - behind.force) / 2e-6 - exact).max() < 1e-7 * np.abs(exact).max()
+    swapped, whole = patch_of(Body(mesh, {lower: other, upper: LARGE})), patch_of(Body(mesh, LARGE))
+    again, expected = (answer(each, -u, answer(each, u).history) for each in (swapped, whole))
+    np.testing.assert_allclose(again.history[~here], expected.history[~here], atol=1e-14)
     one_and_other = patch_of(Body(mesh, {lower: LARGE, upper: replace(LARGE, yield_stress=0.5)}))
     more = answer(one_and_other, u)
     np.testing.assert_allclose(more.history[here], alone[here], atol=1e-14)
