@@ -61,6 +61,9 @@ class MovingObstacle:
         path: Returns the rotation R, shape (dim, dim), or None if it does not turn, and the translation c,
             dim numbers, [length], at a time.
 
+    Raises:
+        InvalidInputError: If the obstacle moves already.
+
     Example:
         >>> import numpy as np
         >>> roll = RigidCylinder((0, 0, 0), (0, 1, 0), 5.0)  # mm
@@ -73,6 +76,13 @@ class MovingObstacle:
 
     obstacle: RigidObstacle
     path: Path
+
+    def __post_init__(self) -> None:
+        """Reject an obstacle that moves already."""
+        if isinstance(self.obstacle, MovingObstacle):
+            raise InvalidInputError(
+                "MovingObstacle.obstacle must stand still, got one that moves: give the path of both"
+            )
 
     @property
     def dim(self) -> int:

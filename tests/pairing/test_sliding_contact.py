@@ -270,6 +270,12 @@ def test_a_path_that_is_no_rigid_motion_is_refused(path: object, message: str) -
         obstacle.at(1.0)
 
 
+def test_an_obstacle_moves_along_one_path() -> None:
+    still = MovingObstacle(RigidPlane((0, 0, -1.0), (0, 0, 1)), lambda time: (None, (0.0, 0.0, time)))
+    with pytest.raises(InvalidInputError, match="must stand still"):
+        MovingObstacle(still, still.path)
+
+
 def test_mortar_pairs_and_coordinates_that_are_none_are_refused() -> None:
     scene = on_arch("hexahedron")
     with pytest.raises(InvalidInputError, match="finite numbers of shape"):

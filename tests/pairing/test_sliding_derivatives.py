@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from fenics_contact.mesh import quadratic
 from fenics_contact.pairing.sliding import SlidingContact, SlidingPoints
 from fenics_contact.pairing.sliding.differential import spread
 from fenics_contact.scene import (
@@ -29,7 +30,7 @@ OBSTACLES = {
 #: Larger errors of difference quotients: the curvatures of a distance given by a function are differences
 #: themselves, and where a body meets itself some points lie near the centre of a patch's curvature.
 LIMITS = {"distance": 1e-4, "itself": 1e-5}
-CASES = (*KINDS, *OBSTACLES, "facets", "itself")
+CASES = (*KINDS, *OBSTACLES, "facets", "itself", "quadratic")
 
 
 @cache
@@ -38,6 +39,11 @@ def case(name: str) -> tuple[SlidingContact, np.ndarray]:
     if name == "itself":
         scene = ring("hexahedron")
         return sliding(scene), shaken(scene, 0.005) * [1.2, 1.0, 0.3]
+    if name == "quadratic":
+        linear = on_arch("tetrahedron")
+        bodies = {key: Body(quadratic(body.mesh), body.material) for key, body in linear.bodies.items()}
+        scene = Scene(bodies, contacts=linear.contacts)
+        return sliding(scene), shaken(scene, 0.005)
     if name in OBSTACLES:
         body = on_arch("hexahedron").bodies["high"]
         pair = ContactPair(Surface("high", "z0"), OBSTACLES[name])
