@@ -6,6 +6,7 @@ from fenics_contact.fem.composition import Composition, composition, integrate, 
 from fenics_contact.fem.forms import FormLibrary, Template, volume_measure
 from fenics_contact.fem.history import History
 from fenics_contact.fem.history_checks import check_history_material
+from fenics_contact.fem.hyperelastic_checks import check_hyperelastic
 from fenics_contact.fem.load_forms import (
     Symbol,
     is_scalar,
@@ -38,6 +39,7 @@ __all__ = [
     "as_tractions",
     "cell_stiffness",
     "check_history_material",
+    "check_hyperelastic",
     "check_kernel",
     "composition",
     "integrate",

@@ -23,7 +23,15 @@ from fenics_contact.fem.templates import (
     surface_measure,
     volume_measure,
 )
-from fenics_contact.scene import HistoryMaterial, Load, Material, Scene, ThermalStrain, is_nonlinear
+from fenics_contact.scene import (
+    HistoryMaterial,
+    Hyperelasticity,
+    Load,
+    Material,
+    Scene,
+    ThermalStrain,
+    is_nonlinear,
+)
 
 __all__ = [
     "LOADED",
@@ -44,6 +52,7 @@ class FormLibrary:
         """Start empty; `prepare` fills it."""
         self._comm, self._templates = comm, Templates(comm)
         self._typical_modulus: dict[tuple[Material, str], float] = {}
+        self._deformable: set[tuple[Material, str]] = set()
 
     @property
     def compiled(self) -> tuple[tuple[object, ...], ...]:
@@ -109,10 +118,25 @@ class FormLibrary:
         return template.bind([space], load_parameters(load, parts), functions, facets, cells=cells)
 
     def prepare_mechanics(self, scene: Scene) -> None:
-        """Compile the missing forms of a scene's nonlinear materials. Collective on its communicator."""
+        """Compile the missing forms of a scene's nonlinear materials. Collective on its communicator.
+
+        Raises:
+            InvalidInputError: If a hyperelastic model contradicts itself (see `check_hyperelastic`).
+        """
         from fenics_contact.fem.hyperelastic import prepare_mechanics  # linear scenes go without
+        from fenics_contact.fem.hyperelastic_checks import check_hyperelastic
 
         prepare_mechanics(self._templates, scene)
+        with together(self._comm):
+            for body in scene.bodies.values():
+                for material in body.materials:
+                    cell_type = body.mesh.cell_type
+                    if (
+                        isinstance(material, Hyperelasticity)
+                        and (material, cell_type) not in self._deformable
+                    ):
+                        check_hyperelastic(material, cell_type, self._templates)
+                        self._deformable.add((material, cell_type))
 
     def mechanics(
         self, parts: Composition, cell_type: str, space: _dolfinx.fem.FunctionSpace, points: np.ndarray

@@ -42,7 +42,7 @@ def check_model(material: Material, cell_type: str, bind: Bind) -> None:
             has the wrong shape, dependent modes or modes with energy, or a mode without energy is missing.
     """
     name = type(material).__name__
-    K, points = stiffness_of_cell(_skewed(CELL_TYPES[cell_type].nodes), cell_type, bind)
+    K, points = stiffness_of_cell(skewed(CELL_TYPES[cell_type].nodes), cell_type, bind)
     if not np.isfinite(K).all():
         raise InvalidInputError(
             f"stiffness and load must be finite, got NaN or infinity in the stiffness of {name}: check the "
@@ -125,7 +125,7 @@ def _checked_kernel(material: Material, points: np.ndarray) -> np.ndarray:
     return R
 
 
-def _skewed(nodes: np.ndarray) -> np.ndarray:
+def skewed(nodes: np.ndarray) -> np.ndarray:
     """Return a cell without any symmetry; the same for every material."""
     n, dim = nodes.shape
     shift = np.sin(1.0 + 2.3 * np.arange(n * dim)).reshape(n, dim)

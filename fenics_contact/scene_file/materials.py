@@ -89,6 +89,41 @@ class FinitePlasticityMaterial(_Material):
     saturation_rate: NonNegativeFloat = 0.0
 
 
+class _Isotropic(_Material):
+    young_modulus: PositiveFloat
+    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)]
+
+
+@keys_of(scene.NeoHooke)
+class NeoHookeMaterial(_Isotropic):
+    """Neo-Hookean elasticity for large deformations, in the plane in plane strain."""
+
+    model: Literal["neo_hooke"]
+
+
+@keys_of(scene.StVenantKirchhoff)
+class StVenantKirchhoffMaterial(_Isotropic):
+    """Small strains under large rotations, in the plane in plane strain."""
+
+    model: Literal["st_venant_kirchhoff"]
+
+
+@keys_of(scene.MooneyRivlin)
+class MooneyRivlinMaterial(_Material):
+    """Rubber under moderate strains, in the plane in plane strain."""
+
+    model: Literal["mooney_rivlin"]
+    bulk_modulus: PositiveFloat
+
+
+@keys_of(scene.Ogden)
+class OgdenMaterial(_Material):
+    """Rubber under large strains, in the plane in plane strain."""
+
+    model: Literal["ogden"]
+    bulk_modulus: PositiveFloat
+
+
 def _frozen(value: Any) -> Any:
     """Convert lists to tuples: materials are hashable."""
     return tuple(map(_frozen, value)) if isinstance(value, list) else value
@@ -130,6 +165,10 @@ AnyMaterial: TypeAlias = Annotated[
         OrthotropicPlate,
         J2Material,
         FinitePlasticityMaterial,
+        NeoHookeMaterial,
+        StVenantKirchhoffMaterial,
+        MooneyRivlinMaterial,
+        OgdenMaterial,
         default="isotropic",
         other=OwnMaterial,
         when=lambda table: is_reference(table.get("model")),

@@ -95,8 +95,24 @@ def test_the_parts_of_a_chain_are_its_links() -> None:
             YIELDING | {"model": "finite_plasticity", "saturation_stress": 300, "saturation_rate": 9},
             scene.FinitePlasticity(2.1e5, 0.3, 235, 2e3, 300, 9),
         ),
+        (
+            {"model": "neo_hooke", "young_modulus": 10, "poisson_ratio": 0.4999, "mean_dilatation": True},
+            scene.NeoHooke(10.0, 0.4999, mean_dilatation=True),
+        ),
+        (
+            {"model": "mooney_rivlin", "c10": 1.0, "c01": 0.2, "bulk_modulus": 1e3},
+            scene.MooneyRivlin(1.0, 0.2, 1e3),
+        ),
+        (
+            {"model": "ogden", "shear_moduli": [2, -0.4], "exponents": [1.3, -2], "bulk_modulus": 9},
+            scene.Ogden((2.0, -0.4), (1.3, -2.0), 9.0),
+        ),
+        (
+            {"model": "st_venant_kirchhoff", "young_modulus": 10, "poisson_ratio": 0.2},
+            scene.StVenantKirchhoff(10.0, 0.2),
+        ),
     ],
-    ids=["isotropic", "orthotropic", "j2", "finite"],
+    ids=["isotropic", "orthotropic", "j2", "finite", "neo", "mooney", "ogden", "st_venant"],
 )  # fmt: skip
 def test_materials_are_those_of_the_package(given: dict[str, Any], built: scene.Material) -> None:
     assert file_of(material=given).scene.bodies["a"].material == built
