@@ -60,8 +60,8 @@ def check_hyperelastic(
     if stress > 1e-10:
         raise InvalidInputError(
             "a hyperelastic model must be free of stress at F = I, the forces on an undeformed cell of "
-            f"{name} are {stress:.1e} of those at a strain of 0.05: its energy has a slope at F = I; subtract "
-            "it, as − μ ln J does in μ/2 (tr FᵀF − 3 − 2 ln J)"
+            f"{name} are {stress:.1e} of those at a strain of 0.05: its energy has a slope at F = I; "
+            "subtract it, as − μ ln J does in μ/2 (tr FᵀF − 3 − 2 ln J)"
         )
     _check_derivatives(cell, u.ravel(), scale, name, tolerance)
     _check_rotation(cell, points, u, scale, name)
