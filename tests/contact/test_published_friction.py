@@ -17,6 +17,9 @@ SOLVERS: dict[str, DualSolver] = {
     "fixed point of face Newton": FixedPoint(FaceNewton(tolerance=TOLERANCE)),
 }
 PLAIN = Damping(fractions=(1.0,))
+#: Takes long: what claims rest on.
+LONG = {("Capsules-i101-404__sym", "fixed point of SMALSE")}
+CLAIM = [pytest.mark.slow, pytest.mark.claim]
 
 
 def notes(history) -> str:
@@ -41,8 +44,14 @@ def test_the_judge_knows_the_reactions_that_came_with_the_problems_from_others()
     assert slipping == 7, "in the others all closed contacts stick: a larger coefficient changes nothing"
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    ("case", "solver"),
+    [
+        pytest.param(case, solver, marks=CLAIM if (case, solver) in LONG else [])
+        for case in CASES
+        for solver in SOLVERS
+    ],
+)
 def test_every_published_problem_is_solved_by_every_solver(case: str, solver: str) -> None:
     problem, mu_f = published(CASES[case])
     found = solve(problem, None, SOLVERS[solver], friction_coefficient=mu_f)

@@ -9,8 +9,14 @@ import pytest
 
 from tests.random_scenes.judge import GOOD, judge
 
+#: Scenes of many seconds, which claims rest on.
+LONG = {20_037, 20_076}
+CLAIM = [pytest.mark.slow, pytest.mark.claim]
 
-@pytest.mark.parametrize("seed", range(20_000, 20_100))
+
+@pytest.mark.parametrize(
+    "seed", [pytest.param(seed, marks=CLAIM if seed in LONG else []) for seed in range(20_000, 20_100)]
+)
 def test_a_random_scene_is_solved_and_verified_or_refused_for_a_reason(seed: int) -> None:
     verdict = judge(seed)
     assert verdict.outcome in GOOD, f"{verdict.detail}\n{verdict.words}"
