@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -15,17 +14,20 @@ from fenics_contact.contact.state import State
 from fenics_contact.contact.static_admissibility import check_held
 from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.errors import InvalidInputError, LoadStepError
-from fenics_contact.feti import Decomposition, build_torn_system
+from fenics_contact.feti import Decomposition, build_torn_system, prescribed_displacements
 from fenics_contact.nonlinear import (
     AutomaticSteps,
+    Contact,
     Equations,
     Evaluation,
+    Load,
+    MovingContact,
     Path,
     PathEndsError,
-    law_of,
+    StillContact,
 )
 from fenics_contact.qp import DualSolution
-from fenics_contact.scene import RigidSurface, Scene
+from fenics_contact.scene import RigidSurface, Scene, is_finite_strain
 from fenics_contact.timing import PhaseTimer
 
 
@@ -54,14 +56,19 @@ class DeformedEquilibria:
         self._steps = steps or AutomaticSteps()
         self._decomposition, self._timer = decomposition, timer
         self._equations = Equations(scene, decomposition)
+        moves = any(is_finite_strain(each) for body in scene.bodies.values() for each in body.materials)
+        self._contact: Contact = StillContact()
+        if scene.contacts and moves:
+            self._contact = MovingContact(scene, decomposition)
 
-    def solve(self, scene: Scene, origin: State | None, tolerance: Tolerance) -> DeformedState:
+    def solve(self, scene: Scene, origin: State | None, tolerance: Tolerance, time: float) -> DeformedState:
         """Compute the equilibrium of a scene. Collective.
 
         Args:
             scene: The scene with its loads.
             origin: The state before, whose history goes on; None for bodies at rest.
             tolerance: Of all residuals; None for that of the solver.
+            time: Time at the end, for obstacles that move.
 
         Raises:
             InvalidInputError: If the tolerance is no number.
@@ -76,16 +83,19 @@ class DeformedEquilibria:
                 )
             steps = replace(steps, newton=replace(steps.newton, tolerance=tolerance))
         equations, timer = self._equations, self._timer
-        before, start, known, earlier = None, None, None, None
+        before, start, known = None, equations.at_rest(), None
         if isinstance(origin, DeformedState):
-            before, known, earlier = origin.torn, origin.equilibrium.system, origin.torn
+            before, known = origin.load, origin.equilibrium.linearisation
             start = origin.equilibrium.configuration
         with timer.phase("assemble"):
-            torn = build_torn_system(scene, self._decomposition, previous=earlier)
-            if earlier is None:
+            torn = build_torn_system(
+                scene, self._decomposition, previous=None if before is None else before.torn
+            )
+            if before is None:
                 check_held(torn)
+            load = Load(torn, prescribed_displacements(scene, self._decomposition.tearing), time)
         try:
-            path = steps.follow(equations, before, torn, start or equations.at_rest(torn), timer, known)
+            path = steps.follow(equations, self._contact, before, load, start, timer, known)
         except PathEndsError as failure:
             last = None if failure.path is None else _state_after(failure.path, timer)
             raise LoadStepError(str(failure), failure.history, last) from failure
@@ -96,11 +106,11 @@ def _state_after(path: Path, timer: PhaseTimer) -> DeformedState:
     """Return the state at the end of a path. Collective."""
     end = path.end
     evaluation, at = end.evaluation, end.evaluation.at
-    system = copy(end.system)
-    system.torn = evaluation.torn
-    law = law_of(evaluation.torn)
+    law, near = evaluation.law, end.linearisation
+    diagonal = evaluation.meeting.carried(near.diagonal, near.meeting, spread=True)
+    system = near.system.on_rows_of(evaluation.torn, law, diagonal)
     solution = DualSolution(
-        problem=system.problem.with_law(law),
+        problem=system.problem,
         multiplier=at.multiplier,
         residual=evaluation.lacking,
         product=np.zeros_like(at.multiplier),
@@ -117,7 +127,7 @@ def _state_after(path: Path, timer: PhaseTimer) -> DeformedState:
         energies = _energies(evaluation, contact)
     return DeformedState(
         system, solution, at.displacement, contact, energies, dict(timer.seconds), equilibrium=end,
-        fractions=path.fractions, factorisations=path.factorisations,
+        load=path.load, fractions=path.fractions, factorisations=path.factorisations,
     )  # fmt: skip
 
 

@@ -135,6 +135,7 @@ class ContactProblem:
         tolerance: Tolerance = None,
         overlap: bool = False,
         sensitivity: bool = False,
+        time: float = 1.0,
     ) -> State:
         """Compute an equilibrium. Collective.
 
@@ -147,6 +148,7 @@ class ContactProblem:
             overlap: Whether bodies may overlap before they are loaded, as those of a design do.
             sensitivity: Whether derivatives of the state are wanted; they need the dual system, and the
                 default tolerance is then a number.
+            time: Time of the equilibrium, for obstacles that move (`MovingObstacle`).
 
         Raises:
             InvalidInputError: If scene or partition cannot be used, or supports hold other components than
@@ -163,7 +165,7 @@ class ContactProblem:
                     "sensitivities and designs need linear materials, this scene has others: optimise it "
                     "with a tool that takes plain functions, see fenics_contact.outer"
                 )
-            self.state = self._deformed(scene, slip_from, wanted)
+            self.state = self._deformed(scene, slip_from, wanted, time)
             return self.state
         previous = self.state if start == "last" else start
         decomposition = self._decomposed(scene)
@@ -193,14 +195,14 @@ class ContactProblem:
                 self._contact_doubts.warn(self.state)
         return self.state
 
-    def _deformed(self, scene: Scene, origin: State | None, tolerance: Tolerance) -> State:
+    def _deformed(self, scene: Scene, origin: State | None, tolerance: Tolerance, time: float) -> State:
         """Compute an equilibrium of nonlinear materials. Collective."""
         from fenics_contact.contact.deformed_equilibria import DeformedEquilibria
 
         if self._deformed_equilibria is None:
             decomposition = self._decomposed(scene)
             self._deformed_equilibria = DeformedEquilibria(scene, decomposition, self.steps, self.timer)
-        return self._deformed_equilibria.solve(scene, origin, tolerance)
+        return self._deformed_equilibria.solve(scene, origin, tolerance, time)
 
     @collectively("ContactProblem.restore", lambda self, *_, **__: self.comm)
     def restore(self, stored: Stored, scene: Scene | None = None) -> State:

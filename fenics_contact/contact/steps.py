@@ -116,7 +116,8 @@ class LoadSequence:
             scene = step.applied_to(self.scene)
         state = self._done.recalled(step, scene, self.problem)
         if state is None:
-            state = self.problem.solve(scene, slip_from=self.state)
+            time = self._number + 1.0 if step.time is None else step.time
+            state = self.problem.solve(scene, slip_from=self.state, time=time)
             self._done.keep(step, state)
         self.scene = scene
         return state

@@ -1,10 +1,13 @@
 """Total FETI: torn systems, contact rows, the dual problem and its operators."""
 
 from fenics_contact.feti.condensation import Condensations
+from fenics_contact.feti.contact_rows import on_copies
 from fenics_contact.feti.decomposition import Decomposition, decompose
 from fenics_contact.feti.direct import DirectSolution, DirectSystem
+from fenics_contact.feti.dirichlet import DirichletPreconditioner
 from fenics_contact.feti.dual import DualSystem
 from fenics_contact.feti.factor import Factor, fixing_nodes
+from fenics_contact.feti.gluing import prescribed_displacements
 from fenics_contact.feti.inverse import LocalKind, TornInverse, kernel_matrix
 from fenics_contact.feti.local import LocalOperator
 from fenics_contact.feti.nodal_mean import nodal_mean, nodal_mean_at, nodal_mean_transposed
@@ -12,7 +15,8 @@ from fenics_contact.feti.nodal_sum import nodal_sum
 from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.feti.sharing import Sharing
 from fenics_contact.feti.subdomain import CachedMatrix, Subdomain, common_kernel
-from fenics_contact.feti.torn import TornSystem, build_torn_system
+from fenics_contact.feti.rows import Rows
+from fenics_contact.feti.torn import TornSystem, build_torn_system, meeting_at
 
 __all__ = [
     "CachedMatrix",
@@ -20,10 +24,12 @@ __all__ = [
     "Decomposition",
     "DirectSolution",
     "DirectSystem",
+    "DirichletPreconditioner",
     "DualSystem",
     "Factor",
     "LocalKind",
     "LocalOperator",
+    "Rows",
     "Sharing",
     "Subdomain",
     "TornInverse",
@@ -34,8 +40,11 @@ __all__ = [
     "decompose",
     "fixing_nodes",
     "kernel_matrix",
+    "meeting_at",
     "nodal_mean",
     "nodal_mean_at",
     "nodal_mean_transposed",
     "nodal_sum",
+    "on_copies",
+    "prescribed_displacements",
 ]

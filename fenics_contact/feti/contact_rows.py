@@ -88,20 +88,41 @@ class Relations:
         jump = self.points.jump[self.which].tocoo()
         # Sorted by row: every rank builds the same rows, and the owner's copy is that of the slave node.
         order = np.lexsort((jump.col, jump.row))
-        row, node, weight = jump.row[order], jump.col[order], jump.data[order]
-        copies = tearing.multiplicity[node]
-        within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
-        copy = np.repeat(tearing.first_copy[node], copies) + within
-        row, node = np.repeat(row, copies), np.repeat(node, copies)
-        value = (np.repeat(weight, copies) * tearing.copy_share[copy])[:, None] * self.directions[row]
+        row, node = jump.row[order], jump.col[order]
+        value = jump.data[order, None] * self.directions[row]
         # Directions along an axis have no entries in other components: the preconditioner depends on the
         # pattern.
         out = fixed[node] | self.held(fixed)[row][:, None]
         entry, component = np.nonzero(np.where(out, 0.0, value))
-        slave = tearing.first_copy[self.points.slave[self.which]]
-        owner = tearing.subdomain_rank[tearing.copy_subdomain[slave]]
-        right = np.zeros(self.count)
-        return Rows(row[entry], copy[entry], component, value[entry, component], right, owner)
+        slaves = self.points.slave[self.which]
+        return on_copies(tearing, row[entry], node[entry], component, value[entry, component], slaves)
+
+
+def on_copies(
+    tearing: Tearing,
+    row: np.ndarray,
+    node: np.ndarray,
+    component: np.ndarray,
+    value: np.ndarray,
+    slaves: np.ndarray,
+) -> Rows:
+    """Return rows on nodal displacements, the means of copies weighted by stiffness, as rows of B.
+
+    Args:
+        tearing: Node numbering and copies.
+        row: Row of each entry, shape (n_entries,).
+        node: Its node, shape (n_entries,).
+        component: Its component, shape (n_entries,).
+        value: Its value, shape (n_entries,).
+        slaves: For each row a node whose rank owns it, shape (n_rows,).
+    """
+    copies = tearing.multiplicity[node]
+    within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
+    copy = np.repeat(tearing.first_copy[node], copies) + within
+    row, component = np.repeat(row, copies), np.repeat(component, copies)
+    value = np.repeat(value, copies) * tearing.copy_share[copy]
+    owner = tearing.subdomain_rank[tearing.copy_subdomain[tearing.first_copy[slaves]]]
+    return Rows(row, copy, component, value, np.zeros(len(slaves)), owner)
 
 
 def normal_relations(points: ContactPoints) -> Relations:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -289,15 +290,58 @@ def _joined(
 ) -> TornSystem:
     """Search for contact and build B; the right side is left empty. Collective."""
     points, ties = _meeting_points(scene, decomposition, overlap)
+    known = None if previous is None else previous.numbering
+    system = _with_rows(scene, decomposition, subdomains, (points, ties), known, prescribed)
+    if decomposition.comm.rank == 0:
+        _log_held(system.relations[2], decomposition.fixed)
+    return system
+
+
+def meeting_at(
+    torn: TornSystem, points: ContactPoints, prescribed: np.ndarray, further: Sequence[Rows] = ()
+) -> TornSystem:
+    """Return a system with other contact points, those of bodies that have moved. Collective.
+
+    Args:
+        torn: The system; it has no rigid surfaces that are free to move.
+        points: The points; their gaps are the right sides of the normal rows, those of the others are zero.
+        prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim).
+        further: Rows of equality after all others, with a zero right side.
+    """
+    ties, known = torn.ties, torn.numbering
+    system = _with_rows(
+        torn.scene, torn.decomposition, torn.subdomains, (points, ties), known, prescribed, further
+    )
+    owned = system.numbering.owned
+    right, supported = np.zeros((2, len(owned)))
+    equality = owned < torn.n_equality  # each rank owns the same of these
+    right[equality] = torn.right[torn.numbering.owned < torn.n_equality]
+    supported[equality] = torn.supported[torn.numbering.owned < torn.n_equality]
+    normal = (owned >= torn.n_equality) & (owned < torn.n_equality + points.count)
+    right[normal] = points.gap[owned[normal] - torn.n_equality]
+    slid = np.zeros((len(system.frictionless), system.dim - 1))
+    free = replace(torn.free, columns=sp.csr_matrix((len(owned), 0)))
+    return replace(system, right=right, supported=supported, slid=slid, free=free)
+
+
+def _with_rows(
+    scene: Scene,
+    decomposition: Decomposition,
+    subdomains: tuple[Subdomain, ...],
+    met: tuple[ContactPoints, ContactPoints],
+    known: DualNumbering | None,
+    prescribed: np.ndarray,
+    further: Sequence[Rows] = (),
+) -> TornSystem:
+    """Build B for contact points and tied ones; the right side is left empty. Collective."""
+    points, ties = met
     has_friction, coefficient, tresca = friction_data(scene, points)
     frictional = np.flatnonzero(has_friction)
     gluing, tearing, fixed = decomposition.gluing.rows, decomposition.tearing, decomposition.fixed
     tied = tied_relations(ties, scene.ties, fixed)
     relations = (tied, normal_relations(points), tangential_relations(points, frictional, prescribed))
-    if decomposition.comm.rank == 0:
-        _log_held(relations[2], fixed)
-    rows = stack([gluing, *(relation.rows(tearing, fixed) for relation in relations)])
-    numbering, B = _own_part(rows, decomposition, None if previous is None else previous.numbering)
+    rows = stack([gluing, *(relation.rows(tearing, fixed) for relation in relations), *further])
+    numbering, B = _own_part(rows, decomposition, known)
     return TornSystem(
         scene, decomposition, subdomains, points, ties, gluing.count + tied.count, frictional,
         coefficient[frictional], tresca[frictional], numbering, relations, B, np.zeros(0), np.zeros(0),

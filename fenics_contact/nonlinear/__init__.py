@@ -1,20 +1,24 @@
 """Large deformations and nonlinear materials: Newton's method on the torn system."""
 
-from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, law_of
-from fenics_contact.nonlinear.load_steps import AutomaticSteps, Path, PathEndsError, unloaded
+from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation, law_of
+from fenics_contact.nonlinear.load_steps import AutomaticSteps, Path, PathEndsError
+from fenics_contact.nonlinear.meeting import Contact, Load, Meeting, MovingContact, StillContact
 from fenics_contact.nonlinear.newton import NonlinearEquilibrium, TangentNewton
-from fenics_contact.nonlinear.tangent_system import TangentSystem
 
 __all__ = [
     "AutomaticSteps",
     "Configuration",
+    "Contact",
     "Equations",
     "Evaluation",
+    "Linearisation",
+    "Load",
+    "Meeting",
+    "MovingContact",
     "NonlinearEquilibrium",
     "Path",
     "PathEndsError",
+    "StillContact",
     "TangentNewton",
-    "TangentSystem",
     "law_of",
-    "unloaded",
 ]

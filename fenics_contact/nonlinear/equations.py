@@ -6,13 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.sparse as sp
 
 from fenics_contact.display import displayed
 from fenics_contact.errors import together
 from fenics_contact.fem import Mechanics, Response, composition
 from fenics_contact.feti import Decomposition, TornSystem
+from fenics_contact.nonlinear.meeting import Meeting
 from fenics_contact.nonlinear.tangent_step import TangentProblem
 from fenics_contact.nonlinear.tangent_system import TangentSystem, linearised
 from fenics_contact.qp import (
@@ -28,6 +31,9 @@ from fenics_contact.qp import (
 from fenics_contact.scene import Scene
 from fenics_contact.timing import PhaseTimer
 
+if TYPE_CHECKING:
+    from fenics_contact.pairing.sliding import GeometricStiffness
+
 #: Forces below this fraction of those that would strain bodies by their displacement are none.
 FORCE_FLOOR = 1e-4
 
@@ -39,13 +45,23 @@ class Configuration:
 
     Attributes:
         displacement: u of this rank, torn, shape (torn_size,), [length].
-        multiplier: λ, owned, [force].
+        multiplier: λ, owned, [force]; empty where nothing is known yet.
         history: Internal variables of each of this rank's subdomains; None without any.
+        meeting: The contact points whose rows the multiplier has; None at the start.
     """
 
     displacement: Vector
     multiplier: Vector
     history: tuple[np.ndarray | None, ...]
+    meeting: Meeting | None
+
+    def meeting_at(self, meeting: Meeting) -> Configuration:
+        """Return the configuration with its forces on the rows of other contact points. Collective."""
+        if self.meeting is None:
+            multiplier = np.zeros(len(meeting.torn.numbering.owned))
+        else:
+            multiplier = meeting.carried(self.multiplier, self.meeting)
+        return replace(self, multiplier=multiplier, meeting=meeting)
 
 
 @displayed
@@ -54,7 +70,8 @@ class Evaluation:
     """The equations at a configuration.
 
     Attributes:
-        torn: The system with the load and the supports of the moment.
+        meeting: The contact points, with the system of their rows.
+        law: The law of friction there.
         at: The configuration.
         responses: Internal forces and tangents of this rank's subdomains.
         unbalanced: f − f_int(u) − Bᵀλ of this rank, torn, [force].
@@ -63,7 +80,8 @@ class Evaluation:
         least_jacobian: Smallest det F of all bodies; 1 where none is strained much.
     """
 
-    torn: TornSystem
+    meeting: Meeting
+    law: SlipLaw
     at: Configuration
     responses: tuple[Response, ...]
     unbalanced: Vector
@@ -72,15 +90,101 @@ class Evaluation:
     least_jacobian: float
 
     @property
+    def torn(self) -> TornSystem:
+        """The system with load, supports and the rows of the contact points."""
+        return self.meeting.torn
+
+    @property
     def history(self) -> tuple[np.ndarray | None, ...]:
         """Internal variables after the displacement, of each subdomain."""
         return tuple(response.history for response in self.responses)
 
-    def linearised(self, timer: PhaseTimer, known: TangentSystem | None) -> TangentSystem:
-        """Factor the tangents. Collective."""
+    def linearised(self, timer: PhaseTimer, known: Linearisation | None) -> Linearisation:
+        """Factor the tangents. Collective.
+
+        Args:
+            timer: Collects the wall time.
+            known: That of a neighbouring configuration, or None.
+        """
+        geometric = self.meeting.stiffness(self.at.multiplier)
         tangents = [response.stiffness for response in self.responses]
-        torn = linearised(self.torn, self.at.displacement, tangents, self.unbalanced, self.lacking)
-        return TangentSystem(torn, timer, known=known)
+        torn, compliance = self.torn, np.zeros(0)
+        if geometric is not None:
+            tangents = _stiffened(torn, tangents, geometric)
+            if round(float(global_max(torn.numbering.comm, geometric.columns.shape[1]))):
+                torn = self.meeting.with_rows_of(geometric)
+                further = torn.numbering.owned[len(self.lacking) :] - self.torn.numbering.total
+                compliance = np.sign(geometric.values)[further]
+        lacking = np.concatenate([self.lacking, np.zeros(len(compliance))])
+        increments = linearised(torn, self.at.displacement, tangents, self.unbalanced, lacking)
+        diagonal, operators = None, {}
+        if known is not None:
+            diagonal = self.meeting.carried(known.diagonal, known.meeting, spread=True)
+            diagonal = np.concatenate([diagonal, np.ones(len(compliance))])
+            operators = known.system.operators
+        system = TangentSystem(increments, timer, diagonal=diagonal, earlier=operators)
+        return Linearisation(system, self.meeting, compliance)
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """Factored tangents, with rows for the stiffness of forces that turn with their surfaces.
+
+    Attributes:
+        system: The factored system; rows of geometric stiffness come after all others.
+        meeting: The contact points.
+        compliance: ±1 of each row of geometric stiffness, owned.
+    """
+
+    system: TangentSystem
+    meeting: Meeting
+    compliance: Vector
+
+    @property
+    def diagonal(self) -> Vector:
+        """Of F on the rows of the meeting, owned."""
+        return self.system.problem.diagonal[: len(self.meeting.torn.numbering.owned)]
+
+    def natural_step(self, meeting: Meeting, caution: float) -> Vector:
+        """Return ρ of the natural map on the rows of a meeting, owned, made smaller by a factor. Collective."""
+        diagonal = meeting.carried(self.diagonal, self.meeting, spread=True)
+        return caution * contact_step(meeting.torn.layout, diagonal)
+
+    def problem(self, evaluation: Evaluation) -> TangentProblem:
+        """Return the problem of one Newton step from the configuration of the linearisation."""
+        nothing = np.zeros(len(self.compliance))
+        torn = self.system.torn
+        return TangentProblem(
+            self.system.problem.with_law(law_of(torn)),
+            self.system.stiffness,
+            np.concatenate([evaluation.at.multiplier, nothing]),
+            np.concatenate([evaluation.lacking, nothing]),
+            np.concatenate([np.zeros(len(evaluation.lacking)), self.compliance]),
+        )
+
+
+def _stiffened(
+    torn: TornSystem, tangents: list[sp.csr_matrix], geometric: GeometricStiffness
+) -> list[sp.csr_matrix]:
+    """Add blocks on single nodes, shared by their copies, to the tangents of this rank's subdomains."""
+    if len(geometric.block_node) == 0:
+        return tangents
+    decomposition, dim = torn.decomposition, torn.dim
+    tearing = decomposition.tearing
+    copies = tearing.multiplicity[geometric.block_node]
+    within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
+    copy = np.repeat(tearing.first_copy[geometric.block_node], copies) + within
+    block = np.repeat(geometric.blocks, copies, axis=0) * tearing.copy_share[copy, None, None]
+    place = decomposition.copy_block[copy]
+    here = np.flatnonzero(place >= 0)
+    dofs = dim * place[here, None] + np.arange(dim)
+    row, column = np.repeat(dofs, dim, axis=1).ravel(), np.tile(dofs, dim).ravel()
+    size = decomposition.torn_size
+    added = sp.csr_matrix((block[here].ravel(), (row, column)), shape=(size, size))
+    ends = dim * decomposition.block_offset
+    parts = [slice(int(a), int(b)) for a, b in pairwise(ends)]
+    return [(K + added[part, part]).tocsr() for K, part in zip(tangents, parts, strict=True)]
 
 
 @displayed
@@ -114,11 +218,10 @@ class Equations:
         ends = self.decomposition.tearing.dim * self.decomposition.block_offset
         return [slice(int(a), int(b)) for a, b in pairwise(ends)]
 
-    def at_rest(self, torn: TornSystem) -> Configuration:
+    def at_rest(self) -> Configuration:
         """Return the undeformed configuration without forces."""
         nothing = (None,) * len(self._mechanics)
-        size = self.decomposition.torn_size
-        return Configuration(np.zeros(size), np.zeros(len(torn.numbering.owned)), nothing)
+        return Configuration(np.zeros(self.decomposition.torn_size), np.zeros(0), nothing, None)
 
     def least_jacobian(self, displacement: Vector) -> float:
         """Return the smallest det F at a torn displacement of all ranks. Collective."""
@@ -128,26 +231,26 @@ class Equations:
             least = min((m.least_jacobian(displacement[part]) for m, part in each), default=1.0)
         return global_min(comm, least)
 
-    def evaluate(self, torn: TornSystem, law: SlipLaw, at: Configuration, step: Vector) -> Evaluation:
+    def evaluate(self, meeting: Meeting, law: SlipLaw, at: Configuration, step: Vector) -> Evaluation:
         """Return forces, openings and their residuals. Collective.
 
         Args:
-            torn: The system with load, supports and origin of slip.
+            meeting: The contact points, with load and supports.
             law: Of friction.
             at: The configuration; its history is that before the load step.
             step: ρ of the natural map, owned.
         """
-        comm, numbering = self.decomposition.comm, torn.numbering
+        comm, torn = self.decomposition.comm, meeting.torn
         with together(comm):
             each = zip(self._mechanics, self._parts, at.history, strict=True)
             responses = tuple(m.at(at.displacement[part], history) for m, part, history in each)
         internal = np.concatenate([np.zeros(0), *(response.force for response in responses)])
-        bound = torn.B.T @ numbering.to_local(at.multiplier)
-        unbalanced, lacking = torn.load - internal - bound, torn.right - torn.jump(at.displacement)
+        bound = torn.B.T @ torn.numbering.to_local(at.multiplier)
+        unbalanced, lacking = torn.load - internal - bound, meeting.lacking(at.displacement)
         stiff = max((float(r.stiffness.diagonal().max()) for r in responses), default=0.0)
         residuals = _residuals(torn, law, at, step, (unbalanced, internal, bound), lacking, stiff)
         least = global_min(comm, min((r.least_jacobian for r in responses), default=1.0))
-        return Evaluation(torn, at, responses, unbalanced, lacking, residuals, least)
+        return Evaluation(meeting, law, at, responses, unbalanced, lacking, residuals, least)
 
 
 def _residuals(
@@ -188,19 +291,3 @@ def law_of(torn: TornSystem) -> SlipLaw:
     """Return the law of friction of this rank's discs."""
     discs = torn.owned_discs
     return CoulombLaw(torn.layout, torn.friction_coefficient[discs], torn.tresca_bound[discs])
-
-
-def tangent_problem(system: TangentSystem, law: SlipLaw, evaluation: Evaluation) -> TangentProblem:
-    """Return the problem of one Newton step."""
-    problem = system.problem.with_law(law)
-    return TangentProblem(problem, system.stiffness, evaluation.at.multiplier, evaluation.lacking)
-
-
-def natural_step(system: TangentSystem, caution: float) -> Vector:
-    """Return ρ of the natural map, owned, made smaller by a factor."""
-    return caution * contact_step(system.problem.layout, system.problem.diagonal)
-
-
-def advanced(at: Configuration, displacement: Vector, multiplier: Vector) -> Configuration:
-    """Return another displacement and multiplier after the same history."""
-    return replace(at, displacement=displacement, multiplier=multiplier)

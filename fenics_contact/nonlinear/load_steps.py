@@ -6,14 +6,11 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from fenics_contact.display import displayed
 from fenics_contact.errors import ConvergenceError, tell
-from fenics_contact.feti import TornSystem
-from fenics_contact.nonlinear.equations import Configuration, Equations
+from fenics_contact.nonlinear.equations import Configuration, Equations, Linearisation
+from fenics_contact.nonlinear.meeting import Contact, Load
 from fenics_contact.nonlinear.newton import NonlinearEquilibrium, TangentNewton
-from fenics_contact.nonlinear.tangent_system import TangentSystem
 from fenics_contact.qp import SolverStep
 from fenics_contact.timing import PhaseTimer
 
@@ -29,7 +26,7 @@ class Path:
     """The equilibria from one load to the next.
 
     Attributes:
-        torn: The system at the end, with the origin of slip of the last part.
+        load: What acts at the end.
         end: The last equilibrium.
         fractions: Parts of the load at which equilibria were found, the last one being 1.
         history: One line for each Newton step of all parts, those of parts that were cut included.
@@ -37,7 +34,7 @@ class Path:
         factorisations: Factored tangents, counting all subdomains as one.
     """
 
-    torn: TornSystem
+    load: Load
     end: NonlinearEquilibrium
     fractions: tuple[float, ...]
     history: tuple[SolverStep, ...]
@@ -76,18 +73,20 @@ class AutomaticSteps:
     def follow(
         self,
         equations: Equations,
-        before: TornSystem | None,
-        target: TornSystem,
+        contact: Contact,
+        before: Load | None,
+        target: Load,
         start: Configuration,
         timer: PhaseTimer,
-        known: TangentSystem | None = None,
+        known: Linearisation | None = None,
     ) -> Path:
         """Return the equilibrium at a load, with the path to it. Collective.
 
         Args:
             equations: Internal forces.
-            before: The system at the start; None for bodies at rest without loads.
-            target: The system with the loads and supports at the end.
+            contact: How the bodies meet.
+            before: What acts at the start; None for bodies at rest without loads.
+            target: What acts at the end.
             start: The configuration at the start.
             timer: Collects the wall time.
             known: A linearisation near the start, or None.
@@ -95,23 +94,32 @@ class AutomaticSteps:
         Raises:
             PathEndsError: The smallest step fails.
         """
-        first = unloaded(target) if before is None else before
-        at, torn = start, first
+        first = target.removed() if before is None else before
+        at, torn = start, first.torn
         end: NonlinearEquilibrium | None = None
         reached, part = 0.0, self.first
         fractions, history, products, factorisations = list[float](), list[SolverStep](), 0, 0
 
         def walked() -> Path:
             assert end is not None
-            return Path(torn, end, tuple(fractions), tuple(history), products, factorisations)
+            return Path(
+                target.between(first, reached),
+                end,
+                tuple(fractions),
+                tuple(history),
+                products,
+                factorisations,
+            )
 
         while reached < 1.0:
             part = min(part, 1.0 - reached)
             fraction = 1.0 if reached + part > 1.0 - 1e-12 else reached + part
-            trial = _between(first, target, fraction)
-            trial = trial.with_slip_from(torn.relative(at.displacement), torn.sliding(at.displacement))
+            load = target.between(first, fraction)
+            if at.meeting is None or at.meeting.points is None:
+                slipped = torn.relative(at.displacement), torn.sliding(at.displacement)
+                load = replace(load, torn=load.torn.with_slip_from(*slipped))
             try:
-                found = self.newton.solve(equations, trial, at, timer, known)
+                found = self.newton.solve(equations, contact, load, at, timer, known)
             except ConvergenceError as failure:
                 history += [replace(line, outer=len(fractions)) for line in failure.history]
                 part *= 0.5
@@ -127,27 +135,7 @@ class AutomaticSteps:
             history += [replace(line, outer=len(fractions)) for line in found.history]
             products, factorisations = products + found.products, factorisations + found.factorisations
             fractions.append(fraction)
-            at, torn, end, known, reached = found.configuration, trial, found, found.system, fraction
+            at, torn, end, reached = found.configuration, load.torn, found, fraction
+            known = found.linearisation
             part *= 2.0 if len(found.history) <= EASY else 1.0
         return walked()
-
-
-def unloaded(torn: TornSystem) -> TornSystem:
-    """Return a system without loads, whose supports prescribe no movement."""
-    equality = torn.numbering.owned < torn.n_equality
-    right = np.where(equality, 0.0, torn.right + torn.supported)
-    subdomains = tuple(replace(part, load=np.zeros_like(part.load)) for part in torn.subdomains)
-    return replace(torn, subdomains=subdomains, right=right, supported=np.zeros_like(torn.supported))
-
-
-def _between(first: TornSystem, last: TornSystem, fraction: float) -> TornSystem:
-    """Return the system at a part of the way from one load to another."""
-    if fraction == 1.0:
-        return last
-    parts = zip(first.subdomains, last.subdomains, strict=True)
-    subdomains = tuple(replace(b, load=(1.0 - fraction) * a.load + fraction * b.load) for a, b in parts)
-
-    def mixed(name: str) -> np.ndarray:
-        return np.asarray((1.0 - fraction) * getattr(first, name) + fraction * getattr(last, name))
-
-    return replace(last, subdomains=subdomains, right=mixed("right"), supported=mixed("supported"))

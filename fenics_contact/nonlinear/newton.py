@@ -8,24 +8,16 @@ import numpy as np
 
 from fenics_contact.display import displayed
 from fenics_contact.errors import ConvergenceError
-from fenics_contact.feti import TornSystem
-from fenics_contact.nonlinear.equations import (
-    Configuration,
-    Equations,
-    Evaluation,
-    advanced,
-    law_of,
-    natural_step,
-    tangent_problem,
-)
+from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation, law_of
+from fenics_contact.nonlinear.meeting import Contact, Load
 from fenics_contact.nonlinear.tangent_step import TangentStep, tangent_step
 from fenics_contact.nonlinear.tangent_system import TangentSystem
 from fenics_contact.qp import (
     FaceNewton,
-    SlipLaw,
     SolverStep,
     Stop,
     Vector,
+    apply_unless_zero,
     classify,
     global_sum,
     solve,
@@ -47,14 +39,14 @@ class NonlinearEquilibrium:
 
     Attributes:
         evaluation: The equations there; all residuals are below the tolerance.
-        system: The last linearisation, from a little before.
+        linearisation: The last one, from a little before.
         history: One line for each Newton step.
         products: Applications of F.
         factorisations: Factored tangents, counting all subdomains as one.
     """
 
     evaluation: Evaluation
-    system: TangentSystem
+    linearisation: Linearisation
     history: tuple[SolverStep, ...]
     products: int
     factorisations: int
@@ -93,59 +85,66 @@ class TangentNewton:
     def solve(
         self,
         equations: Equations,
-        torn: TornSystem,
+        contact: Contact,
+        load: Load,
         start: Configuration,
         timer: PhaseTimer,
-        known: TangentSystem | None,
+        known: Linearisation | None,
     ) -> NonlinearEquilibrium:
         """Return the equilibrium next to a configuration. Collective.
 
         Args:
             equations: Internal forces.
-            torn: The system with loads, supports and origin of slip.
+            contact: How the bodies meet.
+            load: What acts, with the origin of slip where bodies do not move far.
             start: The configuration before, with the history of its materials.
             timer: Collects the wall time.
-            known: An earlier linearisation with the same rows, or None.
+            known: A linearisation near the start, or None.
 
         Raises:
             ConvergenceError: With the history, which ends with the reason.
         """
-        run = _Run(self, equations, torn, law_of(torn), timer)
-        return run.to_equilibrium(start, known)
+        return _Run(self, equations, contact, load, timer).to_equilibrium(start, known)
 
 
 class _Run:
     """One load step."""
 
     def __init__(
-        self, method: TangentNewton, equations: Equations, torn: TornSystem, law: SlipLaw, timer: PhaseTimer
+        self, method: TangentNewton, equations: Equations, contact: Contact, load: Load, timer: PhaseTimer
     ) -> None:
-        self._method, self._equations, self._torn, self._law = method, equations, torn, law
-        self._timer, self._comm = timer, torn.numbering.comm
+        self._method, self._equations, self._contact, self._load = method, equations, contact, load
+        self._timer, self._comm = timer, load.torn.numbering.comm
         self._caution = 1.0
         self.history: list[SolverStep] = []
         self._residuals: list[float] = []
         self._forcing = method.forcing
         self.products = self.factorisations = 0
 
-    def to_equilibrium(self, at: Configuration, known: TangentSystem | None) -> NonlinearEquilibrium:
-        method, system = self._method, known
+    def to_equilibrium(self, at: Configuration, known: Linearisation | None) -> NonlinearEquilibrium:
+        near = known
+        points = None if at.meeting is None else at.meeting.points
+        start = None if points is None else points.material_points()
         while True:
-            step = np.zeros(self._torn.layout.size) if system is None else natural_step(system, self._caution)
             with self._timer.phase("assemble"):
-                evaluation = self._equations.evaluate(self._torn, self._law, at, step)
+                meeting = self._contact.at(self._load, at.displacement, start, at.meeting)
+                start, at = meeting.start, at.meeting_at(meeting)
+                step = np.zeros(meeting.torn.layout.size)
+                if near is not None:
+                    step = near.natural_step(meeting, self._caution)
+                evaluation = self._equations.evaluate(meeting, law_of(meeting.torn), at, step)
             residuals = evaluation.residuals
             if self.history:
                 self.history[-1] = replace(self.history[-1], residuals=residuals)
-            if system is not None and residuals.within(method.tolerance):
+            if near is not None and residuals.within(self._method.tolerance):
                 return NonlinearEquilibrium(
-                    evaluation, system, tuple(self.history), self.products, self.factorisations
+                    evaluation, near, tuple(self.history), self.products, self.factorisations
                 )
             self._require_progress(evaluation)
-            system = evaluation.linearised(self._timer, system)
+            near = evaluation.linearised(self._timer, near)
             self.factorisations += 1
             with self._timer.phase("solve"):
-                at = self._advanced(evaluation, system)
+                at = self._advanced(evaluation, near)
 
     def _require_progress(self, evaluation: Evaluation) -> None:
         """Adapt the forcing term and ρ. Collective.
@@ -175,53 +174,59 @@ class _Run:
             self._caution *= CAUTION
             self._residuals = [worst]
 
-    def _advanced(self, evaluation: Evaluation, system: TangentSystem) -> Configuration:
+    def _advanced(self, evaluation: Evaluation, near: Linearisation) -> Configuration:
         """Take one step. Collective."""
-        at, step = evaluation.at, natural_step(system, self._caution)
-        floor = 0.1 * self._method.tolerance * evaluation.residuals.gluing_scale
-        problem = tangent_problem(system, self._law, evaluation)
-        new = self._torn.points.count > 0 and not self._touching(at.multiplier)
+        at, size, method = evaluation.at, len(evaluation.lacking), self._method
+        further = np.zeros(len(near.compliance))
+        step = np.concatenate([near.natural_step(evaluation.meeting, self._caution), further])
+        floor = 0.1 * method.tolerance * evaluation.residuals.gluing_scale
         taken = None
-        if not new:
-            taken = tangent_step(problem, step, self._forcing, floor, self._method.max_products)
+        if evaluation.torn.points.count == 0 or self._touching(evaluation):
+            problem = near.problem(evaluation)
+            taken = tangent_step(problem, step, self._forcing, floor, method.max_products)
         whole = taken is None
         if taken is None:
-            taken = self._whole(system, evaluation, step)
+            taken = self._whole(near.system, evaluation, step)
         self.products += taken.products
-        change = taken.multiplier - at.multiplier
-        moved = system.displacement(change, taken.motions)
+        change = taken.multiplier - np.concatenate([at.multiplier, further])
+        moved = near.system.displacement(change, taken.motions)
         part = self._room(evaluation, moved)
-        self._record(evaluation, system, taken, part, whole)
-        return advanced(at, at.displacement + part * moved, at.multiplier + part * change)
+        self._record(evaluation, near.system, taken, part, whole)
+        multiplier = at.multiplier + part * change[:size]
+        return replace(at, displacement=at.displacement + part * moved, multiplier=multiplier)
 
-    def _touching(self, multiplier: Vector) -> bool:
-        contact = self._torn.layout.contact
-        return float(global_sum(self._comm, np.count_nonzero(multiplier[contact]))[0]) > 0.0
+    def _touching(self, evaluation: Evaluation) -> bool:
+        contact = evaluation.torn.layout.contact
+        return global_sum(self._comm, np.count_nonzero(evaluation.at.multiplier[contact]))[0] > 0.0
 
     def _whole(self, system: TangentSystem, evaluation: Evaluation, step: Vector) -> TangentStep:
         """Solve the linearised contact problem as a whole, its rigid motions without stiffness. Collective.
 
         At the start of a history nothing is known of the active set, and without stress they have none.
         """
-        at, torn, before = evaluation.at, self._torn, system.products
-        problem = system.problem
-        flexed = (
-            system.apply(at.multiplier) if self._touching(at.multiplier) or np.any(at.multiplier) else 0.0
-        )
-        load = problem.coarse.load + problem.coarse.apply(at.multiplier)
-        coarse = problem.coarse.with_load(load)
+        torn, before, problem = system.torn, system.products, system.problem
+        multiplier = np.zeros(len(torn.numbering.owned))
+        multiplier[: len(evaluation.lacking)] = evaluation.at.multiplier
+        load = problem.coarse.load + problem.coarse.apply(multiplier)
         scaling = None if problem.scaling is None else problem.scaling.with_load(load)
-        problem = replace(problem, rhs=problem.rhs + flexed, coarse=coarse, scaling=scaling, reach=None)
+        flexed = apply_unless_zero(problem, system.apply, multiplier)
+        problem = replace(
+            problem,
+            rhs=problem.rhs + flexed,
+            coarse=problem.coarse.with_load(load),
+            scaling=scaling,
+            reach=None,
+        )
         discs = torn.owned_discs
         coefficient = torn.friction_coefficient[discs] if np.any(torn.friction_coefficient > 0) else None
         solution = solve(
             problem,
             torn.tresca_bound[discs],
             FaceNewton(NESTED),
-            at.multiplier,
+            multiplier,
             friction_coefficient=coefficient,
         )
-        bound = self._law.bound(solution.multiplier)
+        bound = law_of(torn).bound(solution.multiplier)
         face = classify(problem.layout, bound, solution.multiplier, solution.residual, step)
         return TangentStep(
             solution.multiplier, solution.alpha, face, system.products - before, Stop.CONVERGED

@@ -21,6 +21,7 @@ from fenics_contact.qp import (
     CoupledSystem,
     DualProblem,
     Face,
+    FacePreconditioner,
     FaceSystems,
     Kept,
     Stop,
@@ -43,12 +44,15 @@ class TangentProblem:
         stiffness: S of the rigid motions, shape (m, m), replicated.
         multiplier: λ, owned.
         residual: c − B u, owned: the residual r of the natural map, gaps and minus the slip.
+        compliance: Compliances of rows of equality, owned, shape (size,): B u = c + compliance · λ; of either
+            sign, zero on most rows.
     """
 
     problem: DualProblem
     stiffness: sp.csr_matrix
     multiplier: Vector
     residual: Vector
+    compliance: Vector
 
     def scaled(self) -> TangentProblem:
         """Return the problem in the multipliers of `DualProblem.scaling`, itself where there is none."""
@@ -60,6 +64,7 @@ class TangentProblem:
             problem=self.problem.scaled_problem,
             multiplier=np.asarray(self.multiplier / s, dtype=np.float64),
             residual=np.asarray(self.residual * s, dtype=np.float64),
+            compliance=np.asarray(self.compliance * s**2, dtype=np.float64),
         )
 
 
@@ -119,12 +124,14 @@ class _StiffFace:
     Attributes:
         at: The linearised problem.
         coupled: The face with growing friction, as it is without stiffness.
+        compliance: That of rows of equality in coordinates of the face, shape (n_face,), zero on most.
         fixed: The part of λ that is given on the face, owned.
         operator: F, counted.
     """
 
     at: TangentProblem
     coupled: CoupledSystem
+    compliance: Vector
     fixed: Vector
     operator: CountedOperator
 
@@ -133,13 +140,18 @@ class _StiffFace:
         """Prepare the face; None where it does not hold every body. Collective."""
         problem, coarse = at.problem, at.problem.coarse
         system = FaceSystems(problem, operator).build(face)
+        compliance = face.restrict(at.compliance)
+        if isinstance(problem.preconditioner, FacePreconditioner):
+            # Rows with a compliance are nearly those of other contacts: the preconditioner is that of these.
+            others = face.restriction @ sp.diags((compliance == 0.0).astype(float))
+            system = replace(system, preconditioner=problem.preconditioner.on_face(_nonzero(others)))
         growth, fixed, moving = problem.law.growth, face.fixed, face.restriction
         if global_max(problem.comm, float(np.any(growth[face.slip] > 0.0))) > 0.0:
             coupling = face.growth(growth)
             moving = (moving + coupling).tocsr()
             fixed = fixed - coupling @ np.maximum(face.restrict(at.multiplier), 0.0)
         coupled = CoupledSystem.build(system, coarse, face.restriction, moving)
-        return None if coupled is None else cls(at, coupled, fixed, operator)
+        return None if coupled is None else cls(at, coupled, compliance, fixed, operator)
 
     def solve(self, forcing: float, floor: float, max_products: int) -> tuple[Vector, Vector, Stop]:
         """Return δλ, owned, β, replicated, and why the iteration ended. Collective.
@@ -156,12 +168,13 @@ class _StiffFace:
         product = np.zeros_like(change)
         if problem.norm(change) > 0.0:
             product = self.operator(change)
-        gradient = coupled.tested.T @ (product - problem.rhs) + face.curvature * y
+        gradient = coupled.tested.T @ (product - problem.rhs) + (face.curvature + self.compliance) * y
 
         def expand(vector: Vector) -> tuple[Vector, Kept]:
             step, motions = self._direction(vector)
             full = self.operator(coupled.moving @ step)
-            return coupled.operate(step, full) - coupled.oblique.tested.T @ motions, (step, motions)
+            image = coupled.operate(step, full) + self.compliance * step
+            return image - coupled.oblique.tested.T @ motions, (step, motions)
 
         size = float(np.sqrt(global_sum(comm, gradient @ gradient)[0]))
         across = coupled.oblique(gradient)
@@ -175,6 +188,17 @@ class _StiffFace:
         """Return a step y and motions β with G Z y + S β = 0 for a residual. Collective."""
         coupled = self.coupled
         motions = -coupled.oblique.coefficients(vector)
-        step = coupled.precondition(coupled.oblique(vector))
+        across = coupled.oblique(vector)
+        step = coupled.system.precondition(across)
+        stiff = self.compliance != 0.0
+        step[stiff] = across[stiff] / self.compliance[stiff]
+        step = coupled.oblique.moving.project(step)
         borne = coupled.oblique.tested.T @ coupled.oblique.solve(self.at.stiffness @ motions)
         return np.asarray(step - borne, dtype=np.float64), motions
+
+
+def _nonzero(basis: sp.spmatrix) -> sp.csr_matrix:
+    """Return the columns of a basis that are not zero."""
+    kept = sp.csc_matrix(basis)
+    kept.eliminate_zeros()
+    return kept[:, np.diff(kept.indptr) > 0].tocsr()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import partial
 
@@ -13,6 +14,7 @@ from fenics_contact._libraries import MPI
 from fenics_contact.feti import (
     CachedMatrix,
     Condensations,
+    DirichletPreconditioner,
     DualSystem,
     LocalKind,
     LocalOperator,
@@ -22,7 +24,7 @@ from fenics_contact.feti import (
     kernel_matrix,
 )
 from fenics_contact.nonlinear.tangent_operator import TangentOperator
-from fenics_contact.qp import CoarseSpace
+from fenics_contact.qp import CoarseSpace, SlipLaw
 from fenics_contact.scene import rigid_body_modes
 from fenics_contact.timing import PhaseTimer
 
@@ -66,24 +68,29 @@ class TangentSystem(DualSystem):
     softened: int
 
     def __init__(
-        self, torn: TornSystem, timer: PhaseTimer | None = None, *, known: TangentSystem | None = None
+        self,
+        torn: TornSystem,
+        timer: PhaseTimer | None = None,
+        *,
+        diagonal: np.ndarray | None = None,
+        earlier: Mapping[int, TangentOperator] | None = None,
     ) -> None:
         """Factor the tangents and assemble d, G, S, e. Collective.
 
         Args:
             torn: The linearised system.
             timer: Collects the wall time.
-            known: An earlier linearisation with the same rows, or None.
+            diagonal: That of F on contact rows, owned, if it is known well enough.
+            earlier: Operators of an earlier shape by number of subdomain.
         """
-        self._known = known
+        self._known_diagonal, self._earlier = diagonal, earlier or {}
         super().__init__(torn, timer, kind=LocalKind.IMPLICIT)
 
     def _inverse(
         self, torn: TornSystem, condensations: Condensations, kind: LocalKind, known: TornInverse | None
     ) -> TornInverse:
-        inverse = TangentInverse(torn, condensations, {} if self._known is None else self._known.operators)
-        self._known_diagonal = None if self._known is None else self._known.problem.diagonal
-        self._known = None  # a history must not keep all its linearisations
+        inverse = TangentInverse(torn, condensations, self._earlier)
+        self._earlier = {}  # a history must not keep all its linearisations
         parts = zip(torn.subdomains, inverse.tangents, strict=True)
         subdomains = tuple(replace(subdomain, kernel=operator.modes) for subdomain, operator in parts)
         self.torn = replace(torn, subdomains=subdomains)
@@ -111,6 +118,27 @@ class TangentSystem(DualSystem):
         self.unheld = sp.csr_matrix((self.kernel.shape[0], 0))
         self._unheld_points = self.points[:, :0]
         return coarse
+
+    def on_rows_of(self, torn: TornSystem, law: SlipLaw, diagonal: np.ndarray) -> TangentSystem:
+        """Return the factored tangents with the rows of a system at a neighbouring configuration. Collective.
+
+        Args:
+            torn: The system.
+            law: Its law of friction.
+            diagonal: That of F on its contact rows, owned.
+        """
+        other = copy(self)
+        other.torn, other._B, other._Bt = torn, torn.B, torn.B.T.tocsr()
+        other._B_interface = torn.B[:, self.inverse.interface].tocsr()
+        other._Bt_interface = other._B_interface.T.tocsr()
+        preconditioner = DirichletPreconditioner(
+            self.inverse, other._B_interface, other._compliance(), torn.numbering, torn.n_gluing
+        )
+        other.problem = replace(
+            self.problem, layout=torn.layout, preconditioner=preconditioner, diagonal=diagonal, friction=law,
+            scaling=None,
+        )  # fmt: skip
+        return other
 
     def _diagonal(self) -> tuple[np.ndarray, np.ndarray]:
         if self._known_diagonal is not None:

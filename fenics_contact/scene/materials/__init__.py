@@ -8,6 +8,7 @@ from fenics_contact.scene.materials.hyperelasticity import (
     Hyperelasticity,
     deformation_gradient,
     gradient_in_space,
+    is_finite_strain,
     is_nonlinear,
 )
 from fenics_contact.scene.materials.isotropic import IsotropicElasticity
@@ -53,6 +54,7 @@ __all__ = [
     "deformation_gradient",
     "gradient_in_space",
     "has_mean_dilatation",
+    "is_finite_strain",
     "is_nonlinear",
     "material_axes",
     "strain",

@@ -107,3 +107,8 @@ def gradient_in_space(F: Expr) -> Expr:
 def is_nonlinear(material: object) -> bool:
     """Return whether a material's stress is no linear function of the displacement."""
     return bool(getattr(material, "nonlinear", False))
+
+
+def is_finite_strain(material: object) -> bool:
+    """Return whether a material is made for large deformations, rotations included."""
+    return is_nonlinear(material) and bool(getattr(material, "finite", True))

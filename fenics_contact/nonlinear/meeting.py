@@ -1,0 +1,195 @@
+"""Where bodies meet: at the points of the undeformed bodies, or wherever they have moved to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from fenics_contact.display import displayed
+from fenics_contact.feti import Decomposition, Rows, TornSystem, meeting_at, nodal_mean_at, on_copies
+from fenics_contact.pairing import sliding_contact
+from fenics_contact.qp import Vector
+from fenics_contact.scene import Scene, Surface
+
+if TYPE_CHECKING:
+    from fenics_contact.pairing.sliding import GeometricStiffness, MaterialPoints, SlidingPoints
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Load:
+    """What acts on the bodies at one time.
+
+    Attributes:
+        torn: The system with loads and supports.
+        prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim), [length].
+        time: The time, for obstacles that move.
+    """
+
+    torn: TornSystem
+    prescribed: np.ndarray
+    time: float
+
+    def between(self, first: Load, part: float) -> Load:
+        """Return the load at a part of the way from another one to this."""
+        if part == 1.0:
+            return self
+        parts = zip(first.torn.subdomains, self.torn.subdomains, strict=True)
+        subdomains = tuple(replace(b, load=(1.0 - part) * a.load + part * b.load) for a, b in parts)
+
+        def mixed(name: str) -> np.ndarray:
+            return np.asarray((1.0 - part) * getattr(first.torn, name) + part * getattr(self.torn, name))
+
+        torn = replace(self.torn, subdomains=subdomains, right=mixed("right"), supported=mixed("supported"))
+        prescribed = (1.0 - part) * first.prescribed + part * self.prescribed
+        return Load(torn, prescribed, (1.0 - part) * first.time + part * self.time)
+
+    def removed(self) -> Load:
+        """Return the same supports without movement, at time zero, and no loads."""
+        torn = self.torn
+        equality = torn.numbering.owned < torn.n_equality
+        right = np.where(equality, 0.0, torn.right + torn.supported)
+        subdomains = tuple(replace(part, load=np.zeros_like(part.load)) for part in torn.subdomains)
+        torn = replace(torn, subdomains=subdomains, right=right, supported=np.zeros_like(torn.supported))
+        return Load(torn, 0.0 * self.prescribed, 0.0)
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Meeting:
+    """The contact points at a displacement.
+
+    Attributes:
+        torn: The system with the rows of these points.
+        points: The points of bodies that have moved; None where those of the undeformed bodies are used.
+        start: Where the nodes stood on their masters at the start of the load step; None likewise.
+        prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim), [length].
+    """
+
+    torn: TornSystem
+    points: SlidingPoints | None
+    start: MaterialPoints | None
+    prescribed: np.ndarray
+
+    def lacking(self, displacement: Vector) -> Vector:
+        """Return c − B u, owned, [length]: gaps, minus the slip, and openings of glued rows. Collective."""
+        torn, owned = self.torn, self.torn.numbering.owned
+        lacking = torn.right - torn.jump(displacement)
+        if self.points is None or self.start is None:
+            return lacking
+        slip = self.points.slip(self.start)[torn.frictional].ravel()
+        contact = np.concatenate([self.points.points.gap, -slip])
+        mine = owned >= torn.n_equality
+        lacking[mine] = contact[owned[mine] - torn.n_equality]
+        return lacking
+
+    def stiffness(self, multiplier: Vector) -> GeometricStiffness | None:
+        """Return the stiffness of normal forces that turn with their surfaces. Collective."""
+        if self.points is None:
+            return None
+        normal = self.torn.numbering.gather(multiplier, self.torn.normal_rows)
+        return self.points.stiffness(np.maximum(normal, 0.0))
+
+    def carried(self, values: Vector, other: Meeting, spread: bool = False) -> Vector:
+        """Return a vector on the rows of another meeting on these rows. Collective.
+
+        Args:
+            values: By row, owned there.
+            other: The other meeting.
+            spread: Whether points that are new get the mean of the others, rather than zero.
+        """
+        if self.points is None or other.points is None:
+            return values
+        torn, before = self.torn, other.torn
+        rows = np.concatenate([before.normal_rows, before.tangential_rows.ravel()])
+        there = before.numbering.gather(values, rows)
+        count, width = before.points.count, before.dim - 1
+        friction = np.zeros((count, width))
+        friction[before.frictional] = there[count:].reshape(-1, width)
+        if spread:
+            normal, tangential = (self._filled(x, other) for x in (there[:count], friction))
+        else:
+            normal = self.points.carry(there[:count], other.points)
+            tangential = self.points.carry_tangential(friction, other.points)
+        contact = np.concatenate([normal, tangential[torn.frictional].ravel()])
+        owned = torn.numbering.owned
+        result = np.empty(len(owned))
+        equality = owned < torn.n_equality
+        result[equality] = values[before.numbering.owned < before.n_equality]
+        result[~equality] = contact[owned[~equality] - torn.n_equality]
+        return result
+
+    def _filled(self, values: np.ndarray, other: Meeting) -> np.ndarray:
+        assert self.points is not None and other.points is not None
+        carried = self.points.carry(values, other.points)
+        usual = values[values > 0.0].mean() if np.any(values > 0.0) else 1.0
+        return np.where(carried > 0.0, carried, usual)
+
+    def with_rows_of(self, stiffness: GeometricStiffness) -> TornSystem:
+        """Return the system with a row |D|^½ v for each column v of a geometric stiffness. Collective."""
+        assert self.points is not None
+        decomposition, points = self.torn.decomposition, self.points.points
+        entries = stiffness.columns.T.tocoo()
+        node, component = np.divmod(entries.col, self.torn.dim)
+        value = np.sqrt(np.abs(stiffness.values))[entries.row] * entries.data
+        free = ~decomposition.fixed[node, component]
+        rows: Rows = on_copies(
+            decomposition.tearing, entries.row[free], node[free], component[free], value[free],
+            points.slave[stiffness.point],
+        )  # fmt: skip
+        return meeting_at(self.torn, points, self.prescribed, [rows])
+
+
+class Contact(Protocol):
+    """How bodies meet."""
+
+    def at(
+        self, load: Load, displacement: Vector, start: MaterialPoints | None, last: Meeting | None
+    ) -> Meeting:
+        """Return the contact points at a displacement. Collective.
+
+        Args:
+            load: What acts.
+            displacement: u of this rank, torn, shape (torn_size,), [length].
+            start: Where nodes stood at the start of the load step; None for where they are now.
+            last: The meeting at a neighbouring displacement, or None.
+        """
+
+
+class StillContact:
+    """Contact at the points of the undeformed bodies: small displacements."""
+
+    def at(
+        self, load: Load, displacement: Vector, start: MaterialPoints | None, last: Meeting | None
+    ) -> Meeting:
+        """Return the points of the undeformed bodies."""
+        return Meeting(load.torn, None, None, load.prescribed)
+
+
+class MovingContact:
+    """Contact wherever the bodies have moved to."""
+
+    def __init__(self, scene: Scene, decomposition: Decomposition) -> None:
+        """Prepare the surfaces of all pairs. Collective."""
+        self._sliding = sliding_contact(scene, decomposition.fixed, decomposition.comm)
+        self._places = scene.points
+        surfaces = [
+            side for pair in scene.contacts for side in (pair.slave, pair.master) if isinstance(side, Surface)
+        ]
+        numbers = [decomposition.tearing.global_nodes(s.body, np.unique(scene.facets(s))) for s in surfaces]
+        self._nodes = np.unique(np.concatenate(numbers))
+
+    def at(
+        self, load: Load, displacement: Vector, start: MaterialPoints | None, last: Meeting | None
+    ) -> Meeting:
+        """Search for the points at a displacement. Collective."""
+        coordinates = self._places.copy()
+        coordinates[self._nodes] += nodal_mean_at(load.torn.decomposition, displacement, self._nodes)
+        # Prescribed components reach their values within the step: gaps are those after it.
+        coordinates = np.where(np.isnan(load.prescribed), coordinates, self._places + load.prescribed)
+        found = self._sliding.at(coordinates, last=None if last is None else last.points, time=load.time)
+        here = found.material_points()
+        start = here if start is None else start.extended(here)
+        return Meeting(meeting_at(load.torn, found.points, load.prescribed), found, start, load.prescribed)
