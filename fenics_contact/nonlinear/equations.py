@@ -15,7 +15,7 @@ from fenics_contact.display import displayed
 from fenics_contact.errors import together
 from fenics_contact.fem import Mechanics, Response, composition
 from fenics_contact.feti import Decomposition, TornSystem
-from fenics_contact.nonlinear.meeting import Meeting
+from fenics_contact.nonlinear.meeting import Meeting, TurningForces
 from fenics_contact.nonlinear.tangent_step import TangentProblem
 from fenics_contact.nonlinear.tangent_system import TangentSystem, linearised
 from fenics_contact.qp import (
@@ -106,24 +106,61 @@ class Evaluation:
             timer: Collects the wall time.
             known: That of a neighbouring configuration, or None.
         """
-        geometric = self.meeting.stiffness(self.at.multiplier)
+        turning = self.meeting.turning(self.at.multiplier)
         tangents = [response.stiffness for response in self.responses]
-        torn, compliance = self.torn, np.zeros(0)
-        if geometric is not None:
-            tangents = _stiffened(torn, tangents, geometric)
-            if round(float(global_max(torn.numbering.comm, geometric.columns.shape[1]))):
-                torn = self.meeting.with_rows_of(geometric)
-                further = torn.numbering.owned[len(self.lacking) :] - self.torn.numbering.total
-                compliance = np.sign(geometric.values)[further]
-        lacking = np.concatenate([self.lacking, np.zeros(len(compliance))])
+        torn, further = self.torn, NO_ROWS
+        if turning is not None:
+            tangents = _stiffened(torn, tangents, turning.normal)
+            if turning.count:
+                torn = self.meeting.with_rows_of(turning)
+                further = FurtherRows.of(torn, self.torn, turning)
+        lacking = np.concatenate([self.lacking, np.zeros(further.count)])
         increments = linearised(torn, self.at.displacement, tangents, self.unbalanced, lacking)
         diagonal, operators = None, {}
         if known is not None:
             diagonal = self.meeting.carried(known.diagonal, known.meeting, spread=True)
-            diagonal = np.concatenate([diagonal, np.ones(len(compliance))])
+            diagonal = np.concatenate([diagonal, np.ones(further.count)])
             operators = known.system.operators
         system = TangentSystem(increments, timer, diagonal=diagonal, earlier=operators)
-        return Linearisation(system, self.meeting, compliance)
+        return Linearisation(system, self.meeting, further)
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class FurtherRows:
+    """The rows of turning forces, after all others.
+
+    Attributes:
+        compliance: Of rows of normal forces, of either sign, zero of others, owned, shape (count,).
+        acting: Positions among all owned rows of those on which friction acts, shape (k,).
+        felt: Positions of those whose displacement changes it, shape (k,).
+        share: Displacement in each of these for a force of one, shape (k,).
+    """
+
+    compliance: Vector
+    acting: np.ndarray
+    felt: np.ndarray
+    share: Vector
+
+    @classmethod
+    def of(cls, torn: TornSystem, before: TornSystem, turning: TurningForces) -> FurtherRows:
+        """Return those of a system, given the one before without them."""
+        begin, normal = len(before.numbering.owned), len(turning.normal.values)
+        number = torn.numbering.owned[begin:] - before.numbering.total
+        pairs = len(turning.stiffness)
+        compliance = np.concatenate([1.0 / turning.normal.values, np.zeros(2 * pairs)])
+        place = begin + np.arange(len(number))
+        acting = (number >= normal) & (number < normal + pairs)
+        share = 1.0 / turning.stiffness[number[acting] - normal]
+        return cls(compliance[number], place[acting], place[number >= normal + pairs], share)
+
+    @property
+    def count(self) -> int:
+        """Number of rows of this rank."""
+        return len(self.compliance)
+
+
+NO_ROWS = FurtherRows(np.zeros(0), *np.zeros((2, 0), dtype=np.int64), np.zeros(0))
 
 
 @displayed
@@ -132,14 +169,14 @@ class Linearisation:
     """Factored tangents, with rows for the stiffness of forces that turn with their surfaces.
 
     Attributes:
-        system: The factored system; rows of geometric stiffness come after all others.
+        system: The factored system; rows of turning forces come after all others.
         meeting: The contact points.
-        compliance: ±1 of each row of geometric stiffness, owned.
+        further: The rows of turning forces.
     """
 
     system: TangentSystem
     meeting: Meeting
-    compliance: Vector
+    further: FurtherRows
 
     @property
     def diagonal(self) -> Vector:
@@ -153,14 +190,16 @@ class Linearisation:
 
     def problem(self, evaluation: Evaluation) -> TangentProblem:
         """Return the problem of one Newton step from the configuration of the linearisation."""
-        nothing = np.zeros(len(self.compliance))
-        torn = self.system.torn
+        nothing, further, torn = np.zeros(self.further.count), self.further, self.system.torn
         return TangentProblem(
             self.system.problem.with_law(law_of(torn)),
             self.system.stiffness,
             np.concatenate([evaluation.at.multiplier, nothing]),
             np.concatenate([evaluation.lacking, nothing]),
-            np.concatenate([np.zeros(len(evaluation.lacking)), self.compliance]),
+            np.concatenate([np.zeros(len(evaluation.lacking)), further.compliance]),
+            further.acting,
+            further.felt,
+            further.share,
         )
 
 

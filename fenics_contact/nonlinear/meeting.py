@@ -6,15 +6,17 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
+import scipy.sparse as sp
 
 from fenics_contact.display import displayed
-from fenics_contact.feti import Decomposition, Rows, TornSystem, meeting_at, nodal_mean_at, on_copies
+from fenics_contact.feti import Decomposition, TornSystem, meeting_at, nodal_mean_at, on_copies
+from fenics_contact.linalg import ROUNDING
 from fenics_contact.pairing import sliding_contact
 from fenics_contact.qp import Vector
 from fenics_contact.scene import Scene, Surface
 
 if TYPE_CHECKING:
-    from fenics_contact.pairing.sliding import GeometricStiffness, MaterialPoints, SlidingPoints
+    from fenics_contact.pairing.sliding import GeometricStiffness, LowRank, MaterialPoints, SlidingPoints
 
 
 @displayed
@@ -85,12 +87,15 @@ class Meeting:
         lacking[mine] = contact[owned[mine] - torn.n_equality]
         return lacking
 
-    def stiffness(self, multiplier: Vector) -> GeometricStiffness | None:
-        """Return the stiffness of normal forces that turn with their surfaces. Collective."""
+    def turning(self, multiplier: Vector) -> TurningForces | None:
+        """Return the stiffness of forces that turn with their surfaces; None without any. Collective."""
         if self.points is None:
             return None
-        normal = self.torn.numbering.gather(multiplier, self.torn.normal_rows)
-        return self.points.stiffness(np.maximum(normal, 0.0))
+        torn, gather = self.torn, self.torn.numbering.gather
+        normal = np.maximum(gather(multiplier, torn.normal_rows), 0.0)
+        friction = np.zeros((torn.points.count, torn.dim - 1))
+        friction[torn.frictional] = gather(multiplier, torn.tangential_rows.ravel()).reshape(-1, torn.dim - 1)
+        return TurningForces.of(self.points.stiffness(normal), self.points.friction_stiffness(friction))
 
     def carried(self, values: Vector, other: Meeting, spread: bool = False) -> Vector:
         """Return a vector on the rows of another meeting on these rows. Collective.
@@ -127,19 +132,67 @@ class Meeting:
         usual = values[values > 0.0].mean() if np.any(values > 0.0) else 1.0
         return np.where(carried > 0.0, carried, usual)
 
-    def with_rows_of(self, stiffness: GeometricStiffness) -> TornSystem:
-        """Return the system with a row |D|^½ v for each column v of a geometric stiffness. Collective."""
+    def with_rows_of(self, turning: TurningForces) -> TornSystem:
+        """Return the system with the rows of turning forces after all others, in lengths. Collective."""
         assert self.points is not None
         decomposition, points = self.torn.decomposition, self.points.points
-        entries = stiffness.columns.T.tocoo()
-        node, component = np.divmod(entries.col, self.torn.dim)
-        value = np.sqrt(np.abs(stiffness.values))[entries.row] * entries.data
-        free = ~decomposition.fixed[node, component]
-        rows: Rows = on_copies(
-            decomposition.tearing, entries.row[free], node[free], component[free], value[free],
-            points.slave[stiffness.point],
-        )  # fmt: skip
-        return meeting_at(self.torn, points, self.prescribed, [rows])
+        parts = [
+            (turning.normal.columns, turning.normal.point),
+            (turning.acting, turning.point),
+            (turning.felt, turning.point),
+        ]
+        further = []
+        for columns, point in parts:
+            entries = columns.T.tocoo()
+            node, component = np.divmod(entries.col, self.torn.dim)
+            free = ~decomposition.fixed[node, component]
+            further.append(
+                on_copies(
+                    decomposition.tearing, entries.row[free], node[free], component[free],
+                    entries.data[free], points.slave[point],
+                )
+            )  # fmt: skip
+        return meeting_at(self.torn, points, self.prescribed, further)
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class TurningForces:
+    """How contact forces change as surfaces turn under them, at fixed multipliers.
+
+    Attributes:
+        normal: Of the normal forces, symmetric.
+        acting: Directions of changes of friction forces, columns of length one, shape (n_dofs, k).
+        felt: The displacements that change them, columns of length one, shape (n_dofs, k).
+        stiffness: Change of force for a displacement of one, shape (k,), [force / length].
+        point: Contact point of each of these, shape (k,).
+    """
+
+    normal: GeometricStiffness
+    acting: sp.csr_matrix
+    felt: sp.csr_matrix
+    stiffness: np.ndarray
+    point: np.ndarray
+
+    @classmethod
+    def of(cls, normal: GeometricStiffness, friction: LowRank) -> TurningForces:
+        """Return those of two stiffnesses."""
+        left, right = (_lengths(x) for x in (friction.left, friction.right))
+        kept = np.flatnonzero(left * right > ROUNDING * (left * right).max(initial=0.0))
+        acting, felt = (
+            (columns[:, kept] @ sp.diags(1.0 / lengths[kept])).tocsr()
+            for columns, lengths in ((friction.left, left), (friction.right, right))
+        )
+        return cls(normal, acting, felt, (left * right)[kept], friction.point[kept])
+
+    @property
+    def count(self) -> int:
+        """Number of rows: one for each value of the normal forces' stiffness, two for each other one."""
+        return len(self.normal.values) + 2 * len(self.stiffness)
+
+
+def _lengths(columns: sp.csr_matrix) -> np.ndarray:
+    return np.sqrt(np.asarray(columns.multiply(columns).sum(axis=0)).ravel())
 
 
 class Contact(Protocol):

@@ -177,9 +177,9 @@ class _Run:
     def _advanced(self, evaluation: Evaluation, near: Linearisation) -> Configuration:
         """Take one step. Collective."""
         at, size, method = evaluation.at, len(evaluation.lacking), self._method
-        further = np.zeros(len(near.compliance))
+        further = np.zeros(near.further.count)
         step = np.concatenate([near.natural_step(evaluation.meeting, self._caution), further])
-        floor = 0.1 * method.tolerance * evaluation.residuals.gluing_scale
+        floor = 0.01 * method.tolerance * evaluation.residuals.gluing_scale
         taken = None
         if evaluation.torn.points.count == 0 or self._touching(evaluation):
             problem = near.problem(evaluation)

@@ -11,6 +11,7 @@ exact for any columns. Without stress S = 0, and it is the usual problem with it
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,14 +19,16 @@ import scipy.sparse as sp
 from fenics_contact.display import displayed
 from fenics_contact.qp import (
     CountedOperator,
-    CoupledSystem,
     DualProblem,
     Face,
     FacePreconditioner,
+    FaceSystem,
     FaceSystems,
     Kept,
+    ObliqueProjector,
     Stop,
     Vector,
+    apply_unless_zero,
     classify,
     global_max,
     global_sum,
@@ -46,6 +49,10 @@ class TangentProblem:
         residual: c − B u, owned: the residual r of the natural map, gaps and minus the slip.
         compliance: Compliances of rows of equality, owned, shape (size,): B u = c + compliance · λ; of either
             sign, zero on most rows.
+        acting: Positions of rows whose multipliers act without being felt: each is what the row of `felt` of
+            the same number measures, an unsymmetric stiffness; shape (k,).
+        felt: Positions of these rows, which have no multipliers, shape (k,).
+        share: What each of them measures for a multiplier of one, shape (k,).
     """
 
     problem: DualProblem
@@ -53,6 +60,9 @@ class TangentProblem:
     multiplier: Vector
     residual: Vector
     compliance: Vector
+    acting: np.ndarray
+    felt: np.ndarray
+    share: Vector
 
     def scaled(self) -> TangentProblem:
         """Return the problem in the multipliers of `DualProblem.scaling`, itself where there is none."""
@@ -65,6 +75,7 @@ class TangentProblem:
             multiplier=np.asarray(self.multiplier / s, dtype=np.float64),
             residual=np.asarray(self.residual * s, dtype=np.float64),
             compliance=np.asarray(self.compliance * s**2, dtype=np.float64),
+            share=np.asarray(self.share * s[self.felt] * s[self.acting], dtype=np.float64),
         )
 
 
@@ -123,35 +134,51 @@ class _StiffFace:
 
     Attributes:
         at: The linearised problem.
-        coupled: The face with growing friction, as it is without stiffness.
-        compliance: That of rows of equality in coordinates of the face, shape (n_face,), zero on most.
+        system: The face without stiffness, whose preconditioner is used.
+        shared: Columns of the face that W and Z have in common, as numbers, shape (n_shared,).
+        tested: W: those, and the rows that are felt, shape (n_owned, n).
+        moving: Z: those with growing friction, and the rows that act, shape (n_owned, n).
+        compliance: κ, of slipping discs, of rows with a compliance, and one of acting rows, shape (n,).
         fixed: The part of λ that is given on the face, owned.
+        oblique: Projector to equilibrium.
         operator: F, counted.
     """
 
     at: TangentProblem
-    coupled: CoupledSystem
+    system: FaceSystem
+    shared: np.ndarray
+    tested: sp.csr_matrix
+    moving: sp.csr_matrix
     compliance: Vector
     fixed: Vector
+    oblique: ObliqueProjector
     operator: CountedOperator
 
     @classmethod
     def build(cls, at: TangentProblem, face: Face, operator: CountedOperator) -> _StiffFace | None:
         """Prepare the face; None where it does not hold every body. Collective."""
-        problem, coarse = at.problem, at.problem.coarse
-        system = FaceSystems(problem, operator).build(face)
-        compliance = face.restrict(at.compliance)
-        if isinstance(problem.preconditioner, FacePreconditioner):
-            # Rows with a compliance are nearly those of other contacts: the preconditioner is that of these.
-            others = face.restriction @ sp.diags((compliance == 0.0).astype(float))
-            system = replace(system, preconditioner=problem.preconditioner.on_face(_nonzero(others)))
-        growth, fixed, moving = problem.law.growth, face.fixed, face.restriction
+        problem, coarse, equality = at.problem, at.problem.coarse, at.problem.layout.equality
+        basis, felt, acting = face.restriction, *(np.searchsorted(equality, x) for x in (at.felt, at.acting))
+        shared = np.setdiff1d(np.arange(basis.shape[1]), np.concatenate([felt, acting]))
+        moving, fixed = basis, face.fixed
+        growth = problem.law.growth
         if global_max(problem.comm, float(np.any(growth[face.slip] > 0.0))) > 0.0:
             coupling = face.growth(growth)
-            moving = (moving + coupling).tocsr()
+            moving = (basis + coupling).tocsr()
             fixed = fixed - coupling @ np.maximum(face.restrict(at.multiplier), 0.0)
-        coupled = CoupledSystem.build(system, coarse, face.restriction, moving)
-        return None if coupled is None else cls(at, coupled, compliance, fixed, operator)
+        tested = basis[:, np.concatenate([shared, felt])]
+        moving = moving[:, np.concatenate([shared, acting])]
+        oblique = ObliqueProjector.build(sp.csr_matrix(coarse.matrix @ tested), coarse.restricted(moving))
+        if oblique is None:
+            return None
+        own = face.restrict(at.compliance)
+        system = FaceSystems(problem, operator).build(face)
+        if isinstance(problem.preconditioner, FacePreconditioner):
+            # The other rows are nearly combinations of contact rows: the preconditioner is that of these.
+            usual = basis[:, shared[own[shared] == 0.0]]
+            system = replace(system, preconditioner=problem.preconditioner.on_face(usual))
+        compliance = np.concatenate([(face.curvature + own)[shared], at.share])
+        return cls(at, system, shared, tested, moving, compliance, fixed, oblique, operator)
 
     def solve(self, forcing: float, floor: float, max_products: int) -> tuple[Vector, Vector, Stop]:
         """Return δλ, owned, β, replicated, and why the iteration ended. Collective.
@@ -159,46 +186,56 @@ class _StiffFace:
         GMRES on the whole residual v of the first equation: its part across the rigid motions is met by
         multipliers in equilibrium, the rest by the motions, with the multipliers that bear their stiffness.
         """
-        problem, coupled, comm = self.at.problem, self.coupled, self.at.problem.comm
-        face, m = coupled.system.face, problem.coarse.m
+        problem, comm, oblique = self.at.problem, self.at.problem.comm, self.oblique
         # From λ onto the face, into the equilibrium of β = 0.
         load = problem.coarse.load + problem.coarse.apply(self.at.multiplier - self.fixed)
-        y = coupled.balanced(face.restrict(self.at.multiplier), load)
-        change = self.fixed + coupled.moving @ y - self.at.multiplier
-        product = np.zeros_like(change)
-        if problem.norm(change) > 0.0:
-            product = self.operator(change)
-        gradient = coupled.tested.T @ (product - problem.rhs) + (face.curvature + self.compliance) * y
+        y = np.concatenate([self.system.face.restrict(self.at.multiplier)[self.shared], self._nothing])
+        y = y - oblique.tested.T @ oblique.solve(oblique.moving.apply(y) - load)
+        change = self.fixed + self.moving @ y - self.at.multiplier
+        product = apply_unless_zero(problem, self.operator, change)
+        gradient = self.tested.T @ (product - problem.rhs) + self.compliance * y
+        weights = self._weights
 
         def expand(vector: Vector) -> tuple[Vector, Kept]:
-            step, motions = self._direction(vector)
-            full = self.operator(coupled.moving @ step)
-            image = coupled.operate(step, full) + self.compliance * step
-            return image - coupled.oblique.tested.T @ motions, (step, motions)
+            step, motions = self._direction(vector / weights)
+            image = self.tested.T @ self.operator(self.moving @ step) + self.compliance * step
+            return weights * (image - oblique.tested.T @ motions), (step, motions)
 
-        size = float(np.sqrt(global_sum(comm, gradient @ gradient)[0]))
-        across = coupled.oblique(gradient)
-        seen = float(np.sqrt(global_sum(comm, across @ across)[0]))
-        tolerance = max(forcing * seen, floor, float(np.finfo(float).eps) * size)
-        found = gmres(comm, -gradient, expand, tolerance, max_products, coupled.system.patience)
-        change = change + coupled.moving @ found.combined(0, len(gradient))
-        return np.asarray(change, dtype=np.float64), found.combined(1, m), found.stop
+        across, gradient = weights * oblique(gradient), weights * gradient
+        size, seen = np.sqrt(global_sum(comm, gradient @ gradient, across @ across))
+        tolerance = max(forcing * float(seen), floor, float(np.finfo(float).eps * size))
+        found = gmres(comm, -gradient, expand, tolerance, max_products, self.system.patience)
+        change = change + self.moving @ found.combined(0, len(gradient))
+        return np.asarray(change, dtype=np.float64), found.combined(1, problem.coarse.m), found.stop
+
+    @property
+    def _weights(self) -> Vector:
+        """Weights of the rows: an error in a soft row causes little force, shape (n,). Collective."""
+        problem, contact = self.at.problem, self.at.problem.layout.contact
+        total, count = global_sum(problem.comm, problem.diagonal[contact].sum(), len(contact))
+        weights = np.ones(len(self.compliance))
+        further = np.concatenate([self._soft, np.ones(len(self._nothing), dtype=bool)])
+        weights[further] = np.minimum(total / max(count, 1.0) / np.abs(self.compliance[further]), 1.0)
+        return weights
+
+    @property
+    def _nothing(self) -> Vector:
+        """No multipliers of acting rows."""
+        return np.zeros(self.tested.shape[1] - len(self.shared))
 
     def _direction(self, vector: Vector) -> tuple[Vector, Vector]:
         """Return a step y and motions β with G Z y + S β = 0 for a residual. Collective."""
-        coupled = self.coupled
-        motions = -coupled.oblique.coefficients(vector)
-        across = coupled.oblique(vector)
-        step = coupled.system.precondition(across)
-        stiff = self.compliance != 0.0
-        step[stiff] = across[stiff] / self.compliance[stiff]
-        step = coupled.oblique.moving.project(step)
-        borne = coupled.oblique.tested.T @ coupled.oblique.solve(self.at.stiffness @ motions)
-        return np.asarray(step - borne, dtype=np.float64), motions
+        oblique, across = self.oblique, self.oblique(vector)
+        motions = -oblique.coefficients(vector)
+        residual = np.zeros(self.system.face.n_face)
+        residual[self.shared] = across[: len(self.shared)]
+        step = np.concatenate([self.system.precondition(residual)[self.shared], self._nothing])
+        further = np.concatenate([self._soft, np.ones(len(self._nothing), dtype=bool)])
+        step[further] = across[further] / self.compliance[further]
+        borne = oblique.tested.T @ oblique.solve(self.at.stiffness @ motions)
+        return np.asarray(oblique.moving.project(step) - borne, dtype=np.float64), motions
 
-
-def _nonzero(basis: sp.spmatrix) -> sp.csr_matrix:
-    """Return the columns of a basis that are not zero."""
-    kept = sp.csc_matrix(basis)
-    kept.eliminate_zeros()
-    return kept[:, np.diff(kept.indptr) > 0].tocsr()
+    @cached_property
+    def _soft(self) -> np.ndarray:
+        """Marks of the shared columns with a compliance of their own."""
+        return self.system.face.restrict(self.at.compliance)[self.shared] != 0.0

@@ -11,7 +11,7 @@ from fenics_contact.qp.coarse import CoarseSpace
 from fenics_contact.qp.equilibrium import Equilibrium, find_equilibrium, require_equilibrium
 from fenics_contact.qp.face import STEEP, Face, Marks, classify, face_basis
 from fenics_contact.qp.face_newton import FaceNewton, ProjectedCG
-from fenics_contact.qp.face_system import CoupledSystem, FaceSystem, FaceSystems
+from fenics_contact.qp.face_system import CoupledSystem, FaceSystem, FaceSystems, ObliqueProjector
 from fenics_contact.qp.feasible import FeasibleSet
 from fenics_contact.qp.iterate import Start, apply_unless_zero, iterate_at
 from fenics_contact.qp.krylov import FaceStep, Kept, Stop, gmres, projected_cg, projected_gmres
@@ -53,6 +53,7 @@ __all__ = [
     "Kept",
     "Marks",
     "Mpgp",
+    "ObliqueProjector",
     "ProjectedCG",
     "Residuals",
     "Scaling",
