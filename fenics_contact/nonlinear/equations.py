@@ -160,7 +160,8 @@ class FurtherRows:
         return len(self.compliance)
 
 
-NO_ROWS = FurtherRows(np.zeros(0), *np.zeros((2, 0), dtype=np.int64), np.zeros(0))
+_NOWHERE = np.zeros(0, dtype=np.int64)
+NO_ROWS = FurtherRows(np.zeros(0), _NOWHERE, _NOWHERE, np.zeros(0))
 
 
 @displayed

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from fenics_contact.nonlinear.tangent_step import TangentStep, tangent_step
 from fenics_contact.nonlinear.tangent_system import TangentSystem
 from fenics_contact.qp import (
     FaceNewton,
+    Residuals,
     SolverStep,
     Stop,
     Vector,
@@ -24,6 +26,16 @@ from fenics_contact.qp import (
 )
 from fenics_contact.timing import PhaseTimer
 
+if TYPE_CHECKING:
+    from fenics_contact.pairing.sliding import MaterialPoints
+
+#: Fractions of a step that are tried where it is worse than the last two.
+FRACTIONS = (0.5, 0.25, 0.1)
+#: Factor on the residual of linear systems after each step without progress, and the least of these factors:
+#: near a loss of stability a small residual may hide a large error.
+CARE, LEAST_CARE = 0.1, 1e-3
+#: Residual of a linear system that is small enough, relative to the tolerance of the step.
+FINE = 0.01
 #: Part of the smallest det F that a step must leave.
 ROOM = 0.2
 #: Steps without half the residual after which the natural map becomes more cautious, and by how much.
@@ -115,36 +127,34 @@ class _Run:
     ) -> None:
         self._method, self._equations, self._contact, self._load = method, equations, contact, load
         self._timer, self._comm = timer, load.torn.numbering.comm
-        self._caution = 1.0
+        self._caution = self._care = 1.0
+        self._start: MaterialPoints | None = None
         self.history: list[SolverStep] = []
         self._residuals: list[float] = []
         self._forcing = method.forcing
         self.products = self.factorisations = 0
 
     def to_equilibrium(self, at: Configuration, known: Linearisation | None) -> NonlinearEquilibrium:
-        near = known
         points = None if at.meeting is None else at.meeting.points
-        start = None if points is None else points.material_points()
-        while True:
-            with self._timer.phase("assemble"):
-                meeting = self._contact.at(self._load, at.displacement, start, at.meeting)
-                start, at = meeting.start, at.meeting_at(meeting)
-                step = np.zeros(meeting.torn.layout.size)
-                if near is not None:
-                    step = near.natural_step(meeting, self._caution)
-                evaluation = self._equations.evaluate(meeting, law_of(meeting.torn), at, step)
-            residuals = evaluation.residuals
-            if self.history:
-                self.history[-1] = replace(self.history[-1], residuals=residuals)
-            if near is not None and residuals.within(self._method.tolerance):
-                return NonlinearEquilibrium(
-                    evaluation, near, tuple(self.history), self.products, self.factorisations
-                )
+        self._start = None if points is None else points.material_points()
+        near, evaluation, earlier = known, self._evaluated(at, known), None
+        while near is None or not evaluation.residuals.within(self._method.tolerance):
             self._require_progress(evaluation)
             near = evaluation.linearised(self._timer, near)
             self.factorisations += 1
-            with self._timer.phase("solve"):
-                at = self._advanced(evaluation, near)
+            following = self._advanced(evaluation, earlier, near)
+            evaluation, earlier = following, evaluation.residuals
+        return NonlinearEquilibrium(evaluation, near, tuple(self.history), self.products, self.factorisations)
+
+    def _evaluated(self, at: Configuration, near: Linearisation | None) -> Evaluation:
+        """Return the equations at a configuration, with its contact points. Collective."""
+        with self._timer.phase("assemble"):
+            meeting = self._contact.at(self._load, at.displacement, self._start, at.meeting)
+            self._start, at = meeting.start, at.meeting_at(meeting)
+            step = np.zeros(meeting.torn.layout.size)
+            if near is not None:
+                step = near.natural_step(meeting, self._caution)
+            return self._equations.evaluate(meeting, law_of(meeting.torn), at, step)
 
     def _require_progress(self, evaluation: Evaluation) -> None:
         """Adapt the forcing term and ρ. Collective.
@@ -168,32 +178,53 @@ class _Run:
             chosen = 0.9 * (worst / previous) ** 2
             careful = 0.9 * self._forcing**2
             self._forcing = min(method.forcing, max(chosen, careful if careful > 0.1 else 0.0))
-        self._forcing = max(self._forcing, 0.3 * method.tolerance / max(worst, method.tolerance))
+        if previous is not None:
+            self._care = 1.0 if worst < 0.5 * previous else max(CARE * self._care, LEAST_CARE)
+        least = 0.3 * method.tolerance / max(worst, method.tolerance)
+        self._forcing = max(self._care * self._forcing, least)
         late = self._residuals[-PATIENCE - 1 :]
         if len(late) > PATIENCE and min(late[1:]) > 0.5 * late[0]:
             self._caution *= CAUTION
             self._residuals = [worst]
 
-    def _advanced(self, evaluation: Evaluation, near: Linearisation) -> Configuration:
-        """Take one step. Collective."""
+    def _advanced(self, evaluation: Evaluation, earlier: Residuals | None, near: Linearisation) -> Evaluation:
+        """Take one step. Collective.
+
+        Args:
+            evaluation: The equations at its start.
+            earlier: Residuals before the last step, or None.
+            near: The tangents at its start.
+        """
         at, size, method = evaluation.at, len(evaluation.lacking), self._method
         further = np.zeros(near.further.count)
         step = np.concatenate([near.natural_step(evaluation.meeting, self._caution), further])
-        floor = 0.01 * method.tolerance * evaluation.residuals.gluing_scale
+        floor = FINE * method.tolerance * evaluation.residuals.gluing_scale
         taken = None
-        if evaluation.torn.points.count == 0 or self._touching(evaluation):
-            problem = near.problem(evaluation)
-            taken = tangent_step(problem, step, self._forcing, floor, method.max_products)
-        whole = taken is None
-        if taken is None:
-            taken = self._whole(near.system, evaluation, step)
-        self.products += taken.products
-        change = taken.multiplier - np.concatenate([at.multiplier, further])
-        moved = near.system.displacement(change, taken.motions)
+        with self._timer.phase("solve"):
+            if evaluation.torn.points.count == 0 or self._touching(evaluation):
+                problem = near.problem(evaluation)
+                taken = tangent_step(problem, step, self._forcing, floor, method.max_products)
+            whole = taken is None
+            if taken is None:
+                taken = self._whole(near.system, evaluation, step)
+            self.products += taken.products
+            change = taken.multiplier - np.concatenate([at.multiplier, further])
+            moved = near.system.displacement(change, taken.motions)
+
+        def after(part: float) -> Evaluation:
+            displacement, multiplier = at.displacement + part * moved, at.multiplier + part * change[:size]
+            return self._evaluated(replace(at, displacement=displacement, multiplier=multiplier), near)
+
         part = self._room(evaluation, moved)
-        self._record(evaluation, near.system, taken, part, whole)
-        multiplier = at.multiplier + part * change[:size]
-        return replace(at, displacement=at.displacement + part * moved, multiplier=multiplier)
+        best = after(part)
+        if all(old is None or best.residuals.is_worse_than(old) for old in (evaluation.residuals, earlier)):
+            # The active set alternates between two faces: the solution lies between them.
+            candidates = [(best, part), *((after(f * part), f * part) for f in FRACTIONS)]
+            best, part = min(
+                candidates, key=lambda c: c[0].residuals.worst_beside(candidates[0][0].residuals)
+            )
+        self._record(best, near.system, taken, part, whole)
+        return best
 
     def _touching(self, evaluation: Evaluation) -> bool:
         contact = evaluation.torn.layout.contact

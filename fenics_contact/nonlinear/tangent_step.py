@@ -202,8 +202,10 @@ class _StiffFace:
             return weights * (image - oblique.tested.T @ motions), (step, motions)
 
         across, gradient = weights * oblique(gradient), weights * gradient
+        # Rigid motions that close the jumps of the last step must not make the tolerance larger, nor may an
+        # oblique projection.
         size, seen = np.sqrt(global_sum(comm, gradient @ gradient, across @ across))
-        tolerance = max(forcing * float(seen), floor, float(np.finfo(float).eps * size))
+        tolerance = max(forcing * float(min(size, seen)), floor, float(np.finfo(float).eps * size))
         found = gmres(comm, -gradient, expand, tolerance, max_products, self.system.patience)
         change = change + self.moving @ found.combined(0, len(gradient))
         return np.asarray(change, dtype=np.float64), found.combined(1, problem.coarse.m), found.stop

@@ -53,16 +53,12 @@ def damp(problem: DualProblem, before: Iterate, after: Iterate, earlier: Residua
         earlier: Residuals of the iterate before that, if there was one.
     """
     for residuals in (before.residuals, earlier):
-        if residuals is not None and not _worse(after.residuals, residuals):
+        if residuals is not None and not after.residuals.is_worse_than(residuals):
             return Damped(after, 1.0)
     candidates = [Damped(after, 1.0)]
     fractions = (*FRACTIONS, SHORTEST) if before.residuals.worst < NEAR else FRACTIONS
     candidates += [Damped(iterate_between(problem, before, after, part), part) for part in fractions]
     return min(candidates, key=lambda candidate: candidate.iterate.residuals.worst_beside(after.residuals))
-
-
-def _worse(one: Residuals, other: Residuals) -> bool:
-    return one.worst > other.worst and one.worst_beside(other) > other.worst_beside(one)
 
 
 @dataclass(frozen=True)

@@ -57,6 +57,10 @@ class Residuals:
         natural = _ratio(self.natural * self.force_scale, force)
         return max(natural, _ratio(self.gluing * self.gluing_scale, gluing), self.coarse)
 
+    def is_worse_than(self, other: Residuals) -> bool:
+        """Return whether these are worse, in their own scales and in the smaller ones of both."""
+        return self.worst > other.worst and self.worst_beside(other) > other.worst_beside(self)
+
     def beside(self, reach: float) -> Residuals:
         """Return the residuals with the gluing residual relative to smaller displacements."""
         if not 0.0 < reach < self.gluing_scale:

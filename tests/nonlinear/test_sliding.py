@@ -1,0 +1,105 @@
+"""Rubber that slides far over rubber and over rigid bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_contact.contact import ContactProblem, DeformedState, solve_steps
+from fenics_contact.gallery import rectangle
+from fenics_contact.mesh import BodyMesh
+from fenics_contact.partition import box_partition
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    Coulomb,
+    LoadStep,
+    NeoHooke,
+    RigidCylinder,
+    Scene,
+    Support,
+    Surface,
+)
+from tests.nonlinear.scenes import RUBBER
+
+#: Depths and ways of a die that is pressed into a block and drawn along it.
+WAY = [(0.0, -0.4), (0.0, -0.8), (0.25, -0.8), (0.5, -0.8)]
+
+
+def die(cells: int) -> BodyMesh:
+    """A square whose lower side is an arc."""
+    mesh = rectangle((0.2, 4.2), (1.4, 5.4), (cells, cells))
+    x, y = mesh.points.T
+    radius = (0.6**2 + 0.3**2) / 0.6
+    low = 4.2 + radius - np.sqrt(radius**2 - (x - 0.8) ** 2)
+    return replace(mesh, points=np.column_stack([x, low + (5.4 - low) * (y - 4.2) / 1.2]))
+
+
+def turned(mesh: BodyMesh, quarter: bool) -> BodyMesh:
+    return replace(mesh, points=mesh.points @ [[0.0, 1.0], [-1.0, 0.0]]) if quarter else mesh
+
+
+def ironing(friction: float, way: tuple[float, float], quarter: bool = False) -> Scene:
+    x, y = way
+    move = (-y, x) if quarter else (x, y)
+    block = turned(rectangle((0.0, 0.0), (6.0, 4.0), (24, 12)), quarter)
+    pair = ContactPair(Surface("die", "y0"), Surface("block", "y1"), Coulomb(friction) if friction else None)
+    return Scene(
+        {"block": Body(block, NeoHooke(1.0, 0.32)), "die": Body(turned(die(10), quarter), NeoHooke(10.0, 0.32))},
+        [Support("block", "y0"), Support("die", "y1", move)],
+        contacts=[pair],
+    )
+
+
+def ironed(friction: float, pieces: int, quarter: bool = False) -> Sequence[DeformedState]:
+    scenes = [ironing(friction, way, quarter) for way in WAY]
+    parts = {
+        "block": box_partition(ironing(0.0, WAY[0]).bodies["block"].mesh, (2 * pieces, pieces)),
+        "die": box_partition(ironing(0.0, WAY[0]).bodies["die"].mesh, (pieces, pieces)),
+    }
+    problem = ContactProblem(scenes[0], MPI.COMM_SELF, partitions=parts, tolerance=1e-9)
+    steps = [LoadStep(str(number), supports=scene.supports) for number, scene in enumerate(scenes)]
+    states = solve_steps(problem, steps)
+    assert all(isinstance(state, DeformedState) for state in states)
+    return states  # type: ignore[return-value]
+
+
+def force(state: DeformedState) -> np.ndarray:
+    return np.asarray(state.reactions()[1].force)
+
+
+def test_ironing_is_the_same_however_bodies_are_cut() -> None:
+    torn, whole = ironed(0.3, 2), ironed(0.3, 1)
+    for one, other in zip(torn, whole, strict=True):
+        assert np.abs(force(one) - force(other)).max() < 1e-7 * np.abs(force(other)).max()
+        moved = other.gather_displacement("block")
+        assert np.abs(one.gather_displacement("block") - moved).max() < 1e-7 * np.abs(moved).max()
+        assert one.balance().imbalance < 1e-8
+    last = torn[-1].contact
+    assert last.count(2) > 3, "it slides"
+    worst = [line.residuals.worst for line in torn[1].solution.history]
+    assert worst[-1] < 10 * worst[-2] ** 1.5, "superlinear, with friction between two bodies"
+
+
+def test_ironing_turned_in_the_plane_gives_the_turned_answer() -> None:
+    upright, turn = ironed(0.3, 1)[-1], ironed(0.3, 1, quarter=True)[-1]
+    x, y = force(upright)
+    assert np.abs(force(turn) - [-y, x]).max() < 1e-8 * np.abs(y)
+    normal = upright.contact.normal_force
+    assert np.abs(turn.contact.normal_force - normal).max() < 1e-8 * normal.max()
+
+
+def test_tangents_know_that_forces_turn_with_the_surfaces() -> None:
+    """Without friction a rigid cylinder and a block: residuals fall quadratically at a large depth."""
+    block = rectangle((0.0, 0.0), (4.0, 2.0), (16, 8))
+    roll = RigidCylinder((2.0, 3.0), None, 1.0) if False else None
+    assert roll is None
+    scene = Scene(
+        {"block": Body(block, RUBBER)},
+        [Support("block", "y0")],
+        contacts=[ContactPair(Surface("block", "y1"), RigidCylinder((2.0, 3.0, 0.0), (0.0, 0.0, 1.0), 1.0))],
+    )
+    assert scene is not None
