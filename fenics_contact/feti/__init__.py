@@ -12,10 +12,10 @@ from fenics_contact.feti.inverse import LocalKind, TornInverse, kernel_matrix
 from fenics_contact.feti.local import LocalOperator
 from fenics_contact.feti.nodal_mean import nodal_mean, nodal_mean_at, nodal_mean_transposed
 from fenics_contact.feti.nodal_sum import nodal_sum
+from fenics_contact.feti.rows import Rows
 from fenics_contact.feti.same_input import check_same_input
 from fenics_contact.feti.sharing import Sharing
 from fenics_contact.feti.subdomain import CachedMatrix, Subdomain, common_kernel
-from fenics_contact.feti.rows import Rows
 from fenics_contact.feti.torn import TornSystem, build_torn_system, meeting_at
 
 __all__ = [

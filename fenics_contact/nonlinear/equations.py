@@ -185,7 +185,7 @@ class Linearisation:
         return self.system.problem.diagonal[: len(self.meeting.torn.numbering.owned)]
 
     def natural_step(self, meeting: Meeting, caution: float) -> Vector:
-        """Return ρ of the natural map on the rows of a meeting, owned, made smaller by a factor. Collective."""
+        """Return ρ of the natural map on the rows of a meeting, owned, times a factor. Collective."""
         diagonal = meeting.carried(self.diagonal, self.meeting, spread=True)
         return caution * contact_step(meeting.torn.layout, diagonal)
 

@@ -97,7 +97,7 @@ class AutomaticSteps:
         first = target.removed() if before is None else before
         at, torn = start, first.torn
         end: NonlinearEquilibrium | None = None
-        reached, part = 0.0, self.first
+        reached, part, longest = 0.0, self.first, contact.longest_part(first, target)
         fractions, history, products, factorisations = list[float](), list[SolverStep](), 0, 0
 
         def walked() -> Path:
@@ -112,7 +112,7 @@ class AutomaticSteps:
             )
 
         while reached < 1.0:
-            part = min(part, 1.0 - reached)
+            part = min(part, longest, 1.0 - reached)
             fraction = 1.0 if reached + part > 1.0 - 1e-12 else reached + part
             load = target.between(first, fraction)
             if at.meeting is None or at.meeting.points is None:

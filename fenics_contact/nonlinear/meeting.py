@@ -13,10 +13,15 @@ from fenics_contact.feti import Decomposition, TornSystem, meeting_at, nodal_mea
 from fenics_contact.linalg import ROUNDING
 from fenics_contact.pairing import sliding_contact
 from fenics_contact.qp import Vector
-from fenics_contact.scene import Scene, Surface
+from fenics_contact.scene import MovingObstacle, Scene, Surface
+from fenics_contact.surfaces import share_areas
 
 if TYPE_CHECKING:
     from fenics_contact.pairing.sliding import GeometricStiffness, LowRank, MaterialPoints, SlidingPoints
+
+
+#: Number of facets that supports and obstacles may pass within a step: contact is searched where nodes stand.
+FACETS = 2.0
 
 
 @displayed
@@ -127,7 +132,8 @@ class Meeting:
         return result
 
     def _filled(self, values: np.ndarray, other: Meeting) -> np.ndarray:
-        assert self.points is not None and other.points is not None
+        assert self.points is not None
+        assert other.points is not None
         carried = self.points.carry(values, other.points)
         usual = values[values > 0.0].mean() if np.any(values > 0.0) else 1.0
         return np.where(carried > 0.0, carried, usual)
@@ -198,6 +204,9 @@ def _lengths(columns: sp.csr_matrix) -> np.ndarray:
 class Contact(Protocol):
     """How bodies meet."""
 
+    def longest_part(self, first: Load, last: Load) -> float:
+        """Return the part of the way between two loads that one step may take: what moves must be found."""
+
     def at(
         self, load: Load, displacement: Vector, start: MaterialPoints | None, last: Meeting | None
     ) -> Meeting:
@@ -213,6 +222,10 @@ class Contact(Protocol):
 
 class StillContact:
     """Contact at the points of the undeformed bodies: small displacements."""
+
+    def longest_part(self, first: Load, last: Load) -> float:
+        """Return the whole way."""
+        return 1.0
 
     def at(
         self, load: Load, displacement: Vector, start: MaterialPoints | None, last: Meeting | None
@@ -233,6 +246,21 @@ class MovingContact:
         ]
         numbers = [decomposition.tearing.global_nodes(s.body, np.unique(scene.facets(s))) for s in surfaces]
         self._nodes = np.unique(np.concatenate(numbers))
+        self._obstacles = [pair.master for pair in scene.contacts if isinstance(pair.master, MovingObstacle)]
+        self._facet = min(_facet_size(scene, side) for side in surfaces)
+
+    def longest_part(self, first: Load, last: Load) -> float:
+        """Return the part in which supports and obstacles move by a few facets."""
+        way = np.nan_to_num(last.prescribed - first.prescribed)
+        moved = float(np.linalg.norm(way, axis=1).max(initial=0.0))
+        corners = np.array([self._places[self._nodes].min(axis=0), self._places[self._nodes].max(axis=0)])
+        for obstacle in self._obstacles:
+            before, after = (
+                corners @ rotation.T + translation
+                for rotation, translation in (obstacle.frame(load.time) for load in (first, last))
+            )
+            moved = max(moved, float(np.linalg.norm(after - before, axis=1).max()))
+        return min(1.0, FACETS * self._facet / moved) if moved > 0.0 else 1.0
 
     def at(
         self, load: Load, displacement: Vector, start: MaterialPoints | None, last: Meeting | None
@@ -246,3 +274,10 @@ class MovingContact:
         here = found.material_points()
         start = here if start is None else start.extended(here)
         return Meeting(meeting_at(load.torn, found.points, load.prescribed), found, start, load.prescribed)
+
+
+def _facet_size(scene: Scene, side: Surface) -> float:
+    """Return the usual size of the facets of a surface, [length]."""
+    mesh = scene.bodies[side.body].mesh
+    area = float(share_areas(mesh, side.name).sum()) / len(mesh.surfaces[side.name])
+    return area ** (1.0 / (scene.dim - 1))

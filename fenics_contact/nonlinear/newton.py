@@ -172,13 +172,13 @@ class _Run:
                 f"{len(self.history)} steps: {last}: take smaller load steps",
                 self.history,
             )
-        if previous is None or previous >= 1.0:
+        if not previous or previous >= 1.0:
             self._forcing = method.forcing
         else:
             chosen = 0.9 * (worst / previous) ** 2
             careful = 0.9 * self._forcing**2
             self._forcing = min(method.forcing, max(chosen, careful if careful > 0.1 else 0.0))
-        if previous is not None:
+        if previous:
             self._care = 1.0 if worst < 0.5 * previous else max(CARE * self._care, LEAST_CARE)
         least = 0.3 * method.tolerance / max(worst, method.tolerance)
         self._forcing = max(self._care * self._forcing, least)

@@ -23,8 +23,8 @@ class LoadStep:
         loads: All loads that act at the end of the step, or None.
         supports: All supports with their values at the end of the step, or None; they must hold the same
             components in every step.
-        time: Time at the end of the step in any unit, for records and for obstacles that move; None: the number
-            of the step, from 1.
+        time: Time at the end of the step in any unit, for records and for obstacles that move; None: the
+            number of the step, from 1.
     """
 
     name: str

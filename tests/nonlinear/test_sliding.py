@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, DeformedState, solve_steps
+from fenics_contact.contact import ContactProblem, DeformedState, solve_scene, solve_steps
 from fenics_contact.gallery import rectangle
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.partition import box_partition
@@ -17,8 +17,9 @@ from fenics_contact.scene import (
     ContactPair,
     Coulomb,
     LoadStep,
+    MovingObstacle,
     NeoHooke,
-    RigidCylinder,
+    RigidSphere,
     Scene,
     Support,
     Surface,
@@ -48,7 +49,10 @@ def ironing(friction: float, way: tuple[float, float], quarter: bool = False) ->
     block = turned(rectangle((0.0, 0.0), (6.0, 4.0), (24, 12)), quarter)
     pair = ContactPair(Surface("die", "y0"), Surface("block", "y1"), Coulomb(friction) if friction else None)
     return Scene(
-        {"block": Body(block, NeoHooke(1.0, 0.32)), "die": Body(turned(die(10), quarter), NeoHooke(10.0, 0.32))},
+        {
+            "block": Body(block, NeoHooke(1.0, 0.32)),
+            "die": Body(turned(die(10), quarter), NeoHooke(10.0, 0.32)),
+        },
         [Support("block", "y0"), Support("die", "y1", move)],
         contacts=[pair],
     )
@@ -60,7 +64,7 @@ def ironed(friction: float, pieces: int, quarter: bool = False) -> Sequence[Defo
         "block": box_partition(ironing(0.0, WAY[0]).bodies["block"].mesh, (2 * pieces, pieces)),
         "die": box_partition(ironing(0.0, WAY[0]).bodies["die"].mesh, (pieces, pieces)),
     }
-    problem = ContactProblem(scenes[0], MPI.COMM_SELF, partitions=parts, tolerance=1e-9)
+    problem = ContactProblem(scenes[0], MPI.COMM_SELF, partitions=parts, tolerance=1e-11)
     steps = [LoadStep(str(number), supports=scene.supports) for number, scene in enumerate(scenes)]
     states = solve_steps(problem, steps)
     assert all(isinstance(state, DeformedState) for state in states)
@@ -92,14 +96,20 @@ def test_ironing_turned_in_the_plane_gives_the_turned_answer() -> None:
     assert np.abs(turn.contact.normal_force - normal).max() < 1e-8 * normal.max()
 
 
-def test_tangents_know_that_forces_turn_with_the_surfaces() -> None:
-    """Without friction a rigid cylinder and a block: residuals fall quadratically at a large depth."""
-    block = rectangle((0.0, 0.0), (4.0, 2.0), (16, 8))
-    roll = RigidCylinder((2.0, 3.0), None, 1.0) if False else None
-    assert roll is None
+def test_a_rigid_disc_deep_in_rubber() -> None:
+    """Forces turn with the disc's surface: without their stiffness convergence would be linear."""
+    block = rectangle((0.0, 0.0), (4.0, 2.0), (20, 10))
+    ball = MovingObstacle(RigidSphere((2.0, 2.0 + 0.5), 0.5), lambda time: (None, (0.0, -0.5 * time)))
     scene = Scene(
         {"block": Body(block, RUBBER)},
         [Support("block", "y0")],
-        contacts=[ContactPair(Surface("block", "y1"), RigidCylinder((2.0, 3.0, 0.0), (0.0, 0.0, 1.0), 1.0))],
+        contacts=[ContactPair(Surface("block", "y1"), ball)],
     )
-    assert scene is not None
+    state = solve_scene(scene, MPI.COMM_SELF, tolerance=1e-10)
+    worst = [line.residuals.worst for line in state.solution.history]
+    assert isinstance(state, DeformedState)
+    assert len(state.fractions) > 1, "the disc moves by several facets"
+    assert worst[-1] < max(100 * worst[-2] ** 2, 1e-10), "quadratic"
+    depth = -state.gather_displacement("block")[:, 1].min()
+    assert abs(depth - 0.5) < 1e-8, "the lowest point of the disc carries a node with it"
+    assert state.balance().imbalance < 1e-9
