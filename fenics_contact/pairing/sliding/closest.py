@@ -81,7 +81,7 @@ class ClosestPoints:
     reach: float = np.inf
     apart: sp.csr_matrix | None = None
     margin: float = 0.1
-    hold: float = 1e-3
+    hold: float = 1e-6
 
     def find(
         self, targets: np.ndarray, normals: np.ndarray, facet: np.ndarray, local: np.ndarray
