@@ -60,7 +60,11 @@ class Own(Hyperelasticity):
             "slope",
             r"must be the derivatives of its energy, the stress of Own differs .*write the energy alone",
         ),
-        ("tangent", r"the tangent of Own differs from the difference quotient by"),
+        pytest.param(
+            "tangent",
+            r"the tangent of Own differs from the difference quotient by",
+            marks=(pytest.mark.slow, pytest.mark.claim),
+        ),
     ],
 )
 def test_a_mistake_is_named(mistake: str, message: str) -> None:

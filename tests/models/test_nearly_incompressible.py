@@ -4,11 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
+from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import rectangle
 from fenics_contact.mesh import BodyMesh, quadratic
-from fenics_contact.scene import Body, IsotropicElasticity, Material, MooneyRivlin, NeoHooke
+from fenics_contact.partition import box_partition
+from fenics_contact.scene import (
+    Body,
+    IsotropicElasticity,
+    Material,
+    MooneyRivlin,
+    NeoHooke,
+    Scene,
+    Support,
+)
 from tests.models.bodies import in_halves
 from tests.models.deformed import derivative_errors, equilibrium, patch_of, skew_patch, smooth_field
 
@@ -19,7 +30,18 @@ SHEAR, BULK = 80.1938, 400_942.0
 TIP = 6.9
 
 
-@pytest.mark.parametrize("cell", ["quadrilateral", "hexahedron", "tetrahedron10", "triangle6"])
+LONG = (pytest.mark.slow, pytest.mark.claim)
+
+
+@pytest.mark.parametrize(
+    "cell",
+    [
+        "quadrilateral",
+        "triangle6",
+        pytest.param("hexahedron", marks=LONG),
+        pytest.param("tetrahedron10", marks=LONG),
+    ],
+)
 def test_forces_and_tangents_of_mean_dilatations_are_derivatives(cell: str) -> None:
     patch = patch_of(Body(skew_patch(cell), NeoHooke(10.0, 0.499, mean_dilatation=True)))
     u = smooth_field(patch.points, 0.2)
@@ -100,3 +122,23 @@ def test_cooks_membrane_does_not_lock() -> None:
     assert errors[0] > 2 * errors[1] > 4 * errors[2], "it converges"
     assert tip_of(RUBBER, "triangle6", 8) == pytest.approx(TIP, rel=0.015)
     assert tip_of(MooneyRivlin(SHEAR / 2, 0.0, BULK), "quadrilateral", 8) < 0.4 * TIP, "points of cells lock"
+
+
+def test_a_torn_body_of_mean_dilatations_is_in_equilibrium_as_a_whole() -> None:
+    mesh = rectangle((0, 0), (2, 1), (8, 4))
+    rubber = NeoHooke(3.0, 0.499, mean_dilatation=True)
+    supports = [Support("body", "x0"), Support("body", "x1", (0.1, 0.05))]
+    problem = ContactProblem(
+        Scene({"body": Body(mesh, rubber)}, supports),
+        MPI.COMM_SELF,
+        partitions={"body": box_partition(mesh, (2, 2))},
+        tolerance=1e-9,
+    )
+    found = problem.solve().gather_displacement("body")
+    patch = patch_of(Body(mesh, rubber))
+    inside = np.abs(patch.points[:, 0] - 1) < 1 - 1e-9
+    force = patch.at(found[patch.mesh.nodes]).force.reshape(-1, 2)
+    assert np.abs(force[inside]).max() < 1e-6 * np.abs(force).max()
+    assert np.abs(patch.at(0.0 * force).stiffness - patch.linear_stiffness()).max() > 1.0, (
+        "not that of points"
+    )
