@@ -119,6 +119,8 @@ def _through_steps(desk: Desk, file: SceneFile, resume: bool | None) -> dict[str
         Some of the states by name, the last one among them.
     """
     checkpoint = checkpoint_of(file, resume)
+    if checkpoint is None and file.document.output.checkpoint:
+        desk.say("without a checkpoint: states of nonlinear materials are not stored")
     rows, drawn = [], {}
     chosen = set(np.unique(np.linspace(0, len(file.steps) - 1, MAPS).round().astype(int)))
     with resumable(desk, checkpoint):

@@ -60,7 +60,8 @@ that was read from a checkpoint says so and has no tolerance |
     | ``residuals`` | ``gluing``, ``natural``, ``equilibrium``; recomputed, relative |
     | ``residual_history`` | ``method``, ``outer``, ``products``, ``natural``, ``gluing``, ``coarse``: \
 lists, one entry per step of the solver; empty for a state that was read from a checkpoint |
-    | ``energies`` | ``strain``, ``load``, ``friction``, ``dual``, ``total_potential``, ``primal`` |
+    | ``energies`` | ``strain``, ``load``, ``friction``, ``dual``, ``total_potential``, ``primal``; \
+None where materials dissipate or are nonlinear |
     | ``errors`` | ``algebraic``, ``friction``, ``discretisation``, ``by_body``; None if unknown |
     | ``contact`` | one entry per pair: ``points``, ``open``, ``stick``, ``slip``, ``force`` on the slave, \
 ``normal_force``, ``peak_pressure``, ``smallest_gap``, ``largest_slip`` in the last load step; without \
@@ -223,7 +224,7 @@ def _state_record(state: State, unheld: Sequence[UnheldMotion]) -> dict[str, Any
         },
         "residual_history": _residual_history(solution.history),
         "energies": {
-            key: getattr(state.energies, key)
+            key: readable(getattr(state.energies, key))
             for key in ("strain", "load", "friction", "dual", "total_potential", "primal")
         },
         "contact": [_pair(state, number) for number in range(len(state.scene.contacts))],

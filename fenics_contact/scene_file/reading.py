@@ -106,7 +106,7 @@ class SceneFile:
             self.comm,
             partitions=self.partitions,
             solver=solver.chosen(self.scene, self.partitions),
-            tolerance=solver.accuracy(),
+            tolerance=solver.accuracy(self.scene),
         )
 
     def solve(self) -> State:

@@ -51,8 +51,10 @@ class SolverPart(Part):
         description="subdomains of every body, or by body: a number, or boxes of a structured mesh",
     )
 
-    def accuracy(self) -> Tolerance:
-        """Return the tolerance for solvers."""
+    def accuracy(self, scene: Scene) -> Tolerance:
+        """Return the tolerance for solvers; None, their own, where errors of the mesh are not estimated."""
+        if scene.is_nonlinear and "tolerance" not in self.model_fields_set:
+            return None
         if isinstance(self.tolerance, float):
             return self.tolerance
         from fenics_contact.accuracy import Balanced  # not imported for a fixed tolerance

@@ -1,0 +1,62 @@
+"""Scene files with materials that have a history, through their load steps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+
+from fenics_contact import cli
+from fenics_contact.io import read_result
+
+TEXT = """
+meshes.m = { shape = "block", lower = [0, 0, 0], upper = [2, 1, 1], counts = [2, 1, 1] }
+bodies.bar = { mesh = "m", material = "s" }
+output.pictures = []
+
+[materials.s]
+model = "j2_plasticity"
+young_modulus = 2.1e5
+poisson_ratio = 0.3
+yield_stress = 235
+kinematic_hardening = 1e3
+
+[[supports]]
+name = "fix"
+body = "bar"
+surface = "x0"
+
+[[supports]]
+name = "pull"
+body = "bar"
+surface = "x1"
+
+[[steps]]
+name = "out"
+supports = { pull = [0.01, 0.0, 0.0] }
+
+[[steps]]
+name = "back"
+supports = { pull = [0.0, 0.0, 0.0] }
+"""
+
+
+def test_a_bar_that_was_stretched_and_put_back_presses(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "bar.toml"
+    path.write_text(TEXT)
+    assert cli.main(MPI.COMM_SELF, ["run", str(path), "-o", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    assert "nonlinear material (1 body deforms much or yields)" in printed
+    assert "without a checkpoint: states of nonlinear materials are not stored" in printed
+    result = read_result(tmp_path / "result.json")
+    assert result["energies"]["strain"] is None
+    pushed = next(each for each in result["forces"]["reactions"] if each["surface"] == "x0")
+    assert 150 < pushed["force"][0] < 300
+    assert not (tmp_path / "checkpoint.npz").exists()
+    assert cli.main(MPI.COMM_SELF, ["run", str(path), "-o", str(tmp_path), "--resume"]) == 2
+    assert "checkpoints of load steps need linear materials" in capsys.readouterr().err
+    assert cli.main(MPI.COMM_SELF, ["run", str(path), "--set", "solver.tolerance='balanced'"]) == 2
+    assert "the tolerance of nonlinear materials must be a number" in capsys.readouterr().err
