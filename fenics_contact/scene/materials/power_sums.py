@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import ufl
-from scipy.special import roots_jacobi
 from ufl.core.expr import Expr
 
 
@@ -31,6 +30,8 @@ def power_sum(first: Expr, second: Expr, exponent: float, count: int = 32) -> Ex
         p.append(first * p[-1] - second * p[-2] + p[-3])
     if rest == 0.0:
         return p[whole]
+    from scipy.special import roots_jacobi  # for models that need it
+
     with np.errstate(divide="ignore", invalid="ignore"):  # of what SciPy does not use
         v, weights = roots_jacobi(count, rest - 1, -rest)
     poles, factors = (1 - v) / (1 + v), 2 * np.sin(np.pi * rest) / np.pi * weights / (1 + v)
