@@ -89,8 +89,8 @@ class ContactPair:
 
     Attributes:
         slave: Surface whose nodes carry the contact forces: the finer or softer one.
-        master: Surface of another body, or a rigid obstacle; of the same body, or the same surface, where it
-            deforms so much that its parts meet.
+        master: Surface of another body, or a rigid obstacle; another one of the same body where it
+            deforms so much that these meet.
         friction: Law of friction; without one (None) contact is frictionless.
         discretisation: ``"node"`` keeps the gap of every slave node non-negative; ``"mortar"`` does so for
             weighted means of the gap. The former is simple. The latter (dual basis, integration over the

@@ -58,8 +58,8 @@ def half_on_arch(kind: str) -> Scene:
     return Scene(bodies, rollers, contacts=[ContactPair(Surface("high", "z0"), Surface("low", "z1"))])
 
 
-def ring(kind: str, sides: tuple[str, str] = ("inner", "inner")) -> Scene:
-    """Return a ring of radius one and thickness 0.2, cut open, whose sides may meet."""
+def ring(kind: str, sides: tuple[str, str] = ("roof", "floor")) -> Scene:
+    """Return a ring of radius one and thickness 0.2, cut open at the bottom, whose sides may meet."""
     if kind in ("hexahedron", "tetrahedron"):
         mesh = block((-3.1, -0.2, 0.0), (3.1, 0.2, 0.2), (40, 2, 1), kind)
         under, over = "z0", "z1"
@@ -69,7 +69,11 @@ def ring(kind: str, sides: tuple[str, str] = ("inner", "inner")) -> Scene:
     angle, radius = mesh.points[:, 0], 0.9 + mesh.points[:, -1]
     points = mesh.points.copy()
     points[:, 0], points[:, -1] = radius * np.sin(angle), radius * np.cos(angle)
-    bent = BodyMesh(points, mesh.cells, {"inner": mesh.surfaces[under], "outer": mesh.surfaces[over]})
+    inner, outer = mesh.surfaces[under], mesh.surfaces[over]
+    up, out = (points[facets].mean(axis=1)[:, -1] > 0 for facets in (inner, outer))
+    surfaces = {"inner": inner, "outer": outer, "roof": inner[up], "floor": inner[~up]}
+    surfaces |= {"crown": outer[out], "base": outer[~out]}
+    bent = BodyMesh(points, mesh.cells, surfaces)
     pair = ContactPair(Surface("ring", sides[0]), Surface("ring", sides[1]))
     return Scene({"ring": Body(bent, NeoHooke(1.0, 0.3))}, contacts=[pair])
 

@@ -218,7 +218,7 @@ def test_a_squashed_ring_meets_itself_inside_and_never_through_its_wall(kind: st
     flat = scene.points * ([1.2, 0.2] if scene.dim == 2 else [1.2, 1.0, 0.2])
     now = contact.at(flat, round_ring)
     middle = np.abs(flat[now.points.slave, 0]) < 0.4
-    assert np.count_nonzero(middle) >= 10
+    assert np.count_nonzero(middle) >= 4
     assert now.points.gap.min() > 0.0
     opposite = 2 * np.abs(flat[now.points.slave[middle], -1])
     assert now.points.gap[middle] == pytest.approx(opposite, rel=0.05)
@@ -229,7 +229,7 @@ def test_a_squashed_ring_meets_itself_inside_and_never_through_its_wall(kind: st
     through = contact.at(pushed, now)
     crown = np.abs(pushed[through.points.slave, 0]) < 0.1
     assert through.points.gap[crown] == pytest.approx(0.36 - 0.38, abs=0.01)
-    for sides in (("inner", "outer"), ("outer", "inner"), ("outer", "outer")):
+    for sides in (("inner", "outer"), ("outer", "inner"), ("crown", "base"), ("base", "crown")):
         assert sliding(ring(kind, sides)).at(flat).points.count == 0
 
 

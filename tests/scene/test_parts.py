@@ -117,6 +117,8 @@ def test_only_a_body_that_may_deform_much_can_touch_itself() -> None:
     ):
         with pytest.raises(InvalidInputError, match=message):
             Scene({"seal": Body(mesh, material)}, contacts=[wrong])
+    with pytest.raises(InvalidInputError, match="surface 'z0' of body 'seal' cannot be its own master"):
+        Scene({"seal": Body(mesh, NeoHooke(1.0, 0.3))}, contacts=[replace(pair, master=pair.slave)])
 
 
 def test_elasticity_hands_out_the_parameters_of_lame() -> None:
