@@ -26,6 +26,7 @@ from fenics_contact.surface_shapes import (
     closest_points,
     placed,
     principal_curvatures,
+    tensor_grid,
 )
 
 AXIS = (1.0, 2.0, -1.0)
@@ -348,3 +349,9 @@ def test_shapes_can_be_sent_to_other_ranks(name: str) -> None:
 def test_shapes_are_recognised_by_their_members() -> None:
     assert all(isinstance(shape, SurfaceShape) for shape in SHAPES.values())
     assert not isinstance(object(), SurfaceShape)
+
+
+def test_a_tensor_grid_has_every_combination_and_its_last_coordinate_runs_fastest() -> None:
+    grid = tensor_grid([[0, 1], [5, 6, 7]])
+    np.testing.assert_array_equal(grid, [[0, 5], [0, 6], [0, 7], [1, 5], [1, 6], [1, 7]])
+    assert np.issubdtype(grid.dtype, np.integer), "counts stay whole numbers"
