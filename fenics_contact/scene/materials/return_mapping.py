@@ -8,9 +8,6 @@ import numpy as np
 
 from fenics_contact.errors import InvalidInputError
 
-#: √(2/3): radius of the yield surface in deviatoric stress, per unit of yield stress.
-_ROOT = float(np.sqrt(2.0 / 3.0))
-
 
 @dataclass(frozen=True)
 class Hardening:
@@ -135,7 +132,7 @@ def radial_return(
         - 2 * shear * along[:, None, None, None, None] * np.einsum("nij,nkl->nijkl", normal, normal)
     )
     stress = deviator - 2 * shear * flow + bulk * volume[:, None, None] * one
-    return Returned(stress, moduli, flow, alpha + _ROOT * multiplier)
+    return Returned(stress, moduli, flow, alpha + np.sqrt(2 / 3) * multiplier)
 
 
 def _multipliers(
@@ -146,19 +143,20 @@ def _multipliers(
     Newton's method, with bisection where it leaves the bracket: softening ends with a kink at σ_y = 0.
     """
     multiplier, slope = np.zeros_like(length), np.zeros_like(length)
-    radius = _ROOT * hardening.at(alpha)[0]
+    root = np.sqrt(2.0 / 3.0)  # radius of the yield surface in deviatoric stress, per unit of yield stress
+    radius = root * hardening.at(alpha)[0]
     flows = np.flatnonzero(length > radius * (1 + 1e-12))  # a state on the surface is elastic, not rounding
     size, alpha = length[flows], alpha[flows]
     low, high = np.zeros_like(size), size / stiffness
     guess = low
     for _ in range(60):
-        stress, rate = hardening.at(alpha + _ROOT * guess)
-        rest = size - stiffness * guess - _ROOT * stress
+        stress, rate = hardening.at(alpha + root * guess)
+        rest = size - stiffness * guess - root * stress
         low, high = np.where(rest >= 0, guess, low), np.where(rest <= 0, guess, high)
         step = guess + rest / (stiffness + 2 / 3 * rate)
         inside = (step >= low) & (step <= high)
         guess = np.where(inside, step, 0.5 * (low + high))
         if not (np.abs(rest) > 1e-14 * size).any():
             break
-    multiplier[flows], slope[flows] = guess, hardening.at(alpha + _ROOT * guess)[1]
+    multiplier[flows], slope[flows] = guess, hardening.at(alpha + root * guess)[1]
     return multiplier, slope
