@@ -217,8 +217,11 @@ class _Run:
 
         part = self._room(evaluation, moved)
         best = after(part)
-        if all(old is None or best.residuals.is_worse_than(old) for old in (evaluation.residuals, earlier)):
-            # The active set alternates between two faces: the solution lies between them.
+        before = evaluation.residuals
+        worse = all(old is None or best.residuals.is_worse_than(old) for old in (before, earlier))
+        if worse and best.residuals.natural > before.natural:
+            # The active set alternates between two faces: the solution lies between them. Forces out of
+            # balance alone are no reason: a step that turns a body strains it until the next one.
             candidates = [(best, part), *((after(f * part), f * part) for f in FRACTIONS)]
             best, part = min(
                 candidates, key=lambda c: c[0].residuals.worst_beside(candidates[0][0].residuals)
