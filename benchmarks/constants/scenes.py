@@ -33,6 +33,7 @@ from fenics_contact.scene import (
     Friction,
     IsotropicElasticity,
     LoadStep,
+    NeoHooke,
     OrthotropicElasticity,
     PlaneStrain,
     RigidObstacle,
@@ -306,11 +307,23 @@ def nonsmooth_minimum() -> Figures:
     }  # fmt: skip
 
 
+def rubber_drawn_over_a_disc() -> Figures:
+    """A block of rubber in four pieces, pressed deep on a rigid disc and drawn over it."""
+    mesh = rectangle((0.0, 0.0), (2.0, 1.0), (12, 6))
+    pair = ContactPair(Surface("block", "y0"), RigidSphere((0.8, -0.5), 0.5), Coulomb(0.3))
+    scene = Scene({"block": Body(mesh, NeoHooke(1.0, 0.3))}, [Support("block", "y1")], contacts=[pair])
+    problem = ContactProblem(scene, COMM, partitions=_cut(scene, 4))
+    way = [(0.0, -0.15), (0.0, -0.35), (0.1, -0.35)]
+    steps = [LoadStep(f"{x}, {y}", supports=[Support("block", "y1", (x, y))]) for x, y in way]
+    states = solve_steps(problem, steps)
+    return _figures(*states, tolerance=1e-8)
+
+
 SCENES: dict[str, Callable[[], Figures]] = {
     scene.__name__.replace("_", " "): scene
     for scene in (
         floating_block, hardly_held_block, cornered_block, pressed_ball, mortar_blocks, tresca_far_away,
         by_smalse, by_fixed_point, there_and_back, shaped_obstacles, without_contact, heated_stack,
-        chain_gradient, small_design, nonsmooth_minimum,
+        chain_gradient, small_design, nonsmooth_minimum, rubber_drawn_over_a_disc,
     )
 }  # fmt: skip

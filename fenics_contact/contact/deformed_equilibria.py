@@ -20,7 +20,7 @@ from fenics_contact.nonlinear import (
     Contact,
     Equations,
     Evaluation,
-    Load,
+    Loading,
     MovingContact,
     Path,
     PathEndsError,
@@ -93,7 +93,7 @@ class DeformedEquilibria:
             )
             if before is None:
                 check_held(torn)
-            load = Load(torn, prescribed_displacements(scene, self._decomposition.tearing), time)
+            load = Loading(torn, prescribed_displacements(scene, self._decomposition.tearing), time)
         try:
             path = steps.follow(equations, self._contact, before, load, start, timer, known)
         except PathEndsError as failure:

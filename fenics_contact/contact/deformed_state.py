@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import dolfinx
 
     from fenics_contact.accuracy import StateErrors
-    from fenics_contact.nonlinear import Load, NonlinearEquilibrium
+    from fenics_contact.nonlinear import Loading, NonlinearEquilibrium
 
 
 @displayed
@@ -41,7 +41,7 @@ class DeformedState(State):
     """
 
     equilibrium: NonlinearEquilibrium = field(kw_only=True)
-    load: Load = field(kw_only=True)
+    load: Loading = field(kw_only=True)
     fractions: tuple[float, ...] = field(kw_only=True)
     factorisations: int = field(kw_only=True)
 

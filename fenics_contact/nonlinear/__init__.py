@@ -2,7 +2,7 @@
 
 from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation, law_of
 from fenics_contact.nonlinear.load_steps import AutomaticSteps, Path, PathEndsError
-from fenics_contact.nonlinear.meeting import Contact, Load, Meeting, MovingContact, StillContact
+from fenics_contact.nonlinear.meeting import Contact, Loading, Meeting, MovingContact, StillContact
 from fenics_contact.nonlinear.newton import NonlinearEquilibrium, TangentNewton
 
 __all__ = [
@@ -12,7 +12,7 @@ __all__ = [
     "Equations",
     "Evaluation",
     "Linearisation",
-    "Load",
+    "Loading",
     "Meeting",
     "MovingContact",
     "NonlinearEquilibrium",

@@ -32,7 +32,7 @@ from fenics_contact.scene import Scene
 from fenics_contact.timing import PhaseTimer
 
 if TYPE_CHECKING:
-    from fenics_contact.pairing.sliding import GeometricStiffness
+    from fenics_contact.pairing import GeometricStiffness
 
 #: Forces below this fraction of those that would strain bodies by their displacement are none.
 FORCE_FLOOR = 1e-4

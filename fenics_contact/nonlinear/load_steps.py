@@ -6,10 +6,12 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from fenics_contact.display import displayed
 from fenics_contact.errors import ConvergenceError, tell
 from fenics_contact.nonlinear.equations import Configuration, Equations, Linearisation
-from fenics_contact.nonlinear.meeting import Contact, Load
+from fenics_contact.nonlinear.meeting import Contact, Loading
 from fenics_contact.nonlinear.newton import NonlinearEquilibrium, TangentNewton
 from fenics_contact.qp import SolverStep
 from fenics_contact.timing import PhaseTimer
@@ -34,7 +36,7 @@ class Path:
         factorisations: Factored tangents, counting all subdomains as one.
     """
 
-    load: Load
+    load: Loading
     end: NonlinearEquilibrium
     fractions: tuple[float, ...]
     history: tuple[SolverStep, ...]
@@ -74,8 +76,8 @@ class AutomaticSteps:
         self,
         equations: Equations,
         contact: Contact,
-        before: Load | None,
-        target: Load,
+        before: Loading | None,
+        target: Loading,
         start: Configuration,
         timer: PhaseTimer,
         known: Linearisation | None = None,
@@ -112,7 +114,7 @@ class AutomaticSteps:
             )
 
         while reached < 1.0:
-            part = min(part, longest, 1.0 - reached)
+            part = (1.0 - reached) / np.ceil((1.0 - reached) / min(part, longest) - 1e-9)
             fraction = 1.0 if reached + part > 1.0 - 1e-12 else reached + part
             load = target.between(first, fraction)
             if at.meeting is None or at.meeting.points is None:

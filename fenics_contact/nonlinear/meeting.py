@@ -17,7 +17,7 @@ from fenics_contact.scene import MovingObstacle, Scene, Surface
 from fenics_contact.surfaces import share_areas
 
 if TYPE_CHECKING:
-    from fenics_contact.pairing.sliding import GeometricStiffness, LowRank, MaterialPoints, SlidingPoints
+    from fenics_contact.pairing import GeometricStiffness, LowRank, MaterialPoints, SlidingPoints
 
 
 #: Number of facets that supports and obstacles may pass within a step: contact is searched where nodes stand.
@@ -26,7 +26,7 @@ FACETS = 2.0
 
 @displayed
 @dataclass(frozen=True, eq=False)
-class Load:
+class Loading:
     """What acts on the bodies at one time.
 
     Attributes:
@@ -39,7 +39,7 @@ class Load:
     prescribed: np.ndarray
     time: float
 
-    def between(self, first: Load, part: float) -> Load:
+    def between(self, first: Loading, part: float) -> Loading:
         """Return the load at a part of the way from another one to this."""
         if part == 1.0:
             return self
@@ -51,16 +51,16 @@ class Load:
 
         torn = replace(self.torn, subdomains=subdomains, right=mixed("right"), supported=mixed("supported"))
         prescribed = (1.0 - part) * first.prescribed + part * self.prescribed
-        return Load(torn, prescribed, (1.0 - part) * first.time + part * self.time)
+        return Loading(torn, prescribed, (1.0 - part) * first.time + part * self.time)
 
-    def removed(self) -> Load:
+    def removed(self) -> Loading:
         """Return the same supports without movement, at time zero, and no loads."""
         torn = self.torn
         equality = torn.numbering.owned < torn.n_equality
         right = np.where(equality, 0.0, torn.right + torn.supported)
         subdomains = tuple(replace(part, load=np.zeros_like(part.load)) for part in torn.subdomains)
         torn = replace(torn, subdomains=subdomains, right=right, supported=np.zeros_like(torn.supported))
-        return Load(torn, 0.0 * self.prescribed, 0.0)
+        return Loading(torn, 0.0 * self.prescribed, 0.0)
 
 
 @displayed
@@ -204,11 +204,11 @@ def _lengths(columns: sp.csr_matrix) -> np.ndarray:
 class Contact(Protocol):
     """How bodies meet."""
 
-    def longest_part(self, first: Load, last: Load) -> float:
+    def longest_part(self, first: Loading, last: Loading) -> float:
         """Return the part of the way between two loads that one step may take: what moves must be found."""
 
     def at(
-        self, load: Load, displacement: Vector, start: MaterialPoints | None, last: Meeting | None
+        self, load: Loading, displacement: Vector, start: MaterialPoints | None, last: Meeting | None
     ) -> Meeting:
         """Return the contact points at a displacement. Collective.
 
@@ -223,12 +223,12 @@ class Contact(Protocol):
 class StillContact:
     """Contact at the points of the undeformed bodies: small displacements."""
 
-    def longest_part(self, first: Load, last: Load) -> float:
+    def longest_part(self, first: Loading, last: Loading) -> float:
         """Return the whole way."""
         return 1.0
 
     def at(
-        self, load: Load, displacement: Vector, start: MaterialPoints | None, last: Meeting | None
+        self, load: Loading, displacement: Vector, start: MaterialPoints | None, last: Meeting | None
     ) -> Meeting:
         """Return the points of the undeformed bodies."""
         return Meeting(load.torn, None, None, load.prescribed)
@@ -249,7 +249,7 @@ class MovingContact:
         self._obstacles = [pair.master for pair in scene.contacts if isinstance(pair.master, MovingObstacle)]
         self._facet = min(_facet_size(scene, side) for side in surfaces)
 
-    def longest_part(self, first: Load, last: Load) -> float:
+    def longest_part(self, first: Loading, last: Loading) -> float:
         """Return the part in which supports and obstacles move by a few facets."""
         way = np.nan_to_num(last.prescribed - first.prescribed)
         moved = float(np.linalg.norm(way, axis=1).max(initial=0.0))
@@ -263,7 +263,7 @@ class MovingContact:
         return min(1.0, FACETS * self._facet / moved) if moved > 0.0 else 1.0
 
     def at(
-        self, load: Load, displacement: Vector, start: MaterialPoints | None, last: Meeting | None
+        self, load: Loading, displacement: Vector, start: MaterialPoints | None, last: Meeting | None
     ) -> Meeting:
         """Search for the points at a displacement. Collective."""
         coordinates = self._places.copy()

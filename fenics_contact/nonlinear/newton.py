@@ -10,7 +10,7 @@ import numpy as np
 from fenics_contact.display import displayed
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation, law_of
-from fenics_contact.nonlinear.meeting import Contact, Load
+from fenics_contact.nonlinear.meeting import Contact, Loading
 from fenics_contact.nonlinear.tangent_step import TangentStep, tangent_step
 from fenics_contact.nonlinear.tangent_system import TangentSystem
 from fenics_contact.qp import (
@@ -27,18 +27,21 @@ from fenics_contact.qp import (
 from fenics_contact.timing import PhaseTimer
 
 if TYPE_CHECKING:
-    from fenics_contact.pairing.sliding import MaterialPoints
+    from fenics_contact.pairing import MaterialPoints
 
-#: Fractions of a step that are tried where it is worse than the last two.
+#: Fractions of a step that are tried where it is worse than the last two and progress has stalled.
 FRACTIONS = (0.5, 0.25, 0.1)
 #: Factor on the residual of linear systems after each step without progress, and the least of these factors:
 #: near a loss of stability a small residual may hide a large error.
 CARE, LEAST_CARE = 0.1, 1e-3
+#: Part of the slip bound within which a disc counts as slipping at the start of a load step.
+SLIPPED = 1e-6
 #: Residual of a linear system that is small enough, relative to the tolerance of the step.
 FINE = 0.01
 #: Part of the smallest det F that a step must leave.
 ROOM = 0.2
-#: Steps without half the residual after which the natural map becomes more cautious, and by how much.
+#: Steps without half the residual after which steps are shortened and systems solved more accurately, and
+#: the second time the natural map becomes more cautious, and by how much.
 PATIENCE, CAUTION = 4, 0.2
 #: Residual of contact problems that are solved as a whole, at the start of a history.
 NESTED = 1e-4
@@ -98,7 +101,7 @@ class TangentNewton:
         self,
         equations: Equations,
         contact: Contact,
-        load: Load,
+        load: Loading,
         start: Configuration,
         timer: PhaseTimer,
         known: Linearisation | None,
@@ -123,11 +126,12 @@ class _Run:
     """One load step."""
 
     def __init__(
-        self, method: TangentNewton, equations: Equations, contact: Contact, load: Load, timer: PhaseTimer
+        self, method: TangentNewton, equations: Equations, contact: Contact, load: Loading, timer: PhaseTimer
     ) -> None:
         self._method, self._equations, self._contact, self._load = method, equations, contact, load
         self._timer, self._comm = timer, load.torn.numbering.comm
         self._caution = self._care = 1.0
+        self._stalls = 0
         self._start: MaterialPoints | None = None
         self.history: list[SolverStep] = []
         self._residuals: list[float] = []
@@ -178,13 +182,14 @@ class _Run:
             chosen = 0.9 * (worst / previous) ** 2
             careful = 0.9 * self._forcing**2
             self._forcing = min(method.forcing, max(chosen, careful if careful > 0.1 else 0.0))
-        if previous:
+        if previous and self._stalls:
             self._care = 1.0 if worst < 0.5 * previous else max(CARE * self._care, LEAST_CARE)
         least = 0.3 * method.tolerance / max(worst, method.tolerance)
         self._forcing = max(self._care * self._forcing, least)
         late = self._residuals[-PATIENCE - 1 :]
         if len(late) > PATIENCE and min(late[1:]) > 0.5 * late[0]:
-            self._caution *= CAUTION
+            self._stalls += 1
+            self._caution *= CAUTION if self._stalls > 1 else 1.0
             self._residuals = [worst]
 
     def _advanced(self, evaluation: Evaluation, earlier: Residuals | None, near: Linearisation) -> Evaluation:
@@ -201,9 +206,11 @@ class _Run:
         floor = FINE * method.tolerance * evaluation.residuals.gluing_scale
         taken = None
         with self._timer.phase("solve"):
-            if evaluation.torn.points.count == 0 or self._touching(evaluation):
+            if self.history or evaluation.torn.points.count == 0 or self._forces_known(evaluation):
                 problem = near.problem(evaluation)
-                taken = tangent_step(problem, step, self._forcing, floor, method.max_products)
+                # What slipped in the last load step will mostly go on: its forces are at the bound.
+                margin = 0.0 if self.history else SLIPPED
+                taken = tangent_step(problem, step, self._forcing, floor, method.max_products, margin=margin)
             whole = taken is None
             if taken is None:
                 taken = self._whole(near.system, evaluation, step)
@@ -229,9 +236,8 @@ class _Run:
         self._record(best, near.system, taken, part, whole)
         return best
 
-    def _touching(self, evaluation: Evaluation) -> bool:
-        contact = evaluation.torn.layout.contact
-        return global_sum(self._comm, np.count_nonzero(evaluation.at.multiplier[contact]))[0] > 0.0
+    def _forces_known(self, evaluation: Evaluation) -> bool:
+        return global_sum(self._comm, np.count_nonzero(evaluation.at.multiplier))[0] > 0.0
 
     def _whole(self, system: TangentSystem, evaluation: Evaluation, step: Vector) -> TangentStep:
         """Solve the linearised contact problem as a whole, its rigid motions without stiffness. Collective.

@@ -100,7 +100,13 @@ class TangentStep:
 
 
 def tangent_step(
-    tangent: TangentProblem, step: Vector, forcing: float, floor: float, max_products: int
+    tangent: TangentProblem,
+    step: Vector,
+    forcing: float,
+    floor: float,
+    max_products: int,
+    *,
+    margin: float = 0.0,
 ) -> TangentStep | None:
     """Solve the face that the natural map selects; None where it does not hold every body. Collective.
 
@@ -110,11 +116,12 @@ def tangent_step(
         forcing: Residual of the linear system relative to that of its start.
         floor: A residual that is small enough, [length].
         max_products: Largest number of products.
+        margin: Discs inside their slip bound by less than this part of it count as slipping.
     """
     factor = None if tangent.problem.scaling is None else tangent.problem.scaling.factor
     at = tangent.scaled()
     problem = at.problem
-    bound = problem.law.bound(at.multiplier)
+    bound = (1.0 - margin) * problem.law.bound(at.multiplier)
     ratio = step if factor is None else np.asarray(step / factor**2, dtype=np.float64)
     face = classify(problem.layout, bound, at.multiplier, at.residual, ratio)
     operator = CountedOperator(problem.operator)

@@ -8,7 +8,7 @@ from mpi4py import MPI
 from scipy.sparse.linalg import splu
 
 from fenics_contact.feti import TornSystem, build_torn_system, decompose
-from fenics_contact.nonlinear import Equations, Load
+from fenics_contact.nonlinear import Equations, Loading
 from fenics_contact.qp import ContactLayout
 from fenics_contact.scene import Scene
 
@@ -41,7 +41,7 @@ class Monolithic:
     def advance(self, scene: Scene, tolerance: float = 1e-11) -> None:
         """Find the equilibrium of the next load."""
         torn = build_torn_system(scene, self._decomposition, previous=self._last)
-        earlier = self._last or Load(torn, np.zeros(0), 1.0).removed().torn
+        earlier = self._last or Loading(torn, np.zeros(0), 1.0).removed().torn
         self._last = torn
         torn = torn.with_slip_from(earlier.relative(self._u), earlier.sliding(self._u))
         if self.multiplier.size == 0:

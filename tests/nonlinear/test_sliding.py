@@ -64,7 +64,7 @@ def ironed(friction: float, pieces: int, quarter: bool = False) -> Sequence[Defo
         "block": box_partition(ironing(0.0, WAY[0]).bodies["block"].mesh, (2 * pieces, pieces)),
         "die": box_partition(ironing(0.0, WAY[0]).bodies["die"].mesh, (pieces, pieces)),
     }
-    problem = ContactProblem(scenes[0], MPI.COMM_SELF, partitions=parts, tolerance=1e-11)
+    problem = ContactProblem(scenes[0], MPI.COMM_SELF, partitions=parts, tolerance=1e-10)
     steps = [LoadStep(str(number), supports=scene.supports) for number, scene in enumerate(scenes)]
     states = solve_steps(problem, steps)
     assert all(isinstance(state, DeformedState) for state in states)
