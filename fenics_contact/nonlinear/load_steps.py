@@ -124,6 +124,8 @@ class AutomaticSteps:
                 found = self.newton.solve(equations, contact, load, at, timer, known)
             except ConvergenceError as failure:
                 history += [replace(line, outer=len(fractions)) for line in failure.history]
+                products += failure.history[-1].products if failure.history else 0
+                factorisations += len(failure.history)
                 part *= 0.5
                 if part < self.smallest:
                     raise PathEndsError(

@@ -37,7 +37,7 @@ CARE, LEAST_CARE = 0.1, 1e-3
 #: Part of the slip bound within which a disc counts as slipping at the start of a load step.
 SLIPPED = 1e-6
 #: Residual of a linear system that is small enough, relative to the tolerance of the step.
-FINE = 0.01
+FINE = 1e-4
 #: Part of the smallest det F that a step must leave.
 ROOM = 0.2
 #: Steps without half the residual after which steps are shortened and systems solved more accurately, and
