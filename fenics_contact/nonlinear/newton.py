@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact.display import displayed
-from fenics_contact.errors import ConvergenceError
+from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation, law_of
 from fenics_contact.nonlinear.meeting import Contact, Loading
 from fenics_contact.nonlinear.tangent_step import TangentStep, tangent_step
@@ -213,7 +213,7 @@ class _Run:
                 taken = tangent_step(problem, step, self._forcing, floor, method.max_products, margin=margin)
             whole = taken is None
             if taken is None:
-                taken = self._whole(near.system, evaluation, step)
+                taken = self._held_whole(near.system, evaluation, step)
             self.products += taken.products
             change = taken.multiplier - np.concatenate([at.multiplier, further])
             moved = near.system.displacement(change, taken.motions)
@@ -238,6 +238,19 @@ class _Run:
 
     def _forces_known(self, evaluation: Evaluation) -> bool:
         return global_sum(self._comm, np.count_nonzero(evaluation.at.multiplier))[0] > 0.0
+
+    def _held_whole(self, system: TangentSystem, evaluation: Evaluation, step: Vector) -> TangentStep:
+        """Solve contact as a whole; a body that nothing holds any more ends the load step. Collective."""
+        try:
+            return self._whole(system, evaluation, step)
+        except InfeasibleError as reason:
+            if not self._forces_known(evaluation):  # bodies at rest: nothing holds them from the start
+                raise
+            raise ConvergenceError(
+                f"Newton's method needs tangents that the rows of supports and contacts hold, got after "
+                f"{len(self.history)} steps: {reason}: take smaller load steps",
+                self.history,
+            ) from reason
 
     def _whole(self, system: TangentSystem, evaluation: Evaluation, step: Vector) -> TangentStep:
         """Solve the linearised contact problem as a whole, its rigid motions without stiffness. Collective.
