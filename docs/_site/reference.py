@@ -41,7 +41,7 @@ OUTSIDE = [
         "py:.*",
         "ArrayLike|Console|Expr|Figure|Table|FilePath|NDArray|ndarray|dtype|generic|bool_|float64|int64",
     ),
-    ("py:.*", "ModuleType"),
+    ("py:.*", "ModuleType|cKDTree"),
 ]
 
 

@@ -51,7 +51,8 @@ class ContactProblem:
         comm: Communicator over which the subdomains are spread.
         solver: Dual solver with its tolerance; None: the one that `Scene.plan` names.
         tolerance: Largest relative residual of the solutions, see `solve_scene`.
-        steps: How loads on nonlinear materials are followed; None: `nonlinear.AutomaticSteps()`.
+        steps: How loads on nonlinear materials are followed; None: the default
+            `fenics_contact.nonlinear.AutomaticSteps`.
         timer: Wall time of this rank by phase, over all solutions.
         state: The last solution, None before the first.
 
@@ -268,7 +269,8 @@ def solve_scene(
             solves as accurately as the mesh deserves. By default the solver's own, and without a solver
             `Balanced`. Give a number, 1e-6 or less, where the status of single contact points matters, or
             small differences between states. Where materials are nonlinear a number, 1e-8 by default.
-        steps: How loads on nonlinear materials are followed; None: `nonlinear.AutomaticSteps()`.
+        steps: How loads on nonlinear materials are followed; None: the default
+            `fenics_contact.nonlinear.AutomaticSteps`.
 
     Raises:
         InvalidInputError: If scene or partition cannot be used.

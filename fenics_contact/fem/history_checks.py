@@ -27,11 +27,11 @@ def check_history_material(
         tolerance: Largest difference between tangent and difference quotients, relative to the largest entry.
 
     Raises:
-        InvalidInputError: If the unloaded material has stress or an unsymmetric tangent, `respond` changes
+        InvalidInputError: If the unloaded material has stress or an unsymmetric tangent, "respond" changes
             its arguments, the answer of a point depends on others, the tangent is not the derivative of the
             stress, a model in large deformations notices rotations of the deformed body, or one in small
             strain notices rotations at all.
-        UserCodeError: If `respond` raises.
+        UserCodeError: If "respond" raises.
 
     Example:
         >>> from fenics_contact.scene import J2Plasticity

@@ -58,7 +58,7 @@ class Configuration:
     def meeting_at(self, meeting: Meeting) -> Configuration:
         """Return the configuration with its forces on the rows of other contact points. Collective."""
         if self.meeting is None:
-            multiplier = np.zeros(len(meeting.torn.numbering.owned))
+            multiplier: Vector = np.zeros(len(meeting.torn.numbering.owned))
         else:
             multiplier = meeting.carried(self.multiplier, self.meeting)
         return replace(self, multiplier=multiplier, meeting=meeting)

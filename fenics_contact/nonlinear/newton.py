@@ -155,7 +155,7 @@ class _Run:
         with self._timer.phase("assemble"):
             meeting = self._contact.at(self._load, at.displacement, self._start, at.meeting)
             self._start, at = meeting.start, at.meeting_at(meeting)
-            step = np.zeros(meeting.torn.layout.size)
+            step: Vector = np.zeros(meeting.torn.layout.size)
             if near is not None:
                 step = near.natural_step(meeting, self._caution)
             return self._equations.evaluate(meeting, law_of(meeting.torn), at, step)

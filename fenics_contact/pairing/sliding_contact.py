@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def sliding_contact(
     scene: Scene, fixed: np.ndarray, comm: MPI.Comm | None = None, *, reach: float = np.inf
 ) -> SlidingContact:
-    """Return the contact pairs of a scene whose bodies may move far; see `SlidingContact.of`. Collective."""
+    """Return the contact pairs of a scene whose bodies may move far. Collective."""
     from fenics_contact.pairing.sliding import SlidingContact
 
     return SlidingContact.of(scene, fixed, comm, reach=reach)

@@ -209,7 +209,7 @@ def _newton_step(
 
 
 def best_projections(projections: Projection, rounding: float) -> Projection:
-    """Keep the projection least beside its facet for each point; then by smallest |gap|, then facet.
+    """Keep the projection least beside its facet for each point; then by smallest abs(gap), then facet.
 
     Args:
         projections: Projections, several per point.
