@@ -40,7 +40,7 @@ class MaterialResponse:
 
 
 class HistoryMaterial(Elasticity):
-    """A material whose stress depends on what it went through; write `history_size` and `respond`.
+    """A material whose stress depends on what it went through; write its history_size and respond.
 
     The internal variables are zero at first, where the body is free of stress. Bodies in the plane are in
     plane strain. The tangent at zero displacement and history, for a step of no duration, is the model's

@@ -15,7 +15,7 @@ from fenics_contact.scene.materials.hyperelasticity import (
 
 
 class NearlyIncompressible(Hyperelasticity):
-    """Hyperelasticity with W(F) = `shape_energy`(F) + `volume_energy`(J); write both and `parameters`.
+    """Hyperelasticity with W(F) = shape_energy(F) + volume_energy(J): write both and parameters.
 
     J = det F. With `mean_dilatation` the volume energy is that of the mean J of each cell,
     ∫ U(J) dV = V U(∫ J dV / V): each cell is asked to keep its volume, and not each of its points, which
@@ -51,7 +51,7 @@ class NearlyIncompressible(Hyperelasticity):
         return ufl.derivative(ufl.inner(stress, ufl.grad(v)), u, du)
 
     def tangent(self, u: Expr, du: Expr, v: Expr, parameters: tuple[ufl.Constant, ...]) -> Expr:
-        """Return the growth of `work` with the displacement along ``du``."""
+        """Return the growth of the work of the shape stress with the displacement along ``du``."""
         pressure = self.pressure(ufl.det(deformation_gradient(u)), parameters)
         volume = ufl.derivative(pressure * volume_change(u, v), u, du)
         return self.shape_tangent(u, du, v, parameters) + volume
