@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,6 +30,9 @@ from fenics_contact.nonlinear import (
 from fenics_contact.qp import DualSolution
 from fenics_contact.scene import RigidSurface, Scene, is_finite_strain
 from fenics_contact.timing import PhaseTimer
+
+if TYPE_CHECKING:
+    from fenics_contact.pairing import MaterialPoints, SlidingPoints
 
 
 class DeformedEquilibria:
@@ -97,13 +101,13 @@ class DeformedEquilibria:
         try:
             path = steps.follow(equations, self._contact, before, load, start, timer, known)
         except PathEndsError as failure:
-            last = None if failure.path is None else _state_after(failure.path, timer)
+            last = None if failure.path is None else _state_after(failure.path, origin, timer)
             raise LoadStepError(str(failure), failure.history, last) from failure
-        return _state_after(path, timer)
+        return _state_after(path, origin, timer)
 
 
-def _state_after(path: Path, timer: PhaseTimer) -> DeformedState:
-    """Return the state at the end of a path. Collective."""
+def _state_after(path: Path, origin: State | None, timer: PhaseTimer) -> DeformedState:
+    """Return the state at the end of a path from another state. Collective."""
     end = path.end
     evaluation, at = end.evaluation, end.evaluation.at
     law, near = evaluation.law, end.linearisation
@@ -124,11 +128,24 @@ def _state_after(path: Path, timer: PhaseTimer) -> DeformedState:
     )
     with timer.phase("state"):
         contact = contact_result(system, solution, at.displacement)
+        if (points := evaluation.meeting.points) is not None and path.start is not None:
+            contact = _with_slip(contact, points, path.start, origin)
         energies = _energies(evaluation, contact)
     return DeformedState(
         system, solution, at.displacement, contact, energies, dict(timer.seconds), equilibrium=end,
         load=path.load, fractions=path.fractions, factorisations=path.factorisations,
     )  # fmt: skip
+
+
+def _with_slip(
+    contact: ContactResult, points: SlidingPoints, start: MaterialPoints, origin: State | None
+) -> ContactResult:
+    """Return the contact of moved bodies with the slip of its load step and of all before."""
+    slip = points.slip(start)
+    before = np.zeros_like(slip)
+    if isinstance(origin, DeformedState) and (stood := origin.equilibrium.evaluation.meeting.points):
+        before = points.carry_tangential(origin.contact.slip + origin.contact.slip_before, stood)
+    return replace(contact, slip=slip, slip_before=before)
 
 
 def _energies(evaluation: Evaluation, contact: ContactResult) -> Energies:

@@ -22,23 +22,10 @@ def solve_dual(
         solver: `FaceNewton` and `FixedPoint` handle Coulomb's law; `Smalse` is wrapped in a `FixedPoint`.
         start: Earlier solution, or multiplier to start from, owned, or None.
     """
-    tresca, coefficient = friction_of(system)
+    tresca, coefficient = system.torn.friction
     if coefficient is not None and isinstance(solver, Smalse):
         solver = FixedPoint(solver)
     return solve(system.problem, tresca, solver, start, friction_coefficient=coefficient)
-
-
-def friction_of(system: DualSystem) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return the data of the friction law for this rank's discs.
-
-    Returns:
-        The part of the slip bound that is given, shape (n_friction,), [force], and the friction coefficient,
-        shape (n_friction,), None if it is zero everywhere.
-    """
-    torn = system.torn
-    discs = torn.owned_discs
-    coefficient = torn.friction_coefficient[discs] if np.any(torn.friction_coefficient > 0) else None
-    return torn.tresca_bound[discs], coefficient
 
 
 def contact_result(system: DualSystem, solution: DualSolution, displacement: np.ndarray) -> ContactResult:

@@ -6,11 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fenics_contact.contact.dual_solve import friction_of
 from fenics_contact.contact.state import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti import DirectSystem, DualSystem, TornSystem
-from fenics_contact.qp import CoulombLaw, CountedOperator, DualSolution, SlipLaw, TrescaLaw, iterate_at
+from fenics_contact.qp import CountedOperator, DualSolution, iterate_at
 
 Stored = Mapping[str, np.ndarray]
 
@@ -51,7 +50,7 @@ def with_stored_slip(torn: TornSystem, stored: Stored) -> TornSystem:
 
 def restored_solution(system: DualSystem, stored: Stored) -> DualSolution:
     """Compute the residuals of a stored multiplier. Collective; one product."""
-    problem, law = system.problem, _law(system)
+    problem, law = system.problem, system.torn.law
     multiplier, motion = stored["multiplier"][system.torn.numbering.owned], stored["motion"]
     operator = CountedOperator(problem.operator)
     iterate = iterate_at(problem.with_law(law), multiplier, operator(multiplier), motion)
@@ -68,8 +67,3 @@ def restored_solution(system: DualSystem, stored: Stored) -> DualSolution:
         products=operator.products,
         history=(),
     )
-
-
-def _law(system: DualSystem) -> SlipLaw:
-    (tresca, coefficient), layout = friction_of(system), system.problem.layout
-    return TrescaLaw(layout, tresca) if coefficient is None else CoulombLaw(layout, coefficient, tresca)

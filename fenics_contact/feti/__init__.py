@@ -6,8 +6,9 @@ from fenics_contact.feti.decomposition import Decomposition, decompose
 from fenics_contact.feti.direct import DirectSolution, DirectSystem
 from fenics_contact.feti.dirichlet import DirichletPreconditioner
 from fenics_contact.feti.dual import DualSystem
-from fenics_contact.feti.factor import Factor, fixing_nodes
+from fenics_contact.feti.factor import FIXING_NODES, Factor, fixing_motions, fixing_nodes, held_by
 from fenics_contact.feti.gluing import prescribed_displacements
+from fenics_contact.feti.implicit import FactoredOperator, dofs_inside
 from fenics_contact.feti.inverse import LocalKind, TornInverse, kernel_matrix
 from fenics_contact.feti.local import LocalOperator
 from fenics_contact.feti.nodal_mean import nodal_mean, nodal_mean_at, nodal_mean_transposed
@@ -19,6 +20,7 @@ from fenics_contact.feti.subdomain import CachedMatrix, Subdomain, common_kernel
 from fenics_contact.feti.torn import TornSystem, build_torn_system, meeting_at
 
 __all__ = [
+    "FIXING_NODES",
     "CachedMatrix",
     "Condensations",
     "Decomposition",
@@ -27,6 +29,7 @@ __all__ = [
     "DirichletPreconditioner",
     "DualSystem",
     "Factor",
+    "FactoredOperator",
     "LocalKind",
     "LocalOperator",
     "Rows",
@@ -38,7 +41,10 @@ __all__ = [
     "check_same_input",
     "common_kernel",
     "decompose",
+    "dofs_inside",
+    "fixing_motions",
     "fixing_nodes",
+    "held_by",
     "kernel_matrix",
     "meeting_at",
     "nodal_mean",

@@ -116,13 +116,10 @@ def on_copies(
         value: Its value, shape (n_entries,).
         slaves: For each row a node whose rank owns it, shape (n_rows,).
     """
-    copies = tearing.multiplicity[node]
-    within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
-    copy = np.repeat(tearing.first_copy[node], copies) + within
-    row, component = np.repeat(row, copies), np.repeat(component, copies)
-    value = np.repeat(value, copies) * tearing.copy_share[copy]
+    entry, copy = tearing.copies_of(node)
     owner = tearing.subdomain_rank[tearing.copy_subdomain[tearing.first_copy[slaves]]]
-    return Rows(row, copy, component, value, np.zeros(len(slaves)), owner)
+    value = value[entry] * tearing.copy_share[copy]
+    return Rows(row[entry], copy, component[entry], value, np.zeros(len(slaves)), owner)
 
 
 def normal_relations(points: ContactPoints) -> Relations:

@@ -48,6 +48,12 @@ class Tearing(NodeNumbers):
         """Node of each copy, shape (n_copies,)."""
         return np.repeat(np.arange(self.n_nodes), self.multiplicity)
 
+    def copies_of(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return for each copy of each of some nodes the place of that node among them, and the copy."""
+        copies = self.multiplicity[nodes]
+        within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
+        return np.repeat(np.arange(len(nodes)), copies), np.repeat(self.first_copy[nodes], copies) + within
+
     @cached_property
     def copy_share(self) -> np.ndarray:
         """Stiffness of each copy relative to all copies of its node, shape (n_copies,)."""

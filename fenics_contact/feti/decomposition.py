@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -57,6 +59,19 @@ class Decomposition:
     def torn_unknowns(self) -> int:
         """Number of displacement unknowns of all subdomains of all ranks."""
         return self.tearing.dim * len(self.tearing.copy_subdomain)
+
+    @cached_property
+    def parts(self) -> tuple[slice, ...]:
+        """Where each of this rank's subdomains lies in its torn vectors."""
+        ends = self.tearing.dim * self.block_offset
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+
+    def copies_here(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return for each copy on this rank of some nodes its place among them, its number and its block."""
+        place, copy = self.tearing.copies_of(nodes)
+        block = self.copy_block[copy]
+        here = block >= 0
+        return place[here], copy[here], block[here]
 
     @property
     def fixed(self) -> np.ndarray:

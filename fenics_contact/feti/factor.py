@@ -126,10 +126,30 @@ def regularised(stiffness: sp.csr_matrix, kernel: np.ndarray, points: np.ndarray
         stable computation of a generalized inverse of the stiffness matrix of a floating structure.
         Int. J. Numer. Meth. Engng 88 (2011) 493-509.
     """
-    nodes = np.sort(fixing_nodes(points))
-    dim = points.shape[1]
+    return held_by(stiffness, *fixing_motions(kernel, points), float(stiffness.diagonal().max()))
+
+
+def fixing_motions(
+    kernel: np.ndarray, points: np.ndarray, count: int = FIXING_NODES
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the dofs of well-spread nodes and orthonormal rigid motions on them.
+
+    Args:
+        kernel: Rigid motions, shape (dim n, n_modes).
+        points: Coordinates by block of dofs, shape (n, dim).
+        count: Number of nodes.
+
+    Returns:
+        Dofs, ascending, shape (n_dofs,), and motions, shape (n_dofs, n_modes).
+    """
+    nodes, dim = np.sort(fixing_nodes(points, count)), points.shape[1]
     dofs = (dim * nodes[:, None] + np.arange(dim)).ravel()
     basis, _ = np.linalg.qr(kernel[dofs])
-    block = stiffness.diagonal().max() * (basis @ basis.T)
+    return dofs, basis
+
+
+def held_by(stiffness: sp.csr_matrix, dofs: np.ndarray, motions: np.ndarray, weight: float) -> sp.csr_matrix:
+    """Return K + ρ R̂ R̂ᵀ, with the motions R̂ on some dofs and a weight ρ."""
+    block = weight * (motions @ motions.T)
     rows, columns = np.repeat(dofs, len(dofs)), np.tile(dofs, len(dofs))
     return (stiffness + sp.coo_matrix((block.ravel(), (rows, columns)), shape=stiffness.shape)).tocsr()

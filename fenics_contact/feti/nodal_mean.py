@@ -46,7 +46,7 @@ def nodal_mean_at(decomposition: Decomposition, field: np.ndarray, nodes: np.nda
         Shape (n, dim), replicated.
     """
     tearing = decomposition.tearing
-    place, copy, block = _copies_here(decomposition, nodes)
+    place, copy, block = decomposition.copies_here(nodes)
     total = np.zeros((len(nodes), tearing.dim))
     np.add.at(total, place, tearing.copy_share[copy, None] * field.reshape(-1, tearing.dim)[block])
     return np.asarray(decomposition.comm.allreduce(total))
@@ -64,20 +64,7 @@ def nodal_mean_transposed(decomposition: Decomposition, nodes: np.ndarray, value
         This rank's part of the field, shape (torn_size,).
     """
     tearing = decomposition.tearing
-    place, copy, block = _copies_here(decomposition, nodes)
+    place, copy, block = decomposition.copies_here(nodes)
     result = np.zeros((decomposition.torn_size // tearing.dim, tearing.dim))
     result[block] = tearing.copy_share[copy, None] * values[place]
     return result.ravel()
-
-
-def _copies_here(
-    decomposition: Decomposition, nodes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return for each copy on this rank its place in ``nodes``, its number and its block of torn dofs."""
-    tearing = decomposition.tearing
-    copies = tearing.multiplicity[nodes]
-    within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
-    copy = np.repeat(tearing.first_copy[nodes], copies) + within
-    block = decomposition.copy_block[copy]
-    here = np.flatnonzero(block >= 0)
-    return np.repeat(np.arange(len(nodes)), copies)[here], copy[here], block[here]

@@ -34,7 +34,7 @@ from fenics_contact.pairing import (
     friction_data,
     join_points,
 )
-from fenics_contact.qp import ContactLayout
+from fenics_contact.qp import ContactLayout, CoulombLaw, SlipLaw, TrescaLaw
 from fenics_contact.scene import Scene
 
 _LOG = logging.getLogger(__name__)
@@ -213,6 +213,19 @@ class TornSystem:
     def owned_discs(self) -> np.ndarray:
         """The frictional points whose discs this rank owns, positions in `frictional`."""
         return np.flatnonzero(self.numbering.owned_index(self.tangential_rows[:, 0]) >= 0)
+
+    @property
+    def friction(self) -> tuple[np.ndarray, np.ndarray | None]:
+        """The given slip bounds of this rank's discs, [force], and coefficients, None if zero everywhere."""
+        discs = self.owned_discs
+        coefficient = self.friction_coefficient[discs] if np.any(self.friction_coefficient > 0) else None
+        return self.tresca_bound[discs], coefficient
+
+    @property
+    def law(self) -> SlipLaw:
+        """The law of friction of this rank's discs."""
+        given, coefficient, layout = *self.friction, self.layout
+        return TrescaLaw(layout, given) if coefficient is None else CoulombLaw(layout, coefficient, given)
 
     @property
     def load(self) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Large deformations and nonlinear materials: Newton's method on the torn system."""
 
-from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation, law_of
+from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation
 from fenics_contact.nonlinear.load_steps import AutomaticSteps, Path, PathEndsError
 from fenics_contact.nonlinear.meeting import Contact, Loading, Meeting, MovingContact, StillContact
 from fenics_contact.nonlinear.newton import NonlinearEquilibrium, TangentNewton
@@ -20,5 +20,4 @@ __all__ = [
     "PathEndsError",
     "StillContact",
     "TangentNewton",
-    "law_of",
 ]

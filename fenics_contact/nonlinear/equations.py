@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +17,6 @@ from fenics_contact.nonlinear.meeting import Meeting, TurningForces
 from fenics_contact.nonlinear.tangent_step import TangentProblem
 from fenics_contact.nonlinear.tangent_system import TangentSystem, linearised
 from fenics_contact.qp import (
-    CoulombLaw,
     Residuals,
     SlipLaw,
     Vector,
@@ -193,7 +190,7 @@ class Linearisation:
         """Return the problem of one Newton step from the configuration of the linearisation."""
         nothing, further, torn = np.zeros(self.further.count), self.further, self.system.torn
         return TangentProblem(
-            self.system.problem.with_law(law_of(torn)),
+            self.system.problem.with_law(torn.law),
             self.system.stiffness,
             np.concatenate([evaluation.at.multiplier, nothing]),
             np.concatenate([evaluation.lacking, nothing]),
@@ -211,20 +208,14 @@ def _stiffened(
     if len(geometric.block_node) == 0:
         return tangents
     decomposition, dim = torn.decomposition, torn.dim
-    tearing = decomposition.tearing
-    copies = tearing.multiplicity[geometric.block_node]
-    within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
-    copy = np.repeat(tearing.first_copy[geometric.block_node], copies) + within
-    block = np.repeat(geometric.blocks, copies, axis=0) * tearing.copy_share[copy, None, None]
-    place = decomposition.copy_block[copy]
-    here = np.flatnonzero(place >= 0)
-    dofs = dim * place[here, None] + np.arange(dim)
+    entry, copy, place = decomposition.copies_here(geometric.block_node)
+    block = geometric.blocks[entry] * decomposition.tearing.copy_share[copy, None, None]
+    dofs = dim * place[:, None] + np.arange(dim)
     row, column = np.repeat(dofs, dim, axis=1).ravel(), np.tile(dofs, dim).ravel()
     size = decomposition.torn_size
-    added = sp.csr_matrix((block[here].ravel(), (row, column)), shape=(size, size))
-    ends = dim * decomposition.block_offset
-    parts = [slice(int(a), int(b)) for a, b in pairwise(ends)]
-    return [(K + added[part, part]).tocsr() for K, part in zip(tangents, parts, strict=True)]
+    added = sp.csr_matrix((block.ravel(), (row, column)), shape=(size, size))
+    each = zip(tangents, decomposition.parts, strict=True)
+    return [(K + added[part, part]).tocsr() for K, part in each]
 
 
 @displayed
@@ -253,11 +244,6 @@ class Equations:
     def _facts(self) -> dict[str, object]:
         return {"subdomains": f"{len(self._mechanics)} on this rank"}
 
-    @cached_property
-    def _parts(self) -> list[slice]:
-        ends = self.decomposition.tearing.dim * self.decomposition.block_offset
-        return [slice(int(a), int(b)) for a, b in pairwise(ends)]
-
     def at_rest(self) -> Configuration:
         """Return the undeformed configuration without forces."""
         nothing = (None,) * len(self._mechanics)
@@ -267,7 +253,7 @@ class Equations:
         """Return the smallest det F at a torn displacement of all ranks. Collective."""
         comm = self.decomposition.comm
         with together(comm):
-            each = zip(self._mechanics, self._parts, strict=True)
+            each = zip(self._mechanics, self.decomposition.parts, strict=True)
             least = min((m.least_jacobian(displacement[part]) for m, part in each), default=1.0)
         return global_min(comm, least)
 
@@ -282,7 +268,7 @@ class Equations:
         """
         comm, torn = self.decomposition.comm, meeting.torn
         with together(comm):
-            each = zip(self._mechanics, self._parts, at.history, strict=True)
+            each = zip(self._mechanics, self.decomposition.parts, at.history, strict=True)
             responses = tuple(m.at(at.displacement[part], history) for m, part, history in each)
         internal = np.concatenate([np.zeros(0), *(response.force for response in responses)])
         bound = torn.B.T @ torn.numbering.to_local(at.multiplier)
@@ -304,7 +290,8 @@ def _residuals(
 ) -> Residuals:
     """Return the relative residuals: forces out of balance as `coarse`. Collective."""
     comm, contact = torn.numbering.comm, torn.numbering.owned >= torn.n_equality
-    mapped = law.feasible(at.multiplier).project(at.multiplier - step * lacking)
+    feasible = law.feasible(at.multiplier)
+    mapped = feasible.project(at.multiplier - step * lacking)
     error, u = (at.multiplier - mapped)[contact], at.displacement
     sums = global_sum(
         comm,
@@ -315,7 +302,7 @@ def _residuals(
     moved = max(moved, given)
     floor = FORCE_FLOOR * global_max(comm, stiff) * moved / np.sqrt(sums[8])
     force = max(min(internal, bound) if internal > 0 else bound, load, floor)
-    violation = global_max(comm, law.feasible(at.multiplier).violation(at.multiplier))
+    violation = global_max(comm, feasible.violation(at.multiplier))
     ratio = 1.0 / force if force > 0.0 else 0.0
     return Residuals(
         natural * ratio,
@@ -325,9 +312,3 @@ def _residuals(
         force,
         moved,
     )
-
-
-def law_of(torn: TornSystem) -> SlipLaw:
-    """Return the law of friction of this rank's discs."""
-    discs = torn.owned_discs
-    return CoulombLaw(torn.layout, torn.friction_coefficient[discs], torn.tresca_bound[discs])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from fenics_contact.nonlinear.meeting import Contact, Loading
 from fenics_contact.nonlinear.newton import NonlinearEquilibrium, TangentNewton
 from fenics_contact.qp import SolverStep
 from fenics_contact.timing import PhaseTimer
+
+if TYPE_CHECKING:
+    from fenics_contact.pairing import MaterialPoints
 
 _LOG = logging.getLogger(__name__)
 
@@ -30,6 +34,8 @@ class Path:
     Attributes:
         load: What acts at the end.
         end: The last equilibrium.
+        start: Where nodes stood on their masters at the start; None where contact is that of the undeformed
+            bodies.
         fractions: Parts of the load at which equilibria were found, the last one being 1.
         history: One line for each Newton step of all parts, those of parts that were cut included.
         products: Applications of F.
@@ -38,6 +44,7 @@ class Path:
 
     load: Loading
     end: NonlinearEquilibrium
+    start: MaterialPoints | None
     fractions: tuple[float, ...]
     history: tuple[SolverStep, ...]
     products: int
@@ -99,6 +106,7 @@ class AutomaticSteps:
         first = target.removed() if before is None else before
         at, torn = start, first.torn
         end: NonlinearEquilibrium | None = None
+        stood = None if at.meeting is None else at.meeting.stood
         reached, part, longest = 0.0, self.first, contact.longest_part(first, target)
         fractions, history, products, factorisations = list[float](), list[SolverStep](), 0, 0
 
@@ -107,6 +115,7 @@ class AutomaticSteps:
             return Path(
                 target.between(first, reached),
                 end,
+                stood,
                 tuple(fractions),
                 tuple(history),
                 products,
@@ -140,6 +149,8 @@ class AutomaticSteps:
             products, factorisations = products + found.products, factorisations + found.factorisations
             fractions.append(fraction)
             at, torn, end, reached = found.configuration, load.torn, found, fraction
+            new = found.evaluation.meeting.start
+            stood = new if stood is None or new is None else stood.extended(new)
             known = found.linearisation
             part *= 2.0 if len(found.history) <= EASY else 1.0
         return walked()

@@ -80,27 +80,25 @@ class Meeting:
     start: MaterialPoints | None
     prescribed: np.ndarray
 
+    @property
+    def stood(self) -> MaterialPoints | None:
+        """Where nodes stand on their masters; None where contact is that of the undeformed bodies."""
+        return None if self.points is None else self.points.material_points()
+
     def lacking(self, displacement: Vector) -> Vector:
         """Return c − B u, owned, [length]: gaps, minus the slip, and openings of glued rows. Collective."""
-        torn, owned = self.torn, self.torn.numbering.owned
-        lacking = torn.right - torn.jump(displacement)
+        lacking = self.torn.right - self.torn.jump(displacement)
         if self.points is None or self.start is None:
             return lacking
-        slip = self.points.slip(self.start)[torn.frictional].ravel()
-        contact = np.concatenate([self.points.points.gap, -slip])
-        mine = owned >= torn.n_equality
-        lacking[mine] = contact[owned[mine] - torn.n_equality]
-        return lacking
+        return self._placed(lacking, self.points.points.gap, -self.points.slip(self.start))
 
     def turning(self, multiplier: Vector) -> TurningForces | None:
         """Return the stiffness of forces that turn with their surfaces; None without any. Collective."""
         if self.points is None:
             return None
-        torn, gather = self.torn, self.torn.numbering.gather
-        normal = np.maximum(gather(multiplier, torn.normal_rows), 0.0)
-        friction = np.zeros((torn.points.count, torn.dim - 1))
-        friction[torn.frictional] = gather(multiplier, torn.tangential_rows.ravel()).reshape(-1, torn.dim - 1)
-        return TurningForces.of(self.points.stiffness(normal), self.points.friction_stiffness(friction))
+        normal, friction = self._at_points(multiplier)
+        stiffness = self.points.stiffness(np.maximum(normal, 0.0))
+        return TurningForces.of(stiffness, self.points.friction_stiffness(friction))
 
     def carried(self, values: Vector, other: Meeting, spread: bool = False) -> Vector:
         """Return a vector on the rows of another meeting on these rows. Collective.
@@ -113,23 +111,37 @@ class Meeting:
         if self.points is None or other.points is None:
             return values
         torn, before = self.torn, other.torn
-        rows = np.concatenate([before.normal_rows, before.tangential_rows.ravel()])
-        there = before.numbering.gather(values, rows)
-        count, width = before.points.count, before.dim - 1
-        friction = np.zeros((count, width))
-        friction[before.frictional] = there[count:].reshape(-1, width)
+        normal, friction = other._at_points(values)
         if spread:
-            normal, tangential = (self._filled(x, other) for x in (there[:count], friction))
+            normal, friction = (self._filled(x, other) for x in (normal, friction))
         else:
-            normal = self.points.carry(there[:count], other.points)
-            tangential = self.points.carry_tangential(friction, other.points)
-        contact = np.concatenate([normal, tangential[torn.frictional].ravel()])
-        owned = torn.numbering.owned
-        result = np.empty(len(owned))
-        equality = owned < torn.n_equality
+            normal = self.points.carry(normal, other.points)
+            friction = self.points.carry_tangential(friction, other.points)
+        result = np.empty(len(torn.numbering.owned))
+        equality = torn.numbering.owned < torn.n_equality
         result[equality] = values[before.numbering.owned < before.n_equality]
-        result[~equality] = contact[owned[~equality] - torn.n_equality]
-        return result
+        return self._placed(result, normal, friction)
+
+    def _at_points(self, values: Vector) -> tuple[np.ndarray, np.ndarray]:
+        """Return the part of a vector on normal rows, shape (n,), and on tangents, (n, dim − 1). Collective.
+
+        That of points without friction is zero.
+        """
+        torn = self.torn
+        count, width = torn.points.count, torn.dim - 1
+        rows = np.concatenate([torn.normal_rows, torn.tangential_rows.ravel()])
+        gathered = torn.numbering.gather(values, rows)
+        tangential = np.zeros((count, width))
+        tangential[torn.frictional] = gathered[count:].reshape(-1, width)
+        return gathered[:count], tangential
+
+    def _placed(self, values: Vector, normal: np.ndarray, tangential: np.ndarray) -> Vector:
+        """Write values at points into the contact rows of a vector, and return it."""
+        torn = self.torn
+        contact = np.concatenate([normal, tangential[torn.frictional].ravel()])
+        mine = torn.numbering.owned >= torn.n_equality
+        values[mine] = contact[torn.numbering.owned[mine] - torn.n_equality]
+        return values
 
     def _filled(self, values: np.ndarray, other: Meeting) -> np.ndarray:
         assert self.points is not None

@@ -9,7 +9,7 @@ import numpy as np
 
 from fenics_contact.display import displayed
 from fenics_contact.errors import ConvergenceError, InfeasibleError
-from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation, law_of
+from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation
 from fenics_contact.nonlinear.meeting import Contact, Loading
 from fenics_contact.nonlinear.tangent_step import TangentStep, tangent_step
 from fenics_contact.nonlinear.tangent_system import TangentSystem
@@ -29,7 +29,7 @@ from fenics_contact.timing import PhaseTimer
 if TYPE_CHECKING:
     from fenics_contact.pairing import MaterialPoints
 
-#: Fractions of a step that are tried where it is worse than the last two and progress has stalled.
+#: Fractions of a step that are tried where it and its contact are worse than at the last two configurations.
 FRACTIONS = (0.5, 0.25, 0.1)
 #: Factor on the residual of linear systems after each step without progress, and the least of these factors:
 #: near a loss of stability a small residual may hide a large error.
@@ -40,8 +40,8 @@ SLIPPED = 1e-6
 FINE = 1e-4
 #: Part of the smallest det F that a step must leave.
 ROOM = 0.2
-#: Steps without half the residual after which steps are shortened and systems solved more accurately, and
-#: the second time the natural map becomes more cautious, and by how much.
+#: Steps without half the residual after which systems are solved more accurately, and from the second time
+#: on the natural map becomes more cautious, by this factor.
 PATIENCE, CAUTION = 4, 0.2
 #: Residual of contact problems that are solved as a whole, at the start of a history.
 NESTED = 1e-4
@@ -139,8 +139,7 @@ class _Run:
         self.products = self.factorisations = 0
 
     def to_equilibrium(self, at: Configuration, known: Linearisation | None) -> NonlinearEquilibrium:
-        points = None if at.meeting is None else at.meeting.points
-        self._start = None if points is None else points.material_points()
+        self._start = None if at.meeting is None else at.meeting.stood
         near, evaluation, earlier = known, self._evaluated(at, known), None
         while near is None or not evaluation.residuals.within(self._method.tolerance):
             self._require_progress(evaluation)
@@ -158,7 +157,7 @@ class _Run:
             step: Vector = np.zeros(meeting.torn.layout.size)
             if near is not None:
                 step = near.natural_step(meeting, self._caution)
-            return self._equations.evaluate(meeting, law_of(meeting.torn), at, step)
+            return self._equations.evaluate(meeting, meeting.torn.law, at, step)
 
     def _require_progress(self, evaluation: Evaluation) -> None:
         """Adapt the forcing term and ρ. Collective.
@@ -270,16 +269,11 @@ class _Run:
             scaling=scaling,
             reach=None,
         )
-        discs = torn.owned_discs
-        coefficient = torn.friction_coefficient[discs] if np.any(torn.friction_coefficient > 0) else None
+        tresca, coefficient = torn.friction
         solution = solve(
-            problem,
-            torn.tresca_bound[discs],
-            FaceNewton(NESTED),
-            multiplier,
-            friction_coefficient=coefficient,
+            problem, tresca, FaceNewton(NESTED), multiplier, friction_coefficient=coefficient
         )
-        bound = law_of(torn).bound(solution.multiplier)
+        bound = torn.law.bound(solution.multiplier)
         face = classify(problem.layout, bound, solution.multiplier, solution.residual, step)
         return TangentStep(
             solution.multiplier, solution.alpha, face, system.products - before, Stop.CONVERGED

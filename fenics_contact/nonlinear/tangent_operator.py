@@ -6,7 +6,14 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from fenics_contact.feti import Subdomain, fixing_nodes
+from fenics_contact.feti import (
+    FIXING_NODES,
+    FactoredOperator,
+    Subdomain,
+    dofs_inside,
+    fixing_motions,
+    held_by,
+)
 from fenics_contact.nonlinear.indefinite_factor import IndefiniteFactor
 
 #: Fixing nodes relative to the cube root of the number of nodes: held at its corners alone, a body under
@@ -21,7 +28,7 @@ PROBES, FIRST_SWEEPS, SWEEPS = 4, 6, 2
 ROUGH = 1e-2
 
 
-class TangentOperator:
+class TangentOperator(FactoredOperator):
     """K_ρ⁻¹ and the Schur complement of K_ρ = K + C Cᵀ on the interface, for a symmetric tangent K.
 
     C holds the rigid motions at some nodes and, where these leave motions that stress has made soft or
@@ -47,29 +54,26 @@ class TangentOperator:
         """
         K, size = subdomain.stiffness, subdomain.mesh.size
         typical = float(np.abs(K.diagonal()).max())
-        dofs, basis = _fixing_columns(subdomain)
-        block = typical * (basis @ basis.T)
-        entries = (block.ravel(), (np.repeat(dofs, len(dofs)), np.tile(dofs, len(dofs))))
-        held = (K + sp.coo_matrix(entries, shape=K.shape)).tocsr()
+        points = subdomain.points
+        count = max(FIXING_NODES, round(SPREAD * len(points) ** (1.0 / subdomain.mesh.dim)))
+        dofs, basis = fixing_motions(subdomain.kernel, points, count)
+        held = held_by(K, dofs, basis, typical)
         factor = IndefiniteFactor(held)
         columns = np.zeros((size, basis.shape[1]))
         columns[dofs] = basis
         weights = np.full(basis.shape[1], typical)
         soft, grip = self._soft_motions(held, factor, earlier, typical)
         self.softened = soft.shape[1]
-        self._factor = _Updated(factor, soft, grip)
+        whole = _Updated(factor, soft, grip)
         columns, weights = np.hstack([columns, soft]), np.concatenate([weights, grip])
-        self.modes = self._factor.solve_many(columns * weights)
+        self.modes = whole.solve_many(columns * weights)
         self.stiffness = _symmetric(np.linalg.lstsq(columns, K @ self.modes, rcond=None)[0])
-        self._interface, self._right, self._left = interface, np.zeros(size), np.zeros(size)
-        self._rest = rest = np.setdiff1d(np.arange(size), interface, assume_unique=True)
-        rows = held[interface]
-        self._K_bb, self._K_bi = rows[:, interface].tocsr(), rows[:, rest].tocsr()
-        self._K_ib = self._K_bi.T
+        rest = dofs_inside(K, interface)
         self._at_interface, self._at_rest, self._grip = soft[interface], soft[rest], grip
-        inside = IndefiniteFactor(held[rest][:, rest].tocsr()) if len(rest) else None
-        self._inside = None if inside is None else _Updated(inside, soft[rest], grip)
-        self._inner = np.zeros(len(rest))
+        inside = None
+        if len(rest):
+            inside = _Updated(IndefiniteFactor(held[rest][:, rest].tocsr()), soft[rest], grip)
+        super().__init__(held, interface, whole, inside)
 
     def _soft_motions(
         self, held: sp.csr_matrix, factor: IndefiniteFactor, earlier: TangentOperator | None, typical: float
@@ -88,40 +92,14 @@ class TangentOperator:
         self._searched = vectors[:, soft]
         return self._searched, GRIP * np.maximum(-values[soft], 0.0) + LEAST_GRIP * typical
 
-    def flex(self, force: np.ndarray, displacement: np.ndarray) -> None:
-        """Write (K_ρ⁻¹)_bb times an interface force into ``displacement``."""
-        self._right[self._interface] = force
-        self._factor.solve(self._right, self._left)
-        displacement[:] = self._left[self._interface]
-
-    def stiffen(self, displacement: np.ndarray, force: np.ndarray) -> None:
-        """Write the Schur complement of K_ρ times an interface displacement into ``force``."""
+    def _forces(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        here, inside = super()._forces(displacement)
         moved = self._grip * (self._at_interface.T @ displacement)
-        force[:] = self._K_bb @ displacement + self._at_interface @ moved
-        if self._inside is not None:
-            self._inside.solve(self._K_ib @ displacement + self._at_rest @ moved, self._inner)
-            force -= self._K_bi @ self._inner
-            force -= self._at_interface @ (self._grip * (self._at_rest.T @ self._inner))
+        return here + self._at_interface @ moved, inside + self._at_rest @ moved
 
-    def extend(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the displacement in equilibrium inside for one of the interface, and its force there."""
-        self.stiffen(displacement, force := np.empty_like(displacement))
-        whole = np.empty(len(self._right))
-        whole[self._interface] = displacement
-        whole[self._rest] = -self._inner
-        return whole, force
-
-    def invert(self, right: np.ndarray) -> np.ndarray:
-        """Return K_ρ⁻¹ times a vector, shape (n,)."""
-        solution = np.empty_like(right)
-        self._factor.solve(right, solution)
-        return solution
-
-    def row_flexibility(self, rows: sp.csr_matrix) -> np.ndarray:
-        """Return bᵀ (K_ρ⁻¹)_bb b for each row b of a matrix with interface columns, shape (n_rows,)."""
-        right = np.zeros((len(self._right), rows.shape[0]))
-        right[self._interface] = rows.toarray().T
-        return np.asarray(np.einsum("nk,nk->k", right, self._factor.solve_many(right)))
+    def _forces_from_inside(self, displacement: np.ndarray) -> np.ndarray:
+        moved = self._grip * (self._at_rest.T @ displacement)
+        return super()._forces_from_inside(displacement) + self._at_interface @ moved
 
 
 class _Updated:
@@ -145,16 +123,6 @@ class _Updated:
         if len(self._small):
             solution = solution - self._moved @ (self._small @ (self._columns.T @ solution))
         return solution
-
-
-def _fixing_columns(subdomain: Subdomain) -> tuple[np.ndarray, np.ndarray]:
-    """Return the dofs of well-spread nodes and orthonormal rigid motions on them, shape (n_dofs, m)."""
-    points, dim = subdomain.points, subdomain.mesh.dim
-    count = max(4, round(SPREAD * len(points) ** (1.0 / dim)))
-    nodes = np.sort(fixing_nodes(points, count))
-    dofs = (dim * nodes[:, None] + np.arange(dim)).ravel()
-    basis, _ = np.linalg.qr(subdomain.kernel[dofs])
-    return dofs, basis
 
 
 def _softest(

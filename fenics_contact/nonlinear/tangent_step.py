@@ -223,7 +223,7 @@ class _StiffFace:
         problem, contact = self.at.problem, self.at.problem.layout.contact
         total, count = global_sum(problem.comm, problem.diagonal[contact].sum(), len(contact))
         weights = np.ones(len(self.compliance))
-        further = np.concatenate([self._soft, np.ones(len(self._nothing), dtype=bool)])
+        further = self._further
         weights[further] = np.minimum(total / max(count, 1.0) / np.abs(self.compliance[further]), 1.0)
         return weights
 
@@ -239,12 +239,12 @@ class _StiffFace:
         residual = np.zeros(self.system.face.n_face)
         residual[self.shared] = across[: len(self.shared)]
         step = np.concatenate([self.system.precondition(residual)[self.shared], self._nothing])
-        further = np.concatenate([self._soft, np.ones(len(self._nothing), dtype=bool)])
-        step[further] = across[further] / self.compliance[further]
+        step[self._further] = across[self._further] / self.compliance[self._further]
         borne = oblique.tested.T @ oblique.solve(self.at.stiffness @ motions)
         return np.asarray(oblique.moving.project(step) - borne, dtype=np.float64), motions
 
     @cached_property
-    def _soft(self) -> np.ndarray:
-        """Marks of the shared columns with a compliance of their own."""
-        return self.system.face.restrict(self.at.compliance)[self.shared] != 0.0
+    def _further(self) -> np.ndarray:
+        """Marks of the columns with a compliance of their own, shape (n,)."""
+        soft = self.system.face.restrict(self.at.compliance)[self.shared] != 0.0
+        return np.concatenate([soft, np.ones(len(self._nothing), dtype=bool)])

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, DeformedState, solve_scene, solve_steps
 from fenics_contact.gallery import rectangle
 from fenics_contact.mesh import BodyMesh
+from fenics_contact.nonlinear import AutomaticSteps
 from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
@@ -24,7 +26,7 @@ from fenics_contact.scene import (
     Support,
     Surface,
 )
-from tests.nonlinear.scenes import RUBBER
+from tests.nonlinear.scenes import RUBBER, pressed, rounded
 
 #: Depths and ways of a die that is pressed into a block and drawn along it.
 WAY = [(0.0, -0.4), (0.0, -0.8), (0.25, -0.8), (0.5, -0.8)]
@@ -94,6 +96,29 @@ def test_ironing_turned_in_the_plane_gives_the_turned_answer() -> None:
     assert np.abs(force(turn) - [-y, x]).max() < 1e-8 * np.abs(y)
     normal = upright.contact.normal_force
     assert np.abs(turn.contact.normal_force - normal).max() < 1e-8 * normal.max()
+
+
+@pytest.mark.parametrize("parts", [1, 4])
+def test_slip_is_how_far_nodes_have_gone_over_the_plane(parts: int) -> None:
+    """Also without friction, in however many parts a load step is done; that of earlier steps is added up."""
+    mesh = rounded(3)
+    way = [(0.0, 0.3), (0.4, 0.3), (0.7, 0.3)]
+    steps = [
+        LoadStep(str(x), supports=pressed(mesh, depth, pushed=x, friction=0.0).supports) for x, depth in way
+    ]
+    problem = ContactProblem(
+        pressed(mesh, 0.3, friction=0.0), MPI.COMM_SELF, steps=AutomaticSteps(first=1.0 / parts)
+    )
+    states = solve_steps(problem, steps)
+    places = [state.gather_displacement("block") for state in states]
+    for last, state, before in zip(places[1:], states[1:], places[:-1], strict=True):
+        contact = state.contact
+        points = contact.points
+        gone = np.einsum("nad,nd->na", points.tangents, (last - before)[points.slave])
+        since = np.einsum("nad,nd->na", points.tangents, (before - places[0])[points.slave])
+        assert np.abs(gone).max() > 0.2
+        np.testing.assert_allclose(contact.slip, gone, atol=1e-8)
+        np.testing.assert_allclose(contact.slip_before - states[0].contact.slip, since, atol=1e-8)
 
 
 def test_a_rigid_disc_deep_in_rubber() -> None:
