@@ -52,7 +52,7 @@ def checked(*own: str) -> Callable[[Class], Class]:
     """
 
     def with_check(cls: Class) -> Class:
-        further = cls.__dict__.get("__post_init__")
+        further = getattr(cls, "__post_init__", None)  # its own, or that of a base
 
         def __post_init__(self: Any) -> None:
             _check(self, cls, own)

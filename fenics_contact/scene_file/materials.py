@@ -66,32 +66,29 @@ class OrthotropicPlate(_Material):
     shear_modulus: PositiveFloat
 
 
-@keys_of(scene.J2Plasticity)
-class J2Material(_Material):
-    """Elastic-plastic metals in small strain: von Mises' yield function with hardening."""
-
-    model: Literal["j2_plasticity"]
-    young_modulus: PositiveFloat
-    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)]
-    yield_stress: PositiveFloat
-    kinematic_hardening: NonNegativeFloat = 0.0
-    saturation_rate: NonNegativeFloat = 0.0
-
-
-@keys_of(scene.FinitePlasticity)
-class FinitePlasticityMaterial(_Material):
-    """Elastic-plastic metals in large deformations: von Mises' yield function with hardening."""
-
-    model: Literal["finite_plasticity"]
-    young_modulus: PositiveFloat
-    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)]
-    yield_stress: PositiveFloat
-    saturation_rate: NonNegativeFloat = 0.0
-
-
 class _Isotropic(_Material):
     young_modulus: PositiveFloat
     poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)]
+
+
+class _VonMisesMetal(_Isotropic):
+    yield_stress: PositiveFloat
+    saturation_rate: NonNegativeFloat = 0.0
+
+
+@keys_of(scene.J2Plasticity)
+class J2Material(_VonMisesMetal):
+    """Elastic-plastic metals in small strain: von Mises' yield function with hardening."""
+
+    model: Literal["j2_plasticity"]
+    kinematic_hardening: NonNegativeFloat = 0.0
+
+
+@keys_of(scene.FinitePlasticity)
+class FinitePlasticityMaterial(_VonMisesMetal):
+    """Elastic-plastic metals in large deformations: von Mises' yield function with hardening."""
+
+    model: Literal["finite_plasticity"]
 
 
 @keys_of(scene.NeoHooke)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import fenics_contact.scene as package
+from fenics_contact.checks import checked
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.scene import (
@@ -161,3 +162,23 @@ def test_a_material_of_ones_own_is_left_to_its_author() -> None:
     assert known(1.0, 0.3, names="x").names == "x"
     with pytest.raises(InvalidInputError, match=r"number, got 'x': Young's modulus E > 0"):
         known("x", 0.3)
+
+
+def test_checks_of_a_base_are_not_lost() -> None:
+    @dataclass
+    class Wire:
+        radius: float
+
+        def __post_init__(self) -> None:
+            if self.radius <= 0:
+                raise InvalidInputError("radius above zero")
+
+    @dataclass
+    @checked()
+    class Rope(Wire):
+        strands: int
+
+    with pytest.raises(InvalidInputError, match="above zero"):
+        Rope(-1.0, 3)
+    with pytest.raises(InvalidInputError, match=r"Rope\.strands must be"):
+        Rope(1.0, "three")  # type: ignore[arg-type]

@@ -8,16 +8,16 @@ from typing import ClassVar
 import numpy as np
 
 from fenics_contact.checks import checked
-from fenics_contact.scene.materials.constants import check_isotropic
-from fenics_contact.scene.materials.history_material import HistoryMaterial, MaterialResponse
+from fenics_contact.scene.materials.history_material import MaterialResponse
 from fenics_contact.scene.materials.j2_plasticity import elastic_moduli
-from fenics_contact.scene.materials.return_mapping import Hardening, check_plastic, radial_return
+from fenics_contact.scene.materials.return_mapping import radial_return
 from fenics_contact.scene.materials.voigt import to_tensor, to_vector
+from fenics_contact.scene.materials.von_mises_metal import VonMisesMetal
 
 
 @dataclass(frozen=True)
 @checked()
-class FinitePlasticity(HistoryMaterial):
+class FinitePlasticity(VonMisesMetal):
     """Elastic-plastic metals in large deformations: multiplicative von Mises plasticity, F = F_e F_p.
 
     Hencky's elastic law τ = κ tr ε I + 2 G dev ε between the Kirchhoff stress τ and the logarithmic elastic
@@ -51,24 +51,6 @@ class FinitePlasticity(HistoryMaterial):
     isotropic_hardening: float = 0.0
     saturation_stress: float | None = None
     saturation_rate: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Reject constants without a unique answer."""
-        check_isotropic(self.young_modulus, self.poisson_ratio, None)
-        law = self.hardening
-        saturation = law.saturation_stress, law.saturation_rate
-        check_plastic(self.young_modulus, law.yield_stress, law.slope, 0.0, saturation)
-
-    @property
-    def hardening(self) -> Hardening:
-        """Yield stress by equivalent plastic strain."""
-        final = self.yield_stress if self.saturation_stress is None else self.saturation_stress
-        return Hardening(self.yield_stress, self.isotropic_hardening, final, self.saturation_rate)
-
-    @property
-    def history_size(self) -> int:
-        """Plastic deformation and equivalent plastic strain."""
-        return 7
 
     def respond(self, gradient: np.ndarray, history: np.ndarray, duration: float) -> MaterialResponse:
         """Return P, its exact tangent and the new plastic deformation; nothing depends on the duration."""

@@ -7,15 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.checks import checked
-from fenics_contact.scene.materials.constants import check_isotropic, lame
-from fenics_contact.scene.materials.history_material import HistoryMaterial, MaterialResponse
-from fenics_contact.scene.materials.return_mapping import Hardening, check_plastic, radial_return
+from fenics_contact.scene.materials.constants import lame
+from fenics_contact.scene.materials.history_material import MaterialResponse
+from fenics_contact.scene.materials.return_mapping import radial_return
 from fenics_contact.scene.materials.voigt import to_tensor, to_vector
+from fenics_contact.scene.materials.von_mises_metal import VonMisesMetal
 
 
 @dataclass(frozen=True)
 @checked()
-class J2Plasticity(HistoryMaterial):
+class J2Plasticity(VonMisesMetal):
     """Elastic-plastic metals in small strain: von Mises' yield function, associated flow, no creep.
 
     Yields where √(3/2) ‖dev σ − β‖ = σ_y(α), with σ_y = σ_0 + H α + (σ_∞ − σ_0)(1 − exp(−δ α)) and Prager's
@@ -51,23 +52,9 @@ class J2Plasticity(HistoryMaterial):
     saturation_stress: float | None = None
     saturation_rate: float = 0.0
 
-    def __post_init__(self) -> None:
-        """Reject constants without a unique answer."""
-        check_isotropic(self.young_modulus, self.poisson_ratio, None)
-        law = self.hardening
-        saturation = law.saturation_stress, law.saturation_rate
-        check_plastic(self.young_modulus, law.yield_stress, law.slope, self.kinematic_hardening, saturation)
-
     @property
-    def hardening(self) -> Hardening:
-        """Yield stress by equivalent plastic strain."""
-        final = self.yield_stress if self.saturation_stress is None else self.saturation_stress
-        return Hardening(self.yield_stress, self.isotropic_hardening, final, self.saturation_rate)
-
-    @property
-    def history_size(self) -> int:
-        """Plastic strain and equivalent plastic strain."""
-        return 7
+    def _back_slope(self) -> float:
+        return self.kinematic_hardening
 
     def respond(self, gradient: np.ndarray, history: np.ndarray, duration: float) -> MaterialResponse:
         """Return σ, the consistent tangent and the new plastic strain; nothing depends on the duration."""
