@@ -15,12 +15,13 @@ from fenics_contact.contact.state import State
 from fenics_contact.contact.static_admissibility import check_held
 from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.errors import InvalidInputError, LoadStepError
-from fenics_contact.feti import Decomposition, build_torn_system, prescribed_displacements
+from fenics_contact.feti import Decomposition, TornSystem, build_torn_system, prescribed_displacements
 from fenics_contact.nonlinear import (
     AutomaticSteps,
     Contact,
     Equations,
     Evaluation,
+    FollowingPressures,
     Loading,
     MovingContact,
     Path,
@@ -28,7 +29,7 @@ from fenics_contact.nonlinear import (
     StillContact,
 )
 from fenics_contact.qp import DualSolution
-from fenics_contact.scene import RigidSurface, Scene, is_finite_strain
+from fenics_contact.scene import RigidSurface, Scene
 from fenics_contact.timing import PhaseTimer
 
 if TYPE_CHECKING:
@@ -60,7 +61,8 @@ class DeformedEquilibria:
         self._steps = steps or AutomaticSteps()
         self._decomposition, self._timer = decomposition, timer
         self._equations = Equations(scene, decomposition)
-        moves = any(is_finite_strain(each) for body in scene.bodies.values() for each in body.materials)
+        self._assembled: TornSystem | None = None
+        moves = any(body.deforms_much for body in scene.bodies.values())
         self._contact: Contact = StillContact()
         if scene.contacts and moves:
             self._contact = MovingContact(scene, decomposition)
@@ -92,18 +94,24 @@ class DeformedEquilibria:
             before, known = origin.load, origin.equilibrium.linearisation
             start = origin.equilibrium.configuration
         with timer.phase("assemble"):
-            torn = build_torn_system(
-                scene, self._decomposition, previous=None if before is None else before.torn
-            )
+            load = self._loading(scene, time)
             if before is None:
-                check_held(torn)
-            load = Loading(torn, prescribed_displacements(scene, self._decomposition.tearing), time)
+                check_held(load.torn)
         try:
             path = steps.follow(equations, self._contact, before, load, start, timer, known)
         except PathEndsError as failure:
             last = None if failure.path is None else _state_after(failure.path, origin, timer)
             raise LoadStepError(str(failure), failure.history, last) from failure
         return _state_after(path, origin, timer)
+
+    def _loading(self, scene: Scene, time: float) -> Loading:
+        """Return what acts at a time. Collective."""
+        self._assembled = build_torn_system(scene, self._decomposition, previous=self._assembled)
+        prescribed = prescribed_displacements(scene, self._decomposition.tearing)
+        following: tuple[tuple[float, FollowingPressures], ...] = ()
+        if scene.following_pressures:
+            following = ((1.0, FollowingPressures(scene, self._decomposition)),)
+        return Loading(self._assembled, prescribed, time, following)
 
 
 def _state_after(path: Path, origin: State | None, timer: PhaseTimer) -> DeformedState:
@@ -112,7 +120,7 @@ def _state_after(path: Path, origin: State | None, timer: PhaseTimer) -> Deforme
     evaluation, at = end.evaluation, end.evaluation.at
     law, near = evaluation.law, end.linearisation
     diagonal = evaluation.meeting.carried(near.diagonal, near.meeting, spread=True)
-    system = near.system.on_rows_of(evaluation.torn, law, diagonal)
+    system = near.system.on_rows_of(evaluation.loaded, law, diagonal)
     solution = DualSolution(
         problem=system.problem,
         multiplier=at.multiplier,
@@ -149,9 +157,13 @@ def _with_slip(
 
 
 def _energies(evaluation: Evaluation, contact: ContactResult) -> Energies:
-    """Return the stored energy, the work of dead loads and the friction of the last step. Collective."""
+    """Return the stored energy, the work of dead loads and the friction of the last step. Collective.
+
+    The work of pressures that follow their surfaces depends on the way: then it is not known.
+    """
     stored = [np.nan if response.energy is None else response.energy for response in evaluation.responses]
     strain = float(evaluation.torn.numbering.comm.allreduce(float(np.sum(stored))))
-    work = evaluation.torn.load_work(evaluation.at.displacement)
+    dead = evaluation.softening is None
+    work = evaluation.torn.load_work(evaluation.at.displacement) if dead else np.nan
     friction = float(np.sum(contact.slip_bound * np.linalg.norm(contact.slip, axis=1)))
     return Energies(strain, work, friction, np.nan)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import ufl
 
@@ -28,10 +30,14 @@ from fenics_contact.scene import (
     Hyperelasticity,
     Load,
     Material,
+    Pressure,
     Scene,
     ThermalStrain,
     is_nonlinear,
 )
+
+if TYPE_CHECKING:
+    from fenics_contact.fem.following_pressure import FollowingPressure
 
 __all__ = [
     "LOADED",
@@ -118,15 +124,17 @@ class FormLibrary:
         return template.bind([space], load_parameters(load, parts), functions, facets, cells=cells)
 
     def prepare_mechanics(self, scene: Scene) -> None:
-        """Compile the missing forms of a scene's nonlinear materials. Collective on its communicator.
+        """Compile the missing forms of nonlinear materials and following pressures of a scene. Collective.
 
         Raises:
             InvalidInputError: If a hyperelastic model contradicts itself (see `check_hyperelastic`).
         """
-        from fenics_contact.fem.hyperelastic import prepare_mechanics  # linear scenes go without
+        from fenics_contact.fem.following_pressure import prepare_following  # linear scenes go without
+        from fenics_contact.fem.hyperelastic import prepare_mechanics
         from fenics_contact.fem.hyperelastic_checks import check_hyperelastic
 
         prepare_mechanics(self._templates, scene)
+        prepare_following(self._templates, scene)
         with together(self._comm):
             for body in scene.bodies.values():
                 for material in body.materials:
@@ -165,6 +173,20 @@ class FormLibrary:
         from fenics_contact.fem.history_mechanics import HistoryMechanics
 
         return HistoryMechanics(parts, cell_type, space, points, others)
+
+    def following(
+        self,
+        load: Pressure,
+        cell_type: str,
+        space: _dolfinx.fem.FunctionSpace,
+        points: np.ndarray,
+        facets: tuple[np.ndarray, np.ndarray],
+        acted: np.ndarray,
+    ) -> FollowingPressure:
+        """Return what a pressure that follows its surface adds on one mesh; arguments as for `load`."""
+        from fenics_contact.fem.following_pressure import FollowingPressure
+
+        return FollowingPressure(self._templates, load, cell_type, space, points, facets, acted)
 
     def varies(self, material: Material, cell_type: str) -> bool:
         """Return whether the stiffness of a material depends on position."""

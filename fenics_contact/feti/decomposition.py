@@ -74,6 +74,14 @@ class Decomposition:
         return place[here], copy[here], block[here]
 
     @property
+    def torn_stiffness(self) -> np.ndarray:
+        """Typical stiffness at each dof of this rank's torn vectors, the largest of all ranks being one."""
+        here = self.copy_block >= 0
+        stiffness = np.empty(int(self.block_offset[-1]))
+        stiffness[self.copy_block[here]] = self.tearing.copy_stiffness[here]
+        return np.repeat(stiffness, self.tearing.dim)
+
+    @property
     def fixed(self) -> np.ndarray:
         """Marks of prescribed components of nodes, shape (n_nodes, dim), replicated."""
         return self.gluing.fixed

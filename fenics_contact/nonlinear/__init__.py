@@ -2,7 +2,8 @@
 
 from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation
 from fenics_contact.nonlinear.load_steps import AutomaticSteps, Path, PathEndsError
-from fenics_contact.nonlinear.meeting import Contact, Loading, Meeting, MovingContact, StillContact
+from fenics_contact.nonlinear.loading import FollowingPressures, Loading
+from fenics_contact.nonlinear.meeting import Contact, Meeting, MovingContact, StillContact
 from fenics_contact.nonlinear.newton import NonlinearEquilibrium, TangentNewton
 
 __all__ = [
@@ -11,6 +12,7 @@ __all__ = [
     "Contact",
     "Equations",
     "Evaluation",
+    "FollowingPressures",
     "Linearisation",
     "Loading",
     "Meeting",

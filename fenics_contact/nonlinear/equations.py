@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,9 +12,11 @@ from fenics_contact.display import displayed
 from fenics_contact.errors import together
 from fenics_contact.fem import Mechanics, Response, composition
 from fenics_contact.feti import Decomposition, TornSystem
-from fenics_contact.nonlinear.meeting import Meeting, TurningForces
+from fenics_contact.nonlinear.loading import Loading
+from fenics_contact.nonlinear.meeting import Meeting
 from fenics_contact.nonlinear.tangent_step import TangentProblem
 from fenics_contact.nonlinear.tangent_system import TangentSystem, linearised
+from fenics_contact.nonlinear.turning import NO_ROWS, FurtherRows, stiffened, unsymmetric_at
 from fenics_contact.qp import (
     Residuals,
     SlipLaw,
@@ -27,9 +28,6 @@ from fenics_contact.qp import (
 )
 from fenics_contact.scene import Scene
 from fenics_contact.timing import PhaseTimer
-
-if TYPE_CHECKING:
-    from fenics_contact.pairing import GeometricStiffness
 
 #: Forces below this fraction of those that would strain bodies by their displacement are none.
 FORCE_FLOOR = 1e-4
@@ -71,20 +69,28 @@ class Evaluation:
         law: The law of friction there.
         at: The configuration.
         responses: Internal forces and tangents of this rank's subdomains.
-        unbalanced: f − f_int(u) − Bᵀλ of this rank, torn, [force].
+        load: f(u) of this rank, torn, [force].
+        softening: −∂f/∂u of this rank, torn; None where all loads are dead.
+        rim: Marks of the nodes where neighbours do not balance the unsymmetric part of that, (n_nodes,).
+        unbalanced: f(u) − f_int(u) − Bᵀλ of this rank, torn, [force].
         lacking: c − B u, owned, [length]: gaps, minus the slip, and openings of glued rows.
         residuals: Their size, relative.
         least_jacobian: Smallest det F of all bodies; 1 where none is strained much.
+        stiff: Largest entry of the tangents' diagonals, [force / length].
     """
 
     meeting: Meeting
     law: SlipLaw
     at: Configuration
     responses: tuple[Response, ...]
+    load: Vector
+    softening: sp.csr_matrix | None
+    rim: np.ndarray
     unbalanced: Vector
     lacking: Vector
     residuals: Residuals
     least_jacobian: float
+    stiff: float
 
     @property
     def torn(self) -> TornSystem:
@@ -92,9 +98,50 @@ class Evaluation:
         return self.meeting.torn
 
     @property
+    def loaded(self) -> TornSystem:
+        """The system with the load as it is on the deformed bodies."""
+        each = zip(self.torn.subdomains, self.torn.decomposition.parts, strict=True)
+        subdomains = tuple(replace(subdomain, load=self.load[part]) for subdomain, part in each)
+        return replace(self.torn, subdomains=subdomains)
+
+    @property
     def history(self) -> tuple[np.ndarray | None, ...]:
         """Internal variables after the displacement, of each subdomain."""
         return tuple(response.history for response in self.responses)
+
+    @property
+    def _tangents(self) -> list[sp.csr_matrix]:
+        """Growth of the internal forces with the displacement, less that of the loads, by subdomain.
+
+        That of the loads is made symmetric; for the other part there are `passed_on` and rows of its own.
+        """
+        tangents = [response.stiffness for response in self.responses]
+        if self.softening is None:
+            return tangents
+        symmetric = (self.softening + self.softening.T) / 2
+        each = zip(tangents, self.torn.decomposition.parts, strict=True)
+        return [(K + symmetric[part, part]).tocsr() for K, part in each]
+
+    def passed_on(self, moved: Vector) -> Vector:
+        """Return what neighbours and supports take of the unsymmetric part of the loads' growth. Collective.
+
+        Args:
+            moved: A change of the displacement of this rank, torn, shape (torn_size,), [length].
+
+        Returns:
+            Change of multipliers, owned, zero but in gluing rows and those of supports, [force].
+        """
+        torn = self.torn
+        taken = np.zeros(len(self.lacking))
+        if self.softening is None:
+            return taken
+        left = 0.5 * (self.softening.T - self.softening) @ moved
+        flexibility = 1.0 / torn.decomposition.torn_stiffness
+        # Of these rows B D⁻¹ Bᵀ is diagonal.
+        size = torn.numbering.to_owned(torn.B.multiply(torn.B) @ flexibility)
+        glued = torn.numbering.owned < torn.n_gluing
+        taken[glued] = (torn.jump(flexibility * left) / size)[glued]
+        return taken
 
     def linearised(self, timer: PhaseTimer, known: Linearisation | None) -> Linearisation:
         """Factor the tangents. Collective.
@@ -103,11 +150,15 @@ class Evaluation:
             timer: Collects the wall time.
             known: That of a neighbouring configuration, or None.
         """
-        turning = self.meeting.turning(self.at.multiplier)
-        tangents = [response.stiffness for response in self.responses]
+        uneven = None
+        if self.softening is not None:
+            uneven = unsymmetric_at(self.torn.decomposition, self.softening, self.rim)
+        turning = self.meeting.turning(self.at.multiplier, uneven)
+        tangents = self._tangents
         torn, further = self.torn, NO_ROWS
         if turning is not None:
-            tangents = _stiffened(torn, tangents, turning.normal)
+            if turning.normal is not None:
+                tangents = stiffened(torn, tangents, turning.normal)
             if turning.count:
                 torn = self.meeting.with_rows_of(turning)
                 further = FurtherRows.of(torn, self.torn, turning)
@@ -120,45 +171,6 @@ class Evaluation:
             operators = known.system.operators
         system = TangentSystem(increments, timer, diagonal=diagonal, earlier=operators)
         return Linearisation(system, self.meeting, further)
-
-
-@displayed
-@dataclass(frozen=True, eq=False)
-class FurtherRows:
-    """The rows of turning forces, after all others.
-
-    Attributes:
-        compliance: Of rows of normal forces, of either sign, zero of others, owned, shape (count,).
-        acting: Positions among all owned rows of those on which friction acts, shape (k,).
-        felt: Positions of those whose displacement changes it, shape (k,).
-        share: Displacement in each of these for a force of one, shape (k,).
-    """
-
-    compliance: Vector
-    acting: np.ndarray
-    felt: np.ndarray
-    share: Vector
-
-    @classmethod
-    def of(cls, torn: TornSystem, before: TornSystem, turning: TurningForces) -> FurtherRows:
-        """Return those of a system, given the one before without them."""
-        begin, normal = len(before.numbering.owned), len(turning.normal.values)
-        number = torn.numbering.owned[begin:] - before.numbering.total
-        pairs = len(turning.stiffness)
-        compliance = np.concatenate([1.0 / turning.normal.values, np.zeros(2 * pairs)])
-        place = begin + np.arange(len(number))
-        acting = (number >= normal) & (number < normal + pairs)
-        share = 1.0 / turning.stiffness[number[acting] - normal]
-        return cls(compliance[number], place[acting], place[number >= normal + pairs], share)
-
-    @property
-    def count(self) -> int:
-        """Number of rows of this rank."""
-        return len(self.compliance)
-
-
-_NOWHERE = np.zeros(0, dtype=np.int64)
-NO_ROWS = FurtherRows(np.zeros(0), _NOWHERE, _NOWHERE, np.zeros(0))
 
 
 @displayed
@@ -198,24 +210,8 @@ class Linearisation:
             further.acting,
             further.felt,
             further.share,
+            1.0 / evaluation.stiff if evaluation.stiff > 0.0 else 1.0,
         )
-
-
-def _stiffened(
-    torn: TornSystem, tangents: list[sp.csr_matrix], geometric: GeometricStiffness
-) -> list[sp.csr_matrix]:
-    """Add blocks on single nodes, shared by their copies, to the tangents of this rank's subdomains."""
-    if len(geometric.block_node) == 0:
-        return tangents
-    decomposition, dim = torn.decomposition, torn.dim
-    entry, copy, place = decomposition.copies_here(geometric.block_node)
-    block = geometric.blocks[entry] * decomposition.tearing.copy_share[copy, None, None]
-    dofs = dim * place[:, None] + np.arange(dim)
-    row, column = np.repeat(dofs, dim, axis=1).ravel(), np.tile(dofs, dim).ravel()
-    size = decomposition.torn_size
-    added = sp.csr_matrix((block.ravel(), (row, column)), shape=(size, size))
-    each = zip(tangents, decomposition.parts, strict=True)
-    return [(K + added[part, part]).tocsr() for K, part in each]
 
 
 @displayed
@@ -257,26 +253,43 @@ class Equations:
             least = min((m.least_jacobian(displacement[part]) for m, part in each), default=1.0)
         return global_min(comm, least)
 
-    def evaluate(self, meeting: Meeting, law: SlipLaw, at: Configuration, step: Vector) -> Evaluation:
+    def evaluate(
+        self, meeting: Meeting, law: SlipLaw, at: Configuration, step: Vector, load: Loading
+    ) -> Evaluation:
         """Return forces, openings and their residuals. Collective.
 
         Args:
-            meeting: The contact points, with load and supports.
+            meeting: The contact points, with supports.
             law: Of friction.
             at: The configuration; its history is that before the load step.
             step: ρ of the natural map, owned.
+            load: What acts.
         """
         comm, torn = self.decomposition.comm, meeting.torn
         with together(comm):
             each = zip(self._mechanics, self.decomposition.parts, at.history, strict=True)
             responses = tuple(m.at(at.displacement[part], history) for m, part, history in each)
+            external, softening = load.at(at.displacement)
         internal = np.concatenate([np.zeros(0), *(response.force for response in responses)])
         bound = torn.B.T @ torn.numbering.to_local(at.multiplier)
-        unbalanced, lacking = torn.load - internal - bound, meeting.lacking(at.displacement)
-        stiff = max((float(r.stiffness.diagonal().max()) for r in responses), default=0.0)
-        residuals = _residuals(torn, law, at, step, (unbalanced, internal, bound), lacking, stiff)
+        unbalanced, lacking = external - internal - bound, meeting.lacking(at.displacement)
+        stiff = global_max(comm, max((float(r.stiffness.diagonal().max()) for r in responses), default=0.0))
+        residuals = _residuals(torn, law, at, step, (unbalanced, internal, bound, external), lacking, stiff)
         least = global_min(comm, min((r.least_jacobian for r in responses), default=1.0))
-        return Evaluation(meeting, law, at, responses, unbalanced, lacking, residuals, least)
+        return Evaluation(
+            meeting,
+            law,
+            at,
+            responses,
+            external,
+            softening,
+            load.rim,
+            unbalanced,
+            lacking,
+            residuals,
+            least,
+            stiff,
+        )
 
 
 def _residuals(
@@ -288,19 +301,29 @@ def _residuals(
     lacking: Vector,
     stiff: float,
 ) -> Residuals:
-    """Return the relative residuals: forces out of balance as `coarse`. Collective."""
+    """Return the relative residuals: forces out of balance as `coarse`. Collective.
+
+    Args:
+        torn: The system.
+        law: Of friction.
+        at: The configuration.
+        step: ρ of the natural map, owned.
+        forces: Those out of balance, internal ones, Bᵀλ and loads, each torn, of this rank, [force].
+        lacking: c − B u, owned, [length].
+        stiff: Largest entry of the tangents' diagonals, [force / length].
+    """
     comm, contact = torn.numbering.comm, torn.numbering.owned >= torn.n_equality
     feasible = law.feasible(at.multiplier)
     mapped = feasible.project(at.multiplier - step * lacking)
     error, u = (at.multiplier - mapped)[contact], at.displacement
     sums = global_sum(
         comm,
-        *(x @ x for x in (*forces, torn.load, u, lacking[~contact], torn.right[~contact], error)),
+        *(x @ x for x in (*forces, u, lacking[~contact], torn.right[~contact], error)),
         len(u),
     )
     unbalanced, internal, bound, load, moved, open_, given, natural = np.sqrt(sums[:8])
     moved = max(moved, given)
-    floor = FORCE_FLOOR * global_max(comm, stiff) * moved / np.sqrt(sums[8])
+    floor = FORCE_FLOOR * stiff * moved / np.sqrt(sums[8])
     force = max(min(internal, bound) if internal > 0 else bound, load, floor)
     violation = global_max(comm, feasible.violation(at.multiplier))
     ratio = 1.0 / force if force > 0.0 else 0.0

@@ -12,7 +12,8 @@ import numpy as np
 from fenics_contact.display import displayed
 from fenics_contact.errors import ConvergenceError, tell
 from fenics_contact.nonlinear.equations import Configuration, Equations, Linearisation
-from fenics_contact.nonlinear.meeting import Contact, Loading
+from fenics_contact.nonlinear.loading import Loading
+from fenics_contact.nonlinear.meeting import Contact
 from fenics_contact.nonlinear.newton import NonlinearEquilibrium, TangentNewton
 from fenics_contact.qp import SolverStep
 from fenics_contact.timing import PhaseTimer

@@ -2,65 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-import scipy.sparse as sp
 
 from fenics_contact.display import displayed
 from fenics_contact.feti import Decomposition, TornSystem, meeting_at, nodal_mean_at, on_copies
-from fenics_contact.linalg import ROUNDING
+from fenics_contact.nonlinear.loading import Loading
+from fenics_contact.nonlinear.turning import TurningForces, UnevenStiffness
 from fenics_contact.pairing import sliding_contact
 from fenics_contact.qp import Vector
 from fenics_contact.scene import MovingObstacle, Scene, Surface
 from fenics_contact.surfaces import share_areas
 
 if TYPE_CHECKING:
-    from fenics_contact.pairing import GeometricStiffness, LowRank, MaterialPoints, SlidingPoints
+    from fenics_contact.pairing import MaterialPoints, SlidingPoints
 
 
 #: Number of facets that supports and obstacles may pass within a step: contact is searched where nodes stand.
 FACETS = 2.0
-
-
-@displayed
-@dataclass(frozen=True, eq=False)
-class Loading:
-    """What acts on the bodies at one time.
-
-    Attributes:
-        torn: The system with loads and supports.
-        prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim), [length].
-        time: The time, for obstacles that move.
-    """
-
-    torn: TornSystem
-    prescribed: np.ndarray
-    time: float
-
-    def between(self, first: Loading, part: float) -> Loading:
-        """Return the load at a part of the way from another one to this."""
-        if part == 1.0:
-            return self
-        parts = zip(first.torn.subdomains, self.torn.subdomains, strict=True)
-        subdomains = tuple(replace(b, load=(1.0 - part) * a.load + part * b.load) for a, b in parts)
-
-        def mixed(name: str) -> np.ndarray:
-            return np.asarray((1.0 - part) * getattr(first.torn, name) + part * getattr(self.torn, name))
-
-        torn = replace(self.torn, subdomains=subdomains, right=mixed("right"), supported=mixed("supported"))
-        prescribed = (1.0 - part) * first.prescribed + part * self.prescribed
-        return Loading(torn, prescribed, (1.0 - part) * first.time + part * self.time)
-
-    def removed(self) -> Loading:
-        """Return the same supports without movement, at time zero, and no loads."""
-        torn = self.torn
-        equality = torn.numbering.owned < torn.n_equality
-        right = np.where(equality, 0.0, torn.right + torn.supported)
-        subdomains = tuple(replace(part, load=np.zeros_like(part.load)) for part in torn.subdomains)
-        torn = replace(torn, subdomains=subdomains, right=right, supported=np.zeros_like(torn.supported))
-        return Loading(torn, 0.0 * self.prescribed, 0.0)
 
 
 @displayed
@@ -92,13 +53,21 @@ class Meeting:
             return lacking
         return self._placed(lacking, self.points.points.gap, -self.points.slip(self.start))
 
-    def turning(self, multiplier: Vector) -> TurningForces | None:
-        """Return the stiffness of forces that turn with their surfaces; None without any. Collective."""
+    def turning(self, multiplier: Vector, pressure: UnevenStiffness | None) -> TurningForces | None:
+        """Return the stiffness of forces that turn with their surfaces; None without any. Collective.
+
+        Args:
+            multiplier: λ, owned.
+            pressure: The unsymmetric stiffness of pressures.
+        """
+        further = [] if pressure is None else [pressure]
         if self.points is None:
-            return None
+            return TurningForces.of(None, further) if further else None
         normal, friction = self._at_points(multiplier)
+        slave, of_friction = self.points.points.slave, self.points.friction_stiffness(friction)
+        sliding = UnevenStiffness(of_friction.left, of_friction.right, slave[of_friction.point])
         stiffness = self.points.stiffness(np.maximum(normal, 0.0))
-        return TurningForces.of(stiffness, self.points.friction_stiffness(friction))
+        return TurningForces.of(stiffness, [sliding, *further], slave[stiffness.point])
 
     def carried(self, values: Vector, other: Meeting, spread: bool = False) -> Vector:
         """Return a vector on the rows of another meeting on these rows. Collective.
@@ -152,65 +121,23 @@ class Meeting:
 
     def with_rows_of(self, turning: TurningForces) -> TornSystem:
         """Return the system with the rows of turning forces after all others, in lengths. Collective."""
-        assert self.points is not None
-        decomposition, points = self.torn.decomposition, self.points.points
-        parts = [
-            (turning.normal.columns, turning.normal.point),
-            (turning.acting, turning.point),
-            (turning.felt, turning.point),
-        ]
+        decomposition = self.torn.decomposition
+        points = self.torn.points if self.points is None else self.points.points
+        parts = [(turning.acting, turning.owner), (turning.felt, turning.owner)]
+        if turning.normal is not None:
+            parts = [(turning.normal.columns, turning.normal_owner), *parts]
         further = []
-        for columns, point in parts:
+        for columns, owner in parts:
             entries = columns.T.tocoo()
             node, component = np.divmod(entries.col, self.torn.dim)
             free = ~decomposition.fixed[node, component]
             further.append(
                 on_copies(
                     decomposition.tearing, entries.row[free], node[free], component[free],
-                    entries.data[free], points.slave[point],
+                    entries.data[free], owner,
                 )
             )  # fmt: skip
         return meeting_at(self.torn, points, self.prescribed, further)
-
-
-@displayed
-@dataclass(frozen=True, eq=False)
-class TurningForces:
-    """How contact forces change as surfaces turn under them, at fixed multipliers.
-
-    Attributes:
-        normal: Of the normal forces, symmetric.
-        acting: Directions of changes of friction forces, columns of length one, shape (n_dofs, k).
-        felt: The displacements that change them, columns of length one, shape (n_dofs, k).
-        stiffness: Change of force for a displacement of one, shape (k,), [force / length].
-        point: Contact point of each of these, shape (k,).
-    """
-
-    normal: GeometricStiffness
-    acting: sp.csr_matrix
-    felt: sp.csr_matrix
-    stiffness: np.ndarray
-    point: np.ndarray
-
-    @classmethod
-    def of(cls, normal: GeometricStiffness, friction: LowRank) -> TurningForces:
-        """Return those of two stiffnesses."""
-        left, right = (_lengths(x) for x in (friction.left, friction.right))
-        kept = np.flatnonzero(left * right > ROUNDING * (left * right).max(initial=0.0))
-        acting, felt = (
-            (columns[:, kept] @ sp.diags(1.0 / lengths[kept])).tocsr()
-            for columns, lengths in ((friction.left, left), (friction.right, right))
-        )
-        return cls(normal, acting, felt, (left * right)[kept], friction.point[kept])
-
-    @property
-    def count(self) -> int:
-        """Number of rows: one for each value of the normal forces' stiffness, two for each other one."""
-        return len(self.normal.values) + 2 * len(self.stiffness)
-
-
-def _lengths(columns: sp.csr_matrix) -> np.ndarray:
-    return np.sqrt(np.asarray(columns.multiply(columns).sum(axis=0)).ravel())
 
 
 class Contact(Protocol):

@@ -10,7 +10,8 @@ import numpy as np
 from fenics_contact.display import displayed
 from fenics_contact.errors import ConvergenceError, InfeasibleError
 from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation
-from fenics_contact.nonlinear.meeting import Contact, Loading
+from fenics_contact.nonlinear.loading import Loading
+from fenics_contact.nonlinear.meeting import Contact
 from fenics_contact.nonlinear.tangent_step import TangentStep, tangent_step
 from fenics_contact.nonlinear.tangent_system import TangentSystem
 from fenics_contact.qp import (
@@ -157,7 +158,7 @@ class _Run:
             step: Vector = np.zeros(meeting.torn.layout.size)
             if near is not None:
                 step = near.natural_step(meeting, self._caution)
-            return self._equations.evaluate(meeting, meeting.torn.law, at, step)
+            return self._equations.evaluate(meeting, meeting.torn.law, at, step, self._load)
 
     def _require_progress(self, evaluation: Evaluation) -> None:
         """Adapt the forcing term and ρ. Collective.
@@ -216,6 +217,7 @@ class _Run:
             self.products += taken.products
             change = taken.multiplier - np.concatenate([at.multiplier, further])
             moved = near.system.displacement(change, taken.motions)
+            change[:size] += evaluation.passed_on(moved)
 
         def after(part: float) -> Evaluation:
             displacement, multiplier = at.displacement + part * moved, at.multiplier + part * change[:size]
@@ -270,9 +272,7 @@ class _Run:
             reach=None,
         )
         tresca, coefficient = torn.friction
-        solution = solve(
-            problem, tresca, FaceNewton(NESTED), multiplier, friction_coefficient=coefficient
-        )
+        solution = solve(problem, tresca, FaceNewton(NESTED), multiplier, friction_coefficient=coefficient)
         bound = torn.law.bound(solution.multiplier)
         face = classify(problem.layout, bound, solution.multiplier, solution.residual, step)
         return TangentStep(

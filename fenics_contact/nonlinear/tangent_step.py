@@ -53,6 +53,7 @@ class TangentProblem:
             the same number measures, an unsymmetric stiffness; shape (k,).
         felt: Positions of these rows, which have no multipliers, shape (k,).
         share: What each of them measures for a multiplier of one, shape (k,).
+        flexibility: A typical entry of F, [length / force].
     """
 
     problem: DualProblem
@@ -63,6 +64,7 @@ class TangentProblem:
     acting: np.ndarray
     felt: np.ndarray
     share: Vector
+    flexibility: float
 
     def scaled(self) -> TangentProblem:
         """Return the problem in the multipliers of `DualProblem.scaling`, itself where there is none."""
@@ -224,7 +226,8 @@ class _StiffFace:
         total, count = global_sum(problem.comm, problem.diagonal[contact].sum(), len(contact))
         weights = np.ones(len(self.compliance))
         further = self._further
-        weights[further] = np.minimum(total / max(count, 1.0) / np.abs(self.compliance[further]), 1.0)
+        usual = total / count if count > 0.0 else self.at.flexibility
+        weights[further] = np.minimum(usual / np.abs(self.compliance[further]), 1.0)
         return weights
 
     @property

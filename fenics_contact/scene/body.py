@@ -11,7 +11,7 @@ from fenics_contact.checks import checked
 from fenics_contact.display import displayed
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import CELL_TYPES, BodyMesh
-from fenics_contact.scene.materials import Material, has_mean_dilatation
+from fenics_contact.scene.materials import Material, has_mean_dilatation, is_finite_strain
 
 
 @displayed
@@ -46,6 +46,11 @@ class Body:
             if self.material[region] not in different:
                 different.append(self.material[region])
         return tuple(different)
+
+    @property
+    def deforms_much(self) -> bool:
+        """Whether one of the materials is made for large deformations, rotations included."""
+        return any(map(is_finite_strain, self.materials))
 
     @property
     def in_words(self) -> str:

@@ -25,6 +25,7 @@ class EffectName(StrEnum):
     RIGID_SURFACE = "rigid surface"
     BODY_FORCE = "body force"
     SURFACE_LOAD = "surface load"
+    FOLLOWING_PRESSURE = "following pressure"
     THERMAL_STRAIN = "thermal strain"
     TIE = "tied surfaces"
     CONTACT = "contact"
@@ -70,6 +71,10 @@ def _effects_in(scene: SceneParts) -> Iterator[Effect]:
         yield Effect(names.BODY_FORCE, _count(len(volume), "load on a volume", "loads on volumes"))
     if surface:
         yield Effect(names.SURFACE_LOAD, _count(surface, "load on a surface", "loads on surfaces"))
+    following = len(scene.following_pressures)
+    if following:
+        words = _count(following, "pressure follows its surface", "pressures follow their surfaces")
+        yield Effect(names.FOLLOWING_PRESSURE, words)
     if thermal:
         yield Effect(names.THERMAL_STRAIN, _count(len(thermal), "change of temperature", "temperatures"))
     if scene.ties:

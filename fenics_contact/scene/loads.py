@@ -1,6 +1,7 @@
 """Loads, each on one named body or on one of its surfaces.
 
-Loads are dead: they keep direction and size while the body deforms. Values are numbers, functions of position
+Loads are dead: they keep direction and size while the body deforms; `Pressure` alone follows the surface of a
+body that deforms much. Values are numbers, functions of position
 (evaluated at the nodes and interpolated) or `Ufl`. Loads are values: two with the same numbers, or with the
 same function object, are equal, and a vector assembled for one is reused for the other. A function must
 therefore always return the same values for the same points.
@@ -98,17 +99,27 @@ def _numbers(name: str, given: GivenVector | float) -> GivenVector | float:
 @dataclass(frozen=True)
 @checked("value")
 class Pressure:
-    """Dead load normal to the undeformed surface; positive presses on the body, traction = −p n.
+    """Load normal to a surface; positive presses on the body, traction = −p n.
+
+    On a body of a material for large deformations it follows the surface, f = −p cof F N per undeformed area:
+    it stays normal to the surface as it lies now, and grows with its area. Elsewhere surfaces keep their
+    places.
 
     Attributes:
         body: Name of the body.
         surface: Name of its surface.
-        value: Pressure p, [force / length²].
+        value: Pressure p, [force / length²]; a function of position is one of the undeformed body.
+        dead: Whether it keeps the direction and size that it has on the undeformed surface.
+
+    Example:
+        >>> gas = Pressure("tyre", "inside", 0.2)  # N/mm²
+        >>> weight_of_snow = Pressure("membrane", "top", 1e-3, dead=True)
     """
 
     body: str
     surface: str
     value: ScalarValue
+    dead: bool = False
 
     def __post_init__(self) -> None:
         """Reject a value that is not a scalar."""

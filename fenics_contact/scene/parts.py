@@ -13,7 +13,7 @@ from fenics_contact.checks import checked
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.mesh import BodyMesh
 from fenics_contact.scene.body import Body
-from fenics_contact.scene.loads import Load, SurfaceLoad, ThermalStrain, TotalForce
+from fenics_contact.scene.loads import Load, Pressure, SurfaceLoad, ThermalStrain, TotalForce
 from fenics_contact.scene.materials import Material, can_expand, is_nonlinear
 from fenics_contact.scene.obstacles import RigidObstacle
 from fenics_contact.scene.pairs import ContactPair, Surface, Tie
@@ -60,6 +60,15 @@ class SceneParts:
                 self._require_linear(pair.slave, pair.master, pair.discretisation, kind)
             else:
                 self._require_dimension(pair.master)
+
+    @property
+    def following_pressures(self) -> tuple[Pressure, ...]:
+        """The pressures that follow their surfaces, those on bodies that deform much."""
+        return tuple(
+            load
+            for load in self.loads
+            if isinstance(load, Pressure) and not load.dead and self.bodies[load.body].deforms_much
+        )
 
     def _require(self, body: str, surface: str | None, user: str) -> None:
         if body not in self.bodies:

@@ -15,6 +15,7 @@ from fenics_contact.scene.materials.isotropic import IsotropicElasticity
 from fenics_contact.scene.materials.j2_plasticity import J2Plasticity
 from fenics_contact.scene.materials.nearly_incompressible import (
     NearlyIncompressible,
+    cofactor,
     has_mean_dilatation,
     volume_change,
 )
@@ -51,6 +52,7 @@ __all__ = [
     "Thermoelastic",
     "Transverse",
     "can_expand",
+    "cofactor",
     "deformation_gradient",
     "gradient_in_space",
     "has_mean_dilatation",
