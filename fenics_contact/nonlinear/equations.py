@@ -210,6 +210,9 @@ class Linearisation:
             further.acting,
             further.felt,
             further.share,
+            further.lacking,
+            further.completed,
+            np.ones(len(further.lacking)),
             1.0 / evaluation.stiff if evaluation.stiff > 0.0 else 1.0,
         )
 

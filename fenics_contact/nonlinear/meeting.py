@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
+import scipy.sparse as sp
 
 from fenics_contact.display import displayed
 from fenics_contact.feti import Decomposition, TornSystem, meeting_at, nodal_mean_at, on_copies
 from fenics_contact.nonlinear.loading import Loading
-from fenics_contact.nonlinear.turning import TurningForces, UnevenStiffness
+from fenics_contact.nonlinear.turning import LackingRows, TurningForces, UnevenStiffness
 from fenics_contact.pairing import sliding_contact
 from fenics_contact.qp import Vector
 from fenics_contact.scene import MovingObstacle, Scene, Surface
@@ -61,13 +62,21 @@ class Meeting:
             pressure: The unsymmetric stiffness of pressures.
         """
         further = [] if pressure is None else [pressure]
-        if self.points is None:
+        if self.points is None or self.start is None:
             return TurningForces.of(None, further) if further else None
         normal, friction = self._at_points(multiplier)
-        slave, of_friction = self.points.points.slave, self.points.friction_stiffness(friction)
-        sliding = UnevenStiffness(of_friction.left, of_friction.right, slave[of_friction.point])
-        stiffness = self.points.stiffness(np.maximum(normal, 0.0))
-        return TurningForces.of(stiffness, [sliding, *further], slave[stiffness.point])
+        points, slave, normal = self.points, self.points.points.slave, np.maximum(normal, 0.0)
+        stiffness, means = points.stiffness(normal), points.mean_tangents(normal, friction, self.start)
+        further += [
+            UnevenStiffness(each.left, each.right, slave[each.point])
+            for each in (points.friction_stiffness(friction), means.stiffness)
+        ]
+        width, frictional = self.torn.dim - 1, self.torn.frictional
+        rubbed = (width * frictional[:, None] + np.arange(width)).ravel()
+        # In the order of the rows of contact, of which those of gaps measure −n·[u].
+        rows = sp.vstack([-means.gap, means.slip[rubbed]], "csr")
+        lacking = LackingRows.of(rows, slave[np.concatenate([np.arange(len(slave)), rubbed // width])])
+        return TurningForces.of(stiffness, further, slave[stiffness.point], lacking)
 
     def carried(self, values: Vector, other: Meeting, spread: bool = False) -> Vector:
         """Return a vector on the rows of another meeting on these rows. Collective.
@@ -126,6 +135,8 @@ class Meeting:
         parts = [(turning.acting, turning.owner), (turning.felt, turning.owner)]
         if turning.normal is not None:
             parts = [(turning.normal.columns, turning.normal_owner), *parts]
+        if turning.lacking is not None:
+            parts.append((turning.lacking.columns, turning.lacking.owner))
         further = []
         for columns, owner in parts:
             entries = columns.T.tocoo()

@@ -53,6 +53,10 @@ class TangentProblem:
             the same number measures, an unsymmetric stiffness; shape (k,).
         felt: Positions of these rows, which have no multipliers, shape (k,).
         share: What each of them measures for a multiplier of one, shape (k,).
+        lacking: Positions of rows without multipliers that others lack where displacements are measured: the
+            derivative of a gap need not be the row of its force; shape (m,).
+        completed: Positions of these others, shape (m,).
+        completing: How much of the former the latter lack, shape (m,).
         flexibility: A typical entry of F, [length / force].
     """
 
@@ -64,7 +68,15 @@ class TangentProblem:
     acting: np.ndarray
     felt: np.ndarray
     share: Vector
+    lacking: np.ndarray
+    completed: np.ndarray
+    completing: Vector
     flexibility: float
+
+    def complete(self, rows: sp.csr_matrix) -> sp.csr_matrix:
+        """Return columns of weights of rows, shape (n_owned, n), with those of the rows that they lack."""
+        entries = self.completing, (self.lacking, self.completed)
+        return (rows + sp.csr_matrix(entries, shape=(rows.shape[0],) * 2) @ rows).tocsr()
 
     def scaled(self) -> TangentProblem:
         """Return the problem in the multipliers of `DualProblem.scaling`, itself where there is none."""
@@ -78,6 +90,7 @@ class TangentProblem:
             residual=np.asarray(self.residual * s, dtype=np.float64),
             compliance=np.asarray(self.compliance * s**2, dtype=np.float64),
             share=np.asarray(self.share * s[self.felt] * s[self.acting], dtype=np.float64),
+            completing=np.asarray(self.completing * s[self.completed] / s[self.lacking], dtype=np.float64),
         )
 
 
@@ -167,15 +180,16 @@ class _StiffFace:
     def build(cls, at: TangentProblem, face: Face, operator: CountedOperator) -> _StiffFace | None:
         """Prepare the face; None where it does not hold every body. Collective."""
         problem, coarse, equality = at.problem, at.problem.coarse, at.problem.layout.equality
-        basis, felt, acting = face.restriction, *(np.searchsorted(equality, x) for x in (at.felt, at.acting))
-        shared = np.setdiff1d(np.arange(basis.shape[1]), np.concatenate([felt, acting]))
+        basis = face.restriction
+        felt, acting, lacking = (np.searchsorted(equality, x) for x in (at.felt, at.acting, at.lacking))
+        shared = np.setdiff1d(np.arange(basis.shape[1]), np.concatenate([felt, acting, lacking]))
         moving, fixed = basis, face.fixed
         growth = problem.law.growth
         if global_max(problem.comm, float(np.any(growth[face.slip] > 0.0))) > 0.0:
             coupling = face.growth(growth)
             moving = (basis + coupling).tocsr()
             fixed = fixed - coupling @ np.maximum(face.restrict(at.multiplier), 0.0)
-        tested = basis[:, np.concatenate([shared, felt])]
+        tested = at.complete(basis[:, np.concatenate([shared, felt])])
         moving = moving[:, np.concatenate([shared, acting])]
         oblique = ObliqueProjector.build(sp.csr_matrix(coarse.matrix @ tested), coarse.restricted(moving))
         if oblique is None:

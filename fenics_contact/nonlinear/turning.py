@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,8 +39,35 @@ class UnevenStiffness:
 
 @displayed
 @dataclass(frozen=True, eq=False)
+class LackingRows:
+    """What rows of contact lack to be derivatives of gap and slip.
+
+    Attributes:
+        columns: Of each such row, shape (n_dofs, m); dof dim · node + component of all nodes.
+        completed: Number of the row that lacks it among those of contact, shape (m,).
+        owner: Node whose rank owns both, shape (m,).
+    """
+
+    columns: sp.csr_matrix
+    completed: np.ndarray
+    owner: np.ndarray
+
+    @classmethod
+    def of(cls, rows: sp.csr_matrix, owner: np.ndarray) -> LackingRows:
+        """Return those of rows of contact that lack something.
+
+        Args:
+            rows: What each row of contact lacks, zero where it is the derivative, shape (n, n_dofs).
+            owner: Node whose rank owns each row, shape (n,).
+        """
+        completed = np.flatnonzero(_lengths(rows.T) > ROUNDING)
+        return cls(rows[completed].T.tocsr(), completed, owner[completed])
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
 class TurningForces:
-    """How forces change as surfaces turn under them, at fixed multipliers.
+    """How forces change as surfaces turn under them, at fixed multipliers, and gaps beside their rows.
 
     Attributes:
         normal: Of the normal forces of contact, symmetric; None where contact points do not move.
@@ -49,6 +77,7 @@ class TurningForces:
         felt: The displacements that change them, columns of length one, shape (n_dofs, k).
         stiffness: Change of force for a displacement of one, shape (k,), [force / length].
         owner: Node whose rank owns the rows of each of these, shape (k,).
+        lacking: What rows of contact lack; None where contact points do not move.
     """
 
     normal: GeometricStiffness | None
@@ -57,6 +86,7 @@ class TurningForces:
     felt: sp.csr_matrix
     stiffness: np.ndarray
     owner: np.ndarray
+    lacking: LackingRows | None
 
     @classmethod
     def of(
@@ -64,6 +94,7 @@ class TurningForces:
         normal: GeometricStiffness | None,
         others: Sequence[UnevenStiffness],
         normal_owner: np.ndarray = _NONE,
+        lacking: LackingRows | None = None,
     ) -> TurningForces:
         """Return those of several stiffnesses, with at least one unsymmetric one."""
         L, R = (sp.hstack([getattr(each, side) for each in others]).tocsr() for side in ("left", "right"))
@@ -74,7 +105,7 @@ class TurningForces:
             (columns[:, kept] @ sp.diags(1.0 / lengths[kept])).tocsr()
             for columns, lengths in ((L, left), (R, right))
         )
-        return cls(normal, normal_owner, acting, felt, (left * right)[kept], owner[kept])
+        return cls(normal, normal_owner, acting, felt, (left * right)[kept], owner[kept], lacking)
 
     @property
     def compliance(self) -> np.ndarray:
@@ -83,8 +114,13 @@ class TurningForces:
 
     @property
     def count(self) -> int:
-        """Number of rows: one for each value of the normal forces' stiffness, two for each other one."""
-        return len(self.compliance) + 2 * len(self.stiffness)
+        """Number of rows: one for each value of `normal`, two for each other stiffness, what rows lack."""
+        return len(self.compliance) + 2 * len(self.stiffness) + len(self.completed)
+
+    @property
+    def completed(self) -> np.ndarray:
+        """Numbers of rows of contact that lack something, shape (m,)."""
+        return _NONE if self.lacking is None else self.lacking.completed
 
 
 def _lengths(columns: sp.csr_matrix) -> np.ndarray:
@@ -132,12 +168,16 @@ class FurtherRows:
         acting: Positions among all owned rows of those on which friction acts, shape (k,).
         felt: Positions of those whose displacement changes it, shape (k,).
         share: Displacement in each of these for a force of one, shape (k,).
+        lacking: Positions of rows that others lack to be derivatives of gap and slip, shape (m,).
+        completed: Positions of these others, shape (m,).
     """
 
     compliance: Vector
     acting: np.ndarray
     felt: np.ndarray
     share: Vector
+    lacking: np.ndarray
+    completed: np.ndarray
 
     @classmethod
     def of(cls, torn: TornSystem, before: TornSystem, turning: TurningForces) -> FurtherRows:
@@ -145,11 +185,14 @@ class FurtherRows:
         begin, normal = len(before.numbering.owned), len(turning.compliance)
         number = torn.numbering.owned[begin:] - before.numbering.total
         pairs = len(turning.stiffness)
-        compliance = np.concatenate([turning.compliance, np.zeros(2 * pairs)])
-        place = begin + np.arange(len(number))
-        acting = (number >= normal) & (number < normal + pairs)
+        compliance = np.concatenate([turning.compliance, np.zeros(turning.count - normal)])
+        place, ends = begin + np.arange(len(number)), normal + pairs * np.arange(3)
+        acting, felt = ((number >= first) & (number < last) for first, last in pairwise(ends))
         share = 1.0 / turning.stiffness[number[acting] - normal]
-        return cls(compliance[number], place[acting], place[number >= normal + pairs], share)
+        lacking = number >= ends[-1]
+        row = before.n_equality + turning.completed[number[lacking] - ends[-1]]
+        completed = np.searchsorted(before.numbering.owned, row)
+        return cls(compliance[number], place[acting], place[felt], share, place[lacking], completed)
 
     @property
     def count(self) -> int:
@@ -157,8 +200,7 @@ class FurtherRows:
         return len(self.compliance)
 
 
-_NOWHERE = np.zeros(0, dtype=np.int64)
-NO_ROWS = FurtherRows(np.zeros(0), _NOWHERE, _NOWHERE, np.zeros(0))
+NO_ROWS = FurtherRows(np.zeros(0), _NONE, _NONE, np.zeros(0), _NONE, _NONE)
 
 
 def stiffened(

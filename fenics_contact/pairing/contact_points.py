@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -61,6 +61,10 @@ class ContactPoints:
     def count(self) -> int:
         """Number of contact points."""
         return len(self.slave)
+
+    def part(self, chosen: np.ndarray) -> ContactPoints:
+        """Return some of the points, by indices or a mask."""
+        return ContactPoints(**{each.name: getattr(self, each.name)[chosen] for each in fields(self)})
 
     @cached_property
     def jump(self) -> sp.csr_matrix:

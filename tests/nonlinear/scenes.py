@@ -34,3 +34,10 @@ def pressed(mesh: BodyMesh, depth: float, pushed: float = 0.0, friction: float =
 
 def cut(mesh: BodyMesh, pieces: int) -> dict[str, np.ndarray]:
     return {"block": box_partition(mesh, (pieces,) * 3)}
+
+
+def tilted(angle: float) -> np.ndarray:
+    """A rotation about no axis of the mesh."""
+    axis = np.array([1.0, 2.0, 2.0]) / 3.0
+    cross = np.cross(np.eye(3), axis)
+    return np.asarray(np.eye(3) - np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)

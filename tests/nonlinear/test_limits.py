@@ -27,7 +27,7 @@ from fenics_contact.scene import (
     Support,
     Surface,
 )
-from tests.nonlinear.scenes import RUBBER, cut
+from tests.nonlinear.scenes import RUBBER, cut, tilted
 
 SMALL = 1e-7
 
@@ -98,13 +98,6 @@ def test_a_body_that_turns_with_its_support_has_no_stress(count: int) -> None:
     assert np.abs(last.gather_displacement("block") - exact).max() < 1e-9
     assert np.abs(last.stress["block"].x.array).max() < 1e-8
     assert max(len(state.solution.history) for state in states) <= (12 if count == 1 else 8)
-
-
-def tilted(angle: float) -> np.ndarray:
-    """A rotation about no axis of the mesh."""
-    axis = np.array([1.0, 2.0, 2.0]) / 3.0
-    cross = np.cross(np.eye(3), axis)
-    return np.asarray(np.eye(3) - np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
 
 
 def two_blocks(rotation: np.ndarray, push: tuple[float, float, float]) -> Scene:

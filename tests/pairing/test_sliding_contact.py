@@ -276,12 +276,9 @@ def test_an_obstacle_moves_along_one_path() -> None:
         MovingObstacle(still, still.path)
 
 
-def test_mortar_pairs_and_coordinates_that_are_none_are_refused() -> None:
+def test_coordinates_that_are_none_are_refused() -> None:
     scene = on_arch("hexahedron")
     with pytest.raises(InvalidInputError, match="finite numbers of shape"):
         sliding(scene).at(scene.points[:-1])
     with pytest.raises(InvalidInputError, match="got NaN or infinity"):
         sliding(scene).at(np.where(scene.points == scene.points.max(), np.nan, scene.points))
-    mortar = replace(scene, contacts=[replace(scene.contacts[0], discretisation="mortar")])
-    with pytest.raises(InvalidInputError, match="needs discretisation='node'"):
-        sliding_contact(mortar, free(mortar))

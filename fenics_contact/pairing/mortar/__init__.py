@@ -3,10 +3,13 @@
 from fenics_contact.pairing.mortar.coupling import MortarCoupling, mortar_coupling
 from fenics_contact.pairing.mortar.coupling_derivative import mortar_pulled_back
 from fenics_contact.pairing.mortar.relief_derivative import SurfaceDerivatives
+from fenics_contact.pairing.mortar.weight_derivative import WeightDerivatives, weight_derivatives
 
 __all__ = [
     "MortarCoupling",
     "SurfaceDerivatives",
+    "WeightDerivatives",
     "mortar_coupling",
     "mortar_pulled_back",
+    "weight_derivatives",
 ]

@@ -67,7 +67,7 @@ def mortar_pulled_back(
     part = touched[comm.rank :: comm.size]
     with together(comm):
         if len(part):
-            _add_integrals(slave, _moved_aside(master, beside), part, sums, into)
+            _add_integrals(slave, moved_aside(master, beside), part, sums, into)
     by_slave, by_master = (side.summed(comm) for side in into)
     along = by.gap[:, None] * coupling.normal
     apart = slave.points[coupling.node] - coupling.weight @ master.points + coupling.relief
@@ -77,8 +77,13 @@ def mortar_pulled_back(
     return by_slave, by_master
 
 
-def _moved_aside(master: FacetedSurface, beside: float) -> FacetedSurface:
-    """Return the master beside its place, so that no edge lies exactly over one of the slave."""
+def moved_aside(master: FacetedSurface, beside: float = 1e-9) -> FacetedSurface:
+    """Return the master beside its place, so that no edge lies exactly over one of the slave.
+
+    Args:
+        master: The surface.
+        beside: Distance relative to the smallest radius of a facet.
+    """
     corners = master.points[master.facets]
     size = np.linalg.norm(corners - corners.mean(axis=1, keepdims=True), axis=2).max(axis=1).min()
     step = beside * size + 100 * computed_rounding(master.points)

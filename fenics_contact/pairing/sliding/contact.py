@@ -18,7 +18,8 @@ from fenics_contact.pairing.contact_points import (
     tangent_frames,
 )
 from fenics_contact.pairing.sliding.closest import patch_points
-from fenics_contact.pairing.sliding.differential import Differential, join_differentials
+from fenics_contact.pairing.sliding.differential import Differential, join_differentials, without_patches
+from fenics_contact.pairing.sliding.means import MovingMeans
 from fenics_contact.pairing.sliding.meeting import Meeting, meetings_of
 from fenics_contact.pairing.sliding.points import SlidingPoints
 from fenics_contact.scene import MovingObstacle, Scene
@@ -27,12 +28,23 @@ from fenics_contact.surfaces import shape_functions
 
 
 @dataclass(frozen=True)
+class _Found:
+    """The points of one pair, what derivatives of them need, and nodes without one."""
+
+    points: ContactPoints
+    differential: Differential
+    lost: np.ndarray
+    means: MovingMeans | None
+
+
+@dataclass(frozen=True)
 class SlidingContact:
     """The contact pairs of a scene, whose points are found wherever the bodies lie.
 
-    The gap is the distance to the closest point of a smooth surface through the master's nodes, see
-    `SmoothPatches`; to rigid obstacles it is theirs. Nodes may slide over any number of facets, leave the
-    master and come back. Facets are searched anew only for nodes that leave theirs.
+    By nodes the gap is the distance to the closest point of a smooth surface through the master's nodes, see
+    `SmoothPatches`; by mortar a mean over the facets as they lie now, see `MovingMeans`; to rigid obstacles
+    it is theirs. Nodes may slide over any number of facets, leave the master and come back. By nodes, facets
+    are searched anew only for nodes that leave theirs.
 
     Attributes:
         scene: The scene in its reference configuration.
@@ -71,17 +83,8 @@ class SlidingContact:
             fixed: Whether a component of a node is prescribed, shape (n_nodes, dim).
             comm: Communicator of the ranks that share the work; this rank alone by default.
             reach: Distance beyond which nodes need no point, [length].
-
-        Raises:
-            InvalidInputError: If a pair uses mortar contact.
         """
         comm = comm or MPI.COMM_SELF
-        for index, pair in enumerate(scene.contacts):
-            if pair.discretisation == "mortar":
-                raise InvalidInputError(
-                    f"contact in the current configuration needs discretisation='node', ContactPair {index} "
-                    f"({pair.place}) has 'mortar': leave it out"
-                )
         return cls(scene, fixed, comm, reach, meetings_of(scene, fixed, comm))
 
     def at(
@@ -111,31 +114,30 @@ class SlidingContact:
                 for each in self.meetings
             )
         parts = [self._pair(index, coordinates, last, time) for index in range(len(self.meetings))]
-        points = join_points([part[0] for part in parts], self.scene.dim, len(coordinates))
-        differential = join_differentials([part[1] for part in parts], self.scene.dim, len(coordinates))
-        lost = np.concatenate([np.zeros(0, dtype=np.int64), *[part[2] for part in parts]])
-        return SlidingPoints(
-            points, coordinates, tuple(m.patches for m in self.meetings),
-            tuple(m.master_nodes for m in self.meetings), places, differential, lost,
-        )  # fmt: skip
+        points = join_points([part.points for part in parts], self.scene.dim, len(coordinates))
+        differential = join_differentials(
+            [part.differential for part in parts], self.scene.dim, len(coordinates)
+        )
+        lost = np.concatenate([np.zeros(0, dtype=np.int64), *[part.lost for part in parts]])
+        means = tuple(part.means for part in parts)
+        return SlidingPoints(points, coordinates, means, places, differential, lost)
 
-    def _pair(
-        self, index: int, coordinates: np.ndarray, last: SlidingPoints | None, time: float
-    ) -> tuple[ContactPoints, Differential, np.ndarray]:
-        """Return the points of one pair, their differential, and nodes without one. Collective."""
-        meeting = self.meetings[index]
-        if meeting.patches is None:
+    def _pair(self, index: int, coordinates: np.ndarray, last: SlidingPoints | None, time: float) -> _Found:
+        """Return the points of one pair. Collective."""
+        meeting, lost, means = self.meetings[index], np.zeros(0, dtype=np.int64), None
+        if meeting.obstacle is not None:
             with together(self.comm):
                 points, differential = self._on_obstacle(meeting, coordinates, time)
             name = f"what ContactPair {index} asks its obstacle, {type(meeting.obstacle).__name__}"
             require_alike(self.comm, described((points.slave, points.normal, points.gap), name))
-            lost = np.zeros(0, dtype=np.int64)
+        elif meeting.facets is not None:
+            points, differential, means = self._on_means(meeting, coordinates)
         else:
             points, differential, lost = self._on_patches(index, meeting, coordinates, last)
         points = replace(points, pair=np.full(points.count, index))
         axes = points.axes if last is None else _kept_axes(points, last.points, index)
         points = replace(points, axes=axes, tangents=tangent_frames(points.normal, axes))
-        return in_free_frames(points, self.fixed), differential, lost
+        return _Found(in_free_frames(points, self.fixed), differential, lost, means)
 
     def _on_obstacle(
         self, meeting: Meeting, coordinates: np.ndarray, time: float
@@ -149,11 +151,23 @@ class SlidingContact:
         chosen = np.flatnonzero(facing & (gap <= self.reach))
         curvature = asked(shape, "curvatures", place[chosen])
         none = sp.csr_matrix((len(chosen), len(coordinates)))
-        width, dim = self.scene.dim - 1, self.scene.dim
         points = _points(meeting, chosen, normal[chosen], gap[chosen], none)
         points = replace(points, symmetric=meeting.slave.mirrored[meeting.candidates[chosen]])
-        empty = np.zeros((len(chosen), width, dim)), np.zeros((len(chosen), width, width))
-        return points, Differential(*empty, (none,) * width, curvature)
+        return points, without_patches(curvature, len(coordinates))
+
+    def _on_means(
+        self, meeting: Meeting, coordinates: np.ndarray
+    ) -> tuple[ContactPoints, Differential, MovingMeans]:
+        means = MovingMeans.of(meeting, coordinates, self.comm)
+        met = means.coupling
+        chosen = np.searchsorted(meeting.candidates, met.node)
+        near = met.gap <= self.reach
+        means, chosen = replace(means, coupling=met.part(near)), chosen[near]
+        met = means.coupling
+        points = _points(meeting, chosen, met.normal, met.gap, means.weights(len(coordinates)))
+        points = replace(points, symmetric=means.symmetric())
+        bent = np.zeros((points.count, self.scene.dim, self.scene.dim))
+        return points, without_patches(bent, len(coordinates)), means
 
     def _on_patches(
         self, index: int, meeting: Meeting, coordinates: np.ndarray, last: SlidingPoints | None

@@ -29,18 +29,25 @@ class Differential:
     curvature: np.ndarray
 
 
+def without_patches(curvature: np.ndarray, n_nodes: int) -> Differential:
+    """Return the differential of points that are on no patches.
+
+    Args:
+        curvature: Second derivatives of the distance of rigid obstacles, shape (n, dim, dim), [1 / length].
+        n_nodes: Number of nodes of all bodies.
+    """
+    count, dim, _ = curvature.shape
+    none = (sp.csr_matrix((count, n_nodes)),) * (dim - 1)
+    return Differential(np.zeros((count, dim - 1, dim)), np.zeros((count, dim - 1, dim - 1)), none, curvature)
+
+
 def join_differentials(parts: Sequence[Differential], dim: int, n_nodes: int) -> Differential:
     """Concatenate those of several pairs; empty if there are none."""
-    width = dim - 1
-    none = Differential(
-        np.zeros((0, width, dim)), np.zeros((0, width, width)), (sp.csr_matrix((0, n_nodes)),) * width,
-        np.zeros((0, dim, dim)),
-    )  # fmt: skip
-    every = [none, *parts]
+    every = [without_patches(np.zeros((0, dim, dim)), n_nodes), *parts]
     return Differential(
         np.concatenate([part.tangents for part in every]),
         np.concatenate([part.bend for part in every]),
-        tuple(sp.vstack([part.slopes[a] for part in every], format="csr") for a in range(width)),
+        tuple(sp.vstack([part.slopes[a] for part in every], format="csr") for a in range(dim - 1)),
         np.concatenate([part.curvature for part in every]),
     )
 

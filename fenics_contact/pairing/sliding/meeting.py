@@ -13,9 +13,10 @@ from fenics_contact.errors import together
 from fenics_contact.pairing.contact_search import find_contact_points
 from fenics_contact.pairing.node_numbers import NodeNumbers
 from fenics_contact.pairing.sliding.closest import ClosestPoints
+from fenics_contact.pairing.sliding.moved_surface import moved_surface
 from fenics_contact.pairing.sliding.patches import SmoothPatches
 from fenics_contact.scene import ContactPair, RigidObstacle, Scene, Surface, surface_of
-from fenics_contact.surfaces import FacetedSurface, Projection, corner_products, join
+from fenics_contact.surfaces import FacetedSurface, Projection, join
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,8 @@ class Meeting:
         offset: What is added to the gap of each of them, as the pair gives it, shape (n_candidates,),
             [length].
         given: Whether it is, shape (n_candidates,).
-        patches: The smooth surface of the master; None for a rigid obstacle.
+        patches: The smooth surface of the master; None for a rigid obstacle and for mortar contact.
+        facets: The master in the reference configuration for mortar contact; None for other pairs.
         master_nodes: Nodes of the master among those of all bodies; none for a rigid obstacle.
         master_cut: Components that the normals of these lack on planes of symmetry, shape (n_master, dim).
         obstacle: The rigid obstacle; None for a body.
@@ -44,6 +46,7 @@ class Meeting:
     offset: np.ndarray
     given: np.ndarray
     patches: SmoothPatches | None
+    facets: FacetedSurface | None
     master_nodes: np.ndarray
     master_cut: np.ndarray
     obstacle: RigidObstacle | None
@@ -57,12 +60,7 @@ class Meeting:
 
     def normals(self, coordinates: np.ndarray) -> np.ndarray:
         """Return the outward normals of the candidates as the bodies lie now, shape (n_candidates, dim)."""
-        slave = self.slave
-        summed = np.zeros_like(slave.points)
-        np.add.at(summed, slave.facets, corner_products(coordinates[self.slave_nodes], slave.facets))
-        summed[slave.mirrored] = 0.0
-        length = np.linalg.norm(summed, axis=1)
-        return np.asarray(summed / np.where(length > 0.0, length, 1.0)[:, None])[self.candidates]
+        return moved_surface(self.slave, coordinates[self.slave_nodes]).averaged[self.candidates]
 
     def closest(
         self, coordinates: np.ndarray, last: tuple[np.ndarray, np.ndarray], reach: float, comm: MPI.Comm
@@ -118,11 +116,15 @@ def _meeting(scene: Scene, pair: ContactPair, fixed: np.ndarray) -> Meeting:
     offset, given = np.zeros(len(candidates)), np.zeros(len(candidates), dtype=bool)
     if not isinstance(pair.master, Surface):
         none = np.zeros(0, dtype=np.int64), np.zeros((0, dim), dtype=bool)
-        return Meeting(slave, slave_nodes, candidates, offset, given, None, *none, pair.master)
+        return Meeting(slave, slave_nodes, candidates, offset, given, None, None, *none, pair.master)
     master = surface_of(scene, pair.master, "faceted")
-    patches = SmoothPatches.of(master, smooth=pair.geometry != "faceted")
+    by_means = pair.discretisation == "mortar"
+    patches = None if by_means else SmoothPatches.of(master, smooth=pair.geometry != "faceted")
     nodes = numbers.global_nodes(pair.master.body, master.nodes)
-    met = Meeting(slave, slave_nodes, candidates, offset, given, patches, nodes, master.mirrored, None)
+    met = Meeting(
+        slave, slave_nodes, candidates, offset, given, patches, master if by_means else None, nodes,
+        master.mirrored, None,
+    )  # fmt: skip
     return _within_body(met, master) if pair.within_body else met
 
 

@@ -10,7 +10,8 @@ import scipy.sparse as sp
 
 from fenics_contact.pairing.contact_points import ContactPoints
 from fenics_contact.pairing.sliding.differential import Differential, frame_changes, point_motion, spread
-from fenics_contact.pairing.sliding.patches import SmoothPatches
+from fenics_contact.pairing.sliding.mean_motion import MeanTangents, interleaved, placed
+from fenics_contact.pairing.sliding.means import MovingMeans
 from fenics_contact.pairing.sliding.slip import MaterialPoints
 from fenics_contact.pairing.sliding.stiffness import (
     GeometricStiffness,
@@ -28,8 +29,7 @@ class SlidingPoints:
         points: The points; gap, normal and weights are those of the present coordinates, areas those of the
             reference configuration. The weights reach the nodes around a facet.
         coordinates: Present coordinates of all nodes, shape (n_nodes, dim), [length].
-        patches: The smooth surface of each pair's master; None for rigid obstacles.
-        master_nodes: Its nodes among those of all bodies.
+        means: The coupling of each pair of mortar contact; None for other pairs.
         placements: Rotation and translation of each pair's moving obstacle; None for other masters.
         differential: What derivatives need.
         lost: Slave nodes that face a facet but for which no closest point was found.
@@ -37,8 +37,7 @@ class SlidingPoints:
 
     points: ContactPoints
     coordinates: np.ndarray
-    patches: tuple[SmoothPatches | None, ...]
-    master_nodes: tuple[np.ndarray, ...]
+    means: tuple[MovingMeans | None, ...]
     placements: tuple[tuple[np.ndarray, np.ndarray] | None, ...]
     differential: Differential
     lost: np.ndarray
@@ -89,13 +88,31 @@ class SlidingPoints:
         """Return where the nodes stand on their masters, for the slip from now on."""
         points = self.points
         foot = self.coordinates[points.slave] - points.distance[:, None] * points.normal
-        foot[points.facet >= 0] = 0.0
+        foot[np.diff(points.master.indptr) > 0] = 0.0
         for index, placement in enumerate(self.placements):
             if placement is not None:
                 rotation, translation = placement
                 mine = points.pair == index
                 foot[mine] = (foot[mine] - translation) @ rotation
-        return MaterialPoints(self.key, points.pair, points.facet, points.local, foot)
+        return MaterialPoints(self.key, points.pair, points.master, foot)
+
+    def mean_tangents(self, normal: np.ndarray, friction: np.ndarray, start: MaterialPoints) -> MeanTangents:
+        """Return what derivatives of mortar contact have beside the rows of its forces. Collective.
+
+        Args:
+            normal: λ_N, shape (n,), [force].
+            friction: τ in the points' tangents, shape (n, dim − 1), [force].
+            start: Where the nodes stood, see `material_points`.
+        """
+        (way, weights), count = self._way(start), self.points.count
+        total = MeanTangents.none(count, friction.shape[1], self.coordinates.size)
+        for mine, means in self._by_means:
+            forces = normal[mine], friction[mine]
+            found = means.tangents(
+                self.points.part(mine), self.coordinates, forces, (way[mine], weights[mine])
+            )
+            total = total.with_points(mine, found)
+        return total
 
     def slip(self, start: MaterialPoints) -> np.ndarray:
         """Return t_a·(x_s − x_m), x_m where the node stood at the start, carried along by the master.
@@ -122,33 +139,47 @@ class SlidingPoints:
         motion = point_motion(points, self.differential)
         turned = frame_changes(points.normal, points.axes, motion.directions)
         count, width = points.count, points.normal.shape[1] - 1
-        slave = sp.csr_matrix(
-            (np.ones(count), (np.arange(count), points.slave)), shape=(count, len(self.coordinates))
-        )
-        jump, parts = (slave - weights).tocsr(), []
+        jump, parts = (self._standing - weights).tocsr(), []
         for c in range(width):
             rows = spread(points.tangents[:, c], jump)
             for a in range(width):
                 rows = rows + sp.diags(np.einsum("nd,nd->n", turned[:, c, a], way)) @ motion.turn[a]
             parts.append(rows)
-        order = np.arange(width * count).reshape(width, count).T.ravel()
-        return sp.vstack(parts, format="csr")[order]
+        for mine, means in self._by_means:
+            some = points.part(mine)
+            moved = means.motion(some, np.ones(len(mine), dtype=bool))
+            for c, rows in enumerate(moved.slip_rows(some, self.coordinates, way[mine])):
+                parts[c] = parts[c] + placed(mine, count) @ rows
+        return interleaved(parts)
 
     def _way(self, start: MaterialPoints) -> tuple[np.ndarray, sp.csr_matrix]:
         """Return x_s − x_m, shape (n, dim), and the weights of nodes in x_m, shape (n, n_nodes)."""
         start = start.extended(self.material_points())
         start = start.part(np.searchsorted(start.key, self.key))
-        place, count = start.place.copy(), len(self.coordinates)
-        weights = sp.csr_matrix((self.points.count, count))
-        for index, patches in enumerate(self.patches):
-            mine = np.flatnonzero(start.pair == index)
-            if patches is not None:
-                values = patches.functions(start.local[mine]).value
-                own, nodes = patches.weights(start.facet[mine], values).tocoo(), self.master_nodes[index]
-                entries = (own.data, (mine[own.row], nodes[own.col]))
-                weights = weights + sp.csr_matrix(entries, shape=weights.shape)
-            elif (placement := self.placements[index]) is not None:
+        place = start.place.copy()
+        for index, placement in enumerate(self.placements):
+            if placement is not None:
                 rotation, translation = placement
+                mine = np.flatnonzero(start.pair == index)
                 place[mine] = place[mine] @ rotation.T + translation
-        way = self.coordinates[self.points.slave] - place - weights @ self.coordinates
-        return np.asarray(way), weights.tocsr()
+        way = self._standing @ self.coordinates - place - start.weights @ self.coordinates
+        return np.asarray(way), start.weights
+
+    @cached_property
+    def _standing(self) -> sp.csr_matrix:
+        """Weights of nodes in where each point stands: its node, with mortar the mean that it meets."""
+        at_node = np.ones(self.points.count)
+        for mine, _ in self._by_means:
+            at_node[mine] = 0.0
+        place = np.arange(self.points.count), self.points.slave
+        own = sp.csr_matrix((at_node, place), shape=self.points.master.shape)
+        return (own + sp.diags(1.0 - at_node) @ self.points.master).tocsr()
+
+    @property
+    def _by_means(self) -> list[tuple[np.ndarray, MovingMeans]]:
+        """The points of each pair of mortar contact with its coupling."""
+        return [
+            (np.flatnonzero(self.points.pair == index), means)
+            for index, means in enumerate(self.means)
+            if means is not None
+        ]

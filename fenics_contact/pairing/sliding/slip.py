@@ -5,24 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 
 
 @dataclass(frozen=True)
 class MaterialPoints:
-    """Where nodes stood on their masters, by facets and local coordinates; on obstacles by places in them.
+    """Where nodes stood on their masters, by weights of its nodes; on obstacles by places in them.
 
     Attributes:
         key: Number of each node in its pair, ascending, see `SlidingPoints.key`, shape (n,).
         pair: Contact pair, shape (n,).
-        facet: Facet of the master, −1 on rigid obstacles, shape (n,).
-        local: Local coordinates, shape (n, dim − 1).
+        weights: Weights of the nodes of all bodies, empty rows on rigid obstacles, shape (n, n_nodes).
         place: Places on obstacles as they stand before any motion, zero on bodies, shape (n, dim), [length].
     """
 
     key: np.ndarray
     pair: np.ndarray
-    facet: np.ndarray
-    local: np.ndarray
+    weights: sp.csr_matrix
     place: np.ndarray
 
     def extended(self, other: MaterialPoints) -> MaterialPoints:
@@ -34,12 +33,11 @@ class MaterialPoints:
         order = np.argsort(np.concatenate([self.key, other.key[new]]))
         joined = {
             name: np.concatenate([getattr(self, name), getattr(other, name)[new]])[order]
-            for name in ("key", "pair", "facet", "local", "place")
+            for name in ("key", "pair", "place")
         }
-        return replace(self, **joined)
+        weights = sp.vstack([self.weights, other.weights[new]], format="csr")[order]
+        return replace(self, weights=weights, **joined)
 
     def part(self, chosen: np.ndarray) -> MaterialPoints:
         """Return some of the points, by indices or a mask."""
-        return MaterialPoints(
-            self.key[chosen], self.pair[chosen], self.facet[chosen], self.local[chosen], self.place[chosen]
-        )
+        return MaterialPoints(self.key[chosen], self.pair[chosen], self.weights[chosen], self.place[chosen])

@@ -73,7 +73,8 @@ def geometric_stiffness(
     place, column = np.nonzero(kept)
     chosen = mixed[place, :, column]
     total = sum(sp.diags(chosen[:, r]) @ rows[r][place] for r in range(2 * width))
-    pushed = np.flatnonzero((multiplier > 0.0) & (points.facet < 0))
+    bent = differential.curvature.any(axis=(1, 2))
+    pushed = np.flatnonzero((multiplier > 0.0) & bent)
     blocks = -multiplier[pushed, None, None] * differential.curvature[pushed]
     return GeometricStiffness(
         total.T.tocsr(), values[place, column], pressed[place], blocks, points.slave[pushed]

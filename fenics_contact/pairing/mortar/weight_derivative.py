@@ -1,0 +1,166 @@
+"""The derivative of each mortar weight by the nodes of both surfaces, for tangents of moving bodies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from fenics_contact._libraries import MPI
+from fenics_contact.errors import together
+from fenics_contact.pairing.mortar.candidates import candidate_pairs
+from fenics_contact.pairing.mortar.cells import Overlaps, cells_of, cells_pulled_back, overlaps_of
+from fenics_contact.pairing.mortar.coupling import MortarCoupling, chunks
+from fenics_contact.pairing.mortar.coupling_derivative import moved_aside
+from fenics_contact.pairing.mortar.dual_basis import DualBasis
+from fenics_contact.pairing.mortar.dual_basis_derivative import integrals_pulled_back
+from fenics_contact.pairing.mortar.planes import Planes, planes_of, planes_pulled_back
+from fenics_contact.surfaces import FacetedSurface
+
+
+@dataclass(frozen=True)
+class WeightDerivatives:
+    """Derivatives of the weights of a coupling.
+
+    Attributes:
+        point: Point of the coupling of each weight, ascending, shape (m,).
+        node: Its node of the master, shape (m,).
+        rows: Derivatives by the nodes of the slave and, after them, of the master, shape (m, dim · (n_slave +
+            n_master)), [1 / length].
+    """
+
+    point: np.ndarray
+    node: np.ndarray
+    rows: sp.csr_matrix
+
+
+def weight_derivatives(
+    slave: FacetedSurface,
+    master: FacetedSurface,
+    coupling: MortarCoupling,
+    wanted: np.ndarray,
+    comm: MPI.Comm | None = None,
+) -> WeightDerivatives:
+    """Differentiate the weights of some points of a coupling. Collective on ``comm``.
+
+    As in `mortar_pulled_back` nodes and facets are fixed, and the derivative is that of the master beside its
+    place.
+
+    Args:
+        slave: Surface that carries the multipliers.
+        master: The opposite surface.
+        coupling: The coupling of both.
+        wanted: Points whose weights are differentiated, a mask, shape (n,).
+        comm: Communicator of the ranks that share the work; this one by default. All have the same arguments.
+    """
+    comm = comm or MPI.COMM_SELF
+    marked = np.zeros(len(slave.nodes), dtype=bool)
+    marked[coupling.node[wanted]] = True
+    mine = np.flatnonzero(marked[slave.facets].any(axis=1))[comm.rank :: comm.size]
+    part: tuple[np.ndarray, np.ndarray, sp.csr_matrix] | None = None
+    with together(comm):
+        part = _integrals(slave, moved_aside(master), mine)
+    parts = [each for each in comm.allgather(part) if each is not None]
+    key, integral, rows = _summed(*(list(column) for column in zip(*parts, strict=True)))
+    node, opposite = np.divmod(key, len(master.nodes))
+    kept = np.flatnonzero(marked[node])
+    point, opposite = np.searchsorted(coupling.node, node[kept]), opposite[kept]
+    return WeightDerivatives(
+        point, opposite, _normalised(point, integral[kept], rows[kept], len(coupling.node))
+    )
+
+
+def _normalised(point: np.ndarray, integral: np.ndarray, rows: sp.csr_matrix, count: int) -> sp.csr_matrix:
+    """Return the derivative of M_ij / Σ_j M_ij."""
+    entries = np.ones(len(point)), (point, np.arange(len(point)))
+    over = sp.csr_matrix(entries, shape=(count, len(point)))
+    area = (over @ integral)[point]
+    share = sp.diags(integral / area) @ over.T @ (over @ rows)
+    return (sp.diags(1.0 / area) @ (rows - share)).tocsr()
+
+
+def _summed(
+    keys: list[np.ndarray], integrals: list[np.ndarray], rows: list[sp.csr_matrix]
+) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
+    """Add entries with the same number."""
+    key, place = np.unique(np.concatenate(keys), return_inverse=True)
+    place = place.ravel()
+    add = sp.csr_matrix((np.ones(len(place)), (place, np.arange(len(place)))), shape=(len(key), len(place)))
+    return key, add @ np.concatenate(integrals), (add @ sp.vstack(rows, format="csr")).tocsr()
+
+
+def _integrals(
+    slave: FacetedSurface, master: FacetedSurface, chosen: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
+    """Return numbers (slave node · n_master + master node), integrals M and their derivatives, of facets."""
+    width = slave.dim * (len(slave.nodes) + len(master.nodes))
+    keys, integrals = [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
+    rows = [sp.csr_matrix((0, width))]
+    if len(chosen) and len(master.facets):
+        planes = planes_of(slave, chosen)
+        pairs = candidate_pairs(planes, planes_of(master, np.arange(len(master.facets))))
+        for pair_slave, pair_master in chunks(*pairs):
+            overlaps = overlaps_of(planes, pair_slave, pair_master, master)
+            if len(overlaps.pair) == 0:
+                continue
+            key, integral, part = _of_facets(overlaps, planes, slave, chosen, master)
+            keys.append(key)
+            integrals.append(integral)
+            rows.append(part)
+    return _summed(keys, integrals, rows)
+
+
+def _of_facets(
+    overlaps: Overlaps, planes: Planes, slave: FacetedSurface, chosen: np.ndarray, master: FacetedSurface
+) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
+    """Return the same of some overlaps that have all pairs of their slave facets.
+
+    The dual functions of a facet depend on all that covers it. So reverse mode runs once for each corner and
+    each node of the master over a facet, in all facets at the same time.
+    """
+    dim, n_slave, n_master = slave.dim, len(slave.nodes), len(master.nodes)
+    nodes, opposite = slave.facets[chosen[overlaps.slave]], master.facets[overlaps.master]
+    cells, each = cells_of(overlaps), np.arange(len(nodes))
+    basis, own = DualBasis.on(cells), planes.part(overlaps.slave)
+    over, place = _over_facets(overlaps.facet, opposite)
+    corners, places = slave.points[nodes], master.points[opposite]
+    nothing, integrals = np.zeros_like(own.normal), basis.integrals(cells.master)
+    met = np.concatenate([nodes, n_slave + opposite], axis=1)
+    column = (dim * met[:, :, None] + np.arange(dim)).reshape(len(met), -1)
+    keys, values, rows = [np.zeros(0, dtype=np.int64)], [np.zeros(0)], []
+    for corner, number in np.ndindex(nodes.shape[1], over.shape[1]):
+        seed = np.zeros((*integrals.shape[:2], integrals.shape[2] + 1))
+        seed[:, corner, :-1] = place == number
+        by, _ = integrals_pulled_back(basis, np.zeros_like(cells.weight), np.zeros_like(basis.coverage), seed)
+        by_subject, by_window = cells_pulled_back(overlaps, cells, by)
+        both = planes_pulled_back(own, corners, by_window, nothing, (places, each, by_subject))
+        slopes = np.concatenate(both, axis=1).reshape(len(nodes), -1)
+        felt = np.flatnonzero(slopes.any(axis=1))
+        start = slopes.shape[1] * np.arange(len(felt) + 1)
+        entries = slopes[felt].ravel(), column[felt].ravel(), start
+        rows.append(sp.csr_matrix(entries, shape=(len(felt), dim * (n_slave + n_master))))
+        keys.append(nodes[felt, corner] * n_master + over[overlaps.facet[felt], number])
+        values.append((integrals[felt, corner] * (place[felt] == number)).sum(axis=1))
+    return _summed(keys, values, rows)
+
+
+def _over_facets(facet: np.ndarray, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Number the nodes of the master over each slave facet.
+
+    Args:
+        facet: Slave facet of each pair, shape (n_pairs,).
+        nodes: Nodes of the master's facet, shape (n_pairs, master corners).
+
+    Returns:
+        The nodes over each facet, −1 beyond their number, shape (n_facets, most), and the number of each of
+        the pairs' nodes, in the shape of ``nodes``.
+    """
+    count = int(nodes.max()) + 1
+    key, place = np.unique((facet[:, None] * count + nodes).ravel(), return_inverse=True)
+    which, node = np.divmod(key, count)
+    first = np.searchsorted(which, which)
+    number = np.arange(len(key)) - first
+    over = np.full((int(facet.max()) + 1, int(number.max()) + 1), -1)
+    over[which, number] = node
+    return over, number[place.ravel()].reshape(nodes.shape)
