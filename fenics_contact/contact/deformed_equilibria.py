@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fenics_contact._libraries import MPI
 from fenics_contact.contact.deformed_state import DeformedState
 from fenics_contact.contact.dual_solve import contact_result
 from fenics_contact.contact.energies import Energies
@@ -14,7 +16,7 @@ from fenics_contact.contact.result import ContactResult
 from fenics_contact.contact.state import State
 from fenics_contact.contact.static_admissibility import check_held
 from fenics_contact.contact.tolerance import Tolerance
-from fenics_contact.errors import InvalidInputError, LoadStepError
+from fenics_contact.errors import InvalidInputError, LoadStepError, together
 from fenics_contact.feti import Decomposition, TornSystem, build_torn_system, prescribed_displacements
 from fenics_contact.nonlinear import (
     AutomaticSteps,
@@ -27,9 +29,10 @@ from fenics_contact.nonlinear import (
     Path,
     PathEndsError,
     StillContact,
+    TurnedSurface,
 )
 from fenics_contact.qp import DualSolution
-from fenics_contact.scene import RigidSurface, Scene
+from fenics_contact.scene import HistoryMaterial, LoadStep, RigidSurface, Scene
 from fenics_contact.timing import PhaseTimer
 
 if TYPE_CHECKING:
@@ -67,17 +70,25 @@ class DeformedEquilibria:
         if scene.contacts and moves:
             self._contact = MovingContact(scene, decomposition)
 
-    def solve(self, scene: Scene, origin: State | None, tolerance: Tolerance, time: float) -> DeformedState:
+    def solve(
+        self,
+        scene: Scene,
+        origin: State | None,
+        tolerance: Tolerance,
+        time: float,
+        step: LoadStep | None = None,
+    ) -> DeformedState:
         """Compute the equilibrium of a scene. Collective.
 
         Args:
             scene: The scene with its loads.
             origin: The state before, whose history goes on; None for bodies at rest.
             tolerance: Of all residuals; None for that of the solver.
-            time: Time at the end, for obstacles that move.
+            time: Time at the end, for obstacles that move and materials that creep.
+            step: The load step, with its functions of time; None without any.
 
         Raises:
-            InvalidInputError: If the tolerance is no number.
+            InvalidInputError: If the tolerance is no number, or time runs backwards and materials remember.
             LoadStepError: If the load cannot be followed; has the last equilibrium.
         """
         steps = self._steps
@@ -93,8 +104,12 @@ class DeformedEquilibria:
         if isinstance(origin, DeformedState):
             before, known = origin.load, origin.equilibrium.linearisation
             start = origin.equilibrium.configuration
+        self._require_later(scene, start.time, time)
         with timer.phase("assemble"):
             load = self._loading(scene, time)
+            if step is not None and (callable(step.loads) or callable(step.supports)):
+                course = _Course(step, scene, self._loading, self._decomposition.comm)
+                load = replace(load, course=course)
             if before is None:
                 check_held(load.torn)
         try:
@@ -104,6 +119,14 @@ class DeformedEquilibria:
             raise LoadStepError(str(failure), failure.history, last) from failure
         return _state_after(path, origin, timer)
 
+    def _require_later(self, scene: Scene, before: float, time: float) -> None:
+        materials = [each for body in scene.bodies.values() for each in body.materials]
+        if time < before and any(isinstance(each, HistoryMaterial) for each in materials):
+            raise InvalidInputError(
+                f"the time of load steps must not decrease where materials have a history, got {time:g} "
+                f"after {before:g}: give later times, or none"
+            )
+
     def _loading(self, scene: Scene, time: float) -> Loading:
         """Return what acts at a time. Collective."""
         self._assembled = build_torn_system(scene, self._decomposition, previous=self._assembled)
@@ -111,7 +134,24 @@ class DeformedEquilibria:
         following: tuple[tuple[float, FollowingPressures], ...] = ()
         if scene.following_pressures:
             following = ((1.0, FollowingPressures(scene, self._decomposition)),)
-        return Loading(self._assembled, prescribed, time, following)
+        turned = TurnedSurface.all_of(scene, self._decomposition)
+        return Loading(self._assembled, prescribed, time, following, turned)
+
+
+class _Course:
+    """The functions of time of a load step; a `Course`."""
+
+    def __init__(
+        self, step: LoadStep, scene: Scene, loading: Callable[[Scene, float], Loading], comm: MPI.Comm
+    ) -> None:
+        self.loads, self.supports = callable(step.loads), callable(step.supports)
+        self._step, self._scene, self._loading, self._comm = step, scene, loading, comm
+
+    def at(self, time: float) -> Loading:
+        """Return what acts at a time. Collective."""
+        with together(self._comm):
+            scene = self._step.at(self._scene, time)
+        return self._loading(scene, time)
 
 
 def _state_after(path: Path, origin: State | None, timer: PhaseTimer) -> DeformedState:

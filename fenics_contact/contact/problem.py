@@ -31,7 +31,7 @@ from fenics_contact.feti import (
     decompose,
 )
 from fenics_contact.qp import DualSolver
-from fenics_contact.scene import Load, RigidSurface, Scene, SolverKind, choose_solver
+from fenics_contact.scene import Load, LoadStep, RigidSurface, Scene, SolverKind, choose_solver
 from fenics_contact.timing import PhaseTimer
 
 if TYPE_CHECKING:
@@ -137,6 +137,7 @@ class ContactProblem:
         overlap: bool = False,
         sensitivity: bool = False,
         time: float = 1.0,
+        step: LoadStep | None = None,
     ) -> State:
         """Compute an equilibrium. Collective.
 
@@ -149,7 +150,10 @@ class ContactProblem:
             overlap: Whether bodies may overlap before they are loaded, as those of a design do.
             sensitivity: Whether derivatives of the state are wanted; they need the dual system, and the
                 default tolerance is then a number.
-            time: Time of the equilibrium, for obstacles that move (`MovingObstacle`).
+            time: Time of the equilibrium, for obstacles that move (`MovingObstacle`) and materials that
+                creep.
+            step: The load step, of whose functions of time a load of which parts are followed has the values
+                in between.
 
         Raises:
             InvalidInputError: If scene or partition cannot be used, or supports hold other components than
@@ -166,7 +170,7 @@ class ContactProblem:
                     "sensitivities and designs need linear materials, this scene has others: optimise it "
                     "with a tool that takes plain functions, see fenics_contact.outer"
                 )
-            self.state = self._deformed(scene, slip_from, wanted, time)
+            self.state = self._deformed(scene, slip_from, wanted, time, step)
             return self.state
         previous = self.state if start == "last" else start
         decomposition = self._decomposed(scene)
@@ -196,14 +200,16 @@ class ContactProblem:
                 self._contact_doubts.warn(self.state)
         return self.state
 
-    def _deformed(self, scene: Scene, origin: State | None, tolerance: Tolerance, time: float) -> State:
+    def _deformed(
+        self, scene: Scene, origin: State | None, tolerance: Tolerance, time: float, step: LoadStep | None
+    ) -> State:
         """Compute an equilibrium of nonlinear materials. Collective."""
         from fenics_contact.contact.deformed_equilibria import DeformedEquilibria
 
         if self._deformed_equilibria is None:
             decomposition = self._decomposed(scene)
             self._deformed_equilibria = DeformedEquilibria(scene, decomposition, self.steps, self.timer)
-        return self._deformed_equilibria.solve(scene, origin, tolerance, time)
+        return self._deformed_equilibria.solve(scene, origin, tolerance, time, step)
 
     @collectively("ContactProblem.restore", lambda self, *_, **__: self.comm)
     def restore(self, stored: Stored, scene: Scene | None = None) -> State:

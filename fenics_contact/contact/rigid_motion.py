@@ -14,7 +14,7 @@ from fenics_contact.scene import RigidSurface, Scene, Surface
 @displayed
 @dataclass(frozen=True, eq=False)
 class RigidMotion:
-    """The motion of a rigid surface: u = U + θ × (x − p).
+    """The motion of a rigid surface: u = U + θ × (x − p), of bodies that deform much U + (R(θ) − I)(x − p).
 
     Attributes:
         surface: The surface.
@@ -49,11 +49,14 @@ def rigid_motion(scene: Scene, support: RigidSurface, displacement: np.ndarray) 
         support: The surface.
         displacement: Displacement of the nodes of its body, shape (n_nodes, dim), [length].
     """
-    mesh = scene.bodies[support.body].mesh
+    body, where = scene.bodies[support.body], Surface(support.body, support.surface)
+    if body.deforms_much:  # all of it is prescribed
+        moved, turned = np.split(support.prescribed, [scene.dim])
+        return RigidMotion(where, np.array(support.at), moved, float(turned[0]) if scene.dim == 2 else turned)
+    mesh = body.mesh
     nodes = np.unique(mesh.surfaces[support.surface])
     modes = support.modes(mesh.points[nodes]).reshape(-1, len(support.motion))
     size = np.linalg.norm(modes, axis=0)
     motion = np.linalg.lstsq(modes / size, displacement[nodes].ravel(), rcond=None)[0] / size
     moved, turned = np.split(motion, [scene.dim])
-    where = Surface(support.body, support.surface)
     return RigidMotion(where, np.array(support.at), moved, float(turned[0]) if scene.dim == 2 else turned)

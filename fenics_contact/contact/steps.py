@@ -117,7 +117,7 @@ class LoadSequence:
         state = self._done.recalled(step, scene, self.problem)
         if state is None:
             time = self._number + 1.0 if step.time is None else step.time
-            state = self.problem.solve(scene, slip_from=self.state, time=time)
+            state = self.problem.solve(scene, slip_from=self.state, time=time, step=step)
             self._done.keep(step, state)
         self.scene = scene
         return state

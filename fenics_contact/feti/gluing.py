@@ -10,7 +10,7 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.feti.copies import Tearing
 from fenics_contact.feti.rows import Rows
 from fenics_contact.linalg import LAST_PLACES
-from fenics_contact.scene import Scene, Surface
+from fenics_contact.scene import RigidSurface, Scene, Surface
 
 
 def prescribed_displacements(scene: Scene, tearing: Tearing) -> np.ndarray:
@@ -26,7 +26,12 @@ def prescribed_displacements(scene: Scene, tearing: Tearing) -> np.ndarray:
     for support in scene.supports:
         own = np.unique(scene.facets(Surface(support.body, support.surface)))
         nodes = tearing.global_nodes(support.body, own)
-        given, known = support.values(scene.bodies[support.body].mesh.points[own]), prescribed[nodes]
+        body = scene.bodies[support.body]
+        points, known = body.mesh.points[own], prescribed[nodes]
+        if isinstance(support, RigidSurface) and body.deforms_much:
+            given = support.turned(points, support.prescribed)
+        else:
+            given = support.values(points)
         near = LAST_PLACES * np.nanmax(np.abs(given))
         clash = ~np.isnan(known) & ~np.isnan(given) & (np.abs(known - given) > near)
         if clash.any():

@@ -2,7 +2,7 @@
 
 from fenics_contact.nonlinear.equations import Configuration, Equations, Evaluation, Linearisation
 from fenics_contact.nonlinear.load_steps import AutomaticSteps, Path, PathEndsError
-from fenics_contact.nonlinear.loading import FollowingPressures, Loading
+from fenics_contact.nonlinear.loading import Course, FollowingPressures, Loading, TurnedSurface
 from fenics_contact.nonlinear.meeting import Contact, Meeting, MovingContact, StillContact
 from fenics_contact.nonlinear.newton import NonlinearEquilibrium, TangentNewton
 
@@ -10,6 +10,7 @@ __all__ = [
     "AutomaticSteps",
     "Configuration",
     "Contact",
+    "Course",
     "Equations",
     "Evaluation",
     "FollowingPressures",
@@ -22,4 +23,5 @@ __all__ = [
     "PathEndsError",
     "StillContact",
     "TangentNewton",
+    "TurnedSurface",
 ]

@@ -42,12 +42,17 @@ class Configuration:
         displacement: u of this rank, torn, shape (torn_size,), [length].
         multiplier: λ, owned, [force]; empty where nothing is known yet.
         history: Internal variables of each of this rank's subdomains; None without any.
+        time: The time at which it was reached.
+        largest: Size of the largest displacement that there has been, as in `Residuals.gluing_scale`: where
+            bodies return to rest, residuals are relative to that.
         meeting: The contact points whose rows the multiplier has; None at the start.
     """
 
     displacement: Vector
     multiplier: Vector
     history: tuple[np.ndarray | None, ...]
+    time: float
+    largest: float
     meeting: Meeting | None
 
     def meeting_at(self, meeting: Meeting) -> Configuration:
@@ -246,7 +251,7 @@ class Equations:
     def at_rest(self) -> Configuration:
         """Return the undeformed configuration without forces."""
         nothing = (None,) * len(self._mechanics)
-        return Configuration(np.zeros(self.decomposition.torn_size), np.zeros(0), nothing, None)
+        return Configuration(np.zeros(self.decomposition.torn_size), np.zeros(0), nothing, 0.0, 0.0, None)
 
     def least_jacobian(self, displacement: Vector) -> float:
         """Return the smallest det F at a torn displacement of all ranks. Collective."""
@@ -264,14 +269,15 @@ class Equations:
         Args:
             meeting: The contact points, with supports.
             law: Of friction.
-            at: The configuration; its history is that before the load step.
+            at: The configuration; its history and its time are those before the load step.
             step: ρ of the natural map, owned.
             load: What acts.
         """
         comm, torn = self.decomposition.comm, meeting.torn
         with together(comm):
             each = zip(self._mechanics, self.decomposition.parts, at.history, strict=True)
-            responses = tuple(m.at(at.displacement[part], history) for m, part, history in each)
+            duration = load.time - at.time
+            responses = tuple(m.at(at.displacement[part], history, duration) for m, part, history in each)
             external, softening = load.at(at.displacement)
         internal = np.concatenate([np.zeros(0), *(response.force for response in responses)])
         bound = torn.B.T @ torn.numbering.to_local(at.multiplier)
@@ -325,7 +331,7 @@ def _residuals(
         len(u),
     )
     unbalanced, internal, bound, load, moved, open_, given, natural = np.sqrt(sums[:8])
-    moved = max(moved, given)
+    moved = max(moved, given, at.largest)
     floor = FORCE_FLOOR * stiff * moved / np.sqrt(sums[8])
     force = max(min(internal, bound) if internal > 0 else bound, load, floor)
     violation = global_max(comm, feasible.violation(at.multiplier))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,7 +14,7 @@ from fenics_contact.errors import together
 from fenics_contact.feti import Decomposition, TornSystem
 from fenics_contact.mesh import corners_of
 from fenics_contact.qp import Vector
-from fenics_contact.scene import Scene
+from fenics_contact.scene import RigidSurface, Scene
 
 
 @displayed
@@ -27,17 +28,41 @@ class Loading:
         prescribed: Prescribed components of all nodes, NaN where free, shape (n_nodes, dim), [length].
         time: The time, for obstacles that move.
         following: Pressures that follow their surfaces, each with the part of them that acts.
+        turned: Surfaces that turn as rigid pieces.
+        course: Loads and supports that are functions of time; None without any.
     """
 
     torn: TornSystem
     prescribed: np.ndarray
     time: float
     following: tuple[tuple[float, FollowingPressures], ...] = ()
+    turned: tuple[TurnedSurface, ...] = ()
+    course: Course | None = None
 
     def between(self, first: Loading, part: float) -> Loading:
-        """Return the load at a part of the way from another one to this."""
+        """Return the load at a part of the way from another one to this. Collective.
+
+        Numbers change in proportion to the part, those of rotations are angles; functions of time have their
+        values.
+        """
         if part == 1.0:
             return self
+        mixed = self._mixed(first, part)
+        if self.course is None:
+            return mixed
+        now = self.course.at(mixed.time)
+        if self.course.loads:
+            pairs = zip(mixed.torn.subdomains, now.torn.subdomains, strict=True)
+            subdomains = tuple(replace(a, load=b.load) for a, b in pairs)
+            torn = replace(mixed.torn, subdomains=subdomains)
+            mixed = replace(mixed, torn=torn, following=now.following)
+        if self.course.supports:
+            torn = replace(mixed.torn, right=now.torn.right, supported=now.torn.supported)
+            mixed = replace(mixed, torn=torn, prescribed=now.prescribed, turned=now.turned)
+        return mixed
+
+    def _mixed(self, first: Loading, part: float) -> Loading:
+        """Return the load at a part of the way, in proportion to it."""
         parts = zip(first.torn.subdomains, self.torn.subdomains, strict=True)
         subdomains = tuple(replace(b, load=(1.0 - part) * a.load + part * b.load) for a, b in parts)
 
@@ -49,7 +74,14 @@ class Loading:
         weighted = [((1.0 - part) * weight, each) for weight, each in first.following]
         weighted += [(part * weight, each) for weight, each in self.following]
         time = (1.0 - part) * first.time + part * self.time
-        return Loading(torn, prescribed, time, tuple(weighted))
+        before = {each.place: each for each in first.turned}
+        turned = tuple(each.between(before.get(each.place), part) for each in self.turned)
+        bent = prescribed.copy()
+        for surface in turned:
+            bent[surface.nodes] = surface.displacement
+        if turned:
+            torn = _moved_further(torn, np.nan_to_num(bent - prescribed))
+        return Loading(torn, bent, time, tuple(weighted), turned)
 
     def removed(self) -> Loading:
         """Return the same supports without movement, at time zero, and no loads."""
@@ -58,7 +90,8 @@ class Loading:
         right = np.where(equality, 0.0, torn.right + torn.supported)
         subdomains = tuple(replace(part, load=np.zeros_like(part.load)) for part in torn.subdomains)
         torn = replace(torn, subdomains=subdomains, right=right, supported=np.zeros_like(torn.supported))
-        return Loading(torn, 0.0 * self.prescribed, 0.0)
+        still = tuple(each.between(None, 0.0) for each in self.turned)
+        return Loading(torn, 0.0 * self.prescribed, 0.0, turned=still)
 
     @property
     def rim(self) -> np.ndarray:
@@ -84,6 +117,66 @@ class Loading:
             force, matrix = force + weight * more, weight * matrix
             softening = matrix if softening is None else softening + matrix
         return force, softening
+
+
+class Course(Protocol):
+    """Loads and supports that are functions of time.
+
+    Attributes:
+        loads: Whether loads are.
+        supports: Whether supports are.
+    """
+
+    loads: bool
+    supports: bool
+
+    def at(self, time: float) -> Loading:
+        """Return what acts at a time. Collective."""
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class TurnedSurface:
+    """A surface that turns as a rigid piece by a large angle.
+
+    Attributes:
+        surface: Where, and about which point.
+        motion: U, [length], then θ, in radians.
+        nodes: Its nodes, of those of all bodies, shape (n,).
+        points: Their undeformed coordinates, shape (n, dim), [length].
+    """
+
+    surface: RigidSurface
+    motion: np.ndarray
+    nodes: np.ndarray
+    points: np.ndarray
+
+    @classmethod
+    def all_of(cls, scene: Scene, decomposition: Decomposition) -> tuple[TurnedSurface, ...]:
+        """Return those of a scene."""
+        found = []
+        for support in scene.supports:
+            body = scene.bodies[support.body]
+            if isinstance(support, RigidSurface) and body.deforms_much:
+                own = np.unique(body.mesh.surfaces[support.surface])
+                nodes = decomposition.tearing.global_nodes(support.body, own)
+                found.append(cls(support, support.prescribed, nodes, body.mesh.points[own]))
+        return tuple(found)
+
+    def between(self, first: TurnedSurface | None, part: float) -> TurnedSurface:
+        """Return it at a part of the way from another motion, by default from rest."""
+        start = 0.0 if first is None else first.motion
+        return replace(self, motion=(1.0 - part) * start + part * self.motion)
+
+    @property
+    def place(self) -> tuple[str, str]:
+        """Names of the body and of the surface."""
+        return self.surface.body, self.surface.surface
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Displacement of the nodes, shape (n, dim), [length]."""
+        return self.surface.turned(self.points, self.motion)
 
 
 @displayed
@@ -151,3 +244,14 @@ def _at_rim(facets: np.ndarray, dim: int) -> np.ndarray:
     )
     alone = count[number.reshape(corners.shape)] == 1
     return np.asarray(facets[alone.any(axis=1)])
+
+
+def _moved_further(torn: TornSystem, change: np.ndarray) -> TornSystem:
+    """Return a system whose supports have moved further, shape (n_nodes, dim), zero where free."""
+    gluing = torn.decomposition.gluing
+    supported = np.concatenate([relation.of_supports(change) for relation in torn.relations])
+    supported = np.concatenate([np.zeros(torn.n_gluing), supported])
+    right = -supported
+    right[: torn.n_gluing] = change.ravel()[gluing.dof]
+    owned = torn.numbering.owned
+    return replace(torn, right=torn.right + right[owned], supported=torn.supported + supported[owned])

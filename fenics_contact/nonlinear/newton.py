@@ -57,6 +57,7 @@ class NonlinearEquilibrium:
         evaluation: The equations there; all residuals are below the tolerance.
         linearisation: The last one, from a little before.
         history: One line for each Newton step.
+        time: When it is reached.
         products: Applications of F.
         factorisations: Factored tangents, counting all subdomains as one.
     """
@@ -64,13 +65,17 @@ class NonlinearEquilibrium:
     evaluation: Evaluation
     linearisation: Linearisation
     history: tuple[SolverStep, ...]
+    time: float
     products: int
     factorisations: int
 
     @property
     def configuration(self) -> Configuration:
-        """The configuration, with the history of its materials up to date."""
-        return replace(self.evaluation.at, history=self.evaluation.history)
+        """The configuration, with the history of its materials and the time up to date."""
+        found = self.evaluation
+        return replace(
+            found.at, history=found.history, time=self.time, largest=found.residuals.gluing_scale
+        )
 
 
 @displayed
@@ -148,7 +153,9 @@ class _Run:
             self.factorisations += 1
             following = self._advanced(evaluation, earlier, near)
             evaluation, earlier = following, evaluation.residuals
-        return NonlinearEquilibrium(evaluation, near, tuple(self.history), self.products, self.factorisations)
+        return NonlinearEquilibrium(
+            evaluation, near, tuple(self.history), self._load.time, self.products, self.factorisations
+        )
 
     def _evaluated(self, at: Configuration, near: Linearisation | None) -> Evaluation:
         """Return the equations at a configuration, with its contact points. Collective."""

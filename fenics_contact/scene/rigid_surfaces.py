@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from fenics_contact.checks import GivenVector, checked, floats
 from fenics_contact.errors import InvalidInputError
@@ -22,8 +23,10 @@ class RigidSurface:
     """A surface that moves as one rigid piece: u = U + θ × (x − p), U and θ being the motion of a point p.
 
     Components of U and θ that are given are prescribed; the others follow from the equilibrium of the surface
-    with a force and a moment at the point. Rotations are small, as all displacements. Other programs call it
-    a remote displacement or a kinematic coupling; for a force that leaves the surface flexible see
+    with a force and a moment at the point. Rotations are small, as all displacements, but on bodies of
+    materials for large deformations: there the surface turns about the axis θ by the angle ‖θ‖, however
+    large, u = U + (R(θ) − I)(x − p), along arcs on the way, and everything must be prescribed. Other programs
+    call it a remote displacement or a kinematic coupling; for a force that leaves the surface flexible see
     `TotalForce`.
 
     Attributes:
@@ -41,6 +44,7 @@ class RigidSurface:
 
     Example:
         >>> twisted = RigidSurface("shaft", "end", (0, 0, 50), (0, 0, None), (0, 0, 0.01))  # mm, rad
+        >>> half_a_turn = RigidSurface("rubber", "top", (0, 0, 20), (0, 0, 0), (0, 0, np.pi))
         >>> loaded = RigidSurface("bracket", "plate", (40, 0, 10), force=(0, 0, -500))  # N
     """
 
@@ -138,10 +142,21 @@ class RigidSurface:
         """
         return motions_about(points, np.array(self.at))
 
+    @property
+    def prescribed(self) -> np.ndarray:
+        """U, then θ, zero where free, shape (3,) in the plane, (6,) in space."""
+        return np.array([0.0 if component is None else component for component in self.motion])
+
     def values(self, points: np.ndarray) -> np.ndarray:
         """Return the displacement of points, both of shape (n, dim), with zero for free components."""
-        known = np.array([0.0 if component is None else component for component in self.motion])
-        return self.modes(points) @ known
+        return self.modes(points) @ self.prescribed
+
+    def turned(self, points: np.ndarray, motion: np.ndarray) -> np.ndarray:
+        """Return U + (R(θ) − I)(x − p) of points, both of shape (n, dim), for any U, then θ."""
+        shift, angle = np.split(motion, [self.dim])
+        about = Rotation.from_rotvec(angle if self.dim == 3 else (0.0, 0.0, angle[0]))
+        arms = points - np.array(self.at)
+        return np.asarray(shift + arms @ about.as_matrix()[: self.dim, : self.dim].T - arms)
 
 
 #: What prescribes displacements of a surface.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field, PositiveFloat
 
 from fenics_contact.errors import InvalidInputError
-from fenics_contact.scene import Body, LoadStep
+from fenics_contact.scene import Body, LoadStep, is_nonlinear
 from fenics_contact.scene_file.evaluation import check_formulas
 from fenics_contact.scene_file.expression import VectorExpression, at_time, between, changes
 from fenics_contact.scene_file.part import Part
@@ -64,20 +64,24 @@ def load_steps(
     with at("steps"):
         _require_few(steps)
     dim = next(iter(bodies.values())).mesh.dim
+    in_parts = any(is_nonlinear(each) for body in bodies.values() for each in body.materials)
     held = _Values([part.name for part in supports], [part.size or (0.0,) * dim for part in supports])
     acting = _Values([part.name for part in loads], [part.size for part in loads])
     built: list[LoadStep] = []
     begin = 0.0
     for position, step in enumerate(steps):
         duration = step.duration or float(step.count)
+        acted = _Course(tuple(loads), dim, acting.ways(step.loads), begin, duration)
+        held_up = _Course(tuple(supports), dim, held.ways(step.supports), begin, duration)
         with at("steps", position):
             for number in range(1, step.count + 1):
-                way = _Way(begin, begin + number / step.count * duration, number / step.count)
+                time, share = begin + number / step.count * duration, number / step.count
                 name = step.name if step.count == 1 else f"{step.name} {number}/{step.count}"
-                acted = tuple(map(_built(dim), loads, acting.on_the_way(step.loads, way)))
-                held_up = tuple(map(_built(dim), supports, held.on_the_way(step.supports, way)))
-                built.append(LoadStep(name, acted, held_up, way.time))
-            for part in (*(built[-1].loads or ()), *(built[-1].supports or ())):
+                acts, holds = (
+                    each if in_parts and each.varies else each.at(time, share) for each in (acted, held_up)
+                )
+                built.append(LoadStep(name, acts, holds, time))
+            for part in (*acted.at(time, 1.0), *held_up.at(time, 1.0)):
                 check_formulas(part, bodies)
         held.reach(step.supports)
         acting.reach(step.loads)
@@ -85,27 +89,47 @@ def load_steps(
     return tuple(built)
 
 
-def _built(dim: int) -> Callable[[Any, Any], Any]:
-    return lambda part, value: part.build(dim, value)
-
-
 @dataclass(frozen=True)
-class _Way:
-    """A moment of a step: time at its begin, time now, and the share of the step that is over."""
+class _Course:
+    """All loads, or all supports, within a step, as a function of time.
 
+    Attributes:
+        parts: Those of the file.
+        dim: Dimension of the bodies.
+        ways: Their values before the step and at its end, or as formulas in t.
+        begin: Time at the begin of the step.
+        duration: Of the step.
+    """
+
+    parts: tuple[Any, ...]
+    dim: int
+    ways: tuple[tuple[Any, Any], ...]
     begin: float
-    time: float
-    share: float
+    duration: float
 
-    def value(self, start: Any, end: Any) -> Any:
+    @property
+    def varies(self) -> bool:
+        """Whether a value is a formula in t."""
+        return any(changes(end) for _, end in self.ways)
+
+    def __call__(self, time: float) -> tuple[Any, ...]:
+        """Return what the parts are at a time."""
+        return self.at(time, (time - self.begin) / self.duration)
+
+    def at(self, time: float, share: float) -> tuple[Any, ...]:
+        """Return what the parts are at a time, after a share of the step."""
+        values = [self._value(start, end, time, share) for start, end in self.ways]
+        return tuple(part.build(self.dim, value) for part, value in zip(self.parts, values, strict=True))
+
+    def _value(self, start: Any, end: Any, time: float, share: float) -> Any:
         """Return the value between those before the step and at its end, or of a formula in t."""
         if isinstance(start, tuple) and isinstance(end, tuple):
-            return tuple(map(self.value, start, end))
+            return tuple(self._value(a, b, time, share) for a, b in zip(start, end, strict=False))
         if changes(end):
-            return at_time(end, self.time)
-        if self.share == 1.0 or start is None or end is None:
+            return at_time(end, time)
+        if share == 1.0 or start is None or end is None:
             return end
-        return between(_whole(at_time(start, self.begin)), _whole(end), self.share)
+        return between(_whole(at_time(start, self.begin)), _whole(end), share)
 
 
 class _Values:
@@ -115,10 +139,10 @@ class _Values:
         self._values = dict(enumerate(values))
         self._place = {name: place for place, name in enumerate(names) if name}
 
-    def on_the_way(self, changed: Mapping[str, Any], way: _Way) -> list[Any]:
-        """Return the values within a step, in the order of the file."""
+    def ways(self, changed: Mapping[str, Any]) -> tuple[tuple[Any, Any], ...]:
+        """Return the values before a step and at its end, in the order of the file."""
         ends = {**self._values, **{self._place[name]: value for name, value in changed.items()}}
-        return [way.value(start, ends[place]) for place, start in self._values.items()]
+        return tuple((start, ends[place]) for place, start in self._values.items())
 
     def reach(self, changed: Mapping[str, Any]) -> None:
         """Replace the values that a step has changed."""

@@ -122,6 +122,6 @@ class Creeping(HistoryMaterial):
         return MaterialResponse(np.einsum("nijkl,nkl->nij", tangent, gradient), tangent, history)
 
 
-def test_scenes_have_no_time_for_materials_that_need_it() -> None:
-    with pytest.raises(InvalidInputError, match="the answer of Creeping depends on the duration of the step"):
-        solve_scene(pulled(Creeping(), 0.01), MPI.COMM_SELF)
+def test_a_duration_that_is_not_known_is_asked_for() -> None:
+    with pytest.raises(InvalidInputError, match=r"the answer of Creeping depends on the duration.*: give it"):
+        Creeping().answer(np.zeros((1, 3, 3)), np.zeros((1, 1)), np.nan)

@@ -116,8 +116,8 @@ class HistoryMaterial(Elasticity):
                 )
         if np.isnan(duration) and not np.isfinite(arrays["stress"]).any():
             raise InvalidInputError(
-                f"the answer of {name} depends on the duration of the step, none was given: load steps of "
-                "scenes have none; use a material that does not depend on it"
+                f"the answer of {name} depends on the duration of the step, none was given: give it, or use "
+                "a material that does not depend on it"
             )
         upright = np.linalg.det(np.eye(3) + gradient) > 0 if self.finite else np.ones(n, dtype=bool)
         for part, values in arrays.items():
