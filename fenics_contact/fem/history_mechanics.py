@@ -54,7 +54,11 @@ class HistoryMechanics:
         return *self._gauss.shape, self._size
 
     def at(
-        self, displacement: np.ndarray, history: np.ndarray | None = None, duration: float = np.nan
+        self,
+        displacement: np.ndarray,
+        history: np.ndarray | None = None,
+        duration: float = np.nan,
+        origin: np.ndarray | None = None,
     ) -> Response:
         """Evaluate the materials and assemble; see `Mechanics.at`.
 
@@ -77,10 +81,10 @@ class HistoryMechanics:
             stress[cells] = cauchy(nominal, gradient[cells]) if material.finite else nominal
             force += self._gauss.force(nominal, cells)
             entries += self._gauss.stiffness(end.tangent.reshape(*shape, 3, 3, 3, 3), cells)
-        rest = None if self._others is None else self._others.at(displacement)
+        rest = None if self._others is None else self._others.at(displacement, origin=origin)
         return Response(
             force=force if rest is None else force + rest.force,
-            stiffness=self._gauss.assembled(entries, None if rest is None else rest.stiffness),
+            tangent=lambda: self._gauss.assembled(entries, None if rest is None else rest.stiffness),
             energy=None,
             least_jacobian=self.least_jacobian(displacement),
             history=after,

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
+import scipy.sparse as sp
 
 from fenics_contact import _dolfinx
 from fenics_contact.fem.composition import Composition, material_sets
@@ -45,22 +48,36 @@ class HyperelasticMechanics:
             self._mean = MeanDilatation(templates, parts, cell_type, fields, self._dilatation)
 
     def at(
-        self, displacement: np.ndarray, history: np.ndarray | None = None, duration: float = np.nan
+        self,
+        displacement: np.ndarray,
+        history: np.ndarray | None = None,
+        duration: float = np.nan,
+        origin: np.ndarray | None = None,
     ) -> Response:
         """Assemble; see `Mechanics.at`."""
         _dolfinx.update_coordinates(self._mesh, self._points)
         self._displacement.x.array[:] = displacement
         if self._mean is not None:
             self._mean.follow(displacement)
+        force, energy = _dolfinx.assemble_vector(self._force), _dolfinx.assemble_scalar(self._energy)
+        tangent = partial(self._stiffness, displacement.copy(), origin)
+        return Response(force, tangent, energy, self.least_jacobian(displacement))
+
+    def _stiffness(self, displacement: np.ndarray, origin: np.ndarray | None) -> sp.csr_matrix:
+        """Return the tangent.
+
+        Pressures that grow with the bulk modulus overshoot within a Newton step, by the square of its
+        displacements: the tangent has those that the step foresaw.
+        """
+        _dolfinx.update_coordinates(self._mesh, self._points)
+        if self._mean is not None and origin is not None:
+            self._displacement.x.array[:] = origin
+            self._mean.foresee(origin, displacement)
+        elif self._mean is not None:
+            self._mean.follow(displacement)
+        self._displacement.x.array[:] = displacement
         stiffness = assembled(self._tangent, (displacement.size,) * 2)
-        if self._mean is not None:
-            stiffness = stiffness + self._mean.stiffness()
-        return Response(
-            force=_dolfinx.assemble_vector(self._force),
-            stiffness=stiffness,
-            energy=_dolfinx.assemble_scalar(self._energy),
-            least_jacobian=self.least_jacobian(displacement),
-        )
+        return stiffness if self._mean is None else (stiffness + self._mean.stiffness()).tocsr()
 
     def least_jacobian(self, displacement: np.ndarray) -> float:
         """Return the smallest det F; see `Mechanics.least_jacobian`."""

@@ -25,11 +25,15 @@ class LinearMechanics:
         self._stiffness = sp.csr_matrix((data, indices, indptr), shape=(points.size,) * 2)
 
     def at(
-        self, displacement: np.ndarray, history: np.ndarray | None = None, duration: float = np.nan
+        self,
+        displacement: np.ndarray,
+        history: np.ndarray | None = None,
+        duration: float = np.nan,
+        origin: np.ndarray | None = None,
     ) -> Response:
         """Return K u and K; see `Mechanics.at`."""
         force = self._stiffness @ displacement
-        return Response(force, self._stiffness, float(force @ displacement) / 2, 1.0)
+        return Response(force, lambda: self._stiffness, float(force @ displacement) / 2, 1.0)
 
     def least_jacobian(self, displacement: np.ndarray) -> float:
         """Return 1: in small strain no volume changes."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -61,9 +63,28 @@ class MeanDilatation:
         """Set the mean dilatations to those of a displacement."""
         self._means.x.array[self._dofs] = self._dilatation.means(displacement)
 
+    def foresee(self, origin: np.ndarray, displacement: np.ndarray) -> None:
+        """Set the mean dilatations to those that a step was expected to lead to, θ_c + D δu / V_c.
+
+        Args:
+            origin: Displacement at the start of the step, that of the fields.
+            displacement: That at its end.
+        """
+        self.follow(origin)
+        self._means.x.array[:] += self._volume_changes() @ (displacement - origin) / self._volumes
+
     def stiffness(self) -> sp.csr_matrix:
         """Return the growth of the mean dilatations' stresses, shape (dim n, dim n)."""
-        D = assembled(self._change, (len(self._dofs), self._size))
+        D = self._volume_changes()
+        return (D.T @ sp.diags(_dolfinx.assemble_vector(self._modulus) / self._volumes**2) @ D).tocsr()
+
+    def _volume_changes(self) -> sp.csr_matrix:
+        """Return D at the displacement of the fields, shape (n_cells, dim n)."""
+        return assembled(self._change, (len(self._dofs), self._size))
+
+    @cached_property
+    def _volumes(self) -> np.ndarray:
+        """Undeformed volumes by dof of the mean dilatations, shape (n_cells,), [length^dim]."""
         volumes = np.empty(len(self._dofs))
         volumes[self._dofs] = self._dilatation.volumes
-        return (D.T @ sp.diags(_dolfinx.assemble_vector(self._modulus) / volumes**2) @ D).tocsr()
+        return volumes

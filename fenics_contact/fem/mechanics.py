@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -18,7 +20,7 @@ class Response:
 
     Attributes:
         force: Internal force f(u), by dof, shape (dim n,), [force].
-        stiffness: Tangent ∂f/∂u, shape (dim n, dim n), [force / length].
+        tangent: Assembles `stiffness`.
         energy: Stored energy, [force · length]; None where materials dissipate.
         least_jacobian: Smallest det F at a Gauss point; 0 or less is an inverted cell.
         history: Internal variables at the end of the step, shape (n_cells, n_gauss, k); None without any.
@@ -27,18 +29,27 @@ class Response:
     """
 
     force: np.ndarray
-    stiffness: sp.csr_matrix
+    tangent: Callable[[], sp.csr_matrix]
     energy: float | None
     least_jacobian: float
     history: np.ndarray | None = None
     stress: np.ndarray | None = None
+
+    @cached_property
+    def stiffness(self) -> sp.csr_matrix:
+        """Tangent ∂f/∂u, shape (dim n, dim n), [force / length]; assembled on first use."""
+        return self.tangent()
 
 
 class Mechanics(Protocol):
     """Internal forces and tangent of one mesh with nonlinear materials."""
 
     def at(
-        self, displacement: np.ndarray, history: np.ndarray | None = None, duration: float = np.nan
+        self,
+        displacement: np.ndarray,
+        history: np.ndarray | None = None,
+        duration: float = np.nan,
+        origin: np.ndarray | None = None,
     ) -> Response:
         """Return the response to a displacement.
 
@@ -47,6 +58,8 @@ class Mechanics(Protocol):
             history: Internal variables at the start of the step, for materials that have some, shape
                 (n_cells, n_gauss, k) by the mesh's cells; None for an unloaded body.
             duration: Of the step; NaN where it is not known, which materials that need it refuse.
+            origin: Displacement at the start of the Newton step that led here, None where there was none:
+                tangents of mean dilatations have the pressures that this step foresaw.
         """
 
     def least_jacobian(self, displacement: np.ndarray) -> float:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,6 +14,7 @@ from fenics_contact.fem import Mechanics, Response, composition
 from fenics_contact.feti import Decomposition, TornSystem
 from fenics_contact.nonlinear.loading import Loading
 from fenics_contact.nonlinear.meeting import Meeting
+from fenics_contact.nonlinear.residuals import ROUNDED, Sizes, beyond
 from fenics_contact.nonlinear.tangent_step import TangentProblem
 from fenics_contact.nonlinear.tangent_system import TangentSystem, linearised
 from fenics_contact.nonlinear.turning import NO_ROWS, FurtherRows, stiffened, unsymmetric_at
@@ -24,13 +25,9 @@ from fenics_contact.qp import (
     contact_step,
     global_max,
     global_min,
-    global_sum,
 )
 from fenics_contact.scene import Scene
 from fenics_contact.timing import PhaseTimer
-
-#: Forces below this fraction of those that would strain bodies by their displacement are none.
-FORCE_FLOOR = 1e-4
 
 
 @displayed
@@ -237,6 +234,9 @@ class Equations:
         forms.prepare_mechanics(scene)
         with together(decomposition.comm):
             self._mechanics = tuple(self._of(scene, number) for number in range(len(decomposition.meshes)))
+        meshes = [body.mesh for body in scene.bodies.values()]
+        self._reach = max(float(np.abs(mesh.points).max()) for mesh in meshes)
+        self._cell = max(float(mesh.volume / mesh.n_cells) ** (1.0 / scene.dim) for mesh in meshes)
 
     def _of(self, scene: Scene, number: int) -> Mechanics:
         mesh = self.decomposition.meshes[number]
@@ -247,6 +247,15 @@ class Equations:
 
     def _facts(self) -> dict[str, object]:
         return {"subdomains": f"{len(self._mechanics)} on this rank"}
+
+    @cached_property
+    def stiffness(self) -> float:
+        """The largest entry of the tangents' diagonals at rest, [force / length]. Collective on first use."""
+        comm, sizes = self.decomposition.comm, [mesh.size for mesh in self.decomposition.meshes]
+        with together(comm):
+            pairs = zip(self._mechanics, sizes, strict=True)
+            at_rest = [m.at(np.zeros(size), duration=1.0).stiffness.diagonal() for m, size in pairs]
+        return global_max(comm, max((float(diagonal.max()) for diagonal in at_rest), default=0.0))
 
     def at_rest(self) -> Configuration:
         """Return the undeformed configuration without forces."""
@@ -262,7 +271,13 @@ class Equations:
         return global_min(comm, least)
 
     def evaluate(
-        self, meeting: Meeting, law: SlipLaw, at: Configuration, step: Vector, load: Loading
+        self,
+        meeting: Meeting,
+        law: SlipLaw,
+        at: Configuration,
+        step: Vector,
+        load: Loading,
+        origin: Vector | None = None,
     ) -> Evaluation:
         """Return forces, openings and their residuals. Collective.
 
@@ -272,18 +287,26 @@ class Equations:
             at: The configuration; its history and its time are those before the load step.
             step: ρ of the natural map, owned.
             load: What acts.
+            origin: Displacement before the last Newton step, torn; None where there was none.
         """
         comm, torn = self.decomposition.comm, meeting.torn
         with together(comm):
             each = zip(self._mechanics, self.decomposition.parts, at.history, strict=True)
             duration = load.time - at.time
-            responses = tuple(m.at(at.displacement[part], history, duration) for m, part, history in each)
+            responses = tuple(
+                m.at(at.displacement[part], history, duration, None if origin is None else origin[part])
+                for m, part, history in each
+            )
             external, softening = load.at(at.displacement)
         internal = np.concatenate([np.zeros(0), *(response.force for response in responses)])
         bound = torn.B.T @ torn.numbering.to_local(at.multiplier)
-        unbalanced, lacking = external - internal - bound, meeting.lacking(at.displacement)
-        stiff = global_max(comm, max((float(r.stiffness.diagonal().max()) for r in responses), default=0.0))
-        residuals = _residuals(torn, law, at, step, (unbalanced, internal, bound, external), lacking, stiff)
+        stiff, lacking = self.stiffness, meeting.lacking(at.displacement)
+        # What is no more than rounding of strains and of positions is none.
+        unbalanced = beyond(external - internal - bound, ROUNDED * stiff * self._cell)
+        mapped = law.feasible(at.multiplier).project(at.multiplier - step * lacking)
+        natural = beyond(at.multiplier - mapped, ROUNDED * self._reach * step)
+        sizes = Sizes(natural, unbalanced, internal, bound, external, lacking, at.displacement, at.largest)
+        residuals = sizes.residuals(torn, law, at.multiplier, stiff)
         least = global_min(comm, min((r.least_jacobian for r in responses), default=1.0))
         return Evaluation(
             meeting,
@@ -299,48 +322,3 @@ class Equations:
             least,
             stiff,
         )
-
-
-def _residuals(
-    torn: TornSystem,
-    law: SlipLaw,
-    at: Configuration,
-    step: Vector,
-    forces: Sequence[Vector],
-    lacking: Vector,
-    stiff: float,
-) -> Residuals:
-    """Return the relative residuals: forces out of balance as `coarse`. Collective.
-
-    Args:
-        torn: The system.
-        law: Of friction.
-        at: The configuration.
-        step: ρ of the natural map, owned.
-        forces: Those out of balance, internal ones, Bᵀλ and loads, each torn, of this rank, [force].
-        lacking: c − B u, owned, [length].
-        stiff: Largest entry of the tangents' diagonals, [force / length].
-    """
-    comm, contact = torn.numbering.comm, torn.numbering.owned >= torn.n_equality
-    feasible = law.feasible(at.multiplier)
-    mapped = feasible.project(at.multiplier - step * lacking)
-    error, u = (at.multiplier - mapped)[contact], at.displacement
-    sums = global_sum(
-        comm,
-        *(x @ x for x in (*forces, u, lacking[~contact], torn.right[~contact], error)),
-        len(u),
-    )
-    unbalanced, internal, bound, load, moved, open_, given, natural = np.sqrt(sums[:8])
-    moved = max(moved, given, at.largest)
-    floor = FORCE_FLOOR * stiff * moved / np.sqrt(sums[8])
-    force = max(min(internal, bound) if internal > 0 else bound, load, floor)
-    violation = global_max(comm, feasible.violation(at.multiplier))
-    ratio = 1.0 / force if force > 0.0 else 0.0
-    return Residuals(
-        natural * ratio,
-        open_ / moved if moved > 0.0 else 0.0,
-        unbalanced * ratio,
-        violation * ratio,
-        force,
-        moved,
-    )

@@ -35,6 +35,8 @@ FRACTIONS = (0.5, 0.25, 0.1)
 #: Factor on the residual of linear systems after each step without progress, and the least of these factors:
 #: near a loss of stability a small residual may hide a large error.
 CARE, LEAST_CARE = 0.1, 1e-3
+#: Residual below which a step without progress is reason enough for that care.
+NEAR = 1e-2
 #: Part of the slip bound within which a disc counts as slipping at the start of a load step.
 SLIPPED = 1e-6
 #: Residual of a linear system that is small enough, relative to the tolerance of the step.
@@ -45,7 +47,7 @@ ROOM = 0.2
 #: on the natural map becomes more cautious, by this factor.
 PATIENCE, CAUTION = 4, 0.2
 #: Residual of contact problems that are solved as a whole, at the start of a history.
-NESTED = 1e-4
+NESTED = 1e-2
 
 
 @displayed
@@ -73,9 +75,7 @@ class NonlinearEquilibrium:
     def configuration(self) -> Configuration:
         """The configuration, with the history of its materials and the time up to date."""
         found = self.evaluation
-        return replace(
-            found.at, history=found.history, time=self.time, largest=found.residuals.gluing_scale
-        )
+        return replace(found.at, history=found.history, time=self.time, largest=found.residuals.gluing_scale)
 
 
 @displayed
@@ -157,7 +157,9 @@ class _Run:
             evaluation, near, tuple(self.history), self._load.time, self.products, self.factorisations
         )
 
-    def _evaluated(self, at: Configuration, near: Linearisation | None) -> Evaluation:
+    def _evaluated(
+        self, at: Configuration, near: Linearisation | None, origin: Vector | None = None
+    ) -> Evaluation:
         """Return the equations at a configuration, with its contact points. Collective."""
         with self._timer.phase("assemble"):
             meeting = self._contact.at(self._load, at.displacement, self._start, at.meeting)
@@ -165,7 +167,7 @@ class _Run:
             step: Vector = np.zeros(meeting.torn.layout.size)
             if near is not None:
                 step = near.natural_step(meeting, self._caution)
-            return self._equations.evaluate(meeting, meeting.torn.law, at, step, self._load)
+            return self._equations.evaluate(meeting, meeting.torn.law, at, step, self._load, origin)
 
     def _require_progress(self, evaluation: Evaluation) -> None:
         """Adapt the forcing term and ρ. Collective.
@@ -189,10 +191,10 @@ class _Run:
             chosen = 0.9 * (worst / previous) ** 2
             careful = 0.9 * self._forcing**2
             self._forcing = min(method.forcing, max(chosen, careful if careful > 0.1 else 0.0))
-        if previous and self._stalls:
+        if previous and (self._stalls or worst < NEAR):
             self._care = 1.0 if worst < 0.5 * previous else max(CARE * self._care, LEAST_CARE)
         least = 0.3 * method.tolerance / max(worst, method.tolerance)
-        self._forcing = max(self._care * self._forcing, least)
+        self._forcing = self._care * max(self._forcing, least)
         late = self._residuals[-PATIENCE - 1 :]
         if len(late) > PATIENCE and min(late[1:]) > 0.5 * late[0]:
             self._stalls += 1
@@ -228,19 +230,20 @@ class _Run:
 
         def after(part: float) -> Evaluation:
             displacement, multiplier = at.displacement + part * moved, at.multiplier + part * change[:size]
-            return self._evaluated(replace(at, displacement=displacement, multiplier=multiplier), near)
+            following = replace(at, displacement=displacement, multiplier=multiplier)
+            return self._evaluated(following, near, at.displacement)
 
         part = self._room(evaluation, moved)
         best = after(part)
         before = evaluation.residuals
-        worse = all(old is None or best.residuals.is_worse_than(old) for old in (before, earlier))
+        olds = [old.at_rows for old in (before, earlier) if old is not None]
+        worse = all(best.residuals.at_rows.is_worse_than(old) for old in olds)
         if worse and best.residuals.natural > before.natural:
             # The active set alternates between two faces: the solution lies between them. Forces out of
-            # balance alone are no reason: a step that turns a body strains it until the next one.
+            # balance are no reason: a step that turns a body strains it until the next one.
             candidates = [(best, part), *((after(f * part), f * part) for f in FRACTIONS)]
-            best, part = min(
-                candidates, key=lambda c: c[0].residuals.worst_beside(candidates[0][0].residuals)
-            )
+            full = best.residuals.at_rows
+            best, part = min(candidates, key=lambda c: c[0].residuals.at_rows.worst_beside(full))
         self._record(best, near.system, taken, part, whole)
         return best
 

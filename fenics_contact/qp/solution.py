@@ -61,6 +61,11 @@ class Residuals:
         """Return whether these are worse, in their own scales and in the smaller ones of both."""
         return self.worst > other.worst and self.worst_beside(other) > other.worst_beside(self)
 
+    @property
+    def at_rows(self) -> Residuals:
+        """These without the forces out of balance."""
+        return replace(self, coarse=0.0)
+
     def beside(self, reach: float) -> Residuals:
         """Return the residuals with the gluing residual relative to smaller displacements."""
         if not 0.0 < reach < self.gluing_scale:

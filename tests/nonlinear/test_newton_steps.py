@@ -1,0 +1,72 @@
+"""How many steps Newton's method takes, and when it takes forces and gaps for zero."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.contact import ContactProblem, LoadSequence, solve_scene
+from fenics_contact.fem.hyperelastic import HyperelasticMechanics
+from fenics_contact.gallery import block
+from fenics_contact.scene import Body, LoadStep, NeoHooke, Scene
+from tests.models.deformed import patch_of
+from tests.nonlinear.scenes import cut, pressed, rounded
+
+RUBBER = NeoHooke(1.0, 0.4999, mean_dilatation=True)
+
+
+def of(material: NeoHooke, scene: Scene) -> Scene:
+    return replace(scene, bodies={name: Body(body.mesh, material) for name, body in scene.bodies.items()})
+
+
+def test_nearly_incompressible_bodies_take_hardly_more_steps_than_others() -> None:
+    """Tangents have the pressures that a step foresaw: those of its end would grow with its square."""
+    mesh = rounded(4)
+    counts = []
+    for material in (NeoHooke(1.0, 0.3), RUBBER):
+        scenes = [of(material, pressed(mesh, depth, way)) for depth, way in ((0.1, 0.0), (0.1, 0.05))]
+        sequence = LoadSequence(ContactProblem(scenes[0], MPI.COMM_SELF, partitions=cut(mesh, 2)))
+        states = [
+            sequence.advance(LoadStep(str(n), supports=scene.supports)) for n, scene in enumerate(scenes)
+        ]
+        counts.append([len(state.solution.history) for state in states])
+    assert max(counts[0]) <= 5
+    assert max(counts[1]) <= 7
+
+
+def test_tangents_of_mean_dilatations_have_the_pressures_that_a_step_foresaw() -> None:
+    """The tangent after a step is that of the same forces with their pressures extrapolated along it."""
+    patch = patch_of(Body(block((0, 0, 0), (1, 1, 1), (2, 2, 2)), RUBBER))
+    mechanics = patch.mechanics
+    step = 0.03 * np.random.default_rng(1).standard_normal(patch.mesh.size)
+    plain, foreseen = (mechanics.at(step, origin=origin).stiffness for origin in (None, 0.0 * step))
+    again = mechanics.at(step, origin=step).stiffness
+    assert abs(again - plain).max() < 1e-12 * abs(plain).max()
+    assert abs(foreseen - plain).max() > 1e-3 * abs(plain).max()
+
+
+def test_strains_near_rounding_are_solved() -> None:
+    depth, mesh = 1e-10, block((0, 0, 0), (1, 1, 1), (3, 3, 3))
+    state = solve_scene(pressed(mesh, depth), MPI.COMM_SELF, partitions=cut(mesh, 2))
+    assert len(state.solution.history) <= 5
+    reference = solve_scene(pressed(mesh, 1e-5), MPI.COMM_SELF, partitions=cut(mesh, 2))
+    force, expected = state.contact.force / depth, reference.contact.force / 1e-5
+    assert np.abs(force - expected).max() < 1e-4 * np.abs(expected).max()
+
+
+def test_tangents_are_assembled_only_where_they_are_factored(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+    assemble = HyperelasticMechanics._stiffness
+    monkeypatch.setattr(
+        HyperelasticMechanics, "_stiffness", lambda *given: (asked.append(1), assemble(*given))[1]
+    )
+    mesh = rounded(3)
+    scenes = [pressed(mesh, depth) for depth in (0.05, 0.1)]
+    sequence = LoadSequence(ContactProblem(scenes[0], MPI.COMM_SELF, partitions=cut(mesh, 1)))
+    for scene in scenes:
+        asked.clear()
+        state = sequence.advance(LoadStep("press", supports=scene.supports))
+    assert 0 < len(asked) == len(state.solution.history)
