@@ -22,7 +22,7 @@ endif
 launch := scripts/launch.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demos notebooks test test-slow test-hard test-claims mutants docs benchmark studies study-constants study-optimisation study-optimisers study-surfaces lint setup
+.PHONY: help demo demos notebooks test test-slow test-hard test-claims mutants docs benchmark studies study-constants study-optimisation study-optimisers study-surfaces study-large lint setup
 
 help: ## Show this list
 	@echo "Targets:"
@@ -78,6 +78,9 @@ study-optimisers: $(prepare) ## Compare SciPy's optimisers with the bundle metho
 
 study-surfaces: $(prepare) ## Compare facets, reconstructed and true surfaces with theory; docs/studies/
 	$(python) -m benchmarks true_surfaces $(if $(filter quick,$(BENCH)),--quick)
+
+study-large: $(prepare) ## Solve published problems of plasticity and large deformations; docs/studies/
+	$(python) -m benchmarks large_deformations $(if $(filter quick,$(BENCH)),--quick)
 
 benchmark: $(prepare) ## Measure time, memory and products; results in benchmarks/
 	$(python) -m benchmarks $(if $(filter quick,$(BENCH)),--quick)

@@ -22,6 +22,7 @@ STUDIES = {
     "speed": "benchmarks.speed",
     "constants": "benchmarks.constants.report",
     "effects": "benchmarks.effects",
+    "large_deformations": "benchmarks.large_deformations.report",
     "optimisation_tolerance": "benchmarks.optimisation_tolerance.report",
     "optimisers": "benchmarks.optimisers.report",
     "true_surfaces": "benchmarks.true_surfaces.report",

@@ -1,0 +1,151 @@
+"""The study: its jobs and the tables of its page."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.large_deformations.ironing_meshes import TIMES
+from benchmarks.study import ROOT, Records, Study, filled, found
+from fenics_contact.io import write_json, write_text
+from fenics_contact.study.richardson import extrapolate
+from fenics_contact.study.runner import Job
+from fenics_contact.study.tables import table
+
+HOME, NAME = ROOT / "docs" / "studies", "large_deformations"
+#: Cells along the region of equal cells below the ball, by the order of the cells.
+BALL = {1: (4, 8, 12, 16), 2: (4, 6, 8)}
+#: Those of which a limit is taken; the three of linear cells are halved twice.
+LIMITS = {1: (4, 8, 16), 2: (4, 6, 8)}
+#: Columns of the bed that is ironed.
+IRONING = (48, 60, 72)
+#: Most seconds that a job may take.
+LIMIT = 7200.0
+
+Run = dict[str, Any]
+
+
+def converged(cells: Sequence[int], values: Sequence[float]) -> tuple[float, float]:
+    """Return the limit of the three finest meshes and its error bar.
+
+    The bar is how far the finest mesh is from the limit; where the values do not converge at a rate, the
+    limit is the finest mesh's and the bar the largest difference of the three.
+    """
+    limit = extrapolate([1.0 / each for each in cells], values)
+    last = list(values)[-3:]
+    bar = max(last) - min(last) if limit.rate is None else abs(limit.value - last[-1])
+    return limit.value, bar
+
+
+def force(runs: Sequence[Run]) -> tuple[float, float]:
+    """Return the ball's converged force: of quadratic cells, its bar reaching that of linear ones."""
+    linear, (value, bar) = (
+        converged(LIMITS[order], [_force_on(runs, order, cells) for cells in LIMITS[order]])
+        for order in (1, 2)
+    )
+    return value, max(bar, abs(linear[0] - value))
+
+
+def _force_on(runs: Sequence[Run], order: int, cells: int) -> float:
+    (value,) = (run["force"] for run in runs if (run["order"], run["cells"]) == (order, cells))
+    return float(value)
+
+
+def tables(record: dict[str, list[Run]]) -> dict[str, str]:
+    """Return the tables of the page by their names."""
+    return {"ball": _ball(record["ball"]), "ironing": _ironing(record["ironing"])}
+
+
+def _ball(runs: list[Run]) -> str:
+    head = ("order", "cells to the end of the fine region", "dofs of the quarter", "closed nodes", "force")
+    rows = [
+        (str(run["order"]), str(run["cells"]), str(run["dofs"]), str(run["closed"]), f"{run['force']:.3f}")
+        for run in runs
+    ]
+    value, bar = force(runs)
+    rows.append(("", "limit", "", "", f"**{value:.1f} ± {bar:.1f}**"))
+    return table(head, rows) + "\n"
+
+
+def _ironing(runs: list[Run]) -> str:
+    head = ["columns of the bed", "contact by", "force", *(f"t = {time:g}" for time in TIMES)]
+    rows = []
+    for way in dict.fromkeys(run["discretisation"] for run in runs):
+        mine = [run for run in runs if run["discretisation"] == way]
+        columns = [run["columns"] for run in mine]
+        for part in ("vertical", "horizontal"):
+            values = [[each[part] for each in run["times"]] for run in mine]
+            rows += [
+                (str(count), way, part, *_padded(f"{value:.1f}" for value in line))
+                for count, line in zip(columns, values, strict=True)
+            ]
+            limits = [converged(columns, at) for at in zip(*values, strict=True)]
+            rows.append(
+                ("limit", way, part, *_padded(f"**{value:.1f} ± {bar:.1f}**" for value, bar in limits))
+            )
+        ripples = [
+            max(at) for at in zip(*([each["ripple"] for each in run["times"]] for run in mine), strict=True)
+        ]
+        rows.append(("", way, "ripple", *_padded(f"{ripple:.1f}" for ripple in ripples)))
+    return table(head, rows) + "\n"
+
+
+def _padded(words: Iterable[str]) -> list[str]:
+    """Return the words of a line with empty ones for times at which nothing was measured."""
+    known = list(words)
+    return known + [""] * (len(TIMES) - len(known))
+
+
+def jobs(quick: bool) -> list[Job]:
+    """Return a job for every mesh; the quick study has the coarsest ones."""
+    room = f"benchmarks.{NAME}"
+    balls = [
+        Job(
+            f"ball {order} {cells}", f"{room}.ball_on_metal:measured", {"cells": cells, "order": order},
+            limit=LIMIT,
+        )
+        for order, meshes in BALL.items()
+        for cells in meshes
+    ]  # fmt: skip
+    dies = [
+        Job(f"ironing node {columns}", f"{room}.ironing:measured", {"columns": columns}, limit=LIMIT)
+        for columns in IRONING
+    ]
+    others = [
+        Job(
+            f"ironing GetFEM {columns}", f"{room}.getfem_ironing:measured", {"columns": columns}, ranks=0,
+            limit=LIMIT,
+        )
+        for columns in IRONING
+    ]  # fmt: skip
+    return [balls[0]] if quick else [*balls, *dies, *others]
+
+
+def write(folder: Path, records: Records, quick: bool) -> None:
+    """Write numbers and page; what was not measured keeps its numbers."""
+    new = {name: found(runs[0]) for name, runs in records.items() if "skipped" not in runs[0]}
+    if quick:
+        write_json(folder / f"{NAME}.json", new)
+        return
+    before = json.loads((HOME / f"{NAME}.json").read_text())
+    known = {_name("ball", run): run for run in before["ball"]}
+    known |= {_name("ironing", run): run for run in before["ironing"]}
+    known |= new
+    record: dict[str, list[Run]] = {"ball": [], "ironing": []}
+    for job in jobs(quick):
+        if job.name in known:
+            record[job.name.partition(" ")[0]].append(known[job.name])
+    if records:
+        write_json(folder / f"{NAME}.json", record)
+    page = (HOME / f"{NAME}.md").read_text(encoding="utf-8")
+    write_text(folder / f"{NAME}.md", filled(page, tables(record)))
+
+
+def _name(kind: str, run: Run) -> str:
+    keys = ("order", "cells") if kind == "ball" else ("discretisation", "columns")
+    return " ".join([kind, *(str(run[key]) for key in keys)])
+
+
+study = Study(jobs, write, HOME, (Path(__file__).parent,))

@@ -1,0 +1,107 @@
+"""The study of published problems: its page is its record, and its record can be measured again."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mpi4py import MPI
+
+from benchmarks.large_deformations import ball_on_metal, ironing
+from benchmarks.large_deformations.report import BALL, IRONING, converged, force, jobs, study, tables
+from benchmarks.study import filled
+from tests.conftest import ROOT
+
+PAGE = ROOT / "docs" / "studies" / "large_deformations.md"
+#: Force of the ball on adaptive linear cells, tutorial 42 of deal.II.
+ADAPTIVE = 56.794
+
+
+@pytest.fixture(scope="module")
+def record() -> dict[str, Any]:
+    return json.loads(PAGE.with_suffix(".json").read_text())
+
+
+def test_the_page_is_its_record_and_complete(record: dict[str, Any]) -> None:
+    page = PAGE.read_text()
+    assert page == filled(page, tables(record))
+    assert [(run["order"], run["cells"]) for run in record["ball"]] == [
+        (order, cells) for order, meshes in BALL.items() for cells in meshes
+    ]
+    assert [(run["discretisation"], run["columns"]) for run in record["ironing"]] == [
+        (way, columns) for way in ("node", "GetFEM") for columns in IRONING
+    ]
+
+
+def test_what_was_not_measured_keeps_its_numbers(record: dict[str, Any], tmp_path: Path) -> None:
+    measured = {**record["ironing"][1], "seconds": 1.0}
+    study.write(tmp_path, {f"ironing node {IRONING[1]}": [measured | {"ranks": 1}]}, False)
+    written = json.loads((tmp_path / "large_deformations.json").read_text())
+    assert written["ironing"] == [record["ironing"][0], measured, *record["ironing"][2:]]
+    assert written["ball"] == record["ball"]
+    assert len(jobs(True)) < len(jobs(False))
+
+
+def test_a_limit_has_an_error_bar_whether_values_converge_or_not() -> None:
+    cells = (4, 6, 8)
+    value, bar = converged(cells, [3.0 + 16.0 / n**2 for n in cells])
+    assert (value, bar) == pytest.approx((3.0, 0.25))
+    assert converged(cells, [1.0, 1.3, 1.2]) == pytest.approx((1.2, 0.3))
+
+
+def test_forces_of_the_ball_converge_below_the_published_one(record: dict[str, Any]) -> None:
+    value, bar = force(record["ball"])
+    assert bar < 0.015 * value
+    assert value + bar < ADAPTIVE < 1.04 * value
+    linear = [run["force"] for run in record["ball"] if run["order"] == 1]
+    assert min(linear) < ADAPTIVE < max(linear)
+
+
+def test_a_force_of_the_ball_is_what_the_record_says(record: dict[str, Any]) -> None:
+    found = ball_on_metal.measured(MPI.COMM_SELF, 4, 1)
+    assert found["force"] == pytest.approx(record["ball"][0]["force"], rel=1e-6)
+    assert found["closed"] == record["ball"][0]["closed"]
+
+
+@pytest.mark.claim
+def test_a_force_on_quadratic_cells_is_what_the_record_says(record: dict[str, Any]) -> None:
+    (stored,) = (run for run in record["ball"] if (run["order"], run["cells"]) == (2, 4))
+    assert ball_on_metal.measured(MPI.COMM_SELF, 4, 2)["force"] == pytest.approx(stored["force"], rel=1e-6)
+
+
+def ironed_again(record: dict[str, Any], last: float) -> dict[str, Any]:
+    """Iron on the coarsest mesh until a time and compare with the record."""
+    found = ironing.measured(MPI.COMM_SELF, IRONING[0], last=last)
+    assert found["times"][-1]["time"] == last
+    for now, stored in zip(found["times"], record["ironing"][0]["times"], strict=False):
+        for part in ("vertical", "horizontal"):
+            assert now[part] == pytest.approx(stored[part], rel=1e-4)
+    return found
+
+
+def test_a_die_is_pressed_as_the_record_says(record: dict[str, Any]) -> None:
+    ironed_again(record, 1.0)
+
+
+@pytest.mark.claim
+def test_a_bed_is_ironed_as_the_record_says(record: dict[str, Any]) -> None:
+    assert ironed_again(record, 1.25)["times"][-1]["horizontal"] > 100.0
+
+
+def test_ironing_lies_within_the_published_spread(record: dict[str, Any]) -> None:
+    for run in record["ironing"]:
+        at = {each["time"]: each for each in run["times"]}
+        assert 262.0 < at[1.0]["vertical"] < 338.0
+        assert 334.0 < at[1.5]["vertical"] < 425.0
+        assert 100.0 < at[1.5]["horizontal"] < 190.0
+
+
+def test_a_die_has_the_forces_that_getfem_finds(record: dict[str, Any]) -> None:
+    """Vertical ones to 1 %; while the bed bends around the die's corners, horizontal ones to 5 %."""
+    by = {(run["discretisation"], run["columns"]): run["times"] for run in record["ironing"]}
+    for columns in IRONING[1:]:
+        for ours, others in zip(by["node", columns], by["GetFEM", columns], strict=False):
+            assert ours["vertical"] == pytest.approx(others["vertical"], rel=0.012)
+            assert ours["horizontal"] == pytest.approx(others["horizontal"], rel=0.05)
