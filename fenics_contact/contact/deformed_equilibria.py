@@ -40,7 +40,11 @@ if TYPE_CHECKING:
 
 
 class DeformedEquilibria:
-    """Successive equilibria of a scene with nonlinear materials, on the subdomains of one decomposition."""
+    """Successive equilibria of a scene with nonlinear materials, on the subdomains of one decomposition.
+
+    Attributes:
+        scene: The scene whose meshes they have.
+    """
 
     def __init__(
         self, scene: Scene, decomposition: Decomposition, steps: AutomaticSteps | None, timer: PhaseTimer
@@ -61,7 +65,7 @@ class DeformedEquilibria:
                 "rigid surfaces need linear materials where they are free to move, this scene has others: "
                 "prescribe their displacement and rotation"
             )
-        self._steps = steps or AutomaticSteps()
+        self.scene, self._steps = scene, steps or AutomaticSteps()
         self._decomposition, self._timer = decomposition, timer
         self._equations = Equations(scene, decomposition)
         self._assembled: TornSystem | None = None
@@ -160,7 +164,7 @@ def _state_after(path: Path, origin: State | None, timer: PhaseTimer) -> Deforme
     evaluation, at = end.evaluation, end.evaluation.at
     law, near = evaluation.law, end.linearisation
     diagonal = evaluation.meeting.carried(near.diagonal, near.meeting, spread=True)
-    system = near.system.on_rows_of(evaluation.loaded, law, diagonal)
+    system = near.system.on_rows_of(evaluation.loaded, law, diagonal, -evaluation.lacking)
     solution = DualSolution(
         problem=system.problem,
         multiplier=at.multiplier,
@@ -181,7 +185,7 @@ def _state_after(path: Path, origin: State | None, timer: PhaseTimer) -> Deforme
         energies = _energies(evaluation, contact)
     return DeformedState(
         system, solution, at.displacement, contact, energies, dict(timer.seconds), equilibrium=end,
-        load=path.load, fractions=path.fractions, factorisations=path.factorisations,
+        load=path.load, begun=path.begun, fractions=path.fractions, factorisations=path.factorisations,
     )  # fmt: skip
 
 

@@ -21,7 +21,7 @@ from fenics_contact.contact.static_admissibility import check_held
 from fenics_contact.contact.stored import Stored, restored_solution, with_stored_slip
 from fenics_contact.contact.tolerance import Tolerance, checked_tolerance
 from fenics_contact.display import displayed
-from fenics_contact.errors import InvalidInputError, collectively, together
+from fenics_contact.errors import collectively, together
 from fenics_contact.feti import (
     Decomposition,
     DualSystem,
@@ -165,11 +165,6 @@ class ContactProblem:
         scene = self.scene if scene is None else scene
         wanted = self.tolerance if tolerance is None else tolerance
         if scene.is_nonlinear:
-            if sensitivity or overlap:
-                raise InvalidInputError(
-                    "sensitivities and designs need linear materials, this scene has others: optimise it "
-                    "with a tool that takes plain functions, see fenics_contact.outer"
-                )
             self.state = self._deformed(scene, slip_from, wanted, time, step)
             return self.state
         previous = self.state if start == "last" else start
@@ -206,10 +201,11 @@ class ContactProblem:
         """Compute an equilibrium of nonlinear materials. Collective."""
         from fenics_contact.contact.deformed_equilibria import DeformedEquilibria
 
-        if self._deformed_equilibria is None:
-            decomposition = self._decomposed(scene)
-            self._deformed_equilibria = DeformedEquilibria(scene, decomposition, self.steps, self.timer)
-        return self._deformed_equilibria.solve(scene, origin, tolerance, time, step)
+        equilibria = self._deformed_equilibria
+        if equilibria is None or not scene.has_meshes_of(equilibria.scene):
+            equilibria = DeformedEquilibria(scene, self._decomposed(scene), self.steps, self.timer)
+            self._deformed_equilibria = equilibria
+        return equilibria.solve(scene, origin, tolerance, time, step)
 
     @collectively("ContactProblem.restore", lambda self, *_, **__: self.comm)
     def restore(self, stored: Stored, scene: Scene | None = None) -> State:

@@ -13,7 +13,7 @@ from fenics_contact.display import displayed
 from fenics_contact.errors import ConvergenceError, tell
 from fenics_contact.nonlinear.equations import Configuration, Equations, Linearisation
 from fenics_contact.nonlinear.loading import Loading
-from fenics_contact.nonlinear.meeting import Contact
+from fenics_contact.nonlinear.meeting import Contact, Meeting
 from fenics_contact.nonlinear.newton import NonlinearEquilibrium, TangentNewton
 from fenics_contact.qp import SolverStep
 from fenics_contact.timing import PhaseTimer
@@ -35,8 +35,9 @@ class Path:
     Attributes:
         load: What acts at the end.
         end: The last equilibrium.
-        start: Where nodes stood on their masters at the start; None where contact is that of the undeformed
-            bodies.
+        begun: Where bodies met at the start.
+        start: Where nodes stood on their masters then, or where they were first found; None where contact is
+            that of the undeformed bodies.
         fractions: Parts of the load at which equilibria were found, the last one being 1.
         history: One line for each Newton step of all parts, those of parts that were cut included.
         products: Applications of F.
@@ -45,6 +46,7 @@ class Path:
 
     load: Loading
     end: NonlinearEquilibrium
+    begun: Meeting
     start: MaterialPoints | None
     fractions: tuple[float, ...]
     history: tuple[SolverStep, ...]
@@ -105,9 +107,11 @@ class AutomaticSteps:
             PathEndsError: The smallest step fails.
         """
         first = target.removed() if before is None else before
-        at, torn = start, first.torn
+        # Slip begins where bodies are before supports and obstacles move.
+        at = start if start.meeting else start.meeting_at(contact.at(first, start.displacement, None, None))
+        assert at.meeting is not None
+        torn, begun, stood = first.torn, at.meeting, at.meeting.stood
         end: NonlinearEquilibrium | None = None
-        stood = None if at.meeting is None else at.meeting.stood
         reached, part, longest = 0.0, self.first, contact.longest_part(first, target)
         fractions, history, products, factorisations = list[float](), list[SolverStep](), 0, 0
 
@@ -116,6 +120,7 @@ class AutomaticSteps:
             return Path(
                 target.between(first, reached),
                 end,
+                begun,
                 stood,
                 tuple(fractions),
                 tuple(history),
@@ -127,7 +132,7 @@ class AutomaticSteps:
             part = (1.0 - reached) / np.ceil((1.0 - reached) / min(part, longest) - 1e-9)
             fraction = 1.0 if reached + part > 1.0 - 1e-12 else reached + part
             load = target.between(first, fraction)
-            if at.meeting is None or at.meeting.points is None:
+            if begun.points is None:
                 slipped = torn.relative(at.displacement), torn.sliding(at.displacement)
                 load = replace(load, torn=load.torn.with_slip_from(*slipped))
             try:

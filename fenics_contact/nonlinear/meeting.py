@@ -64,7 +64,7 @@ class Meeting:
         further = [] if pressure is None else [pressure]
         if self.points is None or self.start is None:
             return TurningForces.of(None, further) if further else None
-        normal, friction = self._at_points(multiplier)
+        normal, friction = self.at_points(multiplier)
         points, slave, normal = self.points, self.points.points.slave, np.maximum(normal, 0.0)
         stiffness, means = points.stiffness(normal), points.mean_tangents(normal, friction, self.start)
         further += [
@@ -89,7 +89,7 @@ class Meeting:
         if self.points is None or other.points is None:
             return values
         torn, before = self.torn, other.torn
-        normal, friction = other._at_points(values)
+        normal, friction = other.at_points(values)
         if spread:
             normal, friction = (self._filled(x, other) for x in (normal, friction))
         else:
@@ -100,7 +100,7 @@ class Meeting:
         result[equality] = values[before.numbering.owned < before.n_equality]
         return self._placed(result, normal, friction)
 
-    def _at_points(self, values: Vector) -> tuple[np.ndarray, np.ndarray]:
+    def at_points(self, values: Vector) -> tuple[np.ndarray, np.ndarray]:
         """Return the part of a vector on normal rows, shape (n,), and on tangents, (n, dim − 1). Collective.
 
         That of points without friction is zero.

@@ -140,14 +140,61 @@ def tangent_step(
     ratio = step if factor is None else np.asarray(step / factor**2, dtype=np.float64)
     face = classify(problem.layout, bound, at.multiplier, at.residual, ratio)
     operator = CountedOperator(problem.operator)
-    solved = _StiffFace.build(at, face, operator)
+    growth, coupling, fixed = problem.law.growth, None, face.fixed
+    if global_max(problem.comm, float(np.any(growth[face.slip] > 0.0))) > 0.0:
+        coupling = face.growth(growth)
+        fixed = fixed - coupling @ np.maximum(face.restrict(at.multiplier), 0.0)
+    solved = _StiffFace.build(at, face, coupling, operator)
     if solved is None:
         return None
-    change, motions, stop = solved.solve(forcing, floor, max_products)
+    change, motions, stop = solved.solve(fixed, forcing, floor, max_products)
     multiplier = at.multiplier + change
     if factor is not None:
         multiplier = multiplier * factor
     return TangentStep(multiplier, motions, face, operator.products, stop)
+
+
+def tangent_adjoint(
+    tangent: TangentProblem,
+    face: Face,
+    coupling: sp.csr_matrix,
+    right: Vector,
+    load: Vector,
+    tolerance: float,
+    max_products: int,
+) -> TangentStep | None:
+    """Solve the transpose of a linearised problem; None where its face does not hold every body. Collective.
+
+    It is (Zᵀ F W + κ) z − (G Z)ᵀβ = Zᵀ d under G W z + S β = e, with the bases of `tangent_step` swapped.
+
+    Args:
+        tangent: The linearised problem.
+        face: Its face.
+        coupling: Growth of slipping forces with their normal forces, shape (n_owned, n_face).
+        right: d, owned.
+        load: e, shape (m,), replicated.
+        tolerance: Residual of the linear system relative to that of its start.
+        max_products: Largest number of products.
+
+    Returns:
+        W z as multiplier, β as motions.
+    """
+    problem = tangent.problem
+    factor = 1.0 if problem.scaling is None else problem.scaling.factor
+    scaling = None if problem.scaling is None else problem.scaling.with_load(load)
+    problem = replace(problem, rhs=right, coarse=problem.coarse.with_load(load), scaling=scaling)
+    nothing = np.zeros_like(tangent.multiplier)
+    at = replace(tangent, problem=problem, multiplier=nothing, residual=nothing).scaled()
+    flexibility = face.flexibility * (factor * np.ones_like(nothing))[problem.layout.tangential[:, 0]] ** 2
+    operator = CountedOperator(at.problem.operator)
+    solved = _StiffFace.build(at, replace(face, flexibility=flexibility), coupling, operator)
+    if solved is None:
+        return None
+    transposed = solved.transposed()
+    if transposed is None:
+        return None
+    change, motions, stop = transposed.solve(nothing, tolerance, 0.0, max_products)
+    return TangentStep(change * factor, motions, face, operator.products, stop)
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +208,6 @@ class _StiffFace:
         tested: W: those, and the rows that are felt, shape (n_owned, n).
         moving: Z: those with growing friction, and the rows that act, shape (n_owned, n).
         compliance: κ, of slipping discs, of rows with a compliance, and one of acting rows, shape (n,).
-        fixed: The part of λ that is given on the face, owned.
         oblique: Projector to equilibrium.
         operator: F, counted.
     """
@@ -172,23 +218,19 @@ class _StiffFace:
     tested: sp.csr_matrix
     moving: sp.csr_matrix
     compliance: Vector
-    fixed: Vector
     oblique: ObliqueProjector
     operator: CountedOperator
 
     @classmethod
-    def build(cls, at: TangentProblem, face: Face, operator: CountedOperator) -> _StiffFace | None:
+    def build(
+        cls, at: TangentProblem, face: Face, coupling: sp.csr_matrix | None, operator: CountedOperator
+    ) -> _StiffFace | None:
         """Prepare the face; None where it does not hold every body. Collective."""
         problem, coarse, equality = at.problem, at.problem.coarse, at.problem.layout.equality
         basis = face.restriction
         felt, acting, lacking = (np.searchsorted(equality, x) for x in (at.felt, at.acting, at.lacking))
         shared = np.setdiff1d(np.arange(basis.shape[1]), np.concatenate([felt, acting, lacking]))
-        moving, fixed = basis, face.fixed
-        growth = problem.law.growth
-        if global_max(problem.comm, float(np.any(growth[face.slip] > 0.0))) > 0.0:
-            coupling = face.growth(growth)
-            moving = (basis + coupling).tocsr()
-            fixed = fixed - coupling @ np.maximum(face.restrict(at.multiplier), 0.0)
+        moving = basis if coupling is None else (basis + coupling).tocsr()
         tested = at.complete(basis[:, np.concatenate([shared, felt])])
         moving = moving[:, np.concatenate([shared, acting])]
         oblique = ObliqueProjector.build(sp.csr_matrix(coarse.matrix @ tested), coarse.restricted(moving))
@@ -201,20 +243,37 @@ class _StiffFace:
             usual = basis[:, shared[own[shared] == 0.0]]
             system = replace(system, preconditioner=problem.preconditioner.on_face(usual))
         compliance = np.concatenate([(face.curvature + own)[shared], at.share])
-        return cls(at, system, shared, tested, moving, compliance, fixed, oblique, operator)
+        return cls(at, system, shared, tested, moving, compliance, oblique, operator)
 
-    def solve(self, forcing: float, floor: float, max_products: int) -> tuple[Vector, Vector, Stop]:
+    def transposed(self) -> _StiffFace | None:
+        """Return the face with its bases swapped; None where that does not hold every body. Collective."""
+        coarse = self.at.problem.coarse
+        matrix, moving = sp.csr_matrix(coarse.matrix @ self.moving), coarse.restricted(self.tested)
+        oblique = ObliqueProjector.build(matrix, moving)
+        if oblique is None:
+            return None
+        return replace(self, tested=self.moving, moving=self.tested, oblique=oblique)
+
+    def solve(
+        self, fixed: Vector, forcing: float, floor: float, max_products: int
+    ) -> tuple[Vector, Vector, Stop]:
         """Return δλ, owned, β, replicated, and why the iteration ended. Collective.
 
         GMRES on the whole residual v of the first equation: its part across the rigid motions is met by
         multipliers in equilibrium, the rest by the motions, with the multipliers that bear their stiffness.
+
+        Args:
+            fixed: The part of λ that is given on the face, owned.
+            forcing: As for `tangent_step`.
+            floor: As there.
+            max_products: As there.
         """
         problem, comm, oblique = self.at.problem, self.at.problem.comm, self.oblique
         # From λ onto the face, into the equilibrium of β = 0.
-        load = problem.coarse.load + problem.coarse.apply(self.at.multiplier - self.fixed)
+        load = problem.coarse.load + problem.coarse.apply(self.at.multiplier - fixed)
         y = np.concatenate([self.system.face.restrict(self.at.multiplier)[self.shared], self._nothing])
         y = y - oblique.tested.T @ oblique.solve(oblique.moving.apply(y) - load)
-        change = self.fixed + self.moving @ y - self.at.multiplier
+        change = fixed + self.moving @ y - self.at.multiplier
         product = apply_unless_zero(problem, self.operator, change)
         gradient = self.tested.T @ (product - problem.rhs) + self.compliance * y
         weights = self._weights

@@ -119,13 +119,16 @@ class TangentSystem(DualSystem):
         self._unheld_points = self.points[:, :0]
         return coarse
 
-    def on_rows_of(self, torn: TornSystem, law: SlipLaw, diagonal: np.ndarray) -> TangentSystem:
+    def on_rows_of(
+        self, torn: TornSystem, law: SlipLaw, diagonal: np.ndarray, open_: np.ndarray
+    ) -> TangentSystem:
         """Return the factored tangents with the rows of a system at a neighbouring configuration. Collective.
 
         Args:
             torn: The system.
             law: Its law of friction.
             diagonal: That of F on its contact rows, owned.
+            open_: B u − c there, owned, [length].
         """
         other = copy(self)
         other.torn, other._B, other._Bt = torn, torn.B, torn.B.T.tocsr()
@@ -135,8 +138,8 @@ class TangentSystem(DualSystem):
             self.inverse, other._B_interface, other._compliance(), torn.numbering, torn.n_gluing
         )
         other.problem = replace(
-            self.problem, layout=torn.layout, preconditioner=preconditioner, diagonal=diagonal, friction=law,
-            scaling=None,
+            self.problem, rhs=open_, layout=torn.layout, preconditioner=preconditioner, diagonal=diagonal,
+            friction=law, scaling=None, supported=None,
         )  # fmt: skip
         return other
 

@@ -24,6 +24,12 @@ from fenics_contact.qp import (
 from fenics_contact.shape.linearised_face import LinearisedFace
 from fenics_contact.shape.objective import Partials
 
+#: Said where a face does not hold every body.
+NOT_HELD = (
+    "the adjoint needs a contact face that holds every body, but from this state some body can slide without "
+    "resistance: refine the contact until more points hold it, add a support, choose WeakChoice.HELD where "
+    "points are weakly active, or take a design away from this one"
+)
 #: Derivatives along a rigid motion below this fraction of their summands are rounding.
 UNFELT = 1e-9
 
@@ -90,11 +96,7 @@ def solve_adjoint(
         face_system, problem.coarse, linearised.moving, linearised.tested, damped=True
     )
     if transposed is None:
-        raise ConvergenceError(
-            "the adjoint needs a contact face that holds every body, but from this state some body can slide "
-            "without resistance: refine the contact until more points hold it, add a support, choose "
-            "WeakChoice.HELD where points are weakly active, or take a design away from this one"
-        )
+        raise ConvergenceError(NOT_HELD)
     flexed = system.inverse(partials.by_displacement)
     right = linearised.moving.T @ (factor * (system.jump(flexed) - partials.by_multiplier))
     load = np.asarray(problem.comm.allreduce(system.kernel.T @ partials.by_displacement))

@@ -69,17 +69,24 @@ def contact_by_shape(
         if isinstance(pair.master, Surface) and pair.discretisation == "mortar":
             result += _by_mortar(torn, pair, rows, mine, by_area[mine])
             continue
-        if by_area[mine].any():
-            surface = surface_of(torn.scene, pair.slave, "faceted")
-            nodes = tearing.global_nodes(pair.slave.body, surface.nodes)
-            by_areas = np.zeros(len(nodes))
-            by_areas[np.searchsorted(nodes, points.slave[mine])] = by_area[mine]
-            result[nodes] += areas_pulled_back(surface, by_areas)
+        add_areas(result, torn, pair, mine, by_area[mine])
         if not isinstance(pair.master, Surface):
             result[points.slave[mine]] += _by_obstacle(torn, pair.master, rows, mine)
         else:
             _add_projected(result, torn, pair, rows, mine)
     return result
+
+
+def add_areas(
+    result: np.ndarray, torn: TornSystem, pair: ContactPair, mine: np.ndarray, by_area: np.ndarray
+) -> None:
+    """Add the derivative by the nodes from that by the areas of the points of a pair."""
+    if by_area.any():
+        surface = surface_of(torn.scene, pair.slave, "faceted")
+        nodes = torn.decomposition.tearing.global_nodes(pair.slave.body, surface.nodes)
+        by_areas = np.zeros(len(nodes))
+        by_areas[np.searchsorted(nodes, torn.points.slave[mine])] = by_area
+        result[nodes] += areas_pulled_back(surface, by_areas)
 
 
 def _by_mortar(

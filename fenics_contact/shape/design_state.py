@@ -6,7 +6,13 @@ import logging
 from functools import partial
 
 from fenics_contact.contact import ContactProblem, State
-from fenics_contact.errors import ConvergenceError, InfeasibleError, InvalidDesignError, tell
+from fenics_contact.errors import (
+    ConvergenceError,
+    InfeasibleError,
+    InvalidDesignError,
+    InvalidInputError,
+    tell,
+)
 from fenics_contact.scene import Scene
 
 logger = logging.getLogger(__name__)
@@ -30,9 +36,14 @@ def design_state(
         slip_from: State of the same design after the last load step, or None.
 
     Raises:
+        InvalidInputError: If bodies that deform much have a load step before.
         InvalidDesignError: If the design has no equilibrium.
         ConvergenceError: If the first one is not found.
     """
+    if scene.is_nonlinear and slip_from is not None:
+        raise InvalidInputError(
+            "designs of bodies that deform much have one load step, got a state before it: leave out LoadPath"
+        )
     solve = partial(contact.solve, scene, slip_from=slip_from, tolerance=tolerance, sensitivity=True)
     try:
         return solve(start=start, overlap=start is not None)

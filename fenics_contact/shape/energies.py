@@ -8,7 +8,7 @@ from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene import ThermalStrain
 from fenics_contact.shape.forms import ShapeForms
-from fenics_contact.shape.objective import Partials
+from fenics_contact.shape.objective import Partials, require_linear
 from fenics_contact.shape.sums import Weighable
 from fenics_contact.shape.work_derivative import strain_work_by_shape, work_by_shape
 
@@ -18,7 +18,8 @@ class TotalPotential(Weighable):
     """J = ½ uᵀK u − fᵀu, less the work of loads at the points of rigid surfaces, [force · length]."""
 
     def value(self, state: State, forms: ShapeForms) -> float:
-        """Return the total potential energy."""
+        """Return the total potential energy; raises as `require_linear` does."""
+        require_linear(state, self)
         return state.energies.total_potential
 
     def partials(self, state: State, forms: ShapeForms) -> Partials:
@@ -53,7 +54,8 @@ class StrainEnergy(Weighable):
     """
 
     def value(self, state: State, forms: ShapeForms) -> float:
-        """Return the strain energy."""
+        """Return the strain energy; raises as `require_linear` does."""
+        require_linear(state, self)
         if any(isinstance(load, ThermalStrain) for load in state.scene.loads):
             raise InvalidInputError(
                 "StrainEnergy needs a scene without ThermalStrain, whose strain stores no energy, got one: "

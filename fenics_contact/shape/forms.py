@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import ufl
@@ -29,7 +30,7 @@ from fenics_contact.fem import (
     volume_measure,
 )
 from fenics_contact.feti import Subdomain, TornSystem
-from fenics_contact.scene import Load, Material
+from fenics_contact.scene import Load, Material, is_nonlinear
 
 #: Builds an integrand (UFL) from a displacement u, the coordinate x, the stress σ(u) and constants.
 Integrand = Callable[..., Expr]
@@ -74,12 +75,12 @@ class ShapeForms:
         return self._templates.names
 
     def virtual_work_by_shape(self, materials: Materials, cell_type: str) -> Template:
-        """∂/∂x of a(u, w) with coefficients (u, w)."""
+        """∂/∂x of the work of the stresses at u along w, a(u, w) in small strain; coefficients (u, w)."""
 
         def write() -> Written:
             u, w = _dolfinx.field_symbols(cell_type, 2)
             form, constants = integrate(
-                materials, cell_type, lambda m, c: m.stiffness(u, w, c), volume_measure(cell_type)
+                materials, cell_type, lambda m, c: _virtual_work(m, u, w, c), volume_measure(cell_type)
             )
             return _by_shape(form, cell_type), constants, [u, w]
 
@@ -156,6 +157,11 @@ class ShapeForms:
         types = tuple(type(material) for material in materials)
         key = (density, by, materials, cell_type, temperature.key)
         return self._templates.get(key, (density.name, by, *types, cell_type), write)
+
+
+def _virtual_work(material: Any, u: Expr, w: Expr, constants: Constants) -> Expr:
+    """Return the work of the stresses at u along w."""
+    return material.work(u, w, constants) if is_nonlinear(material) else material.stiffness(u, w, constants)
 
 
 def _by_shape(form: ufl.Form, cell_type: str) -> ufl.Form:

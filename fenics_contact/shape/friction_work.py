@@ -11,7 +11,7 @@ from fenics_contact.contact import State
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.shape.contact_forces import on_rows
 from fenics_contact.shape.forms import ShapeForms
-from fenics_contact.shape.objective import Partials
+from fenics_contact.shape.objective import Partials, require_linear
 from fenics_contact.shape.pressures import points_of
 from fenics_contact.shape.sums import Weighable
 
@@ -57,6 +57,7 @@ class FrictionWork(Weighable):
 
     def _vectors(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Return friction forces and slips of the points with friction, zero elsewhere."""
+        require_linear(state, self)
         contact = state.contact
         mine = np.intersect1d(points_of(state, "FrictionWork", self.pair), state.torn.frictional)
         if len(mine) == 0:

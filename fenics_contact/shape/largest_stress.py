@@ -10,7 +10,7 @@ from ufl.core.expr import Expr
 from fenics_contact.checks import checked
 from fenics_contact.contact import State
 from fenics_contact.shape.forms import Density, ShapeForms
-from fenics_contact.shape.objective import Partials
+from fenics_contact.shape.objective import Partials, require_linear
 from fenics_contact.shape.pressures import require_exponent
 from fenics_contact.shape.sums import Weighable
 from fenics_contact.shape.volume_integral import BodyIntegral, require_body
@@ -78,6 +78,7 @@ class LargestStress(Weighable):
         Any σ_r gives the same J. That of a smaller p is near enough to the largest stress, whatever the unit,
         for powers not to overflow: first the root mean square, then that of 16.
         """
+        require_linear(state, self)
         require_body(state, "LargestStress", self.body)
         integral = BodyIntegral(state, forms, _DENSITY, self.body)
         volume, value = integral(0.0, 1.0, 0.0, 1.0), 1.0

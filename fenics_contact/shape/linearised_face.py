@@ -79,6 +79,7 @@ class LinearisedFace:
         moving: Z_u, directions along which the multiplier varies: a slipping friction force grows with its
             normal force by μ d, shape (n_owned, n_face).
         slip_direction: d at the slipping discs, zero elsewhere, shape (n_friction, dim − 1), owned.
+        growing: Discs whose force grows with its normal force, shape (n_friction,), owned.
         weak: Points on a switch.
     """
 
@@ -86,6 +87,7 @@ class LinearisedFace:
     tested: sp.csr_matrix
     moving: sp.csr_matrix
     slip_direction: np.ndarray
+    growing: np.ndarray
     weak: WeakPoints
 
 
@@ -121,12 +123,12 @@ def linearise_face(state: State, choice: WeakChoice, *, coupling: bool = True) -
         overshoot=np.where(weak.disc, 1.0, known.overshoot),
     )
     starting = weak.vanishing & held & ~at_rest
-    tested = face.restriction
-    moving = tested + _growth(face, starting, coefficient) if coupling else tested
+    tested, growing = face.restriction, face.slip | starting
+    moving = tested + growth_of(face, growing, coefficient) if coupling else tested
     slip_direction = np.where(face.slip[:, None], direction, 0.0)
     contacts, discs = system.problem.comm.allreduce(counted.counts)
     points = WeakPoints(int(contacts), int(discs), _points_on_edges(state), choice)
-    return LinearisedFace(face, tested, moving.tocsr(), slip_direction, points)
+    return LinearisedFace(face, tested, moving.tocsr(), slip_direction, growing, points)
 
 
 @dataclass(frozen=True)
@@ -197,13 +199,13 @@ def _points_on_edges(state: State) -> int:
     return total
 
 
-def _growth(face: Face, starting: np.ndarray, coefficient: np.ndarray) -> sp.csr_matrix:
+def growth_of(face: Face, growing: np.ndarray, coefficient: np.ndarray) -> sp.csr_matrix:
     """Return the growth of slipping forces with their normal forces, and that of incipient ones.
 
     A Coulomb disc has zero radius where its contact is weak. When the contact closes, its force grows along
     the slip: it has a direction but no offset, hence no column of its own; such columns come last.
     """
-    return replace(face, slip=face.slip | starting).growth(coefficient)[:, : face.n_face]
+    return replace(face, slip=growing).growth(coefficient)[:, : face.n_face]
 
 
 def _directions(known: np.ndarray, trial: np.ndarray, length: np.ndarray, weak: np.ndarray) -> np.ndarray:

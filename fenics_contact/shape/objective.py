@@ -96,6 +96,19 @@ def finite(name: str, numbers: np.ndarray) -> np.ndarray:
     return numbers
 
 
+def require_linear(state: State, objective: Objective) -> None:
+    """Reject an objective that knows linear materials alone.
+
+    Raises:
+        InvalidInputError: If the state has others.
+    """
+    if state.scene.is_nonlinear:
+        raise InvalidInputError(
+            f"{type(objective).__name__} needs linear materials, this state has others: take contact forces "
+            "or pressures, Movement, or an objective of your own"
+        )
+
+
 def finite_value(value: float) -> float:
     """Return the value of an objective; raises as `finite` does."""
     return float(finite("value", np.asarray(value, dtype=float)))

@@ -11,25 +11,21 @@ import numpy as np
 from fenics_contact._libraries import MPI
 from fenics_contact.contact import ContactProblem, State
 from fenics_contact.display import displayed
-from fenics_contact.errors import collectively, tell
+from fenics_contact.errors import InvalidInputError, collectively, tell
 from fenics_contact.fingerprint import described
 from fenics_contact.scene import Scene
-from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
 from fenics_contact.shape.beside import with_fewest_weak_points
-from fenics_contact.shape.contact_derivative import contact_by_shape
 from fenics_contact.shape.design import SurfaceDesign
 from fenics_contact.shape.design_function import DesignFunction, aimed
 from fenics_contact.shape.design_state import design_state
 from fenics_contact.shape.geometry import DesignGeometry
-from fenics_contact.shape.linearised_face import LinearisedFace, WeakChoice, linearise_face
+from fenics_contact.shape.linearised_face import WeakChoice, linearise_face
 from fenics_contact.shape.memory import DesignMemory, DesignPoint, Stored
 from fenics_contact.shape.objective import Objective, Partials, asking, finite, finite_partials, finite_value
 from fenics_contact.shape.scenes import check_case, checked_contact, require_influence
+from fenics_contact.shape.sensitivity import adjoint_of, by_nodes, products_of
 from fenics_contact.shape.slip_history import require_from_rest
-from fenics_contact.shape.state_error import state_error
-from fenics_contact.shape.tied_derivative import ties_by_shape
 from fenics_contact.shape.tolerance import AdaptiveTolerance, tightest_of
-from fenics_contact.shape.work_derivative import work_by_shape
 
 #: Tolerance of the adjoint relative to that of its state, and the smallest: no looser than the state's.
 ADJOINT_SHARE, ADJOINT_FLOOR = 1e-1, 1e-11
@@ -144,7 +140,15 @@ class ShapeProblem:
         return {key: text for name, part in parts.items() for key, text in described(part, name).items()}
 
     def memory(self) -> dict[str, np.ndarray]:
-        """Return what the next state depends on, and the stored designs. Collective."""
+        """Return what the next state depends on, and the stored designs. Collective.
+
+        Raises:
+            InvalidInputError: If bodies deform much.
+        """
+        if self.scene.is_nonlinear:
+            raise InvalidInputError(
+                "checkpoints of designs need linear materials, got others: leave the checkpoint out"
+            )
         return {"counts": np.array([self.evaluations, self.products]), **self._memory.stored()}
 
     def recall(self, memory: Mapping[str, np.ndarray]) -> None:
@@ -325,28 +329,27 @@ class ShapeProblem:
         partials: Partials | None = None,
     ) -> DesignPoint:
         """Return objective, subgradient and their errors at a state. Collective."""
-        before = state.dual.products
+        before = products_of(state)
         if partials is None:
             partials = self.partials_of(self.objective, state)
         with self._timer.phase("adjoint"):
             linearised = linearise_face(state, self.choice)
-            adjoint = solve_adjoint(
-                state, partials, linearised,
-                tolerance=max(ADJOINT_SHARE * tolerance, ADJOINT_FLOOR),
-                start=None if known is None else known.adjoint_multiplier,
-            )  # fmt: skip
-            error = state_error(state, partials, linearised, adjoint)
+            start = None if known is None else known.adjoint_multiplier
+            accuracy = max(ADJOINT_SHARE * tolerance, ADJOINT_FLOOR)
+            adjoint, error = adjoint_of(state, partials, linearised, accuracy, start)
         with self._timer.phase("gradient"):
-            gradient = self.geometry.pull_back(self._by_points(state, adjoint, partials, linearised))
-        self.products += state.dual.products
+            by_points = by_nodes(state, adjoint, partials, linearised, self.geometry.forms)
+            gradient = self.geometry.pull_back(by_points)
+        spent = max(products_of(state) - before, adjoint.iterations)
+        self.products += before + spent
         value = partials.value + (error.correction if self.inexact else 0.0)
         # Ranks must take the same decisions, whatever the rounding in sums over ranks.
         value, gradient, error = self.comm.bcast((value, gradient, error))
         finite("gradient", gradient)
-        tell(logger.info, "J = %.9g ± %.1e, %d products", value, error.size, state.dual.products)
+        tell(logger.info, "J = %.9g ± %.1e, %d products", value, error.size, before + spent)
         return DesignPoint(
             alpha=np.array(alpha, dtype=float), value=value, gradient=gradient, state=state,
-            weak=linearised.weak, adjoint_iterations=state.dual.products - before, tolerance=tolerance,
+            weak=linearised.weak, adjoint_iterations=spent, tolerance=tolerance,
             correction=error.correction, error=error.size, adjoint_multiplier=adjoint.multiplier,
         )  # fmt: skip
 
@@ -379,16 +382,6 @@ class ShapeProblem:
     def volume(self, alpha: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the volume of the designed bodies, in the plane the area, and its gradient. Collective."""
         return self.geometry.volume(self.scene_of(alpha))
-
-    def _by_points(
-        self, state: State, adjoint: Adjoint, partials: Partials, linearised: LinearisedFace
-    ) -> np.ndarray:
-        """Sum the objective's own derivative, −wᵀ(δK u − δf) and the share of contacts and ties."""
-        torn = state.torn
-        work = work_by_shape(self.geometry.forms, torn, state.torn_displacement, adjoint.displacement)
-        rows = contact_by_shape(state, adjoint, partials, linearised)
-        rows = rows + ties_by_shape(state, adjoint, partials)
-        return np.asarray(torn.decomposition.comm.allreduce(partials.by_shape - work)) + rows
 
     def _restored(self, alpha: np.ndarray, stored: Stored) -> State:
         state = self.contact.restore(stored, self.scene_of(alpha))

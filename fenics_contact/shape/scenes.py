@@ -7,7 +7,7 @@ import numpy as np
 from fenics_contact.contact import ContactProblem
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.linalg import LAST_PLACES
-from fenics_contact.scene import Scene
+from fenics_contact.scene import HistoryMaterial, Scene, has_mean_dilatation
 from fenics_contact.shape.objective import Objective
 
 
@@ -22,7 +22,30 @@ def checked_contact(contact: ContactProblem) -> ContactProblem:
             f"ShapeProblem needs a ContactProblem, got {type(contact).__name__}: write "
             "ShapeProblem(ContactProblem(scene, comm), designs, objective)"
         )
+    _check_differentiable(contact.scene)
     return contact
+
+
+def _check_differentiable(scene: Scene) -> None:
+    """Reject what of large deformations has no derivative by the shape."""
+    if not scene.is_nonlinear:
+        return
+    reasons = {
+        "materials without history": any(
+            isinstance(each, HistoryMaterial) for body in scene.bodies.values() for each in body.materials
+        ),
+        "materials without mean_dilatation": any(
+            has_mean_dilatation(each) for body in scene.bodies.values() for each in body.materials
+        ),
+        "contact by nodes": any(pair.discretisation == "mortar" for pair in scene.contacts),
+        "pressures that do not follow their surfaces": bool(scene.following_pressures),
+    }
+    for needed, missing in reasons.items():
+        if missing:
+            raise InvalidInputError(
+                f"designs of bodies that deform much need {needed}, this scene has others: optimise it with "
+                "a tool that takes plain functions, see fenics_contact.outer"
+            )
 
 
 def require_influence(objective: Objective, scene: Scene, value: float, gradient: np.ndarray) -> None:

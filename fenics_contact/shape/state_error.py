@@ -34,7 +34,13 @@ class StateError:
         return abs(self.correction) + self.spread
 
 
-def state_error(state: State, partials: Partials, linearised: LinearisedFace, adjoint: Adjoint) -> StateError:
+def state_error(
+    state: State,
+    partials: Partials,
+    linearised: LinearisedFace,
+    adjoint: Adjoint,
+    unbalanced: np.ndarray | None = None,
+) -> StateError:
     r"""Return the effect of a state's residuals on the objective. Collective; no product.
 
     The state is u = K⁺(f − Bᵀλ) + R α. Its residuals are r = −(B u − c) along the test directions of the
@@ -53,6 +59,7 @@ def state_error(state: State, partials: Partials, linearised: LinearisedFace, ad
         partials: Partial derivatives of the objective there.
         linearised: Branch of the contact law.
         adjoint: The adjoint there.
+        unbalanced: Shares βᵀ(G λ − e) of forces out of balance; None for those of a linear state.
 
     References:
         R. Becker, R. Rannacher, An optimal control approach to a posteriori error estimation in finite
@@ -68,7 +75,8 @@ def state_error(state: State, partials: Partials, linearised: LinearisedFace, ad
     discs = shares[layout.tangential].sum(axis=1)
     single = np.concatenate([shares[layout.equality], shares[layout.normal], discs])
     total, squares = problem.comm.allreduce(np.array([single.sum(), single @ single]))
-    unbalanced = adjoint.motions * problem.coarse.residual(solution.multiplier)
+    if unbalanced is None:
+        unbalanced = adjoint.motions * problem.coarse.residual(solution.multiplier)
     return StateError(float(total - unbalanced.sum()), float(np.sqrt(squares + unbalanced @ unbalanced)))
 
 

@@ -21,7 +21,7 @@ from fenics_contact.shape.forms import (
     sum_over_subdomains,
 )
 from fenics_contact.shape.nodal_fields import field_by_places
-from fenics_contact.shape.objective import Partials
+from fenics_contact.shape.objective import Partials, require_linear
 from fenics_contact.shape.sums import Weighable
 
 Functions = Sequence["_dolfinx.fem.Function"]
@@ -148,5 +148,6 @@ class VolumeIntegral(Weighable):
         return Partials.of(state, integral(), **integral.derivatives())
 
     def _on(self, state: State, forms: ShapeForms) -> BodyIntegral:
+        require_linear(state, self)
         require_body(state, "VolumeIntegral", self.body)
         return BodyIntegral(state, forms, Density(self.name, self.integrand), self.body)

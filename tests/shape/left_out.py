@@ -9,7 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from fenics_contact.shape import contact_derivative, problem, projection_derivative, work_derivative
+from fenics_contact.shape import (
+    contact_derivative,
+    problem,
+    projection_derivative,
+    sensitivity,
+    work_derivative,
+)
 from fenics_contact.shape.linearised_face import LinearisedFace
 from tests.shape.quotients import Patch
 
@@ -45,20 +51,20 @@ def without_turning_of_friction(patch: Patch) -> None:
 
 
 def without_stiffness(patch: Patch) -> None:
-    whole = problem.work_by_shape  # type: ignore[attr-defined]
-    patch.setattr(problem, "work_by_shape", lambda *given: np.zeros_like(whole(*given)))
+    whole = sensitivity.work_by_shape  # type: ignore[attr-defined]
+    patch.setattr(sensitivity, "work_by_shape", lambda *given: np.zeros_like(whole(*given)))
 
 
 def without_own(derivative: str) -> Callable[[Patch], None]:
     """Drop a derivative of the objective by the geometry."""
 
     def drop(patch: Patch) -> None:
-        whole = problem.ShapeProblem._by_points
+        whole = problem.by_nodes  # type: ignore[attr-defined]
 
-        def by_points(self: Any, state: Any, adjoint: Any, partials: Any, linearised: Any) -> Any:
-            return whole(self, state, adjoint, replace(partials, **{derivative: 0.0}), linearised)
+        def by_nodes(state: Any, adjoint: Any, partials: Any, *more: Any) -> Any:
+            return whole(state, adjoint, replace(partials, **{derivative: 0.0}), *more)
 
-        patch.setattr(problem.ShapeProblem, "_by_points", by_points)
+        patch.setattr(problem, "by_nodes", by_nodes)
 
     return drop
 

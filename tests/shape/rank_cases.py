@@ -12,10 +12,11 @@ from mpi4py import MPI
 
 from fenics_contact.errors import InvalidDesignError, InvalidInputError
 from fenics_contact.scene import BodyForce, Coulomb, Surface, ThermalStrain, TotalForce, Tresca
-from fenics_contact.shape import MeshMotion
+from fenics_contact.shape import MeshMotion, PressureNorm
 from tests.shape.aims import aims
 from tests.shape.blocks import block_on_block, problem
 from tests.shape.chains import chain_problem
+from tests.shape.deformed_blocks import design_problem, pressed
 from tests.shape.loaded_blocks import loaded, warm
 from tests.shape.mortar_lines import chain_problem_by_mortar
 from tests.shape.objectives import objectives
@@ -46,6 +47,9 @@ PROBLEMS: dict[str, Callable[[MPI.Comm], Remembering]] = {
         cuts=4,
     ),
     "tied": lambda comm: plane_problem(capped("triangle", sliding=True), comm, also=[Surface("block", "y1")]),
+    "rubber": lambda comm: design_problem(
+        pressed("disc", 0.6, 0.03), PressureNorm(), tolerance=1e-11, comm=comm
+    ),
 }
 #: Who judges: between them they ask everything of a state.
 JUDGES = {
@@ -56,6 +60,7 @@ JUDGES = {
     "chain by mortar": ("energy", "stress", "unevenness"),
     "tied": ("stress", "normal forces"),
     "loaded": ("energy", "stress"),
+    "rubber": ("normal forces", "pressure norm", "movement"),
 }
 BODY = {
     "chain": "link2",
@@ -63,6 +68,7 @@ BODY = {
     "chain by mortar": "link2",
     "tied": "cap",
     "loaded": "block",
+    "rubber": "block",
 }
 SURFACE = {
     "chain": "contact",
@@ -70,6 +76,7 @@ SURFACE = {
     "chain by mortar": "contact",
     "tied": "y0",
     "loaded": "y0",
+    "rubber": "x1",
 }
 SIZE = {"chain": 0.03, "plane, quadratic": 0.004, "chain by mortar": 0.03, "tied": 0.004, "loaded": 0.004}
 

@@ -13,6 +13,7 @@ from fenics_contact.pairing.sliding.differential import Differential, frame_chan
 from fenics_contact.pairing.sliding.mean_motion import MeanTangents, interleaved, placed
 from fenics_contact.pairing.sliding.means import MovingMeans
 from fenics_contact.pairing.sliding.slip import MaterialPoints
+from fenics_contact.pairing.sliding.slip_origin import slip_by_start
 from fenics_contact.pairing.sliding.stiffness import (
     GeometricStiffness,
     LowRank,
@@ -129,6 +130,11 @@ class SlidingPoints:
         way, _ = self._way(start)
         return np.asarray(np.einsum("nd,nad->na", way, self.points.tangents))
 
+    @property
+    def gap_rows(self) -> sp.csr_matrix:
+        """Derivative of the gaps by all coordinates, shape (n, n_dofs), dof dim · node + component."""
+        return spread(self.points.normal, self.points.jump)
+
     def slip_rows(self, start: MaterialPoints) -> sp.csr_matrix:
         """Return the derivative of `slip` by all coordinates, (n · (dim − 1), n_dofs), dof dim · node + a.
 
@@ -151,6 +157,21 @@ class SlidingPoints:
             for c, rows in enumerate(moved.slip_rows(some, self.coordinates, way[mine])):
                 parts[c] = parts[c] + placed(mine, count) @ rows
         return interleaved(parts)
+
+    def slip_by_start(self, start: SlidingPoints) -> sp.csr_matrix:
+        """Return the derivative of `slip` by the coordinates at its start, shaped as `slip_rows`.
+
+        Args:
+            start: The points there.
+        """
+        _, here, there = np.intersect1d(self.key, start.key, assume_unique=True, return_indices=True)
+        turned = [
+            np.eye(self.coordinates.shape[1]) if now is None or then is None else now[0] @ then[0].T
+            for now, then in zip(self.placements, start.placements, strict=True)
+        ]
+        return slip_by_start(
+            self.points, self.coordinates, start.points, start.differential, (here, there), turned
+        )
 
     def _way(self, start: MaterialPoints) -> tuple[np.ndarray, sp.csr_matrix]:
         """Return x_s − x_m, shape (n, dim), and the weights of nodes in x_m, shape (n, n_nodes)."""

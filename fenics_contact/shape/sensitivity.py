@@ -1,0 +1,67 @@
+"""The adjoint of a state and the derivative by its nodes, of small and of large deformations."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_contact.contact import DeformedState, State
+from fenics_contact.shape.adjoint import Adjoint, solve_adjoint
+from fenics_contact.shape.contact_derivative import contact_by_shape
+from fenics_contact.shape.forms import ShapeForms
+from fenics_contact.shape.linearised_face import LinearisedFace
+from fenics_contact.shape.objective import Partials
+from fenics_contact.shape.state_error import StateError, state_error
+from fenics_contact.shape.tied_derivative import ties_by_shape
+from fenics_contact.shape.work_derivative import work_by_shape
+
+
+def products_of(state: State) -> int:
+    """Return the number of F-products of a state so far; those of a deformed state's adjoint do not count."""
+    return state.solution.products if isinstance(state, DeformedState) else state.dual.products
+
+
+def adjoint_of(
+    state: State,
+    partials: Partials,
+    linearised: LinearisedFace,
+    tolerance: float,
+    start: np.ndarray | None = None,
+) -> tuple[Adjoint, StateError]:
+    """Solve the adjoint of a state and weigh its residuals with it. Collective.
+
+    Args:
+        state: A converged state.
+        partials: Partial derivatives of the objective.
+        linearised: Branch of the contact law.
+        tolerance: Relative residual of the adjoint.
+        start: Multiplier of a neighbouring adjoint, owned, or None; not used for deformed states.
+    """
+    if isinstance(state, DeformedState):
+        from fenics_contact.shape.deformed_sensitivity import solve_deformed_adjoint
+
+        adjoint = solve_deformed_adjoint(state, partials, linearised, tolerance=tolerance)
+        unbalanced = -adjoint.displacement @ state.equilibrium.evaluation.unbalanced
+        shares = np.array([state.torn.numbering.comm.allreduce(float(unbalanced))])
+        return adjoint, state_error(state, partials, linearised, adjoint, shares)
+    adjoint = solve_adjoint(state, partials, linearised, tolerance=tolerance, start=start)
+    return adjoint, state_error(state, partials, linearised, adjoint)
+
+
+def by_nodes(
+    state: State, adjoint: Adjoint, partials: Partials, linearised: LinearisedFace, forms: ShapeForms
+) -> np.ndarray:
+    """Sum the objective's own derivative, −wᵀ δ(f_int − f) and the share of contacts and ties. Collective.
+
+    Returns:
+        The derivative by the nodes of all bodies, replicated, shape (n_nodes, dim).
+    """
+    torn = state.torn
+    work = work_by_shape(forms, torn, state.torn_displacement, adjoint.displacement)
+    if isinstance(state, DeformedState):
+        from fenics_contact.shape.deformed_sensitivity import deformed_contact_by_shape
+
+        rows = deformed_contact_by_shape(state, adjoint, partials, linearised)
+    else:
+        rows = contact_by_shape(state, adjoint, partials, linearised)
+    rows = rows + ties_by_shape(state, adjoint, partials)
+    return np.asarray(torn.decomposition.comm.allreduce(partials.by_shape - work)) + rows

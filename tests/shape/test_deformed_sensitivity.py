@@ -1,0 +1,143 @@
+"""Shape derivatives of rubber that is pressed far, beside difference quotients."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from fenics_contact.contact import Status
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.pairing.sliding import points as sliding_points
+from fenics_contact.scene import LoadStep, MovingObstacle
+from fenics_contact.shape import (
+    LargestPressure,
+    LoadPath,
+    Movement,
+    Objective,
+    PressureNorm,
+    ShapeProblem,
+    StrainEnergy,
+)
+from tests.shape.deformed_blocks import design_problem, pressed
+
+Patch = pytest.MonkeyPatch
+STEP = 3e-5
+
+
+def line(problem: ShapeProblem) -> tuple[np.ndarray, np.ndarray]:
+    random = np.random.default_rng(1)
+    return 0.01 * random.standard_normal(problem.size), random.uniform(-1.0, 1.0, problem.size)
+
+
+def miss(problem: ShapeProblem, exact: ShapeProblem) -> float:
+    """Relative difference of the derivative by the adjoint from the difference quotient."""
+    alpha, along = line(problem)
+    by_adjoint = problem.evaluate(alpha).gradient @ along
+    quotient = (exact.value_of(alpha + STEP * along) - exact.value_of(alpha - STEP * along)) / (2 * STEP)
+    return float(abs(by_adjoint - quotient) / abs(quotient))
+
+
+@pytest.mark.parametrize(
+    ("master", "friction", "pushed", "statuses"),
+    [
+        ("plane", 0.0, 0.0, {Status.SLIP}),
+        ("plane", 0.6, 0.05, {Status.STICK}),
+        ("disc", 0.2, 0.1, {Status.OPEN, Status.SLIP}),
+        ("disc", 0.6, 0.03, {Status.OPEN, Status.STICK, Status.SLIP}),
+        ("block", 0.0, 0.1, {Status.SLIP}),
+        ("block", 0.3, 0.1, {Status.STICK, Status.SLIP}),
+    ],
+)
+@pytest.mark.parametrize("objective", [PressureNorm(), Movement("block", "x1", (1.0, 0.3))])
+def test_plane_blocks(
+    master: str, friction: float, pushed: float, statuses: set[Status], objective: Objective
+) -> None:
+    """By default settings, against quotients of accurate states."""
+    scene = pressed(master, friction, pushed)
+    problem = design_problem(scene, objective)
+    assert miss(problem, design_problem(scene, objective, tolerance=1e-12)) < 1e-5
+    assert {Status(each) for each in problem.last.state.contact.status} == statuses  # type: ignore[union-attr]
+    assert problem.last.adjoint_iterations > 0  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(("master", "friction"), [("disc", 0.0), ("block", 0.0), ("block", 0.9)])
+def test_blocks_in_space(master: str, friction: float) -> None:
+    scene = pressed(master, friction, 0.02 if friction else 0.1, dim=3)
+    objective = PressureNorm()
+    problem = design_problem(scene, objective)
+    assert miss(problem, design_problem(scene, objective, tolerance=1e-12)) < 1e-5
+
+
+def test_an_obstacle_that_turns() -> None:
+    """A rolling disc: slip counts from where nodes stood on it before it turned."""
+    still = pressed("disc", 0.4, 0.0)
+    pair = still.contacts[0]
+    centre = np.array([1.1, -2.0])
+
+    def motion(time: float) -> tuple[np.ndarray, np.ndarray]:
+        c, s = np.cos(0.05 * time), np.sin(0.05 * time)
+        rotation = np.array([[c, -s], [s, c]])
+        return rotation, centre - rotation @ centre
+
+    rolling = MovingObstacle(pair.master, motion)  # type: ignore[arg-type]
+    scene = replace(still, contacts=[replace(pair, master=rolling)])
+    objective = Movement("block", "x1", (1.0, 0.0))
+    problem = design_problem(scene, objective)
+    exact = design_problem(scene, objective, tolerance=1e-12)
+    assert miss(problem, exact) < 1e-5
+    assert problem.last.state.contact.count(Status.STICK) > 1  # type: ignore[union-attr]
+
+
+def without_the_start_of_slip(patch: Patch) -> None:
+    def none(points: sliding_points.SlidingPoints, start: sliding_points.SlidingPoints) -> sp.csr_matrix:
+        return 0.0 * points.slip_rows(start.material_points())
+
+    patch.setattr(sliding_points.SlidingPoints, "slip_by_start", none)
+
+
+def without_turning_friction(patch: Patch) -> None:
+    whole = sliding_points.friction_stiffness  # type: ignore[attr-defined]
+
+    def none(*given: object) -> object:
+        found = whole(*given)  # type: ignore[arg-type]
+        return type(found)(0.0 * found.left, found.right, found.point)
+
+    patch.setattr(sliding_points, "friction_stiffness", none)
+
+
+@pytest.mark.parametrize("leave_out", [without_the_start_of_slip, without_turning_friction])
+def test_a_term_left_out_is_missed(leave_out: object, monkeypatch: Patch) -> None:
+    scene = pressed("block", 0.3, 0.1)
+    exact = design_problem(scene, PressureNorm(), tolerance=1e-12)
+    problem = design_problem(scene, PressureNorm())
+    problem.state_of(line(problem)[0])
+    leave_out(monkeypatch)  # type: ignore[operator]
+    assert miss(problem, exact) > 1e-4
+
+
+def test_a_design_makes_rubber_press_more_evenly() -> None:
+    """A few steps down the gradient, as an optimiser takes them."""
+    problem = design_problem(pressed("disc", 0.2, 0.05), LargestPressure())
+    first = problem.evaluate(np.zeros(problem.size))
+    down = -0.005 * first.gradient / np.abs(first.gradient).max()
+    assert problem.value_of(down) < first.value + 0.8 * first.gradient @ down
+
+
+def test_what_has_no_derivative_is_named() -> None:
+    with pytest.raises(InvalidInputError, match="StrainEnergy needs linear materials"):
+        design_problem(pressed("plane", 0.0, 0.0), StrainEnergy()).evaluate(np.zeros(4))
+    far = design_problem(pressed("block", 0.3, 1.5), PressureNorm())
+    with pytest.raises(InvalidInputError, match="load step done at once"):
+        far.evaluate(np.zeros(far.size))
+    sliding = design_problem(pressed("disc", 0.1, 0.1, dim=3), PressureNorm())
+    with pytest.raises(InvalidInputError, match=r"discs that stick, here .* slip"):
+        sliding.evaluate(np.zeros(sliding.size))
+    problem = design_problem(pressed("plane", 0.0, 0.0), PressureNorm())
+    with pytest.raises(InvalidInputError, match="checkpoints of designs need linear materials"):
+        problem.memory()
+    path = LoadPath(problem, [LoadStep("press"), LoadStep("again")])
+    with pytest.raises(InvalidInputError, match="have one load step"):
+        path(np.zeros(path.size))
