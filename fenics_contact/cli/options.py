@@ -82,10 +82,7 @@ def read(
 
 
 def checkpoint_of(file: SceneFile, resume: bool | None) -> Checkpoint | None:
-    """Return the checkpoint of a long run, None if the file requests none.
-
-    Nor is there one of nonlinear materials, whose states are not stored, unless it is required.
-    """
-    if not file.document.output.checkpoint or (file.scene.is_nonlinear and not resume):
+    """Return the checkpoint of a long run, None if the file requests none."""
+    if not file.document.output.checkpoint:
         return None
     return Checkpoint(file.folder / "checkpoint.npz", resume=resume, comm=file.comm)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +29,8 @@ from fenics_contact.cli.pictures import Gallery, can_draw, draw_state
 from fenics_contact.cli.plans import show_outputs, show_plan
 from fenics_contact.cli.resumable import resumable
 from fenics_contact.cli.tables import state_facts, step_row, step_table
-from fenics_contact.contact import State
+from fenics_contact.contact import DeformedState, State
+from fenics_contact.errors import LoadStepError
 from fenics_contact.io import (
     ResultSeries,
     forces_record,
@@ -93,8 +96,16 @@ def _wanted(file: SceneFile) -> bool:
 
 def _at_once(desk: Desk, file: SceneFile) -> dict[str, State]:
     """Solve a scene without load steps and write its files. Collective."""
-    state, kinds = file.solve(), file.document.output.files
+    with _keeping_last(desk, file, lambda state: _write(file, state)):
+        state = file.solve()
     _show(desk, file, state)
+    _write(file, state)
+    return {file.title: state}
+
+
+def _write(file: SceneFile, state: State) -> None:
+    """Write the files of a scene without load steps. Collective."""
+    kinds = file.document.output.files
     if "vtu" in kinds:
         write_vtu(state, file.folder)
     if "xdmf" in kinds:
@@ -102,7 +113,19 @@ def _at_once(desk: Desk, file: SceneFile) -> dict[str, State]:
     if "vtx" in kinds:
         write_vtx(state, file.folder)
     write_result(state, file.folder, more=_origin(file))
-    return {file.title: state}
+
+
+@contextmanager
+def _keeping_last(desk: Desk, file: SceneFile, write: Callable[[DeformedState], None]) -> Iterator[None]:
+    """Write the last equilibrium if a load cannot be followed to its end. Collective."""
+    try:
+        yield
+    except LoadStepError as error:
+        if error.state is not None:
+            write(error.state)
+            part = error.state.fractions[-1]
+            desk.say(f"the last equilibrium, at {part:.3g} of the load step, is in {file.folder}/")
+        raise
 
 
 def _show(desk: Desk, file: SceneFile, state: State, title: str = "") -> None:
@@ -119,15 +142,20 @@ def _through_steps(desk: Desk, file: SceneFile, resume: bool | None) -> dict[str
         Some of the states by name, the last one among them.
     """
     checkpoint = checkpoint_of(file, resume)
-    if checkpoint is None and file.document.output.checkpoint:
-        desk.say("without a checkpoint: states of nonlinear materials are not stored")
-    rows, drawn = [], {}
+    rows, drawn = list[tuple[str, ...]](), dict[str, State]()
     chosen = set(np.unique(np.linspace(0, len(file.steps) - 1, MAPS).round().astype(int)))
     with resumable(desk, checkpoint):
         sequence = file.sequence(checkpoint)
         series = ResultSeries(file.folder, "history", desk.comm, formats=file.document.output.files)
+
+        def keep(last: DeformedState) -> None:
+            if file.document.output.files:
+                series.add(last, last.equilibrium.time, f"{step.name}, as far as it could be followed")
+            write_result(last, file.folder, more={**_origin(file), "steps": _steps(rows, file)})
+
         for number, step in enumerate(file.steps):
-            state = sequence.advance(step)
+            with _keeping_last(desk, file, keep):
+                state = sequence.advance(step)
             if file.document.output.files:
                 series.add(state, number if step.time is None else step.time, step.name)
             rows.append(step_row(number, step.name, state))
@@ -166,4 +194,4 @@ def _steps(rows: list[tuple[str, ...]], file: SceneFile) -> dict[str, list[Any]]
         name: [kind(row[column]) for row in rows]
         for column, (name, kind) in enumerate(zip(names, kinds, strict=True))
     }
-    return {**columns, "time": [step.time for step in file.steps]}
+    return {**columns, "time": [step.time for step in file.steps[: len(rows)]]}

@@ -15,6 +15,8 @@ from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.result import ContactResult
 from fenics_contact.contact.state import State
 from fenics_contact.contact.static_admissibility import check_held
+from fenics_contact.contact.stored import Stored
+from fenics_contact.contact.stored_deformed import stored_configuration
 from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.errors import InvalidInputError, LoadStepError, together
 from fenics_contact.feti import Decomposition, TornSystem, build_torn_system, prescribed_displacements
@@ -26,6 +28,7 @@ from fenics_contact.nonlinear import (
     FollowingPressures,
     Loading,
     MovingContact,
+    NonlinearEquilibrium,
     Path,
     PathEndsError,
     StillContact,
@@ -123,6 +126,31 @@ class DeformedEquilibria:
             raise LoadStepError(str(failure), failure.history, last) from failure
         return _state_after(path, origin, timer)
 
+    def restored(self, stored: Stored, scene: Scene) -> DeformedState:
+        """Build a state from what `stored_deformed` returned, with one factorisation. Collective.
+
+        Args:
+            stored: The arrays.
+            scene: The scene with the loads of the state.
+
+        Raises:
+            InvalidInputError: If the arrays are those of another system.
+        """
+        timer, equations = self._timer, self._equations
+        with timer.phase("assemble"):
+            load = whole = self._loading(scene, float(stored["times"][1]))
+            at, load = stored_configuration(stored, load, self._contact, self._decomposition)
+            meeting = at.meeting
+            assert meeting is not None
+            law, step = meeting.torn.law, np.zeros(meeting.torn.layout.size)
+            evaluation = equations.evaluate(meeting, law, at, step, load)
+        near = evaluation.linearised(timer, None)
+        step = near.natural_step(meeting, 1.0)
+        evaluation = equations.evaluate(meeting, law, at, step, load)
+        end = NonlinearEquilibrium(evaluation, near, (), load.time, 0, 1)
+        path = Path(whole, end, None, tuple(stored["parts"].tolist()), (), 0, 1)
+        return _state_after(path, None, timer, stored.get("slip"))
+
     def _require_later(self, scene: Scene, before: float, time: float) -> None:
         materials = [each for body in scene.bodies.values() for each in body.materials]
         if time < before and any(isinstance(each, HistoryMaterial) for each in materials):
@@ -158,8 +186,17 @@ class _Course:
         return self._loading(scene, time)
 
 
-def _state_after(path: Path, origin: State | None, timer: PhaseTimer) -> DeformedState:
-    """Return the state at the end of a path from another state. Collective."""
+def _state_after(
+    path: Path, origin: State | None, timer: PhaseTimer, known: np.ndarray | None = None
+) -> DeformedState:
+    """Return the state at the end of a path from another state. Collective.
+
+    Args:
+        path: The path.
+        origin: The state at its start.
+        timer: Collects the wall time.
+        known: The slip of its contact and that before, if the path has none.
+    """
     end = path.end
     evaluation, at = end.evaluation, end.evaluation.at
     law, near = evaluation.law, end.linearisation
@@ -176,12 +213,14 @@ def _state_after(path: Path, origin: State | None, timer: PhaseTimer) -> Deforme
         iterations=len(path.history),
         products=path.products,
         history=path.history,
-        reason="every residual is below the tolerance",
+        reason="every residual is below the tolerance" if path.history else "read from a checkpoint",
     )
     with timer.phase("state"):
         contact = contact_result(system, solution, at.displacement)
         if (points := evaluation.meeting.points) is not None and path.start is not None:
             contact = _with_slip(contact, points, path.start, origin)
+        if known is not None:
+            contact = replace(contact, slip=known[0], slip_before=known[1])
         energies = _energies(evaluation, contact)
     return DeformedState(
         system, solution, at.displacement, contact, energies, dict(timer.seconds), equilibrium=end,

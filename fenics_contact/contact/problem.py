@@ -199,17 +199,23 @@ class ContactProblem:
         self, scene: Scene, origin: State | None, tolerance: Tolerance, time: float, step: LoadStep | None
     ) -> State:
         """Compute an equilibrium of nonlinear materials. Collective."""
+        return self._equilibria(scene).solve(scene, origin, tolerance, time, step)
+
+    def _equilibria(self, scene: Scene) -> DeformedEquilibria:
+        """Return what finds equilibria of nonlinear materials. Collective on first use."""
         from fenics_contact.contact.deformed_equilibria import DeformedEquilibria
 
         equilibria = self._deformed_equilibria
         if equilibria is None or not scene.has_meshes_of(equilibria.scene):
             equilibria = DeformedEquilibria(scene, self._decomposed(scene), self.steps, self.timer)
             self._deformed_equilibria = equilibria
-        return equilibria.solve(scene, origin, tolerance, time, step)
+        return equilibria
 
     @collectively("ContactProblem.restore", lambda self, *_, **__: self.comm)
     def restore(self, stored: Stored, scene: Scene | None = None) -> State:
         """Build a state from what `stored_state` returned: one product instead of a solve. Collective.
+
+        Of nonlinear materials one factorisation.
 
         Args:
             stored: The arrays, from the same subdomains on any number of ranks.
@@ -223,6 +229,8 @@ class ContactProblem:
             InvalidInputError: If the arrays are those of another system.
         """
         scene = self.scene if scene is None else scene
+        if scene.is_nonlinear:
+            return self._equilibria(scene).restored(stored, scene)
         if not stored:
             torn = self._torn(scene, self.state, overlap=True)
             return direct_state(torn, self.state, self.timer)

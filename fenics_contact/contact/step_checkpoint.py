@@ -29,8 +29,7 @@ class StepCheckpoint:
             problem: The problem of the history.
 
         Raises:
-            InvalidInputError: If the file is not a checkpoint of this problem, or the problem has nonlinear
-                materials; says what to do.
+            InvalidInputError: If the file is not a checkpoint of this problem; says what to do.
         """
         self._checkpoint, self._comm = checkpoint, problem.comm
         self._arrays: dict[str, np.ndarray] = {}
@@ -38,12 +37,8 @@ class StepCheckpoint:
         self._here, self._stored, self._written = 0, 0, 0
         if checkpoint is None:
             return
-        if problem.scene.is_nonlinear:
-            raise InvalidInputError(
-                "checkpoints of load steps need linear materials, this scene has others, whose states are "
-                "not stored: leave the checkpoint out"
-            )
-        for name in ("scene", "partitions", "solver", "tolerance"):
+        names = ("scene", "partitions", "solver", "tolerance")
+        for name in (*names, *(("steps",) if problem.scene.is_nonlinear else ())):
             self._fingerprint.update(described(getattr(problem, name), name))
         arrays = checkpoint.read(KIND, self._fingerprint, problem.comm)
         if arrays is not None:

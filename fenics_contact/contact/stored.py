@@ -20,10 +20,17 @@ def stored_state(state: State) -> dict[str, np.ndarray]:
     Returns:
         ``multiplier`` λ and ``origin``, from which slip is measured, of all rows in their order, shape
         (n_rows,), ``slid``, the same for points without friction, and ``motion``, the coefficients α of the
-        rigid motions; all replicated. Empty for a state that was computed without multipliers.
+        rigid motions; all replicated. Empty for a state that was computed without multipliers. Of bodies with
+        nonlinear materials what `stored_deformed` returns.
     """
     if isinstance(state.system, DirectSystem):
         return {}
+    if state.scene.is_nonlinear:
+        from fenics_contact.contact.deformed_state import DeformedState
+        from fenics_contact.contact.stored_deformed import stored_deformed
+
+        assert isinstance(state, DeformedState)
+        return stored_deformed(state)
     torn, solution = state.torn, state.dual_solution
     rows = np.arange(torn.numbering.total)
     return {
@@ -40,12 +47,21 @@ def with_stored_slip(torn: TornSystem, stored: Stored) -> TornSystem:
     Raises:
         InvalidInputError: If the arrays are those of another system.
     """
+    require_rows(torn, stored)
+    return torn.with_slip_from(stored["origin"][torn.numbering.owned], stored["slid"])
+
+
+def require_rows(torn: TornSystem, stored: Stored) -> None:
+    """Reject a stored state with other rows.
+
+    Raises:
+        InvalidInputError: If it has.
+    """
     if stored["multiplier"].shape != (torn.numbering.total,):
         raise InvalidInputError(
             f"a stored state needs {torn.numbering.total} multipliers, got "
             f"{stored['multiplier'].size}: give the scene and the partition of that state"
         )
-    return torn.with_slip_from(stored["origin"][torn.numbering.owned], stored["slid"])
 
 
 def restored_solution(system: DualSystem, stored: Stored) -> DualSolution:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -216,14 +217,24 @@ class MovingContact:
         self, load: Loading, displacement: Vector, start: MaterialPoints | None, last: Meeting | None
     ) -> Meeting:
         """Search for the points at a displacement. Collective."""
-        coordinates = self._places.copy()
-        coordinates[self._nodes] += nodal_mean_at(load.torn.decomposition, displacement, self._nodes)
-        # Prescribed components reach their values within the step: gaps are those after it.
-        coordinates = np.where(np.isnan(load.prescribed), coordinates, self._places + load.prescribed)
-        found = self._sliding.at(coordinates, last=None if last is None else last.points, time=load.time)
+        known = None if last is None else last.points
+        found = self._sliding.at(self._coordinates(load, displacement), known, load.time)
         here = found.material_points()
         start = here if start is None else start.extended(here)
         return Meeting(meeting_at(load.torn, found.points, load.prescribed), found, start, load.prescribed)
+
+    def found_again(self, load: Loading, displacement: Vector, stored: Mapping[str, np.ndarray]) -> Meeting:
+        """Return the points of a meeting that was stored by `SlidingPoints.stored`. Collective."""
+        coordinates = self._coordinates(load, displacement)
+        found, start = self._sliding.found_again(stored, coordinates, load.time)
+        return Meeting(meeting_at(load.torn, found.points, load.prescribed), found, start, load.prescribed)
+
+    def _coordinates(self, load: Loading, displacement: Vector) -> np.ndarray:
+        """Return where all nodes are that may meet, shape (n_nodes, dim), [length]. Collective."""
+        coordinates = self._places.copy()
+        coordinates[self._nodes] += nodal_mean_at(load.torn.decomposition, displacement, self._nodes)
+        # Prescribed components reach their values within the step: gaps are those after it.
+        return np.where(np.isnan(load.prescribed), coordinates, self._places + load.prescribed)
 
 
 def _facet_size(scene: Scene, side: Surface) -> float:

@@ -50,13 +50,55 @@ def test_a_bar_that_was_stretched_and_put_back_presses(
     assert cli.main(MPI.COMM_SELF, ["run", str(path), "-o", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
     assert "nonlinear material (1 body deforms much or yields)" in printed
-    assert "without a checkpoint: states of nonlinear materials are not stored" in printed
     result = read_result(tmp_path / "result.json")
     assert result["energies"]["strain"] is None
     pushed = next(each for each in result["forces"]["reactions"] if each["surface"] == "x0")
     assert 150 < pushed["force"][0] < 300
     assert not (tmp_path / "checkpoint.npz").exists()
-    assert cli.main(MPI.COMM_SELF, ["run", str(path), "-o", str(tmp_path), "--resume"]) == 2
-    assert "checkpoints of load steps need linear materials" in capsys.readouterr().err
     assert cli.main(MPI.COMM_SELF, ["run", str(path), "--set", "solver.tolerance='balanced'"]) == 2
     assert "the tolerance of nonlinear materials must be a number" in capsys.readouterr().err
+
+
+RUBBER = """
+[meshes.m]
+shape = "rectangle"
+lower = [0.0, 0.0]
+upper = [1.0, 1.0]
+counts = [4, 4]
+
+[materials.rubber]
+model = "neo_hooke"
+young_modulus = 1.0
+poisson_ratio = 0.32
+
+[bodies.block]
+mesh = "m"
+material = "rubber"
+
+[[supports]]
+body = "block"
+surface = "y0"
+
+[[loads]]
+kind = "traction"
+name = "push"
+body = "block"
+surface = "y1"
+value = [0.0, -30.0]
+"""
+
+
+@pytest.mark.parametrize("steps", ["", "[[steps]]\nname = 'push'\n"], ids=["at once", "steps"])
+def test_the_last_equilibrium_before_a_crushing_load_is_written(
+    steps: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "block.toml"
+    path.write_text(RUBBER + steps)
+    assert cli.main(MPI.COMM_SELF, ["run", str(path), "-o", str(tmp_path)]) != 0
+    found = capsys.readouterr()
+    assert "the last equilibrium, at 0." in found.out
+    assert "the load can be followed up to 0." in found.err
+    result = read_result(tmp_path / "result.json")
+    pushed = next(each for each in result["forces"]["reactions"] if each["surface"] == "y0")
+    assert 0.5 < pushed["force"][1] < 30.0
+    assert list(tmp_path.glob("history*" if steps else "state*"))

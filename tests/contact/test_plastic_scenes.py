@@ -11,7 +11,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.contact import ContactProblem, DeformedState, LoadSequence, solve_scene
+from fenics_contact.contact import ContactProblem, DeformedState, LoadSequence, solve_scene, solve_steps
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import block
 from fenics_contact.partition import box_partition
@@ -23,6 +23,7 @@ from fenics_contact.scene import (
     HistoryMaterial,
     IsotropicElasticity,
     J2Plasticity,
+    LoadStep,
     MaterialResponse,
     Scene,
     Support,
@@ -100,10 +101,18 @@ def test_a_plastic_body_in_contact_does_not_depend_on_how_it_is_cut() -> None:
     assert np.isnan(one.gather_nodal_stress("base")[0]).any(), "materials keep their own nodal stresses"
 
 
-def test_steps_of_plastic_bodies_have_no_checkpoint(tmp_path: Path) -> None:
-    problem = ContactProblem(pulled(SMALL, 0.0), MPI.COMM_SELF)
-    with pytest.raises(InvalidInputError, match="checkpoints of load steps need linear materials"):
-        LoadSequence(problem, checkpoint=Checkpoint(tmp_path / "steps.npz"))
+def test_steps_of_plastic_bodies_go_on_from_a_checkpoint(tmp_path: Path) -> None:
+    steps = [LoadStep(f"{x}", supports=pulled(SMALL, x).supports) for x in (0.02, 0.0)]
+    file = Checkpoint(tmp_path / "steps.npz")
+    LoadSequence(ContactProblem(pulled(SMALL, 0.0), MPI.COMM_SELF), checkpoint=file).advance(steps[0])
+    stretched, resumed = solve_steps(
+        ContactProblem(pulled(SMALL, 0.0), MPI.COMM_SELF), steps, checkpoint=file
+    )
+    _, whole = solve_steps(ContactProblem(pulled(SMALL, 0.0), MPI.COMM_SELF), steps)
+    assert stretched.solution.reason == "read from a checkpoint"
+    left = whole.reactions()[2].force
+    assert np.abs(left).max() > 0.1
+    assert resumed.reactions()[2].force == pytest.approx(left, rel=1e-8, abs=1e-8 * np.abs(left).max())
 
 
 @dataclass(frozen=True)

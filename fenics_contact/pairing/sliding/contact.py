@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -22,9 +24,12 @@ from fenics_contact.pairing.sliding.differential import Differential, join_diffe
 from fenics_contact.pairing.sliding.means import MovingMeans
 from fenics_contact.pairing.sliding.meeting import Meeting, meetings_of
 from fenics_contact.pairing.sliding.points import SlidingPoints
+from fenics_contact.pairing.sliding.slip import LastPoints, MaterialPoints
 from fenics_contact.scene import MovingObstacle, Scene
 from fenics_contact.surface_shapes import asked
 from fenics_contact.surfaces import shape_functions
+
+Known: TypeAlias = ContactPoints | LastPoints
 
 
 @dataclass(frozen=True)
@@ -88,7 +93,7 @@ class SlidingContact:
         return cls(scene, fixed, comm, reach, meetings_of(scene, fixed, comm))
 
     def at(
-        self, coordinates: np.ndarray, last: SlidingPoints | None = None, time: float = 0.0
+        self, coordinates: np.ndarray, last: SlidingPoints | LastPoints | None = None, time: float = 0.0
     ) -> SlidingPoints:
         """Return the contact points of the bodies where they lie now. Collective.
 
@@ -113,7 +118,8 @@ class SlidingContact:
                 each.obstacle.frame(time) if isinstance(each.obstacle, MovingObstacle) else None
                 for each in self.meetings
             )
-        parts = [self._pair(index, coordinates, last, time) for index in range(len(self.meetings))]
+        known = last.points if isinstance(last, SlidingPoints) else last
+        parts = [self._pair(index, coordinates, known, time) for index in range(len(self.meetings))]
         points = join_points([part.points for part in parts], self.scene.dim, len(coordinates))
         differential = join_differentials(
             [part.differential for part in parts], self.scene.dim, len(coordinates)
@@ -122,7 +128,20 @@ class SlidingContact:
         means = tuple(part.means for part in parts)
         return SlidingPoints(points, coordinates, means, places, differential, lost)
 
-    def _pair(self, index: int, coordinates: np.ndarray, last: SlidingPoints | None, time: float) -> _Found:
+    def found_again(
+        self, stored: Mapping[str, np.ndarray], coordinates: np.ndarray, time: float
+    ) -> tuple[SlidingPoints, MaterialPoints]:
+        """Return points that were stored, and where they stood. Collective.
+
+        Args:
+            stored: What `SlidingPoints.stored` returned.
+            coordinates: The coordinates of then, shape (n_nodes, dim), [length].
+            time: The time of then.
+        """
+        found = self.at(coordinates, LastPoints.of(stored), time)
+        return found, MaterialPoints.of(stored, len(coordinates))
+
+    def _pair(self, index: int, coordinates: np.ndarray, last: Known | None, time: float) -> _Found:
         """Return the points of one pair. Collective."""
         meeting, lost, means = self.meetings[index], np.zeros(0, dtype=np.int64), None
         if meeting.obstacle is not None:
@@ -135,7 +154,7 @@ class SlidingContact:
         else:
             points, differential, lost = self._on_patches(index, meeting, coordinates, last)
         points = replace(points, pair=np.full(points.count, index))
-        axes = points.axes if last is None else _kept_axes(points, last.points, index)
+        axes = points.axes if last is None else _kept_axes(points, last, index)
         points = replace(points, axes=axes, tangents=tangent_frames(points.normal, axes))
         return _Found(in_free_frames(points, self.fixed), differential, lost, means)
 
@@ -170,7 +189,7 @@ class SlidingContact:
         return points, without_patches(bent, len(coordinates)), means
 
     def _on_patches(
-        self, index: int, meeting: Meeting, coordinates: np.ndarray, last: SlidingPoints | None
+        self, index: int, meeting: Meeting, coordinates: np.ndarray, last: Known | None
     ) -> tuple[ContactPoints, Differential, np.ndarray]:
         patches = meeting.patches
         assert patches is not None
@@ -210,17 +229,17 @@ def _points(
 
 
 def _last_facets(
-    meeting: Meeting, index: int, last: SlidingPoints | None, width: int
+    meeting: Meeting, index: int, last: Known | None, width: int
 ) -> tuple[np.ndarray, np.ndarray]:
     facet, local = np.full(len(meeting.candidates), -1), np.zeros((len(meeting.candidates), width))
     if last is not None:
-        mine = last.points.pair == index
-        place = np.searchsorted(meeting.nodes, last.points.slave[mine])
-        facet[place], local[place] = last.points.facet[mine], last.points.local[mine]
+        mine = last.pair == index
+        place = np.searchsorted(meeting.nodes, last.slave[mine])
+        facet[place], local[place] = last.facet[mine], last.local[mine]
     return facet, local
 
 
-def _kept_axes(points: ContactPoints, last: ContactPoints, index: int, steepest: float = 0.9) -> np.ndarray:
+def _kept_axes(points: ContactPoints, last: Known, index: int, steepest: float = 0.9) -> np.ndarray:
     """Return the axes nearest to the first tangents: the last ones, unless they come near the normal."""
     axes, before = points.axes.copy(), np.flatnonzero(last.pair == index)
     _, now, then = np.intersect1d(points.slave, last.slave[before], return_indices=True)

@@ -12,7 +12,7 @@ from fenics_contact.pairing.contact_points import ContactPoints
 from fenics_contact.pairing.sliding.differential import Differential, frame_changes, point_motion, spread
 from fenics_contact.pairing.sliding.mean_motion import MeanTangents, interleaved, placed
 from fenics_contact.pairing.sliding.means import MovingMeans
-from fenics_contact.pairing.sliding.slip import MaterialPoints
+from fenics_contact.pairing.sliding.slip import LAST, MaterialPoints
 from fenics_contact.pairing.sliding.slip_origin import slip_by_start
 from fenics_contact.pairing.sliding.stiffness import (
     GeometricStiffness,
@@ -96,6 +96,15 @@ class SlidingPoints:
                 mine = points.pair == index
                 foot[mine] = (foot[mine] - translation) @ rotation
         return MaterialPoints(self.key, points.pair, points.master, foot)
+
+    def stored(self, start: MaterialPoints) -> dict[str, np.ndarray]:
+        """Return the arrays from which `SlidingContact.found_again` finds the same points.
+
+        Args:
+            start: Where the nodes stood.
+        """
+        found = {f"found.{name}": getattr(self.points, name) for name in LAST}
+        return found | start.stored()
 
     def mean_tangents(self, normal: np.ndarray, friction: np.ndarray, start: MaterialPoints) -> MeanTangents:
         """Return what derivatives of mortar contact have beside the rows of its forces. Collective.

@@ -2,10 +2,39 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import scipy.sparse as sp
+
+
+@dataclass(frozen=True)
+class LastPoints:
+    """What points are found again by, at nearby coordinates, see `ContactPoints`.
+
+    Attributes:
+        pair: Contact pair, shape (n,).
+        slave: Slave node, shape (n,).
+        facet: Facet of the master on which it stood, −1 on others, shape (n,).
+        local: Where on it, shape (n, dim − 1).
+        axes: Axis next to the first tangent, shape (n, dim).
+    """
+
+    pair: np.ndarray
+    slave: np.ndarray
+    facet: np.ndarray
+    local: np.ndarray
+    axes: np.ndarray
+
+    @classmethod
+    def of(cls, stored: Mapping[str, np.ndarray]) -> LastPoints:
+        """Return those of arrays of `SlidingPoints.stored`."""
+        return cls(*(stored[f"found.{name}"] for name in LAST))
+
+
+#: Names of what points are found again by.
+LAST = tuple(part.name for part in fields(LastPoints))
 
 
 @dataclass(frozen=True)
@@ -37,6 +66,21 @@ class MaterialPoints:
         }
         weights = sp.vstack([self.weights, other.weights[new]], format="csr")[order]
         return replace(self, weights=weights, **joined)
+
+    def stored(self) -> dict[str, np.ndarray]:
+        """Return the points as arrays."""
+        weights = self.weights.tocoo()
+        entries = np.array([weights.row, weights.col, weights.data])
+        plain = {f"stood.{name}": getattr(self, name) for name in ("key", "pair", "place")}
+        return plain | {"stood.weights": entries}
+
+    @classmethod
+    def of(cls, stored: Mapping[str, np.ndarray], n_nodes: int) -> MaterialPoints:
+        """Return the points of arrays from `stored`, with the number of nodes of all bodies."""
+        row, column, value = stored["stood.weights"]
+        key, pair, place = (stored[f"stood.{name}"] for name in ("key", "pair", "place"))
+        at = row.astype(np.int64), column.astype(np.int64)
+        return cls(key, pair, sp.csr_matrix((value, at), shape=(len(key), n_nodes)), place)
 
     def part(self, chosen: np.ndarray) -> MaterialPoints:
         """Return some of the points, by indices or a mask."""

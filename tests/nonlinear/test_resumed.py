@@ -1,0 +1,126 @@
+"""Histories of large deformations and plastic flow go on from a checkpoint as if nothing had happened."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenics_contact.checkpoint import Checkpoint
+from fenics_contact.contact import ContactProblem, DeformedState, LoadSequence, stored_state
+from fenics_contact.errors import InvalidInputError
+from fenics_contact.gallery import rectangle
+from fenics_contact.partition import box_partition
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    Coulomb,
+    FinitePlasticity,
+    LoadStep,
+    NeoHooke,
+    PlaneStrain,
+    Pressure,
+    RigidSphere,
+    Scene,
+    Support,
+    Surface,
+)
+
+SOFT, HARD = NeoHooke(1.0, 0.32), NeoHooke(10.0, 0.32)
+
+
+def drawn() -> tuple[Scene, list[LoadStep]]:
+    """A round slider drawn over a soft bed, with a pressure that follows its side."""
+    bed, slider = rectangle((0.0, 0.0), (4.0, 2.0), (16, 6)), rectangle((1.0, 2.0), (2.2, 3.0), (6, 4))
+    x, y = slider.points.T
+    rim = 2.0 + 0.3 * (x - 1.6) ** 2
+    slider = replace(slider, points=np.column_stack([x, rim + (3.0 - rim) * (y - 2.0)]))
+
+    def held(x: float, y: float) -> list[Support]:
+        return [Support("bed", "y0"), Support("slider", "y1", (x, y))]
+
+    scene = Scene(
+        {"bed": Body(bed, SOFT), "slider": Body(slider, HARD)},
+        held(0.0, 0.0),
+        contacts=[ContactPair(Surface("slider", "y0"), Surface("bed", "y1"), Coulomb(0.3))],
+    )
+    wind = [Pressure("slider", "x0", 0.02)]
+    places = (("press", 0.0, -0.2), ("slide", 0.3, -0.2), ("on", 0.6, -0.2))
+    return scene, [LoadStep(name, wind, held(x, y)) for name, x, y in places]
+
+
+def yielding() -> tuple[Scene, list[LoadStep]]:
+    """A ball pressed into metal and withdrawn; large strains."""
+    metal = FinitePlasticity(100.0, 0.3, 0.5, isotropic_hardening=2.0)
+    body = Body(rectangle((0.0, 0.0), (1.0, 1.0), (8, 8)), metal)
+    pair = ContactPair(Surface("block", "y1"), RigidSphere((0.5, 2.0), 1.0), Coulomb(0.2))
+    scene = Scene({"block": body}, [Support("block", "y0")], contacts=[pair])
+    steps = [
+        LoadStep(f"{rise}", supports=[Support("block", "y0", (0.02 * rise, rise))])
+        for rise in (0.03, 0.05, 0.06)
+    ]
+    return scene, steps
+
+
+def problem(scene: Scene) -> ContactProblem:
+    parts = {name: box_partition(body.mesh, (2, 1)) for name, body in scene.bodies.items()}
+    return ContactProblem(scene, MPI.COMM_SELF, partitions=parts, tolerance=1e-9)
+
+
+def advanced(sequence: LoadSequence, steps: Sequence[LoadStep]) -> DeformedState:
+    state = [sequence.advance(step) for step in steps][-1]
+    assert isinstance(state, DeformedState)
+    return state
+
+
+@pytest.mark.parametrize("history", [drawn, yielding])
+def test_the_rest_of_a_history_is_the_same(
+    history: Callable[[], tuple[Scene, list[LoadStep]]], tmp_path: Path
+) -> None:
+    scene, steps = history()
+    file = Checkpoint(tmp_path / "steps.npz")
+    whole = LoadSequence(problem(scene), checkpoint=file)
+    before = advanced(whole, steps[:2])
+    last = advanced(LoadSequence(problem(scene)), steps)
+    resumed = LoadSequence(problem(scene), checkpoint=file)
+    again = advanced(resumed, steps[:2])
+    assert again.solution.reason == "read from a checkpoint"
+    assert np.array_equal(again.torn_displacement, before.torn_displacement)
+    for name in scene.bodies:
+        assert np.abs(again.stress[name].x.array - before.stress[name].x.array).max() < 1e-12
+    assert np.abs(again.contact.force - before.contact.force).max() < 1e-13
+    assert np.abs(again.contact.slip - before.contact.slip).max() < 1e-13
+    assert np.abs(again.contact.slip).max() > 1e-3
+    assert again.solution.residuals.worst < 1e-9
+    assert again.energies.friction == pytest.approx(before.energies.friction)
+    assert again.history.values.keys() == before.history.values.keys()
+    for name, values in before.history.values.items():
+        assert np.array_equal(again.history.values[name], values)
+        assert values.any()
+    end = advanced(resumed, steps[2:])
+    assert end.solution.reason != "read from a checkpoint"
+    for name in scene.bodies:
+        moved = last.gather_displacement(name)
+        assert np.abs(end.gather_displacement(name) - moved).max() < 1e-8 * np.abs(moved).max()
+    force = last.contact.force
+    assert np.abs(end.contact.force - force).max() < 1e-7 * np.abs(force).max()
+    assert np.abs(end.contact.slip_before - last.contact.slip_before).max() < 1e-8
+
+
+def test_a_stored_state_of_another_mesh_is_refused(tmp_path: Path) -> None:
+    scene, steps = yielding()
+    file = Checkpoint(tmp_path / "steps.npz")
+    state = advanced(LoadSequence(problem(scene), checkpoint=file), steps[:1])
+    body = scene.bodies["block"]
+    finer = replace(scene, bodies={"block": replace(body, mesh=rectangle((0, 0), (1, 1), (9, 8)))})
+    with pytest.raises(InvalidInputError, match=r"there and here differ scene\.bodies\['block'\]\.mesh"):
+        LoadSequence(problem(finer), checkpoint=file)
+    with pytest.raises(InvalidInputError, match=r"a stored state needs .*: give the scene and the partition"):
+        problem(finer).restore(stored_state(state))
+    steel = replace(scene, bodies={"block": replace(body, material=PlaneStrain(100.0, 0.3))})
+    with pytest.raises(InvalidInputError, match="there and here differ"):
+        LoadSequence(problem(steel), checkpoint=file)
