@@ -165,6 +165,11 @@ class ContactProblem:
         scene = self.scene if scene is None else scene
         wanted = self.tolerance if tolerance is None else tolerance
         if scene.is_nonlinear:
+            if self.solver is not None:
+                raise InvalidInputError(
+                    f"dual solvers are for linear materials, this scene has others, got {self.solver!r}: "
+                    "give steps=AutomaticSteps(TangentNewton(...)) of fenics_contact.nonlinear instead"
+                )
             self.state = self._deformed(scene, slip_from, wanted, time, step)
             return self.state
         previous = self.state if start == "last" else start

@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
 from fenics_contact import scene
 from fenics_contact.scene import ContactPair, Surface, Tie
 from fenics_contact.scene_file.expression import Expression
+from fenics_contact.scene_file.moving import ObstaclePart
 from fenics_contact.scene_file.part import Part, keys_of
 from fenics_contact.scene_file.values import FieldOrMeasured, NotNegativeField, Scalar, Triple, one_of
 
@@ -27,14 +28,14 @@ class SurfaceOfBody(Part):
 
 
 @keys_of(scene.RigidPlane)
-class Plane(Part):
+class Plane(ObstaclePart):
     """A rigid half space, in the plane a half plane."""
 
     obstacle: Literal["plane"]
 
 
 @keys_of(scene.RigidSphere)
-class Sphere(Part):
+class Sphere(ObstaclePart):
     """A rigid ball, in the plane a disc."""
 
     obstacle: Literal["sphere"]
@@ -42,7 +43,7 @@ class Sphere(Part):
 
 
 @keys_of(scene.RigidCylinder)
-class Cylinder(Part):
+class Cylinder(ObstaclePart):
     """A rigid endless round bar."""
 
     obstacle: Literal["cylinder"]
@@ -56,7 +57,7 @@ def _function(value: float | Expression) -> Expression:
 
 
 @keys_of(scene.DistanceObstacle, only=["function"])
-class Distance(Part):
+class Distance(ObstaclePart):
     """A rigid obstacle given by its signed distance."""
 
     obstacle: Literal["distance"]

@@ -101,11 +101,13 @@ class SceneFile:
     def problem(self) -> ContactProblem:
         """The scene with the solver of the file, nothing solved yet. Collective on first use."""
         solver = self.document.solver
+        with self._at("solver"):
+            chosen = solver.chosen(self.scene, self.partitions)
         return ContactProblem(
             self.scene,
             self.comm,
             partitions=self.partitions,
-            solver=solver.chosen(self.scene, self.partitions),
+            solver=chosen,
             tolerance=solver.accuracy(self.scene),
         )
 

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, PositiveInt
 
 from fenics_contact.contact import default_solver
+from fenics_contact.errors import InvalidInputError
 from fenics_contact.partition import box_partition, graph_partition
 from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG, Smalse
 from fenics_contact.scene import Scene, choose_solver
@@ -62,7 +63,17 @@ class SolverPart(Part):
         return Balanced()
 
     def chosen(self, scene: Scene, partitions: Mapping[str, np.ndarray]) -> DualSolver | None:
-        """Return the dual solver given by the keys, None for the default one."""
+        """Return the dual solver given by the keys, None for the default one.
+
+        Raises:
+            InvalidInputError: If one is given for nonlinear materials, whose Newton's method has its own.
+        """
+        if scene.is_nonlinear and (self.method != "auto" or self.max_products is not None):
+            raise InvalidInputError(
+                "method and max_products are for linear materials, this scene has others, which Newton's "
+                f"method solves, got method {self.method!r} and max_products {self.max_products}: leave them "
+                "out, or set nonlinear.TangentNewton from Python"
+            )
         kinds: dict[str, DualSolver] = {
             "face_newton": FaceNewton(),
             "smalse": Smalse(),

@@ -6,12 +6,22 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, DeformedState, LoadSequence, solve_steps
+from fenics_contact.contact import ContactProblem, DeformedState, LoadSequence, solve_scene, solve_steps
 from fenics_contact.errors import InvalidInputError, UserCodeError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.nonlinear import AutomaticSteps, TangentNewton
-from fenics_contact.scene import Body, LoadStep, PlaneStrain, RigidSurface, Scene, Support, Traction
-from fenics_contact.scene_file import read_scene_file
+from fenics_contact.qp import Smalse
+from fenics_contact.scene import (
+    Body,
+    LoadStep,
+    MovingObstacle,
+    PlaneStrain,
+    RigidSurface,
+    Scene,
+    Support,
+    Traction,
+)
+from fenics_contact.scene_file import SceneFile, SceneFileError, read_scene_file
 from tests.nonlinear.scenes import RUBBER, cut
 
 CUBE = block((0, 0, 0), (1, 1, 1), (3, 3, 3))
@@ -187,3 +197,44 @@ def test_bodies_come_back_to_rest() -> None:
     assert states[0].contact.points.count == 0
     assert all(np.abs(state.gather_displacement("block")).max() < 1e-8 for state in states[1:])
     assert len(states[1].solution.history) <= 6
+
+
+SPHERE = {"obstacle": "sphere", "centre": [0.5, 0.5, 2.0], "radius": 1.0}
+
+
+def pressed_file(**sphere: object) -> SceneFile:
+    pair = {"slave": {"body": "block", "surface": "z1"}, "master": {**SPHERE, **sphere}}
+    base = {"body": "block", "surface": "z0", "name": "base"}
+    data = {**FILE, "supports": [base], "contacts": [pair], "steps": [{"name": "press", "duration": 2.0}]}
+    return read_scene_file(data, MPI.COMM_SELF)
+
+
+def test_obstacles_of_scene_files_move() -> None:
+    """Half a turn about a point beside the ball and a way back press it as far as a plain way does."""
+    down = [0.0, 0.0, "-0.05 * t", 0.0, 0.0, 0.0]
+    around = [0.0, -2.0, "-0.05 * t", 0.0, 0.0, "0.5 * pi * t"]
+    plain, turned = (pressed_file(motion=motion, about=[0.5, 1.5, 0.0]) for motion in (down, around))
+    for file in (plain, turned):
+        (pair,) = file.scene.contacts
+        assert isinstance(pair.master, MovingObstacle)
+    place = np.array([[0.5, 0.5, 0.9]])
+    assert turned.scene.contacts[0].master.at(2.0).distance(place) == pytest.approx(0.0)
+    state = plain.solve()
+    assert state.contact.force[:, 2].sum() < -1e-3
+    assert state.gather_displacement("block")[:, 2].min() == pytest.approx(-0.1, abs=1e-3)
+
+
+def test_wrong_motions_and_solvers_of_scene_files() -> None:
+    with pytest.raises(
+        SceneFileError, match=r"motion of an obstacle must be 6 numbers .* prescribe all of it"
+    ):
+        _ = pressed_file(motion=[0, 0, "free", 0, 0, 0]).scene
+    file = read_scene_file(
+        {**FILE, "supports": [{"body": "block", "surface": "z0"}], "solver": {"method": "smalse"}},
+        MPI.COMM_SELF,
+    )
+    with pytest.raises(SceneFileError, match=r"method and max_products are for linear materials.*leave them"):
+        file.solve()
+    scene = Scene({"block": Body(CUBE, RUBBER)}, [turn(0.0)])
+    with pytest.raises(InvalidInputError, match=r"dual solvers are for linear materials.*: give steps"):
+        solve_scene(scene, MPI.COMM_SELF, solver=Smalse())
