@@ -15,8 +15,8 @@ from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.result import ContactResult
 from fenics_contact.contact.state import State
 from fenics_contact.contact.static_admissibility import check_held
-from fenics_contact.contact.stored import Stored
 from fenics_contact.contact.stored_deformed import stored_configuration
+from fenics_contact.contact.stored_rows import Stored
 from fenics_contact.contact.tolerance import Tolerance
 from fenics_contact.errors import InvalidInputError, LoadStepError, together
 from fenics_contact.feti import Decomposition, TornSystem, build_torn_system, prescribed_displacements

@@ -18,7 +18,8 @@ from fenics_contact.contact.equilibrium import (
 )
 from fenics_contact.contact.state import State
 from fenics_contact.contact.static_admissibility import check_held
-from fenics_contact.contact.stored import Stored, restored_solution, with_stored_slip
+from fenics_contact.contact.stored import restored_solution
+from fenics_contact.contact.stored_rows import Stored, with_stored_slip
 from fenics_contact.contact.tolerance import Tolerance, checked_tolerance
 from fenics_contact.display import displayed
 from fenics_contact.errors import collectively, together

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from fenics_contact.contact.deformed_state import DeformedState
-from fenics_contact.contact.stored import Stored, require_rows, with_stored_slip
+from fenics_contact.contact.stored_rows import Stored, require_rows, with_stored_slip
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.fem import History
 from fenics_contact.feti import Decomposition
