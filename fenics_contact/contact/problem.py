@@ -22,7 +22,7 @@ from fenics_contact.contact.stored import restored_solution
 from fenics_contact.contact.stored_rows import Stored, with_stored_slip
 from fenics_contact.contact.tolerance import Tolerance, checked_tolerance
 from fenics_contact.display import displayed
-from fenics_contact.errors import collectively, together
+from fenics_contact.errors import InvalidInputError, collectively, together
 from fenics_contact.feti import (
     Decomposition,
     DualSystem,

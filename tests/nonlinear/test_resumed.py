@@ -91,8 +91,8 @@ def test_the_rest_of_a_history_is_the_same(
     assert again.solution.reason == "read from a checkpoint"
     assert np.array_equal(again.torn_displacement, before.torn_displacement)
     for name in scene.bodies:
-        assert np.abs(again.stress[name].x.array - before.stress[name].x.array).max() < 1e-12
-    assert np.abs(again.contact.force - before.contact.force).max() < 1e-13
+        assert np.abs(again.stress[name].x.array - before.stress[name].x.array).max() < 1e-9
+    assert np.abs(again.contact.force - before.contact.force).max() < 1e-12
     assert np.abs(again.contact.slip - before.contact.slip).max() < 1e-13
     assert np.abs(again.contact.slip).max() > 1e-3
     assert again.solution.residuals.worst < 1e-9
