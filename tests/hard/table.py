@@ -88,6 +88,13 @@ GROUPS: dict[str, tuple[str, str]] = {
         "do no harm to the solver. Cells that are flat or inverted are refused with their place when the "
         "mesh is made.",
     ),
+    "deformed": (
+        "Large deformations",
+        "Rubber under contact that slides over rims, turns and keeps its volume. `balance` is that of every "
+        "free node of whole bodies, their internal forces assembled again from the displacement; `same` "
+        "compares displacements with those of another partition, and some with other units or "
+        "another place. A load beyond the last equilibrium ends the path.",
+    ),
     "published": (
         "Published friction problems",
         "Problems (W, q, μ) of the collection of Siconos, solved as F = W, d = −q without bodies or a "
