@@ -45,10 +45,10 @@ def solve_deformed_adjoint(
 
     Raises:
         ConvergenceError: If the face does not hold every body, or the tolerance was not reached.
-        InvalidInputError: If friction depends on more than the derivative knows: more than one part of the
-            load step, points that were found on the way, or slip in space.
+        InvalidInputError: If friction depends on more than the derivative knows: a load step of
+            more than one part.
     """
-    _require_one_step(state, linearised)
+    _require_one_step(state)
     evaluation, torn = state.equilibrium.evaluation, state.torn
     exact = evaluation.linearised(PhaseTimer(), state.equilibrium.linearisation)
     system, tangent = exact.system, exact.problem(evaluation)
@@ -70,8 +70,8 @@ def solve_deformed_adjoint(
     return Adjoint(moved + system.kernel @ found.motions, multiplier, found.motions, found.products)
 
 
-def _require_one_step(state: DeformedState, linearised: LinearisedFace) -> None:
-    """Reject friction whose derivative needs more than the state at rest. Collective."""
+def _require_one_step(state: DeformedState) -> None:
+    """Reject friction whose derivative needs more than the state at rest."""
     torn, points = state.torn, state.equilibrium.evaluation.meeting.points
     if len(torn.frictional) == 0 or points is None:
         return
@@ -79,13 +79,6 @@ def _require_one_step(state: DeformedState, linearised: LinearisedFace) -> None:
         raise InvalidInputError(
             "derivatives of large deformations with friction need a load step done at once, this one took "
             f"{len(state.fractions)} parts: prescribe less, or solve without friction"
-        )
-    slips = int(torn.numbering.comm.allreduce(np.count_nonzero(linearised.face.slip)))
-    if torn.dim == 3 and slips:
-        raise InvalidInputError(
-            "derivatives of large deformations in space need discs that stick, here "
-            f"{slips} slip: their forces turn with the slip, which is not differentiated yet; use a plane "
-            "scene, more friction, or none"
         )
 
 

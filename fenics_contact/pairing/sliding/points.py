@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -122,7 +122,19 @@ class SlidingPoints:
                 self.points.part(mine), self.coordinates, forces, (way[mine], weights[mine])
             )
             total = total.with_points(mine, found)
+        # In the plane a slipping force does not turn with the slip, of which nothing is needed then.
+        if friction.shape[1] == 2:
+            total = replace(total, slip=total.slip + self._slip_beyond_rows(start, friction.any(axis=1)))
         return total
+
+    def _slip_beyond_rows(self, start: MaterialPoints, rubbed: np.ndarray) -> sp.csr_matrix:
+        """Return the derivative of the slip of nodes less the rows of their friction forces."""
+        chosen = rubbed.copy()
+        for mine, _ in self._by_means:
+            chosen[mine] = False
+        points, width = self.points, self.points.normal.shape[1] - 1
+        rows = interleaved([spread(points.tangents[:, c], points.jump) for c in range(width)])
+        return (sp.diags(np.repeat(chosen, width).astype(float)) @ (self.slip_rows(start) - rows)).tocsr()
 
     def slip(self, start: MaterialPoints) -> np.ndarray:
         """Return t_a·(x_s − x_m), x_m where the node stood at the start, carried along by the master.
