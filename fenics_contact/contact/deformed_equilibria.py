@@ -148,7 +148,7 @@ class DeformedEquilibria:
         step = near.natural_step(meeting, 1.0)
         evaluation = equations.evaluate(meeting, law, at, step, load)
         end = NonlinearEquilibrium(evaluation, near, (), load.time, 0, 1)
-        path = Path(whole, end, meeting, None, tuple(stored["parts"].tolist()), (), 0, 1)
+        path = Path(whole, end, None, None, tuple(stored["parts"].tolist()), (), 0, 1)
         return _state_after(path, None, timer, stored.get("slip"))
 
     def _require_later(self, scene: Scene, before: float, time: float) -> None:

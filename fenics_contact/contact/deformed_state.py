@@ -36,14 +36,14 @@ class DeformedState(State):
     Attributes:
         equilibrium: Displacement, forces and history of the materials.
         load: What acts.
-        begun: Where bodies met at the start of the load step.
+        begun: Where bodies met at the start of the load step; None where a checkpoint was read.
         fractions: Parts of the last load step at which equilibria were found.
         factorisations: Factored tangents of the last load step, counting all subdomains as one.
     """
 
     equilibrium: NonlinearEquilibrium = field(kw_only=True)
     load: Loading = field(kw_only=True)
-    begun: Meeting = field(kw_only=True)
+    begun: Meeting | None = field(kw_only=True)
     fractions: tuple[float, ...] = field(kw_only=True)
     factorisations: int = field(kw_only=True)
 

@@ -35,7 +35,7 @@ class Path:
     Attributes:
         load: What acts at the end.
         end: The last equilibrium.
-        begun: Where bodies met at the start.
+        begun: Where bodies met at the start; None where that is not known.
         start: Where nodes stood on their masters then, or where they were first found; None where contact is
             that of the undeformed bodies.
         fractions: Parts of the load at which equilibria were found, the last one being 1.
@@ -46,7 +46,7 @@ class Path:
 
     load: Loading
     end: NonlinearEquilibrium
-    begun: Meeting
+    begun: Meeting | None
     start: MaterialPoints | None
     fractions: tuple[float, ...]
     history: tuple[SolverStep, ...]

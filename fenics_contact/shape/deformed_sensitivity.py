@@ -46,9 +46,9 @@ def solve_deformed_adjoint(
     Raises:
         ConvergenceError: If the face does not hold every body, or the tolerance was not reached.
         InvalidInputError: If friction depends on more than the derivative knows: a load step of
-            more than one part.
+            more than one part, or of a checkpoint.
     """
-    _require_one_step(state)
+    _require_whole_step(state)
     evaluation, torn = state.equilibrium.evaluation, state.torn
     exact = evaluation.linearised(PhaseTimer(), state.equilibrium.linearisation)
     system, tangent = exact.system, exact.problem(evaluation)
@@ -70,8 +70,8 @@ def solve_deformed_adjoint(
     return Adjoint(moved + system.kernel @ found.motions, multiplier, found.motions, found.products)
 
 
-def _require_one_step(state: DeformedState) -> None:
-    """Reject friction whose derivative needs more than the state at rest."""
+def _require_whole_step(state: DeformedState) -> None:
+    """Reject friction whose derivative needs more than the start of the load step."""
     torn, points = state.torn, state.equilibrium.evaluation.meeting.points
     if len(torn.frictional) == 0 or points is None:
         return
@@ -79,6 +79,11 @@ def _require_one_step(state: DeformedState) -> None:
         raise InvalidInputError(
             "derivatives of large deformations with friction need a load step done at once, this one took "
             f"{len(state.fractions)} parts: prescribe less, or solve without friction"
+        )
+    if state.begun is None:
+        raise InvalidInputError(
+            "derivatives of large deformations with friction need the start of the load step, this state was "
+            "read from a checkpoint, which does not keep it: solve the scene again"
         )
 
 
@@ -107,7 +112,7 @@ def deformed_contact_by_shape(
     w = _on_surfaces(torn, points, adjoint.displacement)
     turning, rubbing = points.stiffness(np.maximum(normal, 0.0)), points.friction_stiffness(friction)
     by_nodes = -turning.assembled() @ w - rubbing.right @ (rubbing.left.T @ w) + points.gap_rows.T @ by_gap
-    if by_slip.any() and (start := state.begun.points) is not None:
+    if by_slip.any() and state.begun is not None and (start := state.begun.points) is not None:
         rows = points.slip_rows(start.material_points()) + points.slip_by_start(start)
         by_nodes -= rows.T @ by_slip.ravel()
     result += by_nodes.reshape(result.shape)
