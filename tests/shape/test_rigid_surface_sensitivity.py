@@ -12,8 +12,7 @@ from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, State, Status
 from fenics_contact.scene import Coulomb, RigidSurface, Scene, Support
-from fenics_contact.shape import FrictionWork, Partials
-from fenics_contact.shape import problem as problem_module
+from fenics_contact.shape import FrictionWork, Partials, sensitivity
 from tests.contact.gallery import partitions
 from tests.shape.aims import aims
 from tests.shape.blocks import block_on_block, designs_of, problem
@@ -64,12 +63,12 @@ def test_the_adjoint_agrees_with_central_differences(name: str, objective: str) 
 def test_the_work_of_the_load_at_the_point_counts(name: str, monkeypatch: Patch) -> None:
     judge = OBJECTIVES["energy"]
     here = Line(line(name).problem, line(name).alpha + 1e-7, line(name).direction, 1e-5)
-    whole = problem_module.solve_adjoint  # type: ignore[attr-defined]
+    whole = sensitivity.solve_adjoint  # type: ignore[attr-defined]
 
     def without_points(state: State, partials: Partials, *more: Any, **named: Any) -> Any:
         return whole(state, replace(partials, by_motion=None), *more, **named)
 
-    monkeypatch.setattr(problem_module, "solve_adjoint", without_points)
+    monkeypatch.setattr(sensitivity, "solve_adjoint", without_points)
     assert here.miss(judge) > 1e-3
 
 
