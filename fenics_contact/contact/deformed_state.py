@@ -47,6 +47,16 @@ class DeformedState(State):
     fractions: tuple[float, ...] = field(kw_only=True)
     factorisations: int = field(kw_only=True)
 
+    def _facts(self) -> dict[str, str]:
+        facts = super()._facts()
+        residuals = self.dual_solution.residuals
+        further = {
+            "parts": f"{len(self.fractions)} of the load step",
+            "residuals": f"{facts['residuals']}, out of balance {residuals.coarse:.1e}",
+            "errors": "not estimated where materials are nonlinear: compare two meshes",
+        }
+        return {name: words for name, words in (facts | further).items() if words != "nan"}
+
     @cached_property
     def history(self) -> History:
         """Internal variables of the bodies' materials, on every rank. Collective on first use."""

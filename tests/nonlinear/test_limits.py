@@ -27,7 +27,7 @@ from fenics_contact.scene import (
     Support,
     Surface,
 )
-from tests.nonlinear.scenes import RUBBER, cut, tilted
+from tests.nonlinear.scenes import RUBBER, cut, pressed, rounded, tilted
 
 SMALL = 1e-7
 
@@ -130,3 +130,10 @@ def test_two_blocks_turned_in_space_give_the_turned_answer() -> None:
     for name in ("low", "high"):
         moved = upright.gather_displacement(name) @ tilted(1.1).T
         assert np.abs(turn.gather_displacement(name) - moved).max() < 1e-9 * np.abs(moved).max()
+
+
+def test_a_deformed_state_says_what_it_has() -> None:
+    words = str(solve_scene(pressed(rounded(2), 0.05), MPI.COMM_SELF))
+    assert "out of balance" in words
+    assert "compare two meshes" in words
+    assert "ask for state.errors" not in words
