@@ -34,7 +34,7 @@ from fenics_contact.nonlinear import (
     StillContact,
     TurnedSurface,
 )
-from fenics_contact.qp import DualSolution
+from fenics_contact.qp import DualSolution, Vector
 from fenics_contact.scene import HistoryMaterial, LoadStep, RigidSurface, Scene
 from fenics_contact.timing import PhaseTimer
 
@@ -142,13 +142,14 @@ class DeformedEquilibria:
             at, load = stored_configuration(stored, load, self._contact, self._decomposition)
             meeting = at.meeting
             assert meeting is not None
-            law, step = meeting.torn.law, np.zeros(meeting.torn.layout.size)
+            law = meeting.torn.law
+            step: Vector = np.zeros(meeting.torn.layout.size)
             evaluation = equations.evaluate(meeting, law, at, step, load)
         near = evaluation.linearised(timer, None)
         step = near.natural_step(meeting, 1.0)
         evaluation = equations.evaluate(meeting, law, at, step, load)
         end = NonlinearEquilibrium(evaluation, near, (), load.time, 0, 1)
-        path = Path(whole, end, None, None, tuple(stored["parts"].tolist()), (), 0, 1)
+        path = Path(whole, end, None, None, tuple(map(float, stored["parts"])), (), 0, 1)
         return _state_after(path, None, timer, stored.get("slip"))
 
     def _require_later(self, scene: Scene, before: float, time: float) -> None:

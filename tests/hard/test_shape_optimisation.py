@@ -180,7 +180,8 @@ def test_strict_states_tell_how_near_a_kink_is(switch: str, record: Record) -> N
     start = DESIGN + 0.001 * np.random.default_rng(3).standard_normal(6)
     before = function.problem.products
     bounds = (DESIGN - 0.01, DESIGN + 0.01)
-    result = minimize(function, start, BundleTrust(tolerance=1e-8), bounds=bounds, scale=1e-3)
+    method = BundleTrust(tolerance=1e-8, value_scale=1.0)  # the least value is zero
+    result = minimize(function, start, method, bounds=bounds, scale=1e-3)
     assert result.reason.success
     assert abs(result.value) < 1e-9
     across = (function.held - function.released) / function.size

@@ -124,7 +124,7 @@ class SlidingPoints:
             total = total.with_points(mine, found)
         # In the plane a slipping force does not turn with the slip, of which nothing is needed then.
         if friction.shape[1] == 2:
-            total = replace(total, slip=total.slip + self._slip_beyond_rows(start, friction.any(axis=1)))
+            total = replace(total, slip=total.slip + self._slip_beyond_rows(start, np.any(friction, axis=1)))
         return total
 
     def _slip_beyond_rows(self, start: MaterialPoints, rubbed: np.ndarray) -> sp.csr_matrix:
