@@ -17,7 +17,7 @@ from fenics_contact.nonlinear.meeting import Meeting
 from fenics_contact.nonlinear.residuals import ROUNDED, Sizes, beyond
 from fenics_contact.nonlinear.tangent_step import TangentProblem
 from fenics_contact.nonlinear.tangent_system import TangentSystem, linearised
-from fenics_contact.nonlinear.turning import NO_ROWS, FurtherRows, stiffened, unsymmetric_at
+from fenics_contact.nonlinear.turning import NO_ROWS, FurtherRows, stiffened, unsymmetric_at, with_added
 from fenics_contact.qp import (
     Residuals,
     SlipLaw,
@@ -120,9 +120,7 @@ class Evaluation:
         tangents = [response.stiffness for response in self.responses]
         if self.softening is None:
             return tangents
-        symmetric = (self.softening + self.softening.T) / 2
-        each = zip(tangents, self.torn.decomposition.parts, strict=True)
-        return [(K + symmetric[part, part]).tocsr() for K, part in each]
+        return with_added(self.torn.decomposition, tangents, (self.softening + self.softening.T) / 2)
 
     def passed_on(self, moved: Vector) -> Vector:
         """Return what neighbours and supports take of the unsymmetric part of the loads' growth. Collective.
@@ -303,10 +301,11 @@ class Equations:
         stiff, lacking = self.stiffness, meeting.lacking(at.displacement)
         # What is no more than rounding of strains and of positions is none.
         unbalanced = beyond(external - internal - bound, ROUNDED * stiff * self._cell)
-        mapped = law.feasible(at.multiplier).project(at.multiplier - step * lacking)
+        feasible = law.feasible(at.multiplier)
+        mapped = feasible.project(at.multiplier - step * lacking)
         natural = beyond(at.multiplier - mapped, ROUNDED * self._reach * step)
         sizes = Sizes(natural, unbalanced, internal, bound, external, lacking, at.displacement, at.largest)
-        residuals = sizes.residuals(torn, law, at.multiplier, stiff)
+        residuals = sizes.residuals(torn, feasible.violation(at.multiplier), stiff)
         least = global_min(comm, min((r.least_jacobian for r in responses), default=1.0))
         return Evaluation(
             meeting,

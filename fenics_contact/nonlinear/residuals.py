@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenics_contact.feti import TornSystem
-from fenics_contact.qp import Residuals, SlipLaw, Vector, global_max, global_sum
+from fenics_contact.qp import Residuals, Vector, global_max, global_sum
 
 #: Forces below this fraction of those that would strain bodies by their displacement are none.
 FORCE_FLOOR = 1e-4
@@ -44,13 +44,12 @@ class Sizes:
     displacement: Vector
     largest: float
 
-    def residuals(self, torn: TornSystem, law: SlipLaw, multiplier: Vector, stiff: float) -> Residuals:
+    def residuals(self, torn: TornSystem, violation: float, stiff: float) -> Residuals:
         """Return the relative residuals: forces out of balance as `coarse`. Collective.
 
         Args:
             torn: The system.
-            law: Of friction.
-            multiplier: λ, owned.
+            violation: Largest violation of a bound or disc by this rank's multipliers, [force].
             stiff: Largest entry of the tangents' diagonals, [force / length].
         """
         comm, contact = torn.numbering.comm, torn.numbering.owned >= torn.n_equality
@@ -62,7 +61,7 @@ class Sizes:
         moved = max(moved, given, self.largest)
         floor = FORCE_FLOOR * stiff * moved / np.sqrt(count)
         force = max(min(internal, bound) if internal > 0 else bound, load, floor)
-        violation = global_max(comm, law.feasible(multiplier).violation(multiplier))
+        violation = global_max(comm, violation)
         ratio = 1.0 / force if force > 0.0 else 0.0
         return Residuals(
             natural * ratio,

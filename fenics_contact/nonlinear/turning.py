@@ -216,5 +216,12 @@ def stiffened(
     row, column = np.repeat(dofs, dim, axis=1).ravel(), np.tile(dofs, dim).ravel()
     size = decomposition.torn_size
     added = sp.csr_matrix((block.ravel(), (row, column)), shape=(size, size))
+    return with_added(decomposition, tangents, added)
+
+
+def with_added(
+    decomposition: Decomposition, tangents: Sequence[sp.csr_matrix], added: sp.csr_matrix
+) -> list[sp.csr_matrix]:
+    """Return the tangents of this rank's subdomains with the blocks of a torn matrix added to them."""
     each = zip(tangents, decomposition.parts, strict=True)
     return [(K + added[part, part]).tocsr() for K, part in each]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any
 
 import numpy as np
@@ -85,6 +87,12 @@ def gone_on(name: str, path: Path, comm: MPI.Comm) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    found = {name: gone_on(name, Path(sys.argv[1]) / f"{name}.npz", MPI.COMM_WORLD) for name in BOUND}
+    # In a copy of its own: going on finishes what a file holds, and a launch may be repeated.
+    folder = MPI.COMM_WORLD.bcast(Path(mkdtemp()) if MPI.COMM_WORLD.rank == 0 else None)
     if MPI.COMM_WORLD.rank == 0:
+        shutil.copytree(sys.argv[1], folder, dirs_exist_ok=True)
+    MPI.COMM_WORLD.barrier()
+    found = {name: gone_on(name, folder / f"{name}.npz", MPI.COMM_WORLD) for name in BOUND}
+    if MPI.COMM_WORLD.rank == 0:
+        shutil.rmtree(folder)
         sys.stdout.write(json.dumps(found))

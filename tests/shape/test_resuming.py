@@ -47,12 +47,8 @@ def answer(name: str, ranks: int, folder: Path) -> dict[str, Any]:
 
 @cache
 def on_ranks(ranks: int, folder: Path) -> dict[str, Any]:
-    copy = folder / f"on {ranks} ranks"
-    copy.mkdir(exist_ok=True)
-    for name in BOUND:
-        shutil.copy(folder / f"{name}.npz", copy)
     script = Path(__file__).with_name("resumed_cases.py")
-    found: dict[str, Any] = json.loads(run_on_ranks(script, ranks, copy))
+    found: dict[str, Any] = json.loads(run_on_ranks(script, ranks, folder))
     return found
 
 

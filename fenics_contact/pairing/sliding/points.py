@@ -123,7 +123,7 @@ class SlidingPoints:
             )
             total = total.with_points(mine, found)
         # In the plane a slipping force does not turn with the slip, of which nothing is needed then.
-        if friction.shape[1] == 2:
+        if friction.shape[1] == 2 and friction.any():
             total = replace(total, slip=total.slip + self._slip_beyond_rows(start, np.any(friction, axis=1)))
         return total
 
