@@ -108,7 +108,7 @@ def _drawn(
     content, points = CONTENTS[field](subject), points_of(subject.bodies)
     space = subject.state.scene.dim == 3
     view = oblique_view(points) if space else IN_PLANE
-    obstacles = obstacle_layers(subject.state.scene, points, view)[0] if space else []
+    obstacles = obstacle_layers(subject.state, points, view)[0] if space else []
     words = f"{headline(title, content.facts)}; deformation × {deformed:g}"
     with staged([*obstacles, *content.layers], view, frame_around(view, points), SIZE) as plotter:
         plotter.disable_parallel_projection()  # the viewer knows none

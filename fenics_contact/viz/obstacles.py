@@ -6,8 +6,10 @@ import numpy as np
 import pyvista as pv
 from matplotlib.axes import Axes
 
-from fenics_contact.scene import RigidObstacle, Scene, Surface
-from fenics_contact.surface_shapes import Cylinder, Plane, Sphere
+from fenics_contact.checks import floats
+from fenics_contact.contact import DeformedState, State
+from fenics_contact.scene import MovingObstacle, RigidObstacle, Surface
+from fenics_contact.surface_shapes import Cylinder, Placed, Plane, Sphere, SurfaceShape
 from fenics_contact.viz.colours import GREY, PALE
 from fenics_contact.viz.stage import Layer
 from fenics_contact.viz.view import Frame, View
@@ -21,37 +23,53 @@ BORDER = 0.06
 _LINE = {"color": GREY, "line_width": 3, "lighting": False}
 
 
-def obstacles_of(scene: Scene) -> list[RigidObstacle]:
-    """Return the different rigid obstacles of a scene."""
+def obstacles_of(state: State) -> list[SurfaceShape]:
+    """Return the different rigid obstacles of a scene, where they are in a state of it."""
+    time = state.equilibrium.time if isinstance(state, DeformedState) else 0.0
     obstacles: list[RigidObstacle] = []
-    for pair in scene.contacts:
+    for pair in state.scene.contacts:
         if not isinstance(pair.master, Surface) and pair.master not in obstacles:
             obstacles.append(pair.master)
-    return obstacles
+    return [_simple(each.at(time) if isinstance(each, MovingObstacle) else each) for each in obstacles]
 
 
-def shade_obstacles(axes: Axes, scene: Scene, frame: Frame) -> None:
+def _simple(shape: SurfaceShape) -> SurfaceShape:
+    """Return a plane, a sphere or a cylinder that was moved as one that is there."""
+    if not isinstance(shape, Placed):
+        return shape
+    turn, shift, scale = np.asarray(shape.rotation), np.asarray(shape.translation), shape.scale
+    match shape.shape:
+        case Plane(point, normal):
+            return Plane(floats(scale * turn @ point + shift), floats(turn @ normal))
+        case Sphere(centre, radius, hollow):
+            return Sphere(floats(scale * turn @ centre + shift), scale * radius, hollow)
+        case Cylinder(point, axis, radius, hollow):
+            return Cylinder(floats(scale * turn @ point + shift), floats(turn @ axis), scale * radius, hollow)
+    return shape
+
+
+def shade_obstacles(axes: Axes, state: State, frame: Frame) -> None:
     """Shade the inside of a plane scene's obstacles of any shape, where the distance is negative.
 
     Args:
         axes: Where to.
-        scene: A scene in the plane.
+        state: A state in the plane.
         frame: The visible frame.
     """
     x, y = (np.linspace(a, b, SAMPLES) for a, b in zip(frame.low, frame.high, strict=True))
     grid = np.stack(np.meshgrid(x, y), axis=-1)
-    for obstacle in obstacles_of(scene):
+    for obstacle in obstacles_of(state):
         distance = obstacle.distance(grid.reshape(-1, 2)).reshape(SAMPLES, SAMPLES)
         if distance.min() < 0 < distance.max():
             axes.contourf(x, y, distance, levels=[distance.min(), 0.0], colors=[PALE], zorder=0)
             axes.contour(x, y, distance, levels=[0.0], colors=[GREY], linewidths=1.5, zorder=0.5)
 
 
-def obstacle_layers(scene: Scene, points: np.ndarray, view: View) -> tuple[list[Layer], np.ndarray]:
+def obstacle_layers(state: State, points: np.ndarray, view: View) -> tuple[list[Layer], np.ndarray]:
     """Draw planes as sheets, spheres and cylinders by their outlines; other shapes in space are omitted.
 
     Args:
-        scene: A scene in space.
+        state: A state in space.
         points: All nodes of the drawn bodies, (n, 3).
         view: Direction of view.
 
@@ -60,7 +78,7 @@ def obstacle_layers(scene: Scene, points: np.ndarray, view: View) -> tuple[list[
     """
     layers: list[Layer] = []
     held = [np.zeros((0, 3))]
-    for obstacle in obstacles_of(scene):
+    for obstacle in obstacles_of(state):
         match obstacle:
             case Plane():
                 corners = _sheet(obstacle, points)

@@ -12,7 +12,6 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from fenics_contact.contact import State
-from fenics_contact.scene import Scene
 from fenics_contact.viz.axes_sign import axes_sign, empty_corner, far_corner
 from fenics_contact.viz.colours import INK
 from fenics_contact.viz.fields import Bodies, cells_of, contact_places, moved, points_of
@@ -66,7 +65,7 @@ def paint(state: State, bodies: Bodies, paints: Paints, path: Path | None, *, se
     plane = state.scene.dim == 2
 
     def draw(paper: BinaryIO) -> None:
-        parts = (_in_plane if plane else _in_space)(state.scene, painted, spot, paints)
+        parts = (_in_plane if plane else _in_space)(state, painted, spot, paints)
         _draw(parts, paper, paints, below=not plane or parts[0].frame.proportion > 2.2)
 
     return draw_picture(state.torn.decomposition.comm, path, draw)
@@ -102,22 +101,22 @@ def _lines(parts: Sequence[_Part]) -> list[Sequence[_Part]]:
     return [[main], *([part] for part in details)] if apart else [[main], *([details] if details else [])]
 
 
-def _in_plane(scene: Scene, bodies: Bodies, spot: Spot | None, paints: Paints) -> list[_Part]:
+def _in_plane(state: State, bodies: Bodies, spot: Spot | None, paints: Paints) -> list[_Part]:
     """All bodies, and the contact if it is small."""
     everything = moved(bodies, paints.scale)
     frame = frame_around(IN_PLANE, points_of(everything), 0.04)
-    parts = [_Part(frame, partial(_draw_plane, scene, everything, frame, paints, ""))]
+    parts = [_Part(frame, partial(_draw_plane, state, everything, frame, paints, ""))]
     if spot is not None:
         half = REACH * spot.radius if paints.reach is None else paints.reach
         frame, size = Frame(spot.centre - half, spot.centre + half), float(np.max(frame.size))
         if 2 * half < LARGEST_DETAIL * size / 1.08:
             words = "where they touch; displacement × 1"
-            parts.append(_Part(frame, partial(_draw_plane, scene, moved(bodies, 1.0), frame, paints, words)))
+            parts.append(_Part(frame, partial(_draw_plane, state, moved(bodies, 1.0), frame, paints, words)))
     return parts
 
 
-def _draw_plane(scene: Scene, bodies: Bodies, frame: Frame, paints: Paints, title: str, axes: Axes) -> None:
-    shade_obstacles(axes, scene, frame)
+def _draw_plane(state: State, bodies: Bodies, frame: Frame, paints: Paints, title: str, axes: Axes) -> None:
+    shade_obstacles(axes, state, frame)
     for body in bodies.values():
         points, cells = np.asarray(body.points)[:, :2], cells_of(body)
         draw_field(axes, points, cells, np.asarray(body["shown"]), paints.of_cells)
@@ -128,12 +127,12 @@ def _draw_plane(scene: Scene, bodies: Bodies, frame: Frame, paints: Paints, titl
     frame.fit(axes)
 
 
-def _in_space(scene: Scene, bodies: Bodies, spot: Spot | None, paints: Paints) -> list[_Part]:
+def _in_space(state: State, bodies: Bodies, spot: Spot | None, paints: Paints) -> list[_Part]:
     """All bodies, and two sections through the contact."""
     everything = moved(bodies, paints.scale)
     points = points_of(everything)
     view = oblique_view(points)
-    layers, corners = obstacle_layers(scene, points, view)
+    layers, corners = obstacle_layers(state, points, view)
     for body in everything.values():
         layers.append(Layer(body.extract_surface(algorithm=None), {**paints.of_surfaces, **_LOOK}))
     parts = [_image(layers, view, frame_around(view, np.concatenate([points, corners])), paints)]

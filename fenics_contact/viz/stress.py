@@ -79,7 +79,7 @@ def plot_stress(
     given = None if clim is None else checked_range(clim)
     bodies = drawn_bodies(state)
     # With magnified displacement bodies would penetrate rigid obstacles.
-    chosen = 1.0 if obstacles_of(state.scene) else chosen_scale(bodies)
+    chosen = 1.0 if obstacles_of(state) else chosen_scale(bodies)
     factor = chosen if scale is None else float(scale)
     shown, named = given or stress_range(bodies), units or Units()
     peak = max(float(body["von_mises"].max()) for body in bodies.values())

@@ -8,24 +8,26 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.scene import RigidCylinder, RigidPlane, RigidSphere
 from fenics_contact.viz import plot_contact_status, plot_stress
-from fenics_contact.viz.obstacles import obstacle_layers, obstacles_of
+from fenics_contact.viz.obstacles import obstacle_layers, obstacles_of, shade_obstacles
 from fenics_contact.viz.patch import contact_patches
 from fenics_contact.viz.section import strongest_contact
-from fenics_contact.viz.view import oblique_view
+from fenics_contact.viz.view import Frame, oblique_view
+from tests.viz.moving_states import block_among_movers, pressed_by_a_lid
 from tests.viz.plane_states import caged_block, plane_block
 from tests.viz.states import contains, painted, pixels, touching_blocks
 
 
 def test_obstacles_in_space_are_drawn_where_they_are() -> None:
-    scene = caged_block().scene
-    points = scene.bodies["block"].mesh.points
+    state = caged_block()
+    points = state.scene.bodies["block"].mesh.points
     view = oblique_view(points)
-    layers, corners = obstacle_layers(scene, points, view)
-    assert [type(obstacle).__name__ for obstacle in obstacles_of(scene)] == [
+    layers, corners = obstacle_layers(state, points, view)
+    assert [type(obstacle).__name__ for obstacle in obstacles_of(state)] == [
         "RigidPlane", "RigidSphere", "RigidCylinder", "DistanceObstacle", "RigidPlane"
     ]  # fmt: skip
     # The floor as sheet and outline, ball and bar by outlines, the front wall, which would hide all, too.
@@ -33,7 +35,7 @@ def test_obstacles_in_space_are_drawn_where_they_are() -> None:
     assert corners.shape == (8, 3)
     np.testing.assert_allclose(corners[:4, 2], 0.0, atol=1e-12)
     _, ball, bar, wall = (
-        o for o in obstacles_of(scene) if isinstance(o, RigidPlane | RigidSphere | RigidCylinder)
+        o for o in obstacles_of(state) if isinstance(o, RigidPlane | RigidSphere | RigidCylinder)
     )
     circle = np.asarray(layers[2].mesh.points)
     np.testing.assert_allclose(ball.distance(circle), 0.0, atol=1e-6)
@@ -43,6 +45,26 @@ def test_obstacles_in_space_are_drawn_where_they_are() -> None:
     np.testing.assert_allclose(wall.distance(np.asarray(layers[5].mesh.points)), 0.0, atol=1e-6)
     assert wall.normal == (0.0, 1.0, 0.0)
     assert view.towards[1] < 0, "it stands between the viewer and the block"
+
+
+def test_obstacles_that_move_are_drawn_where_they_are_in_each_state() -> None:
+    for state, time in zip(block_among_movers(), (0.0, 0.5, 1.0), strict=True):
+        points = state.scene.bodies["block"].mesh.points
+        floor, ball, bar = (pair.master.at(time) for pair in state.scene.contacts)  # type: ignore[union-attr]
+        layers, corners = obstacle_layers(state, points, oblique_view(points))
+        assert corners.shape == (4, 3)
+        for there, layer in zip((floor, floor, ball, bar, bar), layers, strict=True):
+            np.testing.assert_allclose(there.distance(np.asarray(layer.mesh.points)), 0.0, atol=1e-6)
+        assert np.ptp(corners[:, 2]) == pytest.approx(np.sin(0.05 * time) * np.ptp(corners[:, 0]), rel=2e-3)
+
+
+def test_a_picture_in_the_plane_shades_an_obstacle_where_it_has_moved(tmp_path: Path) -> None:
+    state, axes = pressed_by_a_lid(), Figure().add_subplot()
+    shade_obstacles(axes, state, Frame(np.array([0.0, 0.0]), np.array([2.0, 2.0])))
+    *_, line = axes.collections
+    (edge,) = line.get_paths()
+    np.testing.assert_allclose(edge.vertices[:, 1], 0.9, atol=1e-9)
+    assert contains(pixels(plot_stress(state, tmp_path / "lid.png", width=640)), "#e3e6e8"), "the lid"
 
 
 def test_a_scene_with_obstacles_is_drawn(tmp_path: Path) -> None:
