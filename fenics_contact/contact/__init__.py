@@ -10,6 +10,7 @@ from fenics_contact.contact.equilibrium import default_solver
 from fenics_contact.contact.fields import body_mesh
 from fenics_contact.contact.gathered import GatheredFields, in_space
 from fenics_contact.contact.multi_block import body_grid
+from fenics_contact.contact.newton_steps import NewtonSteps
 from fenics_contact.contact.pair_resultants import PairResultants
 from fenics_contact.contact.problem import ContactProblem, solve_scene
 from fenics_contact.contact.result import ContactResult, Status
@@ -35,6 +36,7 @@ __all__ = [
     "FixedPoint",
     "GatheredFields",
     "LoadSequence",
+    "NewtonSteps",
     "PairResultants",
     "Resultant",
     "Resultants",

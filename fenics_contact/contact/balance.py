@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenics_contact._libraries import MPI
 from fenics_contact.checks import GivenVector
 from fenics_contact.contact.nodal_forces import NodalForces, by_node
 from fenics_contact.contact.reactions import point_load
@@ -34,7 +35,8 @@ class Balance:
         gaps: Of contacts and ties between bodies: both sides together have no force, but a moment where
             friction, a tie or a mean over facets transmits forces across a gap between the meshes.
         beds: Of materials that resist rigid motions, such as elastic beds; zero otherwise.
-        force_scale: Largest sum of the sizes of the nodal forces of one of these, [force].
+        force_scale: Largest sum of the sizes of the nodal forces of one of these, [force]; where nothing acts
+            a force below which bodies count as free of forces.
         moment_scale: Largest sum of the sizes of nodal forces times their distances from the point,
             [force·length]; never zero by symmetry, as are the moments of forces that point at the point.
     """
@@ -76,8 +78,32 @@ class Balance:
         return f"{lines}\nimbalance {self.imbalance:.1e}"
 
 
-def force_balance(torn: TornSystem, forces: NodalForces, about: GivenVector | np.ndarray | None) -> Balance:
-    """Return the balance of all forces, about a point or the middle of the box around all bodies."""
+def rounding_force(torn: TornSystem, displacement: np.ndarray) -> float:
+    """Return a force far above what rounding makes of a displacement, and far below one that strains by it.
+
+    Collective.
+
+    Args:
+        torn: The system, of linear materials.
+        displacement: u of this rank, torn, shape (torn_size,), [length].
+    """
+    comm = torn.decomposition.comm
+    stiff = max((float(part.stiffness.diagonal().max()) for part in torn.subdomains), default=0.0)
+    square, count = comm.allreduce(np.array([displacement @ displacement, displacement.size]))
+    return float(np.sqrt(ROUNDING * square / count) * comm.allreduce(stiff, op=MPI.MAX))
+
+
+def force_balance(
+    torn: TornSystem, forces: NodalForces, about: GivenVector | np.ndarray | None, least: float
+) -> Balance:
+    """Return the balance of all forces, about a point or the middle of the box around all bodies.
+
+    Args:
+        torn: The system.
+        forces: Forces of all nodes.
+        about: The point, or None.
+        least: A force below which bodies count as free of forces, [force].
+    """
     point = _middle(forces.places) if about is None else point_of(about, torn.dim)
     parts = _parts(torn, forces)
     resultants = {name: resultant(force, forces.places, point) for name, force in parts.items()}
@@ -90,8 +116,8 @@ def force_balance(torn: TornSystem, forces: NodalForces, about: GivenVector | np
     reach = np.linalg.norm(arms, axis=1)
     return Balance(
         **resultants,
-        force_scale=float(max(size.sum() for size in sizes)),
-        moment_scale=float(max(size @ reach for size in sizes)),
+        force_scale=float(max(least, *(size.sum() for size in sizes))),
+        moment_scale=float(max(least * reach.max(), *(size @ reach for size in sizes))),
     )
 
 

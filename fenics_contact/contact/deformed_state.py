@@ -112,6 +112,10 @@ class DeformedState(State):
         )  # fmt: skip
 
     @cached_property
+    def _least_force(self) -> float:
+        return self.dual_solution.residuals.force_scale
+
+    @cached_property
     def _displacement_everywhere(self) -> np.ndarray:
         """Displacement of the nodes of all bodies on every rank, shape (n_nodes, dim), [length]."""
         return np.concatenate([self.gather_displacement(name) for name in self.scene.bodies])

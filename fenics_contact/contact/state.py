@@ -11,7 +11,7 @@ import numpy as np
 
 from fenics_contact._libraries import MPI
 from fenics_contact.checks import GivenVector
-from fenics_contact.contact.balance import Balance, force_balance
+from fenics_contact.contact.balance import Balance, force_balance, rounding_force
 from fenics_contact.contact.cell_stress import principal_stress, stress, von_mises
 from fenics_contact.contact.energies import Energies
 from fenics_contact.contact.fields import body_mesh, cell_values, displacement_function, nodal_function
@@ -340,7 +340,11 @@ class State:
             about: Point for all moments, shape (dim,), [length]; by default the middle of the box around all
                 bodies.
         """
-        return force_balance(self.torn, self._nodal_forces, about)
+        return force_balance(self.torn, self._nodal_forces, about, self._least_force)
+
+    @cached_property
+    def _least_force(self) -> float:
+        return rounding_force(self.torn, self.torn_displacement)
 
     @cached_property
     def _nodal_forces(self) -> NodalForces:

@@ -22,6 +22,9 @@ from fenics_contact.scene import (
     ContactPair,
     Coulomb,
     IsotropicElasticity,
+    Material,
+    NeoHooke,
+    PlaneStrain,
     PlaneStress,
     RigidPlane,
     Scene,
@@ -280,3 +283,18 @@ def test_forces_that_all_point_at_one_place_balance_there() -> None:
     balance = solve_scene(Scene({"plate": plate}, supports), COMM).balance(about=(0.5, 0.5))
     assert balance.force_scale > 1.0
     assert balance.imbalance < 1e-13
+
+
+@pytest.mark.parametrize("material", [PlaneStrain(1.0, 0.3), NeoHooke(1.0, 0.3)])
+def test_bodies_that_are_only_moved_are_in_balance(material: Material) -> None:
+    """Rounding is all the force there is; it is not compared with itself."""
+    plate = Body(rectangle((0.0, 0.0), (2.0, 1.0), (8, 4)), material)
+    moved, strained = (
+        solve_scene(Scene({"plate": plate}, [Support("plate", "y0"), *more]), COMM).balance()
+        for more in ([], [Support("plate", "y1", (0.3, 0.1))])
+    )
+    assert (moved.imbalance, moved.total.force.any()) == (0.0, False)
+    shifted = solve_scene(Scene({"plate": plate}, [Support("plate", "y0", (0.3, 0.1))]), COMM).balance()
+    assert np.abs(shifted.reactions.force).max() > 0.0, "rounding, without which there is nothing to test"
+    assert shifted.imbalance < 1e-7
+    assert shifted.force_scale < 1e-3 * strained.force_scale

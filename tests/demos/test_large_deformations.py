@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,27 +17,33 @@ SEAL = [8.6955, 10.8269, 11.8848, 3.9167]
 pytestmark = [pytest.mark.slow, pytest.mark.claim]
 
 
-def run(demo: Callable[..., Any], name: str, pictures: set[str]) -> dict[str, Any]:
+def run(demo: Callable[..., Any], name: str, ranks: int, pictures: set[str]) -> dict[str, Any]:
     """Run a demo; return what its result holds, after a look at its files."""
-    result, output, printed = demo(name, timeout=300.0)
+    result, output, printed = demo(name, ranks=ranks, timeout=300.0)
+    assert result["ranks"] == ranks
     assert printed.count("pictures and files in") == 1, "one rank prints"
     assert {path.stem for path in output.glob("*.png")} == pictures
     assert min(path.stat().st_size for path in output.glob("*.png")) > 10_000
     more: dict[str, Any] = result["more"]
-    assert min(after / before for before, after in pairwise(more["residuals"])) < 0.01, "superlinear"
+    left = np.asarray(more["left"])
+    assert len(left) > 20
+    assert np.median(left) < 1e-3, "superlinear"
+    assert np.quantile(left, 0.9) < 0.01, "nearly everywhere"
     return more
 
 
-def test_a_hook_snaps_in_and_holds_better_than_it_goes_in(demo: Callable[..., Any]) -> None:
-    more = run(demo, "snap_fit", {"force", "stress", "stress_on_top"})
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_hook_snaps_in_and_holds_better_than_it_goes_in(demo: Callable[..., Any], ranks: int) -> None:
+    more = run(demo, "snap_fit", ranks, {"force", "stress", "stress_on_top"})
     assert (more["inward"], more["outward"], more["snap"]) == pytest.approx(SNAP, rel=1e-3)
     assert abs(more["push"][35]) < 1e-6, "it is home"
     assert more["inward"] == pytest.approx(more["formula"]["in"][1], rel=0.2)
     assert more["outward"] == pytest.approx(more["formula"]["out"][1], rel=0.2)
 
 
-def test_a_seal_fills_its_groove_until_it_meets_itself(demo: Callable[..., Any]) -> None:
-    more = run(demo, "rubber_seal", {"force", "pressure", "free", "stress"})
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_seal_fills_its_groove_until_it_meets_itself(demo: Callable[..., Any], ranks: int) -> None:
+    more = run(demo, "rubber_seal", ranks, {"force", "pressure", "free", "stress"})
     forces = {name: np.asarray(values) for name, values in more["forces"].items()}
     assert [float(values[-1]) for values in forces.values()] == pytest.approx(SEAL, rel=1e-3)
     assert np.all(np.diff(forces["lid"]) > 0)

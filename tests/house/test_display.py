@@ -20,6 +20,7 @@ from fenics_contact.contact import (
     ContactProblem,
     FixedPoint,
     LoadSequence,
+    NewtonSteps,
     RigidMotion,
     State,
     Status,
@@ -158,6 +159,7 @@ def objects() -> dict[str, Any]:
         TotalPotential() + 2.0 * VolumeIntegral("motion", lambda u, x, stress: u[0], "block"),
         StrainEnergy(), PressureNorm(), PressureUnevenness(), ContactArea(), FrictionWork(),
         LargestStress("block"), Movement("block", "z1", (1, 0, 0)), Largest((LargestPressure(),)),
+        NewtonSteps(((0.1, 1e-3, 1e-7),)),
         MovedSurface(shape.designs[0], scene.bodies["block"].mesh, np.zeros(shape.size)),
     ]  # fmt: skip
     roots.append(solve_scene(pressed(rounded(2), 0.1), MPI.COMM_SELF))

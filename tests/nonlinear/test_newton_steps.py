@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, LoadSequence, solve_scene
+from fenics_contact.contact import ContactProblem, LoadSequence, NewtonSteps, solve_scene
 from fenics_contact.fem.hyperelastic import HyperelasticMechanics
 from fenics_contact.gallery import block
 from fenics_contact.scene import Body, LoadStep, NeoHooke, Scene
@@ -33,8 +33,21 @@ def test_nearly_incompressible_bodies_take_hardly_more_steps_than_others() -> No
             sequence.advance(LoadStep(str(n), supports=scene.supports)) for n, scene in enumerate(scenes)
         ]
         counts.append([len(state.solution.history) for state in states])
+        steps = NewtonSteps.of(states)
+        assert [len(run) for run in steps.residuals] == counts[-1]
+        assert steps.left.max() < 1e-2, "superlinear"
     assert max(counts[0]) <= 5
     assert max(counts[1]) <= 7
+
+
+def test_the_ends_of_load_steps_are_told_in_a_line() -> None:
+    steps = NewtonSteps(((1e-16,), (0.5, 0.1, 1e-3, 1e-8, 2e-9), (0.1, 0.01), (0.2, 1e-2, 1e-4, 1e-7)))
+    assert steps.left == pytest.approx([1e-5, 0.1, 1e-3])
+    assert str(steps) == (
+        "Newton's method: 3.0 steps a load step, at most 5; residuals at the end of a median one "
+        "2e-01, 1e-02, 1e-04, 1e-07; its best step leaves 1e-03 of them, of the worst load step 1e-01"
+    )
+    assert str(NewtonSteps.of([])) == "Newton's method: no load step with several steps"
 
 
 def test_tangents_of_mean_dilatations_have_the_pressures_that_a_step_foresaw() -> None:

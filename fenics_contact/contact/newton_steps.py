@@ -1,0 +1,62 @@
+"""How Newton's method ended in the load steps of a history."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenics_contact.contact.deformed_state import DeformedState
+from fenics_contact.contact.state import State
+from fenics_contact.display import displayed
+
+#: Near the end residuals may be what rounding and inexact systems leave: the best of this many steps counts.
+LAST = 3
+
+
+@displayed
+@dataclass(frozen=True)
+class NewtonSteps:
+    """Residuals of Newton's method in load steps, in the last of the parts in which each was followed.
+
+    Attributes:
+        residuals: The worst residual after each Newton step, relative, one tuple for each load step.
+    """
+
+    residuals: tuple[tuple[float, ...], ...]
+
+    @classmethod
+    def of(cls, states: Sequence[State]) -> NewtonSteps:
+        """Return those of states with nonlinear materials; states from a checkpoint have none.
+
+        Args:
+            states: States after load steps.
+        """
+        runs = (state.equilibrium.history for state in states if isinstance(state, DeformedState))
+        return cls(tuple(tuple(line.residuals.worst for line in run) for run in runs if run))
+
+    @property
+    def left(self) -> np.ndarray:
+        """What the best of the last three steps left of the residual, shape (n,), dimensionless.
+
+        Where Newton's method is superlinear that is little: the smaller the residual is, the less is left of
+        it. Load steps of one Newton step, as of bodies that touch nothing, are left out.
+        """
+        ends = (np.array(run[-LAST - 1 :]) for run in self.residuals if len(run) > 1)
+        return np.array([float((end[1:] / end[:-1]).min()) for end in ends])
+
+    def __str__(self) -> str:
+        """Return numbers of steps, the last residuals of the median load step, and what was left of them."""
+        if not self.left.size:
+            return "Newton's method: no load step with several steps"
+        counts = [len(run) for run in self.residuals]
+        several = [run for run in self.residuals if len(run) > 1]
+        usual = several[int(np.argsort(self.left)[len(several) // 2])]
+        ends = ", ".join(f"{value:.0e}" for value in usual[-LAST - 1 :])
+        median, worst = f"{np.median(self.left):.0e}", f"{self.left.max():.0e}"
+        return (
+            f"Newton's method: {np.mean(counts):.1f} steps a load step, at most {max(counts)}; residuals at "
+            f"the end of a median one {ends}; its best step leaves {median} of them, of the worst load step "
+            f"{worst}"
+        )
