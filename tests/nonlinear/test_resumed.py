@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -66,9 +67,9 @@ def yielding() -> tuple[Scene, list[LoadStep]]:
     return scene, steps
 
 
-def problem(scene: Scene) -> ContactProblem:
+def problem(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF) -> ContactProblem:
     parts = {name: box_partition(body.mesh, (2, 1)) for name, body in scene.bodies.items()}
-    return ContactProblem(scene, MPI.COMM_SELF, partitions=parts, tolerance=1e-9)
+    return ContactProblem(scene, comm, partitions=parts, tolerance=1e-9)
 
 
 def advanced(sequence: LoadSequence, steps: Sequence[LoadStep]) -> DeformedState:
@@ -90,10 +91,15 @@ def test_the_rest_of_a_history_is_the_same(
     again = advanced(resumed, steps[:2])
     assert again.solution.reason == "read from a checkpoint"
     assert np.array_equal(again.torn_displacement, before.torn_displacement)
+    assert np.array_equal(again.contact.force, before.contact.force)
+    assert np.array_equal(again.contact.slip, before.contact.slip)
+    # What fields spread inside subdomains: the openings at their interfaces.
+    opening = before.solution.residuals.gluing * before.solution.residuals.gluing_scale
+    assert 0.0 < opening < 1e-9
     for name in scene.bodies:
-        assert np.abs(again.stress[name].x.array - before.stress[name].x.array).max() < 1e-9
-    assert np.abs(again.contact.force - before.contact.force).max() < 1e-12
-    assert np.abs(again.contact.slip - before.contact.slip).max() < 1e-13
+        there, here = before.displacement[name].x.array, again.displacement[name].x.array
+        assert np.abs(here - there).max() <= opening
+        assert np.abs(again.stress[name].x.array - before.stress[name].x.array).max() < 1e-10
     assert np.abs(again.contact.slip).max() > 1e-3
     assert again.solution.residuals.worst < 1e-9
     assert again.energies.friction == pytest.approx(before.energies.friction)
@@ -109,6 +115,48 @@ def test_the_rest_of_a_history_is_the_same(
     force = last.contact.force
     assert np.abs(end.contact.force - force).max() < 1e-7 * np.abs(force).max()
     assert np.abs(end.contact.slip_before - last.contact.slip_before).max() < 1e-8
+
+
+ON_RANKS = """
+    import json, sys
+    from mpi4py import MPI
+    from fenics_contact.checkpoint import Checkpoint
+    from fenics_contact.contact import LoadSequence
+    from tests.nonlinear import test_resumed
+
+    comm = MPI.COMM_WORLD
+    scene, steps = getattr(test_resumed, sys.argv[1])()
+    sequence = LoadSequence(test_resumed.problem(scene, comm), checkpoint=Checkpoint(sys.argv[2]))
+    reasons = [sequence.advance(step).solution.reason for step in steps[:2]]
+    state = test_resumed.advanced(sequence, steps[2:])
+    moved = {name: state.gather_displacement(name).tolist() for name in scene.bodies}
+    history = {name: values.tolist() for name, values in state.history.values.items()}
+    if comm.rank == 0:
+        print(json.dumps([comm.size, reasons, moved, state.contact.force.tolist(), history]))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.claim
+@pytest.mark.parametrize("history", [drawn, yielding])
+def test_the_rest_of_a_history_is_the_same_on_another_number_of_ranks(
+    history: Callable[[], tuple[Scene, list[LoadStep]]], tmp_path: Path, mpirun: Callable[..., str]
+) -> None:
+    scene, steps = history()
+    file = tmp_path / "steps.npz"
+    sequence = LoadSequence(problem(scene), checkpoint=Checkpoint(file))
+    advanced(sequence, steps[:2])
+    printed = mpirun(ON_RANKS, 2, history.__name__, file)
+    ranks, reasons, moved, force, remembered = json.loads(printed)
+    assert (ranks, reasons) == (2, ["read from a checkpoint"] * 2)
+    end = advanced(sequence, steps[2:])
+    for name in scene.bodies:
+        exact = end.gather_displacement(name)
+        assert np.abs(np.array(moved[name]) - exact).max() < 1e-7 * np.abs(exact).max()
+    assert np.abs(np.array(force) - end.contact.force).max() < 1e-7 * np.abs(end.contact.force).max()
+    assert remembered.keys() == end.history.values.keys()
+    for name, values in end.history.values.items():
+        assert np.abs(np.array(remembered[name]) - values).max() < 1e-7 * np.abs(values).max()
 
 
 def test_a_stored_state_of_another_mesh_is_refused(tmp_path: Path) -> None:
