@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenics_contact.display import displayed
-from fenics_contact.errors import ConvergenceError, tell
+from fenics_contact.errors import ConvergenceError, InvalidInputError, tell
 from fenics_contact.nonlinear.equations import Configuration, Equations, Linearisation
 from fenics_contact.nonlinear.loading import Loading
 from fenics_contact.nonlinear.meeting import Contact, Meeting
@@ -81,6 +81,18 @@ class AutomaticSteps:
     newton: TangentNewton = field(default_factory=TangentNewton)
     first: float = 1.0
     smallest: float = 1.0 / 256
+
+    def __post_init__(self) -> None:
+        """Check the parts.
+
+        Raises:
+            InvalidInputError: If they are not in (0, 1], or the smallest is larger than the first.
+        """
+        if not 0.0 < self.smallest <= self.first <= 1.0:
+            raise InvalidInputError(
+                "the smallest and first part of a load step must be in (0, 1] and the smallest not larger "
+                f"than the first, got {self.smallest!r} and {self.first!r}: give parts such as 1/256 and 1"
+            )
 
     def follow(
         self,

@@ -103,12 +103,15 @@ class SceneFile:
         solver = self.document.solver
         with self._at("solver"):
             chosen = solver.chosen(self.scene, self.partitions)
+        with self._at("solver", "newton"):
+            steps = solver.following(self.scene)
         return ContactProblem(
             self.scene,
             self.comm,
             partitions=self.partitions,
             solver=chosen,
             tolerance=solver.accuracy(self.scene),
+            steps=steps,
         )
 
     def solve(self) -> State:

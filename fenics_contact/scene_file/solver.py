@@ -14,11 +14,13 @@ from fenics_contact.errors import InvalidInputError
 from fenics_contact.partition import box_partition, graph_partition
 from fenics_contact.qp import DualSolver, FaceNewton, ProjectedCG, Smalse
 from fenics_contact.scene import Scene, choose_solver
+from fenics_contact.scene_file.newton import NewtonPart
 from fenics_contact.scene_file.part import Part
 from fenics_contact.scene_file.values import Read, said
 
 if TYPE_CHECKING:
     from fenics_contact.contact import Tolerance
+    from fenics_contact.nonlinear import AutomaticSteps
 
 BALANCED = "balanced"
 
@@ -47,6 +49,9 @@ class SolverPart(Part):
     max_products: PositiveInt | None = Field(
         default=None, description="give up after that many products with F"
     )
+    newton: NewtonPart | None = Field(
+        default=None, description="how loads on nonlinear materials are followed, in parts"
+    )
     subdomains: Annotated[Any, Read(_Cuts)] = Field(
         default="auto",
         description="subdomains of every body, or by body: a number, or boxes of a structured mesh",
@@ -72,7 +77,7 @@ class SolverPart(Part):
             raise InvalidInputError(
                 "method and max_products are for linear materials, this scene has others, which Newton's "
                 f"method solves, got method {self.method!r} and max_products {self.max_products}: leave them "
-                "out, or set nonlinear.TangentNewton from Python"
+                "out, or set 'newton'"
             )
         kinds: dict[str, DualSolver] = {
             "face_newton": FaceNewton(),
@@ -86,6 +91,21 @@ class SolverPart(Part):
             subdomains = sum(int(part.max()) + 1 for part in partitions.values())
             solver = default_solver(choose_solver(scene, subdomains))
         return replace(solver, max_products=self.max_products)  # type: ignore[type-var]
+
+    def following(self, scene: Scene) -> AutomaticSteps | None:
+        """Return how loads on nonlinear materials are followed, None for the default.
+
+        Raises:
+            InvalidInputError: If it is given for linear materials, or its parts contradict each other.
+        """
+        if self.newton is None:
+            return None
+        if not scene.is_nonlinear:
+            keys = ", ".join(sorted(self.newton.model_fields_set)) or "no key"
+            raise InvalidInputError(
+                f"newton is for nonlinear materials, all of this scene are linear, got {keys}: leave it out"
+            )
+        return self.newton.made()
 
     def cut(self, scene: Scene, ranks: int) -> dict[str, np.ndarray]:
         """Cut every body into subdomains, body name -> subdomain of every cell.

@@ -224,6 +224,28 @@ def test_obstacles_of_scene_files_move() -> None:
     assert state.gather_displacement("block")[:, 2].min() == pytest.approx(-0.1, abs=1e-3)
 
 
+def test_scene_files_say_how_loads_are_followed() -> None:
+    careful = {"first": 0.25, "smallest": 0.01, "max_steps": 12, "max_products": 99}
+    data = {**FILE, "solver": {"newton": careful}, "supports": [{**TURN, "value": [0] * 6}]}
+    data["loads"] = [{"kind": "traction", "body": "block", "surface": "z1", "value": [0, 0, -0.1]}]
+    file = read_scene_file(data, MPI.COMM_SELF)
+    assert file.problem.steps == AutomaticSteps(TangentNewton(max_steps=12, max_products=99), 0.25, 0.01)
+    state = file.solve()
+    assert isinstance(state, DeformedState)
+    assert state.fractions[0] == 0.25
+    assert (
+        read_scene_file({**data, "solver": {"newton": {}}}, MPI.COMM_SELF).problem.steps == AutomaticSteps()
+    )
+    contradicting = {**data, "solver": {"newton": {"first": 0.001}}}
+    with pytest.raises(
+        SceneFileError, match=r"solver\.newton: .*smallest and first part .* got 0.00390625 and 0.001"
+    ):
+        _ = read_scene_file(contradicting, MPI.COMM_SELF).problem
+    linear = {**data, "materials": {"rubber": {"young_modulus": 1.0, "poisson_ratio": 0.3}}}
+    with pytest.raises(SceneFileError, match=r"newton is for nonlinear materials.*got first, .*: leave it"):
+        _ = read_scene_file(linear, MPI.COMM_SELF).problem
+
+
 def test_wrong_motions_and_solvers_of_scene_files() -> None:
     with pytest.raises(
         SceneFileError, match=r"motion of an obstacle must be 6 numbers .* prescribe all of it"

@@ -3,79 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 from fenics_contact.checkpoint import Checkpoint
-from fenics_contact.contact import ContactProblem, DeformedState, LoadSequence, stored_state
+from fenics_contact.contact import LoadSequence, stored_state
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.gallery import rectangle
-from fenics_contact.partition import box_partition
-from fenics_contact.scene import (
-    Body,
-    ContactPair,
-    Coulomb,
-    FinitePlasticity,
-    LoadStep,
-    NeoHooke,
-    PlaneStrain,
-    Pressure,
-    RigidSphere,
-    Scene,
-    Support,
-    Surface,
-)
-
-SOFT, HARD = NeoHooke(1.0, 0.32), NeoHooke(10.0, 0.32)
-
-
-def drawn() -> tuple[Scene, list[LoadStep]]:
-    """A round slider drawn over a soft bed, with a pressure that follows its side."""
-    bed, slider = rectangle((0.0, 0.0), (4.0, 2.0), (16, 6)), rectangle((1.0, 2.0), (2.2, 3.0), (6, 4))
-    x, y = slider.points.T
-    rim = 2.0 + 0.3 * (x - 1.6) ** 2
-    slider = replace(slider, points=np.column_stack([x, rim + (3.0 - rim) * (y - 2.0)]))
-
-    def held(x: float, y: float) -> list[Support]:
-        return [Support("bed", "y0"), Support("slider", "y1", (x, y))]
-
-    scene = Scene(
-        {"bed": Body(bed, SOFT), "slider": Body(slider, HARD)},
-        held(0.0, 0.0),
-        contacts=[ContactPair(Surface("slider", "y0"), Surface("bed", "y1"), Coulomb(0.3))],
-    )
-    wind = [Pressure("slider", "x0", 0.02)]
-    places = (("press", 0.0, -0.2), ("slide", 0.3, -0.2), ("on", 0.6, -0.2))
-    return scene, [LoadStep(name, wind, held(x, y)) for name, x, y in places]
-
-
-def yielding() -> tuple[Scene, list[LoadStep]]:
-    """A ball pressed into metal and withdrawn; large strains."""
-    metal = FinitePlasticity(100.0, 0.3, 0.5, isotropic_hardening=2.0)
-    body = Body(rectangle((0.0, 0.0), (1.0, 1.0), (8, 8)), metal)
-    pair = ContactPair(Surface("block", "y1"), RigidSphere((0.5, 2.0), 1.0), Coulomb(0.2))
-    scene = Scene({"block": body}, [Support("block", "y0")], contacts=[pair])
-    steps = [
-        LoadStep(f"{rise}", supports=[Support("block", "y0", (0.02 * rise, rise))])
-        for rise in (0.03, 0.05, 0.06)
-    ]
-    return scene, steps
-
-
-def problem(scene: Scene, comm: MPI.Comm = MPI.COMM_SELF) -> ContactProblem:
-    parts = {name: box_partition(body.mesh, (2, 1)) for name, body in scene.bodies.items()}
-    return ContactProblem(scene, comm, partitions=parts, tolerance=1e-9)
-
-
-def advanced(sequence: LoadSequence, steps: Sequence[LoadStep]) -> DeformedState:
-    state = [sequence.advance(step) for step in steps][-1]
-    assert isinstance(state, DeformedState)
-    return state
+from fenics_contact.scene import LoadStep, PlaneStrain, Scene
+from tests.nonlinear.resumed_histories import advanced, drawn, problem, yielding
 
 
 @pytest.mark.parametrize("history", [drawn, yielding])
@@ -122,13 +62,13 @@ ON_RANKS = """
     from mpi4py import MPI
     from fenics_contact.checkpoint import Checkpoint
     from fenics_contact.contact import LoadSequence
-    from tests.nonlinear import test_resumed
+    from tests.nonlinear import resumed_histories as known
 
     comm = MPI.COMM_WORLD
-    scene, steps = getattr(test_resumed, sys.argv[1])()
-    sequence = LoadSequence(test_resumed.problem(scene, comm), checkpoint=Checkpoint(sys.argv[2]))
+    scene, steps = getattr(known, sys.argv[1])()
+    sequence = LoadSequence(known.problem(scene, comm), checkpoint=Checkpoint(sys.argv[2]))
     reasons = [sequence.advance(step).solution.reason for step in steps[:2]]
-    state = test_resumed.advanced(sequence, steps[2:])
+    state = known.advanced(sequence, steps[2:])
     moved = {name: state.gather_displacement(name).tolist() for name in scene.bodies}
     history = {name: values.tolist() for name, values in state.history.values.items()}
     if comm.rank == 0:

@@ -118,6 +118,12 @@ def test_several_mistakes_are_all_listed_in_the_order_of_their_lines(tmp_path: P
         ),
         ("tolerance = 1e-8", "max_products = 2.5", "solver.max_products must be an integer, got 2.5"),
         ("tolerance = 1e-8", "max_products = 0", "max_products must be a number greater than 0, got 0"),
+        ("tolerance = 1e-8", "newton.first = 2", "solver.newton.first must be a number of at most 1, got 2"),
+        (
+            "tolerance = 1e-8",
+            "newton.max_steps = 0",
+            "newton.max_steps must be a number greater than 0, got 0",
+        ),
         ("tolerance = 1e-8", "subdomains = 0", 'solver.subdomains must be "auto", a positive integer, three'),
         (
             "tolerance = 1e-8",
