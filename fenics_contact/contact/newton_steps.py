@@ -43,18 +43,23 @@ class NewtonSteps:
         Where Newton's method is superlinear that is little: the smaller the residual is, the less is left of
         it. Load steps of one Newton step, as of bodies that touch nothing, are left out.
         """
-        ends = (np.array(run[-LAST - 1 :]) for run in self.residuals if len(run) > 1)
+        ends = [np.array(end) for end in self._ends]
         return np.array([float((end[1:] / end[:-1]).min()) for end in ends])
+
+    @property
+    def _ends(self) -> list[tuple[float, ...]]:
+        """The last residuals of load steps of several Newton steps."""
+        return [run[-LAST - 1 :] for run in self.residuals if len(run) > 1]
 
     def __str__(self) -> str:
         """Return numbers of steps, the last residuals of the median load step, and what was left of them."""
-        if not self.left.size:
+        left = self.left
+        if not left.size:
             return "Newton's method: no load step with several steps"
         counts = [len(run) for run in self.residuals]
-        several = [run for run in self.residuals if len(run) > 1]
-        usual = several[int(np.argsort(self.left)[len(several) // 2])]
-        ends = ", ".join(f"{value:.0e}" for value in usual[-LAST - 1 :])
-        median, worst = f"{np.median(self.left):.0e}", f"{self.left.max():.0e}"
+        usual = self._ends[int(np.argsort(left)[len(left) // 2])]
+        ends = ", ".join(f"{value:.0e}" for value in usual)
+        median, worst = f"{np.median(left):.0e}", f"{left.max():.0e}"
         return (
             f"Newton's method: {np.mean(counts):.1f} steps a load step, at most {max(counts)}; residuals at "
             f"the end of a median one {ends}; its best step leaves {median} of them, of the worst load step "

@@ -15,16 +15,26 @@ if TYPE_CHECKING:
 class NewtonPart(Part):
     """How the load of a load step is followed in parts, which are halved where Newton's method fails."""
 
-    first: float = Field(1.0, gt=0, le=1, description="first part of a load step that is tried")
-    smallest: float = Field(
-        1.0 / 256, gt=0, le=1, description="smallest part; one that fails ends the run with what is reached"
+    first: float | None = Field(
+        default=None, gt=0, le=1, description="first part of a load step that is tried, the whole by default"
     )
-    max_steps: PositiveInt = Field(25, description="Newton steps after which a part is halved")
-    max_products: PositiveInt = Field(400, description="products with F of one Newton step at most")
+    smallest: float | None = Field(
+        default=None,
+        gt=0,
+        le=1,
+        description="smallest part; one that fails ends the run with what is reached",
+    )
+    max_steps: PositiveInt | None = Field(
+        default=None, description="Newton steps after which a part is halved"
+    )
+    max_products: PositiveInt | None = Field(
+        default=None, description="products with F of one Newton step at most"
+    )
 
     def made(self) -> AutomaticSteps:  # type: ignore[override]
         """Return the load steps of Python; raises as `AutomaticSteps` does."""
         from fenics_contact.nonlinear import AutomaticSteps, TangentNewton  # not for linear materials
 
-        newton = TangentNewton(max_steps=self.max_steps, max_products=self.max_products)
-        return AutomaticSteps(newton, self.first, self.smallest)
+        given = self.model_dump(exclude_none=True)
+        parts = {name: given.pop(name) for name in ("first", "smallest") if name in given}
+        return AutomaticSteps(TangentNewton(**given), **parts)
