@@ -201,6 +201,7 @@ def _state_after(
     end = path.end
     evaluation, at = end.evaluation, end.evaluation.at
     law, near = evaluation.law, end.linearisation
+    ended = f", at {path.fractions[-1]:.3g} of the load step" if path.fractions[-1] < 1.0 else ""
     diagonal = evaluation.meeting.carried(near.diagonal, near.meeting, spread=True)
     system = near.system.on_rows_of(evaluation.loaded, law, diagonal, -evaluation.lacking)
     solution = DualSolution(
@@ -214,7 +215,7 @@ def _state_after(
         iterations=len(path.history),
         products=path.products,
         history=path.history,
-        reason="every residual is below the tolerance" if path.history else "read from a checkpoint",
+        reason=f"every residual is below the tolerance{ended}" if path.history else "read from a checkpoint",
     )
     with timer.phase("state"):
         contact = contact_result(system, solution, at.displacement)

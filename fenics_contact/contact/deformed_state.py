@@ -50,12 +50,23 @@ class DeformedState(State):
     def _facts(self) -> dict[str, str]:
         facts = super()._facts()
         residuals = self.dual_solution.residuals
+        up_to = "" if self.reached == 1.0 else f", up to {self.reached:.3g}"
         further = {
-            "parts": f"{len(self.fractions)} of the load step",
+            "parts": f"{len(self.fractions)}{up_to} of the load step",
             "residuals": f"{facts['residuals']}, out of balance {residuals.coarse:.1e}",
             "errors": "not estimated where materials are nonlinear: compare two meshes",
         }
         return {name: words for name, words in (facts | further).items() if words != "nan"}
+
+    @property
+    def time(self) -> float:
+        """The time at which it was reached."""
+        return self.equilibrium.time
+
+    @property
+    def reached(self) -> float:
+        """Part of the load step up to which it could be followed; less than one in a `LoadStepError`."""
+        return float(self.fractions[-1])
 
     @cached_property
     def history(self) -> History:

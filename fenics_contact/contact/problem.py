@@ -32,7 +32,15 @@ from fenics_contact.feti import (
     decompose,
 )
 from fenics_contact.qp import DualSolver
-from fenics_contact.scene import Load, LoadStep, RigidSurface, Scene, SolverKind, choose_solver
+from fenics_contact.scene import (
+    Load,
+    LoadStep,
+    MovingObstacle,
+    RigidSurface,
+    Scene,
+    SolverKind,
+    choose_solver,
+)
 from fenics_contact.timing import PhaseTimer
 
 if TYPE_CHECKING:
@@ -164,6 +172,8 @@ class ContactProblem:
         """
         check_not_forked()
         scene = self.scene if scene is None else scene
+        with together(self.comm):
+            _require_obstacles_at(scene, time)
         wanted = self.tolerance if tolerance is None else tolerance
         if scene.is_nonlinear:
             if self.solver is not None:
@@ -302,6 +312,23 @@ def solve_scene(
         scene, comm, partitions=partitions, solver=solver, tolerance=tolerance, steps=steps
     )
     return problem.solve()
+
+
+def _require_obstacles_at(scene: Scene, time: float) -> None:
+    """Refuse obstacles that have moved by a time where bodies with small displacements do not see it.
+
+    Raises:
+        InvalidInputError: They have.
+    """
+    if any(body.deforms_much for body in scene.bodies.values()):
+        return
+    for pair in scene.contacts:
+        if isinstance(pair.master, MovingObstacle) and not pair.master.is_where_it_was(time):
+            raise InvalidInputError(
+                f"with small displacements obstacles must stand still, but that of {pair.place} has moved by "
+                f"time {time:g}: move the bodies against it by their supports, or give a body a material for "
+                "large deformations"
+            )
 
 
 def _loads_of(scene: Scene) -> tuple[list[Load], list[RigidSurface]]:

@@ -122,8 +122,13 @@ class State:
 
     @property
     def scene(self) -> Scene:
-        """The scene in the geometry of this state."""
+        """The scene in the geometry of this state, with loads and supports of the end of its load step."""
         return self.torn.scene
+
+    @property
+    def time(self) -> float:
+        """The time at which obstacles that move are where they are: with small displacements zero."""
+        return 0.0
 
     @cached_property
     @collectively("State.errors", _comm)

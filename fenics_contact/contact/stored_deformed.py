@@ -30,9 +30,9 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
     decomposition, evaluation = state.torn.decomposition, state.equilibrium.evaluation
     comm, tearing, at = decomposition.comm, decomposition.tearing, evaluation.at
     numbering, rows = evaluation.torn.numbering, np.arange(evaluation.torn.numbering.total)
-    here = np.flatnonzero(decomposition.copy_block >= 0)
+    here, block = decomposition.held
     copies = np.zeros((len(tearing.copy_subdomain), tearing.dim))
-    copies[here] = at.displacement.reshape(-1, tearing.dim)[decomposition.copy_block[here]]
+    copies[here] = at.displacement.reshape(-1, tearing.dim)[block]
     stored: dict[str, np.ndarray] = {
         "displacement": np.asarray(comm.allreduce(copies)),
         "multiplier": numbering.gather(at.multiplier, rows),
@@ -73,9 +73,9 @@ def stored_configuration(
             f"a stored state needs displacements of {count} nodes of its subdomains, got shape {given}: give "
             "the scene and the partition of that state"
         )
-    here = np.flatnonzero(decomposition.copy_block >= 0)
-    by_block = np.zeros((int(decomposition.block_offset[-1]), tearing.dim))
-    by_block[decomposition.copy_block[here]] = stored["displacement"][here]
+    here, block = decomposition.held
+    by_block = np.zeros((len(here), tearing.dim))
+    by_block[block] = stored["displacement"][here]
     displacement = by_block.ravel()
     history = tuple(
         stored[f"history.{mesh.body}"][mesh.cells] if f"history.{mesh.body}" in stored else None

@@ -66,6 +66,12 @@ class Decomposition:
         ends = self.tearing.dim * self.block_offset
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
+    @cached_property
+    def held(self) -> tuple[np.ndarray, np.ndarray]:
+        """Numbers of the copies of nodes on this rank, and their blocks in its torn vectors."""
+        here = np.flatnonzero(self.copy_block >= 0)
+        return here, self.copy_block[here]
+
     def copies_here(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return for each copy on this rank of some nodes its place among them, its number and its block."""
         place, copy = self.tearing.copies_of(nodes)
@@ -76,9 +82,9 @@ class Decomposition:
     @property
     def torn_stiffness(self) -> np.ndarray:
         """Typical stiffness at each dof of this rank's torn vectors, the largest of all ranks being one."""
-        here = self.copy_block >= 0
-        stiffness = np.empty(int(self.block_offset[-1]))
-        stiffness[self.copy_block[here]] = self.tearing.copy_stiffness[here]
+        here, block = self.held
+        stiffness = np.empty(len(here))
+        stiffness[block] = self.tearing.copy_stiffness[here]
         return np.repeat(stiffness, self.tearing.dim)
 
     @property

@@ -294,9 +294,9 @@ class DualSystem:
     def _compliance(self) -> np.ndarray:
         """Return 1 / the typical stiffness at each interface dof."""
         decomposition = self.torn.decomposition
-        here = decomposition.copy_block >= 0
-        of_block = np.empty(int(decomposition.block_offset[-1]))
-        of_block[decomposition.copy_block[here]] = 1.0 / decomposition.tearing.copy_stiffness[here]
+        here, block = decomposition.held
+        of_block = np.empty(len(here))
+        of_block[block] = 1.0 / decomposition.tearing.copy_stiffness[here]
         return of_block[self.inverse.interface // self.torn.dim]
 
     def _scaling(self, coarse: CoarseSpace) -> Scaling | None:

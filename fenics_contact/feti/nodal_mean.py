@@ -23,9 +23,8 @@ def nodal_mean(decomposition: Decomposition, displacement: np.ndarray) -> np.nda
         (n_nodes, dim), [length].
     """
     tearing = decomposition.tearing
-    here = np.flatnonzero(decomposition.copy_block >= 0)
+    here, columns = decomposition.held
     nodes, place = np.unique(tearing.copy_node[here], return_inverse=True)
-    columns = decomposition.copy_block[here]
     share = sp.csr_matrix((tearing.copy_share[here], (place.ravel(), columns)))
     mean = share @ displacement.reshape(-1, tearing.dim)
     sharing = Sharing(decomposition.comm, nodes, np.flatnonzero(tearing.on_several_ranks[nodes]))

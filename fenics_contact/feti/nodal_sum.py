@@ -18,7 +18,7 @@ def nodal_sum(decomposition: Decomposition, force: np.ndarray) -> np.ndarray:
         Forces on the nodes of all bodies, shape (n_nodes, dim), replicated, [force].
     """
     tearing = decomposition.tearing
-    here = np.flatnonzero(decomposition.copy_block >= 0)
+    here, block = decomposition.held
     total = np.zeros((tearing.n_nodes, tearing.dim))
-    np.add.at(total, tearing.copy_node[here], force.reshape(-1, tearing.dim)[decomposition.copy_block[here]])
+    np.add.at(total, tearing.copy_node[here], force.reshape(-1, tearing.dim)[block])
     return np.asarray(decomposition.comm.allreduce(total))

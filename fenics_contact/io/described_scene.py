@@ -8,18 +8,19 @@ from functools import partial
 from typing import Any
 
 from fenics_contact.io.json_file import plain
-from fenics_contact.scene import Body, ContactPair, Material, Scene, Surface, Tie
+from fenics_contact.scene import Body, ContactPair, Material, MovingObstacle, Scene, Surface, Tie
 
 #: Any value as plain data.
 readable = partial(plain, lenient=True)
 
 
-def described_scene(scene: Scene, subdomains: Mapping[str, int]) -> dict[str, Any]:
+def described_scene(scene: Scene, subdomains: Mapping[str, int], time: float = 0.0) -> dict[str, Any]:
     """Return bodies, supports, loads and pairs of a scene as plain data.
 
     Args:
         scene: The scene.
         subdomains: Body name -> number of its subdomains.
+        time: When obstacles that move are told.
 
     Returns:
         See `fenics_contact.io.write_result`. Functions are given by their names, numbers by their values.
@@ -29,8 +30,8 @@ def described_scene(scene: Scene, subdomains: Mapping[str, int]) -> dict[str, An
         "bodies": {name: _body(body, subdomains[name]) for name, body in scene.bodies.items()},
         "supports": readable(scene.supports),
         "loads": readable(scene.loads),
-        "contacts": [_pair(pair) for pair in scene.contacts],
-        "ties": [_pair(tie) for tie in scene.ties],
+        "contacts": [_pair(pair, time) for pair in scene.contacts],
+        "ties": [_pair(tie, time) for tie in scene.ties],
     }
 
 
@@ -58,10 +59,14 @@ def _material(material: Material) -> dict[str, Any]:
     return known if is_dataclass(material) else {**known, "parameters": readable(material.parameters)}
 
 
-def _pair(pair: ContactPair | Tie) -> dict[str, Any]:
+def _pair(pair: ContactPair | Tie, time: float) -> dict[str, Any]:
     entries = {part.name: readable(getattr(pair, part.name)) for part in fields(pair)}
     for side in ("slave", "master"):
         surface = getattr(pair, side)
         if isinstance(surface, Surface):
             entries[side] = {"body": surface.body, "surface": surface.name}
+        if isinstance(surface, MovingObstacle):
+            rotation, translation = surface.frame(time)
+            moved = {"rotation": rotation.tolist(), "translation": translation.tolist()}
+            entries[side] = {**entries[side], **moved}
     return entries

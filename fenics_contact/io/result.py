@@ -51,7 +51,8 @@ def write_result(
     | ``format``, ``format_version``, ``kind`` | "fenics_contact result", 1, "state" |
     | ``written``, ``ranks``, ``versions``, ``units`` | when (UTC), on how many ranks, with which libraries |
     | ``scene`` | ``dimension``, ``bodies`` (cells, nodes, subdomains, bounding box, material with its \
-parameters), ``supports``, ``loads``, ``contacts`` and ``ties`` with all their parameters |
+parameters), ``supports``, ``loads``, ``contacts`` and ``ties`` with all their parameters; obstacles \
+that move also with their ``rotation`` and ``translation`` in the state |
     | ``plan`` | ``effects`` with the reason for each, ``cone``, ``memory_bytes`` as expected |
     | ``solver`` | ``kind``, ``methods`` that took steps, ``tolerance``, ``reason`` for the stop; a state \
 that was read from a checkpoint says so and has no tolerance |
@@ -203,7 +204,9 @@ def _state_record(state: State, unheld: Sequence[UnheldMotion]) -> dict[str, Any
     direct = isinstance(state.system, DirectSystem)
     methods = list(dict.fromkeys(step.method for step in solution.history))
     return {
-        "scene": described_scene(state.scene, {name: int(np.max(part)) + 1 for name, part in parts.items()}),
+        "scene": described_scene(
+            state.scene, {name: int(np.max(part)) + 1 for name, part in parts.items()}, state.time
+        ),
         "plan": {
             "effects": {effect.name.value: effect.reason for effect in plan.effects},
             "cone": plan.cone.value,

@@ -48,6 +48,11 @@ ROOM = 0.2
 PATIENCE, CAUTION = 4, 0.2
 #: Residual of contact problems that are solved as a whole, at the start of a history.
 NESTED = 1e-2
+#: What to do where closed contacts and supports leave some body free to move.
+HOLD = (
+    "give each body that slides or turns freely a support in that direction, or its contacts friction; take "
+    "smaller load steps only where contacts open that held it"
+)
 
 
 @displayed
@@ -137,7 +142,7 @@ class _Run:
         self._method, self._equations, self._contact, self._load = method, equations, contact, load
         self._timer, self._comm = timer, load.torn.numbering.comm
         self._caution = self._care = 1.0
-        self._stalls = 0
+        self._stalls, self._loose = 0, False
         self._start: MaterialPoints | None = None
         self.history: list[SolverStep] = []
         self._residuals: list[float] = []
@@ -182,7 +187,7 @@ class _Run:
             last = self.history[-1] if self.history else "no step"
             raise ConvergenceError(
                 f"Newton's method needs residuals below {method.tolerance:.1e}, got after "
-                f"{len(self.history)} steps: {last}: take smaller load steps",
+                f"{len(self.history)} steps: {last}: {HOLD if self._loose else 'take smaller load steps'}",
                 self.history,
             )
         if not previous or previous >= 1.0:
@@ -221,6 +226,7 @@ class _Run:
                 margin = 0.0 if self.history else SLIPPED
                 taken = tangent_step(problem, step, self._forcing, floor, method.max_products, margin=margin)
             whole = taken is None
+            self._loose = whole and self._forces_known(evaluation)
             if taken is None:
                 taken = self._held_whole(near.system, evaluation, step)
             self.products += taken.products
@@ -259,7 +265,7 @@ class _Run:
                 raise
             raise ConvergenceError(
                 f"Newton's method needs tangents that the rows of supports and contacts hold, got after "
-                f"{len(self.history)} steps: {reason}: take smaller load steps",
+                f"{len(self.history)} steps: {reason}: {HOLD}",
                 self.history,
             ) from reason
 

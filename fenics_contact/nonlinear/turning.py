@@ -138,9 +138,9 @@ def unsymmetric_at(
         nodes: Marks of the nodes, shape (n_nodes,).
     """
     tearing, dim = decomposition.tearing, decomposition.tearing.dim
-    here = np.flatnonzero(decomposition.copy_block >= 0)
+    here, block = decomposition.held
     node = np.empty(len(here), dtype=np.int64)
-    node[decomposition.copy_block[here]] = tearing.copy_node[here]
+    node[block] = tearing.copy_node[here]
     dof = (dim * node[:, None] + np.arange(dim)).ravel()
     skew = sp.coo_matrix((stiffness - stiffness.T) / 2)
     row, column = dof[skew.row], dof[skew.col]

@@ -23,9 +23,23 @@ def obstacle_entries(record: Mapping[str, Any], points: np.ndarray) -> list[dict
             different.append(master)
     plane = scene.get("dimension") == 2
     return [
-        {"type": each["type"], "lines": [line.tolist() for line in _lines(each, points, plane=plane)]}
+        {
+            "type": (each.get("obstacle") or each)["type"],
+            "lines": [line.tolist() for line in _moved_lines(each, points, plane=plane)],
+        }
         for each in different
     ]
+
+
+def _moved_lines(obstacle: Mapping[str, Any], points: np.ndarray, *, plane: bool) -> list[np.ndarray]:
+    """Return the lines of an obstacle where it is, (n, 3) each."""
+    if "translation" not in obstacle:
+        return _lines(obstacle, points, plane=plane)
+    shift, turn = np.zeros(3), np.eye(3)
+    given = np.asarray(obstacle["translation"], dtype=float)
+    shift[: given.size], turn[: given.size, : given.size] = given, obstacle["rotation"]
+    lines = _lines(obstacle["obstacle"], (points - shift) @ turn, plane=plane)
+    return [line @ turn.T + shift for line in lines]
 
 
 def _lines(obstacle: Mapping[str, Any], points: np.ndarray, *, plane: bool) -> list[np.ndarray]:

@@ -54,7 +54,7 @@ class MovingObstacle:
     """A rigid obstacle that moves and turns as prescribed: at a time its points x lie at R x + c.
 
     Large displacements follow it through the load steps, and friction feels its motion. Small displacements
-    see it where it is at time zero.
+    do not: there it must be where it is at time zero.
 
     Attributes:
         obstacle: The obstacle before it moves.
@@ -114,6 +114,11 @@ class MovingObstacle:
         """Return the obstacle where it is at a time."""
         turn, shift = self.frame(time)
         return placed(self.obstacle, turn, [float(entry) for entry in shift])
+
+    def is_where_it_was(self, time: float) -> bool:
+        """Return whether it is at a time where it is at time zero."""
+        pairs = zip(self.frame(0.0), self.frame(time), strict=True)
+        return all(np.array_equal(before, now) for before, now in pairs)
 
     def distance(self, points: np.ndarray) -> np.ndarray:
         """Return the signed distance at time zero, (n, dim) -> (n,), [length]."""

@@ -6,7 +6,7 @@ from fenics_contact.surface_shapes.closest import closest_points, principal_curv
 from fenics_contact.surface_shapes.extruded import Extruded
 from fenics_contact.surface_shapes.joined import Joined
 from fenics_contact.surface_shapes.parametric import Parametric
-from fenics_contact.surface_shapes.placed import Placed, placed
+from fenics_contact.surface_shapes.placed import Placed, placed, simplified
 from fenics_contact.surface_shapes.plane import Plane
 from fenics_contact.surface_shapes.profile import Profile
 from fenics_contact.surface_shapes.protocol import SurfaceShape, asked
@@ -37,6 +37,7 @@ __all__ = [
     "placed",
     "principal_curvatures",
     "recognised",
+    "simplified",
     "tangent_bases",
     "tensor_grid",
 ]

@@ -11,7 +11,9 @@ from fenics_contact.checks import GivenVector, checked, floats
 from fenics_contact.errors import InvalidInputError
 from fenics_contact.surface_shapes.joined import Joined
 from fenics_contact.surface_shapes.places import require_place
+from fenics_contact.surface_shapes.plane import Plane
 from fenics_contact.surface_shapes.protocol import SurfaceShape
+from fenics_contact.surface_shapes.round import Cylinder, Sphere
 
 #: Tolerance of the orthonormality of a rotation's columns.
 ORTHOGONAL = 1e-9
@@ -108,3 +110,18 @@ def placed(
     place = scale * turn @ origin + np.asarray(translation)
     rows = tuple(floats(row) for row in both)
     return Placed(shape.shape, rows, floats(place), scale * shape.scale)
+
+
+def simplified(shape: SurfaceShape) -> SurfaceShape:
+    """Return a placed plane, sphere or cylinder as one that is there, any other shape as it is."""
+    if not isinstance(shape, Placed):
+        return shape
+    turn, shift, scale = np.asarray(shape.rotation), np.asarray(shape.translation), shape.scale
+    match shape.shape:
+        case Plane(point, normal):
+            return Plane(floats(scale * turn @ point + shift), floats(turn @ normal))
+        case Sphere(centre, radius, hollow):
+            return Sphere(floats(scale * turn @ centre + shift), scale * radius, hollow)
+        case Cylinder(point, axis, radius, hollow):
+            return Cylinder(floats(scale * turn @ point + shift), floats(turn @ axis), scale * radius, hollow)
+    return shape

@@ -6,10 +6,9 @@ import numpy as np
 import pyvista as pv
 from matplotlib.axes import Axes
 
-from fenics_contact.checks import floats
-from fenics_contact.contact import DeformedState, State
+from fenics_contact.contact import State
 from fenics_contact.scene import MovingObstacle, RigidObstacle, Surface
-from fenics_contact.surface_shapes import Cylinder, Placed, Plane, Sphere, SurfaceShape
+from fenics_contact.surface_shapes import Cylinder, Plane, Sphere, SurfaceShape, simplified
 from fenics_contact.viz.colours import GREY, PALE
 from fenics_contact.viz.stage import Layer
 from fenics_contact.viz.view import Frame, View
@@ -25,27 +24,12 @@ _LINE = {"color": GREY, "line_width": 3, "lighting": False}
 
 def obstacles_of(state: State) -> list[SurfaceShape]:
     """Return the different rigid obstacles of a scene, where they are in a state of it."""
-    time = state.equilibrium.time if isinstance(state, DeformedState) else 0.0
     obstacles: list[RigidObstacle] = []
     for pair in state.scene.contacts:
         if not isinstance(pair.master, Surface) and pair.master not in obstacles:
             obstacles.append(pair.master)
-    return [_simple(each.at(time) if isinstance(each, MovingObstacle) else each) for each in obstacles]
-
-
-def _simple(shape: SurfaceShape) -> SurfaceShape:
-    """Return a plane, a sphere or a cylinder that was moved as one that is there."""
-    if not isinstance(shape, Placed):
-        return shape
-    turn, shift, scale = np.asarray(shape.rotation), np.asarray(shape.translation), shape.scale
-    match shape.shape:
-        case Plane(point, normal):
-            return Plane(floats(scale * turn @ point + shift), floats(turn @ normal))
-        case Sphere(centre, radius, hollow):
-            return Sphere(floats(scale * turn @ centre + shift), scale * radius, hollow)
-        case Cylinder(point, axis, radius, hollow):
-            return Cylinder(floats(scale * turn @ point + shift), floats(turn @ axis), scale * radius, hollow)
-    return shape
+    now = [each.at(state.time) if isinstance(each, MovingObstacle) else each for each in obstacles]
+    return [simplified(each) for each in now]
 
 
 def shade_obstacles(axes: Axes, state: State, frame: Frame) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -101,4 +102,7 @@ def test_the_last_equilibrium_before_a_crushing_load_is_written(
     result = read_result(tmp_path / "result.json")
     pushed = next(each for each in result["forces"]["reactions"] if each["surface"] == "y0")
     assert 0.5 < pushed["force"][1] < 30.0
+    part = re.fullmatch(r".* below the tolerance, at (0\.\d+) of the load step", result["solver"]["reason"])
+    assert part is not None
+    assert pushed["force"][1] == pytest.approx(30.0 * float(part[1]), rel=0.01)
     assert list(tmp_path.glob("history*" if steps else "state*"))

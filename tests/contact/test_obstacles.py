@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import State, Status, solve_scene
-from fenics_contact.errors import InfeasibleError
+from fenics_contact.contact import ContactProblem, State, Status, solve_scene
+from fenics_contact.errors import InfeasibleError, InvalidInputError
 from fenics_contact.gallery import block, hemisphere, rectangle
 from fenics_contact.partition import bisection_partition, box_partition
 from fenics_contact.qp import FaceNewton
@@ -19,6 +19,9 @@ from fenics_contact.scene import (
     Coulomb,
     DistanceObstacle,
     IsotropicElasticity,
+    J2Plasticity,
+    Material,
+    MovingObstacle,
     PlaneStrain,
     RigidCylinder,
     RigidObstacle,
@@ -144,3 +147,22 @@ def test_a_socket_holds_a_ball_that_rolls_off_a_floor() -> None:
     floor = replace(scene, contacts=ball_on(BELOW["plane"]).contacts)
     with pytest.raises(InfeasibleError, match="body 'ball' can move away under the load"):
         solve_scene(floor, MPI.COMM_SELF, partitions=cut)
+
+
+@pytest.mark.parametrize("material", [RUBBER, J2Plasticity(100.0, 0.3, 1.0)], ids=["linear", "metal"])
+def test_with_small_displacements_an_obstacle_must_not_move(material: Material) -> None:
+    body = Body(block((0, 0, 0), (1, 1, 1), (2, 2, 2)), material)
+
+    def pressing(depth: float) -> ContactProblem:
+        floor = MovingObstacle(RigidPlane((0, 0, 0), (0, 0, 1)), lambda time: (None, (0, 0, depth * time)))
+        pair = ContactPair(Surface("block", "z0"), floor)
+        return ContactProblem(
+            Scene({"block": body}, [Support("block", "z1")], contacts=[pair]), MPI.COMM_SELF
+        )
+
+    with pytest.raises(
+        InvalidInputError, match=r"has moved by time 0\.5: move the bodies against"
+    ):
+        pressing(0.1).solve(time=0.5)
+    assert pressing(0.1).solve(time=0.0).contact.count(Status.OPEN) == 9
+    assert pressing(0.0).solve(time=0.5).contact.count(Status.OPEN) == 9

@@ -10,8 +10,10 @@ import pytest
 from mpi4py import MPI
 
 from fenics_contact.contact import ContactProblem, DeformedState, Status, solve_scene, solve_steps
+from fenics_contact.errors import LoadStepError
 from fenics_contact.gallery import block, rectangle
 from fenics_contact.mesh import BodyMesh
+from fenics_contact.nonlinear import AutomaticSteps, TangentNewton
 from fenics_contact.partition import box_partition
 from fenics_contact.scene import (
     Body,
@@ -26,6 +28,7 @@ from fenics_contact.scene import (
     Scene,
     Support,
     Surface,
+    Traction,
 )
 from tests.nonlinear.scenes import RUBBER, cut, pressed, rounded, tilted
 
@@ -137,3 +140,17 @@ def test_a_deformed_state_says_what_it_has() -> None:
     assert "out of balance" in words
     assert "compare two meshes" in words
     assert "ask for state.errors" not in words
+
+
+@pytest.mark.parametrize("friction", [None, Coulomb(0.3)])
+def test_a_body_that_may_slide_freely_is_told_to_be_held(friction: Coulomb | None) -> None:
+    """A dead load holds no body on a plane without friction; smaller load steps would not either."""
+    pair = ContactPair(Surface("block", "y0"), RigidPlane((0, 0), (0, 1)), friction)
+    loads = [Traction("block", "y1", (0.0, -0.05))]
+    scene = Scene({"block": Body(rectangle((0, 0), (1, 1), (4, 4)), RUBBER)}, [], loads, [pair])
+    steps = AutomaticSteps(TangentNewton(max_steps=12), smallest=1.0)
+    if friction is not None:
+        assert solve_scene(scene, MPI.COMM_SELF, steps=steps).balance().imbalance < 1e-8
+        return
+    with pytest.raises(LoadStepError, match="turns freely a support in that direction, or its contacts fric"):
+        solve_scene(scene, MPI.COMM_SELF, steps=steps)

@@ -25,6 +25,7 @@ from fenics_contact.page.fields import rounded_up
 from fenics_contact.page.packing import rounded
 from fenics_contact.page.tables import sections, status_words
 from fenics_contact.viz import Units
+from tests.viz.moving_states import block_among_movers, pressed_by_a_lid
 from tests.viz.plane_states import plane_block
 from tests.viz.states import pulled, touching_blocks
 
@@ -234,6 +235,19 @@ def test_obstacles_are_lines() -> None:
     assert np.asarray(line)[:, 1:] == pytest.approx(0.0)
     assert np.ptp(np.asarray(line)[:, 0]) > 2.0
     assert data["scale"] == 1.0, "bodies are drawn inside of obstacles"
+
+
+def test_obstacles_that_move_are_lines_where_they_are() -> None:
+    *_, state = block_among_movers()
+    data, _ = content(result_page(state).html)
+    assert [entry["type"] for entry in data["obstacles"]] == ["RigidPlane", "RigidSphere", "RigidCylinder"]
+    for entry, pair in zip(data["obstacles"], state.scene.contacts, strict=True):
+        points = np.concatenate([np.asarray(line) for line in entry["lines"]])
+        there, before = pair.master.at(1.0), pair.master  # type: ignore[union-attr]
+        assert np.abs(there.distance(points)).max() < 1e-6
+        assert np.abs(before.distance(points)).max() > 0.02, "it has moved"
+    (lid,) = content(result_page(pressed_by_a_lid()).html)[0]["obstacles"]
+    assert np.asarray(lid["lines"][0])[:, 1:] == pytest.approx(np.tile([0.9, 0.0], (2, 1)))
 
 
 def test_residuals_and_objectives_are_there_to_draw(tmp_path: Path) -> None:

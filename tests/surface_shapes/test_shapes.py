@@ -26,6 +26,7 @@ from fenics_contact.surface_shapes import (
     closest_points,
     placed,
     principal_curvatures,
+    simplified,
     tensor_grid,
 )
 
@@ -156,6 +157,17 @@ def test_points_move_with_the_shape(name: str) -> None:
     np.testing.assert_allclose(
         moved.curvatures(there), turn @ shape.curvatures(x) @ turn.T / scale, rtol=1e-10, atol=1e-12
     )
+
+
+@pytest.mark.parametrize("name", ANALYTIC)
+def test_planes_balls_and_bars_that_are_moved_are_such_again(name: str) -> None:
+    shape, x = SHAPES[name], near(name)
+    dim = x.shape[1]
+    turn = TURN if dim == 3 else np.array([[0.6, -0.8], [0.8, 0.6]])
+    moved = placed(shape, turn, tuple(np.arange(1.0, dim + 1)), 0.8)
+    again = simplified(moved)
+    assert isinstance(again, Placed) != isinstance(shape, Plane | Sphere | Cylinder)
+    np.testing.assert_allclose(again.distance(x), moved.distance(x), atol=1e-12)
 
 
 def test_two_motions_are_one() -> None:
