@@ -17,9 +17,10 @@ from fenics_contact.nonlinear import Configuration, Contact, Loading, Meeting, M
 def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
     """Return the arrays from which a state can be rebuilt, on any number of ranks. Collective.
 
-    Torn displacements, forces, slip and histories come back bit for bit. Fields on whole bodies may differ by
-    a part of the openings at interfaces, which are below the tolerance: they are spread inside subdomains by
-    tangents at the equilibrium, before by those of the last Newton step.
+    Torn displacements, multipliers and histories come back bit for bit; normals and slip are found again, to
+    their last places. Fields on whole bodies may differ by a part of the openings at interfaces, which are
+    below the tolerance: they are spread inside subdomains by tangents at the equilibrium, before by those of
+    the last Newton step.
 
     Returns:
         ``displacement`` of all copies of the nodes, shape (n_copies, dim), ``multiplier`` λ of all rows, the

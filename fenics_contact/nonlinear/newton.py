@@ -35,6 +35,8 @@ FRACTIONS = (0.5, 0.25, 0.1)
 #: Factor on the residual of linear systems after each step without progress, and the least of these factors:
 #: near a loss of stability a small residual may hide a large error.
 CARE, LEAST_CARE = 0.1, 1e-3
+#: Errors at contact below this part of the forces out of balance say nothing of the active set.
+HIDDEN = 1e-2
 #: Residual below which a step without progress is reason enough for that care.
 NEAR = 1e-2
 #: Part of the slip bound within which a disc counts as slipping at the start of a load step.
@@ -244,7 +246,8 @@ class _Run:
         before = evaluation.residuals
         olds = [old.at_rows for old in (before, earlier) if old is not None]
         worse = all(best.residuals.at_rows.is_worse_than(old) for old in olds)
-        if worse and best.residuals.natural > before.natural:
+        hidden = HIDDEN * best.residuals.coarse
+        if worse and best.residuals.natural > max(before.natural, hidden):
             # The active set alternates between two faces: the solution lies between them. Forces out of
             # balance are no reason: a step that turns a body strains it until the next one.
             candidates = [(best, part), *((after(f * part), f * part) for f in FRACTIONS)]

@@ -29,11 +29,14 @@ ROUGH = 1e-2
 
 
 class TangentOperator(FactoredOperator):
-    """K_ρ⁻¹ and the Schur complement of K_ρ = K + C Cᵀ on the interface, for a symmetric tangent K.
+    """K_ρ⁻¹ with K_ρ = K + C Cᵀ, and a Schur complement on the interface, for a symmetric tangent K.
 
     C holds the rigid motions at some nodes and, where these leave motions that stress has made soft or
     unstable, approximate eigenvectors for them. The modes Φ = K_ρ⁻¹C, with factors that make them
     displacements, and their stiffness S keep the dual problem exact for any C.
+
+    The Schur complement is that of K_ρ − C (CᵀK_ρ⁻¹C)⁻¹Cᵀ, which is K without stress: positive, and without
+    forces where the modes move. Multipliers bear their stiffness, which preconditioners must leave out.
 
     Attributes:
         modes: Φ, shape (n, m).
@@ -64,16 +67,18 @@ class TangentOperator(FactoredOperator):
         weights = np.full(basis.shape[1], typical)
         soft, grip = self._soft_motions(held, factor, earlier, typical)
         self.softened = soft.shape[1]
-        whole = _Updated(factor, soft, grip)
+        whole = _Updated(factor, soft, np.diag(grip))
         columns, weights = np.hstack([columns, soft]), np.concatenate([weights, grip])
         self.modes = whole.solve_many(columns * weights)
         self.stiffness = _symmetric(np.linalg.lstsq(columns, K @ self.modes, rcond=None)[0])
+        # In terms of the orthonormal columns, by K Φ = Ĉ S: accurate where S is small.
+        self._relief = -_symmetric(self.stiffness @ np.linalg.inv(columns.T @ self.modes))
         rest = dofs_inside(K, interface)
-        self._at_interface, self._at_rest, self._grip = soft[interface], soft[rest], grip
+        self._at_interface, self._at_rest = columns[interface], columns[rest]
         inside = None
         if len(rest):
-            inside = _Updated(IndefiniteFactor(held[rest][:, rest].tocsr()), soft[rest], grip)
-        super().__init__(held, interface, whole, inside)
+            inside = _Updated(IndefiniteFactor(K[rest][:, rest].tocsr()), self._at_rest, self._relief)
+        super().__init__(K, interface, whole, inside)
 
     def _soft_motions(
         self, held: sp.csr_matrix, factor: IndefiniteFactor, earlier: TangentOperator | None, typical: float
@@ -94,22 +99,22 @@ class TangentOperator(FactoredOperator):
 
     def _forces(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         here, inside = super()._forces(displacement)
-        moved = self._grip * (self._at_interface.T @ displacement)
+        moved = self._relief @ (self._at_interface.T @ displacement)
         return here + self._at_interface @ moved, inside + self._at_rest @ moved
 
     def _forces_from_inside(self, displacement: np.ndarray) -> np.ndarray:
-        moved = self._grip * (self._at_rest.T @ displacement)
+        moved = self._relief @ (self._at_rest.T @ displacement)
         return super()._forces_from_inside(displacement) + self._at_interface @ moved
 
 
 class _Updated:
     """The inverse of A + V D Vᵀ with factors of A, by Woodbury's formula."""
 
-    def __init__(self, factor: IndefiniteFactor, columns: np.ndarray, weights: np.ndarray) -> None:
-        """Prepare for V, shape (n, k), and the diagonal D, shape (k,)."""
+    def __init__(self, factor: IndefiniteFactor, columns: np.ndarray, added: np.ndarray) -> None:
+        """Prepare for V, shape (n, k), and D, symmetric and maybe singular, shape (k, k)."""
         self._factor, self._columns = factor, columns
         self._moved = factor.solve_many(columns)
-        self._small = np.linalg.inv(np.diag(1.0 / weights) + columns.T @ self._moved)
+        self._small = np.linalg.solve(np.eye(len(added)) + added @ (columns.T @ self._moved), added)
 
     def solve(self, right: np.ndarray, out: np.ndarray) -> None:
         """Write the solution for one right side, shape (n,), into ``out``."""

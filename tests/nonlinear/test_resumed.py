@@ -31,8 +31,13 @@ def test_the_rest_of_a_history_is_the_same(
     again = advanced(resumed, steps[:2])
     assert again.solution.reason == "read from a checkpoint"
     assert np.array_equal(again.torn_displacement, before.torn_displacement)
-    assert np.array_equal(again.contact.force, before.contact.force)
-    assert np.array_equal(again.contact.slip, before.contact.slip)
+    assert np.array_equal(again.solution.multiplier, before.solution.multiplier)
+    # Normals are found again, to their last places.
+    for found, was in (
+        (again.contact.force, before.contact.force),
+        (again.contact.slip, before.contact.slip),
+    ):
+        assert np.abs(found - was).max() < 1e-15
     # What fields spread inside subdomains: the openings at their interfaces.
     opening = before.solution.residuals.gluing * before.solution.residuals.gluing_scale
     assert 0.0 < opening < 1e-9
