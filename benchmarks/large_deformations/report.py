@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from statistics import mean
 from typing import Any
 
+from benchmarks.large_deformations.cost import WAYS
 from benchmarks.large_deformations.ironing_meshes import TIMES
 from benchmarks.study import ROOT, Records, Study, filled, found
 from fenics_contact.io import write_json, write_text
@@ -21,6 +23,14 @@ BALL = {1: (4, 8, 12, 16), 2: (4, 6, 8)}
 LIMITS = {1: (4, 8, 16), 2: (4, 6, 8)}
 #: Columns of the bed that is ironed.
 IRONING = (48, 60, 72)
+#: Subdomains along an edge of the block whose load steps are counted, and Poisson's ratios.
+PARTS, RATIOS = (2, 3, 4), (0.3, 0.45, 0.49, 0.4999)
+#: What names a run of a kind.
+KEYS = {
+    "ball": ("order", "cells"),
+    "ironing": ("discretisation", "columns"),
+    "cost": ("way", "parts", "ratio"),
+}
 #: Most seconds that a job may take.
 LIMIT = 7200.0
 
@@ -55,7 +65,11 @@ def _force_on(runs: Sequence[Run], order: int, cells: int) -> float:
 
 def tables(record: dict[str, list[Run]]) -> dict[str, str]:
     """Return the tables of the page by their names."""
-    return {"ball": _ball(record["ball"]), "ironing": _ironing(record["ironing"])}
+    return {
+        "ball": _ball(record["ball"]),
+        "ironing": _ironing(record["ironing"]),
+        "cost": _cost(record["cost"]),
+    }
 
 
 def _ball(runs: list[Run]) -> str:
@@ -92,6 +106,28 @@ def _ironing(runs: list[Run]) -> str:
     return table(head, rows) + "\n"
 
 
+def _cost(runs: list[Run]) -> str:
+    head = (
+        "subdomains", "unknowns", "ν", "done", "products at small strain", "in the load steps", "mean ratio",
+        "factorisations", "mean",
+    )  # fmt: skip
+    rows = [
+        (
+            str(run["parts"] ** 3),
+            str(run["unknowns"]),
+            str(run["ratio"]),
+            run["way"],
+            str(run["small_products"]),
+            " ".join(map(str, run["products"])),
+            f"**{mean(run['products']) / run['small_products']:.2f}**",
+            " ".join(map(str, run["factorisations"])),
+            f"**{mean(run['factorisations']):.1f}**",
+        )
+        for run in runs
+    ]
+    return table(head, rows) + "\n"
+
+
 def _padded(words: Iterable[str]) -> list[str]:
     """Return the words of a line with empty ones for times at which nothing was measured."""
     known = list(words)
@@ -99,7 +135,7 @@ def _padded(words: Iterable[str]) -> list[str]:
 
 
 def jobs(quick: bool) -> list[Job]:
-    """Return a job for every mesh; the quick study has the coarsest ones."""
+    """Return a job for every mesh and every count; the quick study has the coarsest ones."""
     room = f"benchmarks.{NAME}"
     balls = [
         Job(
@@ -120,7 +156,16 @@ def jobs(quick: bool) -> list[Job]:
         )
         for columns in IRONING
     ]  # fmt: skip
-    return [balls[0]] if quick else [*balls, *dies, *others]
+    costs = [
+        Job(
+            f"cost {way} {parts} {ratio}", f"{room}.cost:measured",
+            {"parts": parts, "ratio": ratio, "way": way}, limit=LIMIT,
+        )
+        for way in WAYS
+        for parts in PARTS
+        for ratio in RATIOS
+    ]  # fmt: skip
+    return [balls[0], costs[0]] if quick else [*balls, *dies, *others, *costs]
 
 
 def write(folder: Path, records: Records, quick: bool) -> None:
@@ -130,10 +175,8 @@ def write(folder: Path, records: Records, quick: bool) -> None:
         write_json(folder / f"{NAME}.json", new)
         return
     before = json.loads((HOME / f"{NAME}.json").read_text())
-    known = {_name("ball", run): run for run in before["ball"]}
-    known |= {_name("ironing", run): run for run in before["ironing"]}
-    known |= new
-    record: dict[str, list[Run]] = {"ball": [], "ironing": []}
+    known = {_name(kind, run): run for kind in KEYS for run in before[kind]} | new
+    record: dict[str, list[Run]] = {kind: [] for kind in KEYS}
     for job in jobs(quick):
         if job.name in known:
             record[job.name.partition(" ")[0]].append(known[job.name])
@@ -144,8 +187,7 @@ def write(folder: Path, records: Records, quick: bool) -> None:
 
 
 def _name(kind: str, run: Run) -> str:
-    keys = ("order", "cells") if kind == "ball" else ("discretisation", "columns")
-    return " ".join([kind, *(str(run[key]) for key in keys)])
+    return " ".join([kind, *(str(run[key]) for key in KEYS[kind])])
 
 
 study = Study(jobs, write, HOME, (Path(__file__).parent,))

@@ -6,11 +6,22 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
-from benchmarks.large_deformations import ball_on_metal, ironing
-from benchmarks.large_deformations.report import BALL, IRONING, converged, force, jobs, study, tables
+from benchmarks.large_deformations import ball_on_metal, cost, ironing
+from benchmarks.large_deformations.report import (
+    BALL,
+    IRONING,
+    PARTS,
+    RATIOS,
+    converged,
+    force,
+    jobs,
+    study,
+    tables,
+)
 from benchmarks.study import filled
 from tests.conftest import ROOT
 
@@ -33,6 +44,9 @@ def test_the_page_is_its_record_and_complete(record: dict[str, Any]) -> None:
     assert [(run["discretisation"], run["columns"]) for run in record["ironing"]] == [
         (way, columns) for way in ("node", "GetFEM") for columns in IRONING
     ]
+    assert [(run["way"], run["parts"], run["ratio"]) for run in record["cost"]] == [
+        (way, parts, ratio) for way in cost.WAYS for parts in PARTS for ratio in RATIOS
+    ]
 
 
 def test_what_was_not_measured_keeps_its_numbers(record: dict[str, Any], tmp_path: Path) -> None:
@@ -40,7 +54,7 @@ def test_what_was_not_measured_keeps_its_numbers(record: dict[str, Any], tmp_pat
     study.write(tmp_path, {f"ironing node {IRONING[1]}": [measured | {"ranks": 1}]}, False)
     written = json.loads((tmp_path / "large_deformations.json").read_text())
     assert written["ironing"] == [record["ironing"][0], measured, *record["ironing"][2:]]
-    assert written["ball"] == record["ball"]
+    assert (written["ball"], written["cost"]) == (record["ball"], record["cost"])
     assert len(jobs(True)) < len(jobs(False))
 
 
@@ -105,3 +119,23 @@ def test_a_die_has_the_forces_that_getfem_finds(record: dict[str, Any]) -> None:
         for ours, others in zip(by["node", columns], by["GetFEM", columns], strict=False):
             assert ours["vertical"] == pytest.approx(others["vertical"], rel=0.012)
             assert ours["horizontal"] == pytest.approx(others["horizontal"], rel=0.05)
+
+
+def test_load_steps_cost_what_the_page_and_the_guide_say(record: dict[str, Any]) -> None:
+    for run in record["cost"]:
+        ratio, steps = np.mean(run["products"]) / run["small_products"], np.mean(run["factorisations"])
+        if run["ratio"] < 0.4999:
+            low, high = (1.2, 1.6) if run["way"] == "drag" else (1.5, 2.3)
+            assert low < ratio < high
+            assert 4.0 <= steps < 5.3
+        assert steps <= 7.5
+
+
+def test_load_steps_take_the_products_that_the_record_says(record: dict[str, Any]) -> None:
+    found = cost.measured(MPI.COMM_SELF, 2, 0.3, "drag")
+    (stored,) = (
+        run for run in record["cost"] if (run["parts"], run["ratio"], run["way"]) == (2, 0.3, "drag")
+    )
+    assert found["small_products"] == pytest.approx(stored["small_products"], abs=1)
+    assert sum(found["products"]) == pytest.approx(sum(stored["products"]), rel=0.05)
+    assert found["factorisations"] == stored["factorisations"]
