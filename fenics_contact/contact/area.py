@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_contact.contact.state import State
-from fenics_contact.scene import Surface, surface_of
+from fenics_contact.scene import HistoryMaterial, Surface, surface_of
 from fenics_contact.surfaces import filled_at_corners
 
 #: Newton steps to the root of a cubic, from above: sufficient in practice for any ratio of its coefficients.
@@ -18,7 +18,8 @@ def contact_area(state: State, pair: int = 0) -> float:
     Its rim runs between closed and open nodes and is located by pressure and gap: at a distance d inside the
     rim of a smooth contact the pressure is K √d, at a distance d outside the gap is 4/3 K d^(3/2) / E* with
     the same K. The sum of closed nodes' areas would jump from node to node, by a quarter where only a few are
-    closed. Where a modulus varies within a material the rim is placed half way between the nodes. Collective.
+    closed. Where a modulus varies within a material, or metal may yield, the rim is placed half way between
+    the nodes. Collective.
 
     Args:
         state: The state.
@@ -62,7 +63,8 @@ def _modulus(state: State, pair: int) -> float:
     for surface in (scene.contacts[pair].slave, scene.contacts[pair].master):
         if isinstance(surface, Surface):
             body = scene.bodies[surface.body]
-            if forms.varies(body.materials[0], body.mesh.cell_type):
+            remembers = isinstance(body.materials[0], HistoryMaterial)
+            if remembers or forms.varies(body.materials[0], body.mesh.cell_type):
                 return float("nan")
             dim = scene.dim
             own = moduli(forms, body.materials[0], body.mesh.cell_type)[:: dim + 1, :: dim + 1]

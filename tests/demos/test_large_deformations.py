@@ -13,12 +13,17 @@ SNAP = (0.61451, 0.86331, -0.49173)
 #: Forces of a closed seal on floor, lid, wall and itself, N/mm.
 SEAL = [8.6955, 10.8269, 11.8848, 3.9167]
 
+#: Force of a ball on metal, N, depth of its imprint, mm, its work and what flow takes of that, N mm.
+BALL = (3495.76, 0.0903567, 150.0533, 132.3761)
+
 #: Takes long: what claims rest on.
 pytestmark = [pytest.mark.slow, pytest.mark.claim]
 
 
-def run(demo: Callable[..., Any], name: str, ranks: int, pictures: set[str]) -> dict[str, Any]:
-    """Run a demo; return what its result holds, after a look at its files."""
+def run(
+    demo: Callable[..., Any], name: str, ranks: int, pictures: set[str], steps: int = 20
+) -> dict[str, Any]:
+    """Run a demo of more than some load steps; return what its result holds, after a look at its files."""
     result, output, printed = demo(name, ranks=ranks, timeout=300.0)
     assert result["ranks"] == ranks
     assert printed.count("pictures and files in") == 1, "one rank prints"
@@ -26,7 +31,7 @@ def run(demo: Callable[..., Any], name: str, ranks: int, pictures: set[str]) -> 
     assert min(path.stat().st_size for path in output.glob("*.png")) > 10_000
     more: dict[str, Any] = result["more"]
     left = np.asarray(more["left"])
-    assert len(left) > 20
+    assert len(left) > steps
     assert np.median(left) < 1e-3, "superlinear"
     assert np.quantile(left, 0.9) < 0.01, "nearly everywhere"
     return more
@@ -49,3 +54,15 @@ def test_a_seal_fills_its_groove_until_it_meets_itself(demo: Callable[..., Any],
     assert np.all(np.diff(forces["lid"]) > 0)
     assert np.all(forces["floor"] <= forces["lid"] + 1e-6), "friction on the wall takes the rest"
     assert forces["bore"][-4] == 0 < forces["bore"][-1]
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_ball_leaves_an_imprint_in_metal_and_stress_around_it(demo: Callable[..., Any], ranks: int) -> None:
+    pictures = {"force", "profile", "stress", "stress_under_load"}
+    more = run(demo, "ball_imprint", ranks, pictures, steps=12)
+    found = (max(more["force"]), more["imprint"], more["work"], more["flow"])
+    assert found == pytest.approx(BALL, rel=1e-3)
+    assert more["springback"] == pytest.approx(more["hertz"], rel=0.2)
+    assert abs(more["force"][-1]) < 1e-6, "the ball is away"
+    assert more["flow"] + more["stored"] == pytest.approx(more["work"], rel=0.07)
+    assert more["residual"] > 300.0
