@@ -31,6 +31,7 @@ from fenics_contact.nonlinear import (
     NonlinearEquilibrium,
     Path,
     PathEndsError,
+    Snap,
     StillContact,
     TurnedSurface,
 )
@@ -149,7 +150,10 @@ class DeformedEquilibria:
         step = near.natural_step(meeting, 1.0)
         evaluation = equations.evaluate(meeting, law, at, step, load)
         end = NonlinearEquilibrium(evaluation, near, (), load.time, 0, 1)
-        path = Path(whole, end, None, None, tuple(map(float, stored["parts"])), (), 0, 1)
+        fractions = tuple(map(float, stored["parts"]))
+        rows = stored.get("snaps", ())
+        snaps = tuple(Snap(fraction, way, work, int(stages)) for fraction, way, work, stages in rows)
+        path = Path(whole, end, None, None, fractions, snaps, (), 0, 1)
         return _state_after(path, None, timer, stored.get("slip"))
 
     def _require_later(self, scene: Scene, before: float, time: float) -> None:
@@ -226,7 +230,8 @@ def _state_after(
         energies = _energies(evaluation, contact)
     return DeformedState(
         system, solution, at.displacement, contact, energies, dict(timer.seconds), equilibrium=end,
-        load=path.load, begun=path.begun, fractions=path.fractions, factorisations=path.factorisations,
+        load=path.load, begun=path.begun, fractions=path.fractions, snaps=path.snaps,
+        factorisations=path.factorisations,
     )  # fmt: skip
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import dolfinx
 
     from fenics_contact.accuracy import StateErrors
-    from fenics_contact.nonlinear import Loading, Meeting, NonlinearEquilibrium
+    from fenics_contact.nonlinear import Loading, Meeting, NonlinearEquilibrium, Snap
 
 
 @displayed
@@ -38,6 +38,7 @@ class DeformedState(State):
         load: What acts.
         begun: Where bodies met at the start of the load step; None where a checkpoint was read.
         fractions: Parts of the last load step at which equilibria were found.
+        snaps: Where bodies snapped within it.
         factorisations: Factored tangents of the last load step, counting all subdomains as one.
     """
 
@@ -45,6 +46,7 @@ class DeformedState(State):
     load: Loading = field(kw_only=True)
     begun: Meeting | None = field(kw_only=True)
     fractions: tuple[float, ...] = field(kw_only=True)
+    snaps: tuple[Snap, ...] = field(kw_only=True)
     factorisations: int = field(kw_only=True)
 
     def _facts(self) -> dict[str, str]:
@@ -54,6 +56,7 @@ class DeformedState(State):
         further = {
             "parts": f"{len(self.fractions)}{up_to} of the load step",
             "residuals": f"{facts['residuals']}, out of balance {residuals.coarse:.1e}",
+            "snaps": "; ".join(map(str, self.snaps)) or "nan",
             "errors": "not estimated where materials are nonlinear: compare two meshes",
         }
         return {name: words for name, words in (facts | further).items() if words != "nan"}

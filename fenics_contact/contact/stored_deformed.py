@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 
@@ -25,8 +25,9 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
     Returns:
         ``displacement`` of all copies of the nodes, shape (n_copies, dim), ``multiplier`` λ of all rows, the
         ``history`` of materials of each body, with the time and the largest displacement, before the last
-        part of the load step, and the ``parts``; of moved bodies the facets on which nodes stand, where they
-        stood, and the slip; else ``origin`` and ``slid``, from which slip is measured. All replicated.
+        part of the load step, and the ``parts`` and ``snaps``; of moved bodies the facets on which nodes
+        stand, where they stood, and the slip; else ``origin`` and ``slid``, from which slip is measured. All
+        replicated.
     """
     decomposition, evaluation = state.torn.decomposition, state.equilibrium.evaluation
     comm, tearing, at = decomposition.comm, decomposition.tearing, evaluation.at
@@ -39,6 +40,7 @@ def stored_deformed(state: DeformedState) -> dict[str, np.ndarray]:
         "multiplier": numbering.gather(at.multiplier, rows),
         "times": np.array([at.time, state.equilibrium.time, at.largest]),
         "parts": np.array(state.fractions),
+        "snaps": np.array([astuple(snap) for snap in state.snaps]),
     }
     pairs = zip(decomposition.meshes, at.history, strict=True)
     parts = [(mesh.body, mesh.cells, values) for mesh, values in pairs if values is not None]

@@ -5,6 +5,7 @@ from fenics_contact.nonlinear.load_steps import AutomaticSteps, Path, PathEndsEr
 from fenics_contact.nonlinear.loading import Course, FollowingPressures, Loading, TurnedSurface
 from fenics_contact.nonlinear.meeting import Contact, Meeting, MovingContact, StillContact
 from fenics_contact.nonlinear.newton import NonlinearEquilibrium, TangentNewton
+from fenics_contact.nonlinear.snapping import Snap
 from fenics_contact.nonlinear.tangent_step import tangent_adjoint
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "NonlinearEquilibrium",
     "Path",
     "PathEndsError",
+    "Snap",
     "StillContact",
     "TangentNewton",
     "TurnedSurface",

@@ -249,11 +249,16 @@ class Equations:
     @cached_property
     def stiffness(self) -> float:
         """The largest entry of the tangents' diagonals at rest, [force / length]. Collective on first use."""
-        comm, sizes = self.decomposition.comm, [mesh.size for mesh in self.decomposition.meshes]
-        with together(comm):
+        return global_max(self.decomposition.comm, float(self.diagonal.max(initial=0.0)))
+
+    @cached_property
+    def diagonal(self) -> Vector:
+        """The tangents' diagonals at rest, of this rank, torn, [force / length]. Collective on first use."""
+        sizes = [mesh.size for mesh in self.decomposition.meshes]
+        with together(self.decomposition.comm):
             pairs = zip(self._mechanics, sizes, strict=True)
             at_rest = [m.at(np.zeros(size), duration=1.0).stiffness.diagonal() for m, size in pairs]
-        return global_max(comm, max((float(diagonal.max()) for diagonal in at_rest), default=0.0))
+        return np.concatenate([np.zeros(0), *at_rest])
 
     def at_rest(self) -> Configuration:
         """Return the undeformed configuration without forces."""

@@ -5,17 +5,20 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fenics_contact.display import displayed
 from fenics_contact.errors import ConvergenceError, InvalidInputError, tell
+from fenics_contact.feti import TornSystem
 from fenics_contact.nonlinear.equations import Configuration, Equations, Linearisation
 from fenics_contact.nonlinear.loading import Loading
 from fenics_contact.nonlinear.meeting import Contact, Meeting
 from fenics_contact.nonlinear.newton import NonlinearEquilibrium, TangentNewton
-from fenics_contact.qp import SolverStep
+from fenics_contact.nonlinear.snapping import Snap, Snapping
+from fenics_contact.qp import SolverStep, global_max
 from fenics_contact.timing import PhaseTimer
 
 if TYPE_CHECKING:
@@ -25,6 +28,8 @@ _LOG = logging.getLogger(__name__)
 
 #: Newton steps of an easy load step: the next one is twice as long.
 EASY = 6
+#: Smallest part of a load step that is tried before bodies may snap.
+SNAPPING = 1.0 / 16
 
 
 @displayed
@@ -39,6 +44,7 @@ class Path:
         start: Where nodes stood on their masters then, or where they were first found; None where contact is
             that of the undeformed bodies.
         fractions: Parts of the load at which equilibria were found, the last one being 1.
+        snaps: Where bodies snapped.
         history: One line for each Newton step of all parts, those of parts that were cut included.
         products: Applications of F.
         factorisations: Factored tangents, counting all subdomains as one.
@@ -49,6 +55,7 @@ class Path:
     begun: Meeting | None
     start: MaterialPoints | None
     fractions: tuple[float, ...]
+    snaps: tuple[Snap, ...]
     history: tuple[SolverStep, ...]
     products: int
     factorisations: int
@@ -76,11 +83,16 @@ class AutomaticSteps:
         newton: Solves each of them.
         first: First part of the load that is tried, in (0, 1].
         smallest: Smallest part of the load; a step that fails there ends the path.
+        snaps: Whether bodies that have no equilibrium near, as where structures snap through or an edge jumps
+            over another one, move on through a viscous medium to the next one; `DeformedState.snaps` tells.
+            The medium takes the work that inertia and radiation would, and like them may decide where bodies
+            come to rest.
     """
 
     newton: TangentNewton = field(default_factory=TangentNewton)
     first: float = 1.0
     smallest: float = 1.0 / 256
+    snaps: bool = False
 
     def __post_init__(self) -> None:
         """Check the parts.
@@ -121,54 +133,123 @@ class AutomaticSteps:
         first = target.removed() if before is None else before
         # Slip begins where bodies are before supports and obstacles move.
         at = start if start.meeting else start.meeting_at(contact.at(first, start.displacement, None, None))
-        assert at.meeting is not None
-        torn, begun, stood = first.torn, at.meeting, at.meeting.stood
-        end: NonlinearEquilibrium | None = None
-        reached, part, longest = 0.0, self.first, contact.longest_part(first, target)
-        fractions, history, products, factorisations = list[float](), list[SolverStep](), 0, 0
-
-        def walked() -> Path:
-            assert end is not None
-            return Path(
-                target.between(first, reached),
-                end,
-                begun,
-                stood,
-                tuple(fractions),
-                tuple(history),
-                products,
-                factorisations,
-            )
-
-        while reached < 1.0:
-            part = (1.0 - reached) / np.ceil((1.0 - reached) / min(part, longest) - 1e-9)
-            fraction = 1.0 if reached + part > 1.0 - 1e-12 else reached + part
-            load = target.between(first, fraction)
-            if begun.points is None:
-                slipped = torn.relative(at.displacement), torn.sliding(at.displacement)
-                load = replace(load, torn=load.torn.with_slip_from(*slipped))
+        walk = _Walk(self.newton, equations, contact, first, target, at, timer, known)
+        part, longest = self.first, contact.longest_part(first, target)
+        smallest = max(self.smallest, SNAPPING) if self.snaps else self.smallest
+        while walk.reached < 1.0:
+            left = 1.0 - walk.reached
+            part = left / np.ceil(left / min(part, longest) - 1e-9)
+            fraction = 1.0 if walk.reached + part > 1.0 - 1e-12 else walk.reached + part
             try:
-                found = self.newton.solve(equations, contact, load, at, timer, known)
+                steps = walk.advance(fraction)
             except ConvergenceError as failure:
-                history += [replace(line, outer=len(fractions)) for line in failure.history]
-                products += failure.history[-1].products if failure.history else 0
-                factorisations += len(failure.history)
                 part *= 0.5
-                if part < self.smallest:
-                    raise PathEndsError(
-                        f"the load can be followed up to {reached:.3g} of this step, but a further "
-                        f"{2 * part:.1e} of it fails: {failure}",
-                        history,
-                        None if end is None else walked(),
+                if part >= smallest:
+                    tell(_LOG.info, "load step cut to %.3g: %s", part, failure)
+                    continue
+                if not self.snaps:
+                    raise walk.ends(
+                        f"a further {2 * part:.1e} of it fails: {failure}, or let bodies snap where no "
+                        "equilibrium is near (snaps=True)"
                     ) from failure
-                tell(_LOG.info, "load step cut to %.3g: %s", part, failure)
-                continue
-            history += [replace(line, outer=len(fractions)) for line in found.history]
-            products, factorisations = products + found.products, factorisations + found.factorisations
-            fractions.append(fraction)
-            at, torn, end, reached = found.configuration, load.torn, found, fraction
-            new = found.evaluation.meeting.start
-            stood = new if stood is None or new is None else stood.extended(new)
-            known = found.linearisation
-            part *= 2.0 if len(found.history) <= EASY else 1.0
-        return walked()
+                try:
+                    steps = walk.snap(fraction)
+                except ConvergenceError as unrest:
+                    raise walk.ends(f"{failure}; {unrest}") from unrest
+            part *= 2.0 if steps <= EASY else 1.0
+        return walk.path()
+
+
+class _Walk:
+    """The path as far as it goes, and what it took."""
+
+    def __init__(
+        self,
+        newton: TangentNewton,
+        equations: Equations,
+        contact: Contact,
+        first: Loading,
+        target: Loading,
+        at: Configuration,
+        timer: PhaseTimer,
+        known: Linearisation | None,
+    ) -> None:
+        assert at.meeting is not None
+        self._newton, self._equations, self._contact, self._timer = newton, equations, contact, timer
+        self._first, self._target, self._at, self._known = first, target, at, known
+        self._torn, self._begun, self._stood = first.torn, at.meeting, at.meeting.stood
+        self._end: NonlinearEquilibrium | None = None
+        self._fractions, self._snaps, self._history = list[float](), list[Snap](), list[SolverStep]()
+        self._products = self._factorisations = 0
+        self.reached = 0.0
+
+    def advance(self, fraction: float) -> int:
+        """Go on to a part of the load; return the number of Newton steps. Collective."""
+        try:
+            load = self._load(fraction, self._at, self._torn)
+            found = self._newton.solve(
+                self._equations, self._contact, load, self._at, self._timer, self._known
+            )
+        except ConvergenceError as failure:
+            products = failure.history[-1].products if failure.history else 0
+            self._count(failure.history, products, len(failure.history))
+            raise
+        self._count(found.history, found.products, found.factorisations)
+        return self._reach(fraction, found)
+
+    def snap(self, fraction: float) -> int:
+        """Go on to an equilibrium that is not near; return the number of its Newton steps. Collective."""
+        load = partial(self._load, fraction)
+        snapping = Snapping(self._newton, self._equations, self._contact, load, self._timer)
+        before = self._at.displacement
+        try:
+            found = snapping.to_rest(self._at, self._torn, self._known)
+        finally:
+            self._count(snapping.history, snapping.products, snapping.factorisations)
+        moved = (found.evaluation.at.displacement - before).reshape(-1, self._torn.dim)
+        way = global_max(self._torn.numbering.comm, np.linalg.norm(moved, axis=1).max(initial=0.0))
+        self._snaps.append(Snap(fraction, float(way), snapping.dissipated, snapping.stages))
+        tell(_LOG.info, "%s", self._snaps[-1])
+        return self._reach(fraction, found)
+
+    def _load(self, fraction: float, at: Configuration, before: TornSystem) -> Loading:
+        """Return the load at a part of the way, with slip that begins at a configuration. Collective."""
+        load = self._target.between(self._first, fraction)
+        if self._begun.points is not None:
+            return load
+        slipped = before.relative(at.displacement), before.sliding(at.displacement)
+        return replace(load, torn=load.torn.with_slip_from(*slipped))
+
+    def _reach(self, fraction: float, found: NonlinearEquilibrium) -> int:
+        self._fractions.append(fraction)
+        self._at, self._torn, self._end = found.configuration, found.evaluation.torn, found
+        self._known, self.reached = found.linearisation, fraction
+        new = found.evaluation.meeting.start
+        self._stood = new if self._stood is None or new is None else self._stood.extended(new)
+        return len(found.history)
+
+    def _count(self, history: Sequence[SolverStep], products: int, factorisations: int) -> None:
+        self._history += [replace(line, outer=len(self._fractions)) for line in history]
+        self._products += products
+        self._factorisations += factorisations
+
+    def path(self) -> Path:
+        """Return the path."""
+        assert self._end is not None
+        return Path(
+            self._target.between(self._first, self.reached),
+            self._end,
+            self._begun,
+            self._stood,
+            tuple(self._fractions),
+            tuple(self._snaps),
+            tuple(self._history),
+            self._products,
+            self._factorisations,
+        )
+
+    def ends(self, reason: str) -> PathEndsError:
+        """Return the error where it ends."""
+        path = None if self._end is None else self.path()
+        message = f"the load can be followed up to {self.reached:.3g} of this step, but {reason}"
+        return PathEndsError(message, self._history, path)

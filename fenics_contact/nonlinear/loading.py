@@ -30,6 +30,7 @@ class Loading:
         following: Pressures that follow their surfaces, each with the part of them that acts.
         turned: Surfaces that turn as rigid pieces.
         course: Loads and supports that are functions of time; None without any.
+        drag: A viscous medium; None without any.
     """
 
     torn: TornSystem
@@ -38,6 +39,7 @@ class Loading:
     following: tuple[tuple[float, FollowingPressures], ...] = ()
     turned: tuple[TurnedSurface, ...] = ()
     course: Course | None = None
+    drag: Drag | None = None
 
     def between(self, first: Loading, part: float) -> Loading:
         """Return the load at a part of the way from another one to this. Collective.
@@ -116,7 +118,29 @@ class Loading:
             more, matrix = pressures.at(displacement)
             force, matrix = force + weight * more, weight * matrix
             softening = matrix if softening is None else softening + matrix
+        if self.drag is not None:
+            force = force - self.drag.on(displacement)
+            matrix = sp.diags(self.drag.viscosity, format="csr")
+            softening = matrix if softening is None else softening + matrix
         return force, softening
+
+
+@displayed
+@dataclass(frozen=True, eq=False)
+class Drag:
+    """A viscous medium, in which bodies move on where no equilibrium is near.
+
+    Attributes:
+        viscosity: By how much its forces grow with the way, of this rank, torn, [force / length].
+        origin: Displacement at which it exerts none, torn, shape (torn_size,), [length].
+    """
+
+    viscosity: Vector
+    origin: Vector
+
+    def on(self, displacement: Vector) -> Vector:
+        """Return the forces against a displacement of this rank, torn, shape (torn_size,), [force]."""
+        return self.viscosity * (displacement - self.origin)
 
 
 class Course(Protocol):

@@ -24,6 +24,11 @@ class NewtonPart(Part):
         le=1,
         description="smallest part; one that fails ends the run with what is reached",
     )
+    snaps: bool | None = Field(
+        default=None,
+        description="whether bodies without an equilibrium near move on through a viscous medium to the next "
+        "one, false by default",
+    )
     max_steps: PositiveInt | None = Field(
         default=None, description="Newton steps after which a part is halved"
     )
@@ -36,5 +41,5 @@ class NewtonPart(Part):
         from fenics_contact.nonlinear import AutomaticSteps, TangentNewton  # not for linear materials
 
         given = self.model_dump(exclude_none=True)
-        parts = {name: given.pop(name) for name in ("first", "smallest") if name in given}
+        parts = {name: given.pop(name) for name in ("first", "smallest", "snaps") if name in given}
         return AutomaticSteps(TangentNewton(**given), **parts)

@@ -225,11 +225,13 @@ def test_obstacles_of_scene_files_move() -> None:
 
 
 def test_scene_files_say_how_loads_are_followed() -> None:
-    careful = {"first": 0.25, "smallest": 0.01, "max_steps": 12, "max_products": 99}
+    careful = {"first": 0.25, "smallest": 0.01, "snaps": True, "max_steps": 12, "max_products": 99}
     data = {**FILE, "solver": {"newton": careful}, "supports": [{**TURN, "value": [0] * 6}]}
     data["loads"] = [{"kind": "traction", "body": "block", "surface": "z1", "value": [0, 0, -0.1]}]
     file = read_scene_file(data, MPI.COMM_SELF)
-    assert file.problem.steps == AutomaticSteps(TangentNewton(max_steps=12, max_products=99), 0.25, 0.01)
+    assert file.problem.steps == AutomaticSteps(
+        TangentNewton(max_steps=12, max_products=99), 0.25, 0.01, snaps=True
+    )
     state = file.solve()
     assert isinstance(state, DeformedState)
     assert state.fractions[0] == 0.25

@@ -1,16 +1,41 @@
-"""A shallow arch snaps through: under a prescribed displacement it is followed past its largest load."""
+"""A shallow arch snaps through: followed by a prescribed displacement, or through a viscous medium."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pytest
 from mpi4py import MPI
 
-from fenics_contact.contact import ContactProblem, DeformedState, solve_steps
+from fenics_contact.checkpoint import Checkpoint
+from fenics_contact.contact import ContactProblem, DeformedState, State, solve_steps
+from fenics_contact.errors import LoadStepError
 from fenics_contact.gallery import rectangle
 from fenics_contact.mesh import quadratic
-from fenics_contact.scene import Body, LoadStep, NeoHooke, Scene, Support, TotalForce
+from fenics_contact.nonlinear import AutomaticSteps, TangentNewton
+from fenics_contact.partition import box_partition
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    LoadStep,
+    MovingObstacle,
+    NeoHooke,
+    Pressure,
+    RigidSphere,
+    Scene,
+    Support,
+    Surface,
+    TotalForce,
+    Traction,
+)
+
+#: Pressures a little below the largest one before the arch snaps, and beyond it.
+LARGEST, BEYOND = 0.0073, 0.0075
+#: With so few Newton steps its method does not find the far side by itself.
+SNAPPING = AutomaticSteps(TangentNewton(max_steps=6), snaps=True)
 
 
 def arch() -> Body:
@@ -42,3 +67,66 @@ def test_a_prescribed_displacement_goes_through_the_snap() -> None:
     (snapped,) = solve_steps(loaded, [LoadStep("push", loads=pushed)])
     assert isinstance(snapped, DeformedState)
     assert snapped.gather_displacement("arch")[:, 1].min() < -3.2
+
+
+def pressed(pressure: float) -> LoadStep:
+    return LoadStep(f"{pressure}", [Pressure("arch", "y1", pressure, dead=True)])
+
+
+def followed(steps: AutomaticSteps, pressures: Sequence[float]) -> Sequence[State]:
+    scene, parts = Scene({"arch": arch()}, crown(None)), {"arch": box_partition(arch().mesh, (2, 1))}
+    problem = ContactProblem(scene, MPI.COMM_SELF, partitions=parts, steps=steps)
+    return solve_steps(problem, [pressed(p) for p in pressures])
+
+
+def test_an_arch_that_snaps_rests_where_a_finger_pushes_it() -> None:
+    """Held by a finger there is no snap: it is pushed through, loaded, and released."""
+    before, after = followed(SNAPPING, (LARGEST, BEYOND))
+    assert isinstance(before, DeformedState)
+    assert isinstance(after, DeformedState)
+    (snap,) = after.snaps
+    assert not before.snaps
+    assert 0.0 < snap.fraction <= 1.0
+    assert snap.stages > 3
+    finger = MovingObstacle(RigidSphere((10.0, 4.0), 2.0), lambda time: (None, (0.0, -time)))
+    touched = Scene({"arch": arch()}, crown(None), contacts=[ContactPair(Surface("arch", "y1"), finger)])
+    load = pressed(BEYOND).loads
+    pushed = [LoadStep(f"push {time}", time=time) for time in (0.5, 1.0, 2.0, 3.0)]
+    released = [LoadStep(f"release {time}", load, time=time) for time in (3.0, 2.0, 0.0)]
+    reference = solve_steps(ContactProblem(touched, MPI.COMM_SELF), pushed + released)[-1]
+    assert not reference.contact.normal_force.any()
+    there, here = (state.gather_displacement("arch") for state in (reference, after))
+    assert there[:, 1].min() < -2.5
+    np.testing.assert_allclose(here, there, rtol=0, atol=1e-7)
+    # What the load does and the arch does not keep, the medium takes: by stages that are no small ones.
+    start, end = before.energies, after.energies
+    lost = end.load * (1.0 + LARGEST / BEYOND) / 2 - start.load - (end.strain - start.strain)
+    assert 0.7 * lost < snap.dissipated < lost
+
+
+def test_without_leave_to_snap_the_path_ends() -> None:
+    with pytest.raises(LoadStepError, match="let bodies snap") as caught:
+        followed(replace(SNAPPING, snaps=False), (LARGEST, BEYOND))
+    assert caught.value.history
+
+
+def test_bodies_that_find_no_rest_end_the_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A strip that is crushed: its load has no equilibrium that Newton's method could find."""
+    monkeypatch.setattr("fenics_contact.nonlinear.snapping.MOST", 10)
+    strip = Body(rectangle((0.0, 0.0), (2.0, 1.0), (4, 2)), NeoHooke(1.0, 0.3))
+    crushed = Scene({"strip": strip}, [Support("strip", "x0")], [Traction("strip", "x1", (-300.0, 0.0))])
+    steps = AutomaticSteps(smallest=1.0 / 4, snaps=True)
+    with pytest.raises(LoadStepError, match="come to rest") as caught:
+        ContactProblem(crushed, MPI.COMM_SELF, steps=steps).solve()
+    assert len(caught.value.history) > 10
+
+
+def test_a_checkpoint_keeps_where_bodies_snapped(tmp_path: Path) -> None:
+    problem = ContactProblem(Scene({"arch": arch()}, crown(None)), MPI.COMM_SELF, steps=SNAPPING)
+    steps = [pressed(LARGEST), pressed(BEYOND)]
+    first = solve_steps(problem, steps, checkpoint=Checkpoint(tmp_path / "arch.npz"))[-1]
+    read = solve_steps(problem, steps, checkpoint=Checkpoint(tmp_path / "arch.npz"))[-1]
+    assert isinstance(first, DeformedState)
+    assert isinstance(read, DeformedState)
+    assert read.snaps == first.snaps
+    assert len(read.snaps) == 1
