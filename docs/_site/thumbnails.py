@@ -35,6 +35,7 @@ PIECES = {
     "04_shape_optimisation": (0.00, 0.20, 0.88, 0.92),
     "05_what_accuracy_costs": (0.40, 0.14, 0.63, 0.74),
     "06_inside_tfeti": (0.06, 0.07, 0.97, 0.80),
+    "07_large_deformations": (0.05, 0.10, 0.90, 0.92),
 }
 #: The piece of others: below the title and left of the bar.
 REST = (0.02, 0.06, 0.86, 0.98)

@@ -20,8 +20,8 @@ def code_cells(notebook: Any) -> list[Any]:
     return [cell for cell in notebook.cells if cell.cell_type == "code"]
 
 
-def test_there_are_six_notebooks() -> None:
-    assert [name[:2] for name in NAMES] == ["01", "02", "03", "04", "05", "06"]
+def test_there_are_seven_notebooks() -> None:
+    assert [name[:2] for name in NAMES] == ["01", "02", "03", "04", "05", "06", "07"]
     assert sorted(path.stem for path in FOLDER.glob("*.ipynb")) == NAMES
 
 
@@ -142,5 +142,5 @@ def test_warnings_and_places_are_found(tmp_path: Path) -> None:
 
 def test_a_notebook_that_is_not_there_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
-        program().main(["07"])
-    assert "no notebook begins with ['07']: there are ['01_first_contact'" in capsys.readouterr().err
+        program().main(["17"])
+    assert "no notebook begins with ['17']: there are ['01_first_contact'" in capsys.readouterr().err
