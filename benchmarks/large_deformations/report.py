@@ -146,9 +146,13 @@ def jobs(quick: bool) -> list[Job]:
         for cells in meshes
     ]  # fmt: skip
     dies = [
-        Job(f"ironing node {columns}", f"{room}.ironing:measured", {"columns": columns}, limit=LIMIT)
+        Job(
+            f"ironing {way} {columns}", f"{room}.ironing:measured",
+            {"columns": columns, "discretisation": way}, limit=LIMIT,
+        )
+        for way in ("node", "mortar")
         for columns in IRONING
-    ]
+    ]  # fmt: skip
     others = [
         Job(
             f"ironing GetFEM {columns}", f"{room}.getfem_ironing:measured", {"columns": columns}, ranks=0,

@@ -42,7 +42,7 @@ def test_the_page_is_its_record_and_complete(record: dict[str, Any]) -> None:
         (order, cells) for order, meshes in BALL.items() for cells in meshes
     ]
     assert [(run["discretisation"], run["columns"]) for run in record["ironing"]] == [
-        (way, columns) for way in ("node", "GetFEM") for columns in IRONING
+        (way, columns) for way in ("node", "mortar", "GetFEM") for columns in IRONING
     ]
     assert [(run["way"], run["parts"], run["ratio"]) for run in record["cost"]] == [
         (way, parts, ratio) for way in cost.WAYS for parts in PARTS for ratio in RATIOS

@@ -16,6 +16,9 @@ SEAL = [8.6955, 10.8269, 11.8848, 3.9167]
 #: Force of a ball on metal, N, depth of its imprint, mm, its work and what flow takes of that, N mm.
 BALL = (3495.76, 0.0903567, 150.0533, 132.3761)
 
+#: Vertical and horizontal force on a die when it is pressed, half way, and at the bed's end, N/mm.
+IRONING = ((320.0, 67.0), (409.5, 143.8), (339.6, 82.8))
+
 #: Takes long: what claims rest on.
 pytestmark = [pytest.mark.slow, pytest.mark.claim]
 
@@ -66,3 +69,11 @@ def test_a_ball_leaves_an_imprint_in_metal_and_stress_around_it(demo: Callable[.
     assert abs(more["force"][-1]) < 1e-6, "the ball is away"
     assert more["flow"] + more["stored"] == pytest.approx(more["work"], rel=0.07)
     assert more["residual"] > 300.0
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_bed_is_ironed_from_end_to_end(demo: Callable[..., Any], ranks: int) -> None:
+    more = run(demo, "shallow_ironing", ranks, {"forces", "stress", "stress_at_the_end"})
+    found = [(more["vertical"][step], more["horizontal"][step]) for step in (3, 23, 43)]
+    np.testing.assert_allclose(found, IRONING, rtol=1e-3)
+    assert np.ptp(more["horizontal"][13:24]) < 5.0, "steady"
