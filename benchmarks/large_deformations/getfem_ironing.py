@@ -1,4 +1,4 @@
-"""Shallow ironing on the same meshes by GetFEM's large-sliding brick, where `python3-getfem` is installed.
+"""Dies drawn along a bed by GetFEM's large-sliding brick on the same meshes, where `python3-getfem` is there.
 
 The brick integrates contact over the die's skin, finds the bed by rays along the die's normals, and has
 Lagrange multipliers on the skin's nodes. GetFEM brings a MUMPS without MPI, so nothing that uses MPI or PETSc
@@ -7,9 +7,9 @@ may be imported here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -27,6 +27,8 @@ from benchmarks.large_deformations.ironing_meshes import (
 )
 from fenics_contact.mesh import BodyMesh
 
+#: Displacement of the die's upper side by time.
+Place: TypeAlias = Callable[[float], tuple[float, float]]
 #: Numbers of the regions of each body.
 TOUCHING, HELD = 1, 2
 #: Distance of the brick's search for contact, [mm], and augmentation relative to the bed's modulus.
@@ -50,15 +52,20 @@ def in_getfem(gf: Any, body: BodyMesh, touching: str, held: str) -> Any:
     return mesh
 
 
-def ironing_model(gf: Any, columns: int) -> tuple[Any, Any, list[Any]]:
-    """Return GetFEM's model, the integration on the die's skin, and what has to live as long as these."""
+def drawn(gf: Any, low: BodyMesh, high: BodyMesh, skin_name: str, stiff: float) -> tuple[Any, Any, list[Any]]:
+    """Return GetFEM's model, the integration on the die's skin, and what has to live as long as these.
+
+    Args:
+        gf: The module.
+        low: Mesh of the bed.
+        high: Mesh of the die.
+        skin_name: Surface of the die that meets the bed.
+        stiff: Young's modulus of the die, [N/mm²].
+    """
     model = gf.Model("real")
-    meshes = (
-        in_getfem(gf, bed(columns), "y1", "y0"),
-        in_getfem(gf, die(columns // COARSER), "skin", "y1"),
-    )
+    meshes = in_getfem(gf, low, "y1", "y0"), in_getfem(gf, high, skin_name, "y1")
     alive: list[Any] = list(meshes)
-    for name, mesh, modulus in zip("bd", meshes, (SOFT, HARD), strict=True):
+    for name, mesh, modulus in zip("bd", meshes, (SOFT, stiff), strict=True):
         elements = gf.MeshFem(mesh, 2)
         elements.set_classical_fem(1)
         model.add_fem_variable(f"u{name}", elements)
@@ -109,7 +116,7 @@ def steps(columns: int) -> Iterator[tuple[float, float | None]]:
             before = at
 
 
-def moved(model: Any, start: float, end: float, halvings: int = 4) -> int:
+def moved(model: Any, place: Place, start: float, end: float, halvings: int = 4) -> int:
     """Move the die from one time to another, in halves where Newton's method fails; return its steps.
 
     Raises:
@@ -127,26 +134,40 @@ def moved(model: Any, start: float, end: float, halvings: int = 4) -> int:
     for name, values in before.items():
         model.set_variable(name, values)
     middle = 0.5 * (start + end)
-    return int(taken) + moved(model, start, middle, halvings - 1) + moved(model, middle, end, halvings - 1)
+    halves = ((start, middle), (middle, end))
+    return int(taken) + sum(moved(model, place, *half, halvings - 1) for half in halves)
+
+
+def force_on(gf: Any, skin: Any, model: Any) -> np.ndarray:
+    """Return the force of the bed on the die, shape (2,)."""
+    return np.array([gf.asm("generic", skin, 0, f"force({k})", TOUCHING, model) for k in (1, 2)], float)
+
+
+def missing() -> str | None:
+    """Return why GetFEM cannot be used, or None."""
+    try:
+        import getfem
+    except ImportError as error:
+        return f"GetFEM cannot be imported ({error}); on Debian: apt-get install python3-getfem"
+    getfem.util("trace level", 0)
+    return None
 
 
 def measured(comm: None, columns: int) -> dict[str, Any]:
     """Return forces at the times as `ironing.measured` does, or a note where GetFEM is missing."""
-    try:
-        import getfem as gf
-    except ImportError as error:
-        return {"skipped": f"GetFEM cannot be imported ({error}); on Debian: apt-get install python3-getfem"}
-    gf.util("trace level", 0)
+    if (reason := missing()) is not None:
+        return {"skipped": reason}
+    import getfem as gf
+
     began, newton_steps = perf_counter(), 0
-    model, skin, _alive = ironing_model(gf, columns)
+    model, skin, _alive = drawn(gf, bed(columns), die(columns // COARSER), "skin", HARD)
     forces: dict[float, list[np.ndarray]] = {}
     before = 0.0
     for time, wanted in steps(columns):
-        newton_steps += moved(model, before, time)
+        newton_steps += moved(model, place, before, time)
         before = time
         if wanted is not None:
-            whole = [gf.asm("generic", skin, 0, f"force({k})", TOUCHING, model) for k in (1, 2)]
-            forces.setdefault(wanted, []).append(np.array(whole))
+            forces.setdefault(wanted, []).append(force_on(gf, skin, model))
     return {
         "columns": columns,
         "discretisation": "GetFEM",

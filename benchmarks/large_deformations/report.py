@@ -10,6 +10,7 @@ from typing import Any
 
 from benchmarks.large_deformations.cost import WAYS
 from benchmarks.large_deformations.ironing_meshes import TIMES
+from benchmarks.large_deformations.rounded_meshes import DIES
 from benchmarks.study import ROOT, Records, Study, filled, found
 from fenics_contact.io import write_json, write_text
 from fenics_contact.study.richardson import extrapolate
@@ -23,12 +24,15 @@ BALL = {1: (4, 8, 12, 16), 2: (4, 6, 8)}
 LIMITS = {1: (4, 8, 16), 2: (4, 6, 8)}
 #: Columns of the bed that is ironed.
 IRONING = (48, 60, 72)
+#: Those of the bed along which round dies are drawn.
+ROUNDED = (48, 96)
 #: Subdomains along an edge of the block whose load steps are counted, and Poisson's ratios.
 PARTS, RATIOS = (2, 3, 4), (0.3, 0.45, 0.49, 0.4999)
 #: What names a run of a kind.
 KEYS = {
     "ball": ("order", "cells"),
     "ironing": ("discretisation", "columns"),
+    "rounded": ("die", "discretisation", "columns"),
     "cost": ("way", "parts", "ratio"),
 }
 #: Most seconds that a job may take.
@@ -68,6 +72,7 @@ def tables(record: dict[str, list[Run]]) -> dict[str, str]:
     return {
         "ball": _ball(record["ball"]),
         "ironing": _ironing(record["ironing"]),
+        "rounded": _rounded(record["rounded"]),
         "cost": _cost(record["cost"]),
     }
 
@@ -128,6 +133,22 @@ def _cost(runs: list[Run]) -> str:
     return table(head, rows) + "\n"
 
 
+def _rounded(runs: list[Run]) -> str:
+    """Forces, and beside them by how much they differ from GetFEM's on the same mesh."""
+    forces = ("pressed", "vertical", "horizontal")
+    head = ("die", "columns of the bed", "contact by", *forces, "load steps", "Newton steps", "seconds")
+    theirs = {(run["die"], run["columns"]): run for run in runs if run["discretisation"] == "GetFEM"}
+    rows = []
+    for run in sorted(runs, key=lambda run: (run["die"], run["columns"], run["discretisation"])):
+        other = theirs[run["die"], run["columns"]]
+        values = [f"{run[name]:.2f} ({100 * (run[name] / other[name] - 1):+.1f} %)" for name in forces]
+        if run is other:
+            values = [f"{run[name]:.2f}" for name in forces]
+        counts = (str(run[name]) for name in ("load_steps", "newton_steps", "seconds"))
+        rows.append((run["die"], str(run["columns"]), run["discretisation"], *values, *counts))
+    return table(head, rows) + "\n"
+
+
 def _padded(words: Iterable[str]) -> list[str]:
     """Return the words of a line with empty ones for times at which nothing was measured."""
     known = list(words)
@@ -160,6 +181,23 @@ def jobs(quick: bool) -> list[Job]:
         )
         for columns in IRONING
     ]  # fmt: skip
+    ours = [
+        Job(
+            f"rounded {die} {way} {columns}", f"{room}.rounded:measured",
+            {"columns": columns, "die": die, "discretisation": way}, limit=LIMIT,
+        )
+        for die in DIES
+        for way in ("node", "mortar")
+        for columns in ROUNDED
+    ]  # fmt: skip
+    theirs = [
+        Job(
+            f"rounded {die} GetFEM {columns}", f"{room}.getfem_rounded:measured",
+            {"columns": columns, "die": die}, ranks=0, limit=LIMIT,
+        )
+        for die in DIES
+        for columns in ROUNDED
+    ]  # fmt: skip
     costs = [
         Job(
             f"cost {way} {parts} {ratio}", f"{room}.cost:measured",
@@ -169,7 +207,7 @@ def jobs(quick: bool) -> list[Job]:
         for parts in PARTS
         for ratio in RATIOS
     ]  # fmt: skip
-    return [balls[0], costs[0]] if quick else [*balls, *dies, *others, *costs]
+    return [balls[0], costs[0]] if quick else [*balls, *dies, *others, *ours, *theirs, *costs]
 
 
 def write(folder: Path, records: Records, quick: bool) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,18 +12,20 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from benchmarks.large_deformations import ball_on_metal, cost, ironing
+from benchmarks.large_deformations import ball_on_metal, cost, ironing, rounded
 from benchmarks.large_deformations.report import (
     BALL,
     IRONING,
     PARTS,
     RATIOS,
+    ROUNDED,
     converged,
     force,
     jobs,
     study,
     tables,
 )
+from benchmarks.large_deformations.rounded_meshes import DIES
 from benchmarks.study import filled
 from tests.conftest import ROOT
 
@@ -44,6 +48,9 @@ def test_the_page_is_its_record_and_complete(record: dict[str, Any]) -> None:
     assert [(run["discretisation"], run["columns"]) for run in record["ironing"]] == [
         (way, columns) for way in ("node", "mortar", "GetFEM") for columns in IRONING
     ]
+    assert sorted((run["die"], run["discretisation"], run["columns"]) for run in record["rounded"]) == sorted(
+        (die, way, columns) for die in DIES for way in ("node", "mortar", "GetFEM") for columns in ROUNDED
+    )
     assert [(run["way"], run["parts"], run["ratio"]) for run in record["cost"]] == [
         (way, parts, ratio) for way in cost.WAYS for parts in PARTS for ratio in RATIOS
     ]
@@ -139,3 +146,47 @@ def test_load_steps_take_the_products_that_the_record_says(record: dict[str, Any
     assert found["small_products"] == pytest.approx(stored["small_products"], abs=1)
     assert sum(found["products"]) == pytest.approx(sum(stored["products"]), rel=0.05)
     assert found["factorisations"] == stored["factorisations"]
+
+
+def round_dies(record: dict[str, Any], die: str, columns: int) -> dict[str, np.ndarray]:
+    """Return the forces of each way that the record has."""
+    return {
+        run["discretisation"]: forces_of(run)
+        for run in record["rounded"]
+        if (run["die"], run["columns"]) == (die, columns)
+    }
+
+
+def forces_of(run: dict[str, Any]) -> np.ndarray:
+    return np.array([run[name] for name in ("pressed", "vertical", "horizontal")])
+
+
+@pytest.mark.parametrize("die", DIES)
+def test_round_dies_have_the_forces_that_getfem_finds_to_one_percent(
+    record: dict[str, Any], die: str
+) -> None:
+    coarse, fine = (round_dies(record, die, columns) for columns in ROUNDED)
+    for way in ("node", "mortar"):
+        np.testing.assert_allclose(fine[way], fine["GetFEM"], rtol=0.01)
+        apart = [np.abs(run[way] / run["GetFEM"] - 1.0).max() for run in (coarse, fine)]
+        assert apart[1] < 0.5 * apart[0], "the finer, the closer"
+
+
+@pytest.mark.parametrize("die", DIES)
+def test_round_dies_are_drawn_as_the_record_says(record: dict[str, Any], die: str) -> None:
+    stored = round_dies(record, die, ROUNDED[0])
+    found = rounded.measured(MPI.COMM_SELF, ROUNDED[0], die, "node")
+    np.testing.assert_allclose(forces_of(found), stored["node"], rtol=1e-4)
+
+
+def test_getfem_draws_round_dies_as_the_record_says(record: dict[str, Any]) -> None:
+    """In a process of its own: GetFEM brings a MUMPS without MPI."""
+    code = (
+        "import json; from benchmarks.large_deformations.getfem_rounded import measured\n"
+        f"print(json.dumps(measured(None, {ROUNDED[0]}, 'equal')))"
+    )
+    printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    found = json.loads(printed.splitlines()[-1])
+    if "skipped" in found:
+        pytest.skip(found["skipped"])
+    np.testing.assert_allclose(forces_of(found), round_dies(record, "equal", ROUNDED[0])["GetFEM"], rtol=1e-3)
