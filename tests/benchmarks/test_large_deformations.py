@@ -27,6 +27,7 @@ from benchmarks.large_deformations.report import (
 )
 from benchmarks.large_deformations.rounded_meshes import DIES
 from benchmarks.study import filled
+from fenics_contact.launching import clean_environment
 from tests.conftest import ROOT
 
 PAGE = ROOT / "docs" / "studies" / "large_deformations.md"
@@ -185,8 +186,9 @@ def test_getfem_draws_round_dies_as_the_record_says(record: dict[str, Any]) -> N
         "import json; from benchmarks.large_deformations.getfem_rounded import measured\n"
         f"print(json.dumps(measured(None, {ROUNDED[0]}, 'equal')))"
     )
-    printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    found = json.loads(printed.splitlines()[-1])
+    command, environment = [sys.executable, "-c", code], clean_environment() | {"PYTHONPATH": str(ROOT)}
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    found = json.loads(run.stdout.splitlines()[-1])
     if "skipped" in found:
         pytest.skip(found["skipped"])
     np.testing.assert_allclose(forces_of(found), round_dies(record, "equal", ROUNDED[0])["GetFEM"], rtol=1e-3)
