@@ -31,7 +31,9 @@ class Case:
         checks: Asserts what is known of these very states, by other means than the solver's.
         twins: Displacements that must be those of the last state, solved in other ways, shape (n_nodes, dim).
         agreement: Largest relative difference between displacements that should be the same.
-        remembers: Whether forces depend on the way there, and are not recomputed from the last displacement.
+        remembers: Whether forces depend on the way there or on loads, and are not recomputed from the last
+            displacement.
+        snaps: Whether bodies snap through where no equilibrium is near.
         error: Class of the error that is expected instead.
         match: Pattern of its message.
     """
@@ -44,6 +46,7 @@ class Case:
     twins: Mapping[str, Callable[[], np.ndarray]] = field(default_factory=dict)
     agreement: float = 1e-6
     remembers: bool = False
+    snaps: bool = False
     error: type[Exception] | None = None
     match: str = ""
 
@@ -54,7 +57,7 @@ class Case:
             name: bisection_partition(body.mesh, min(number, body.mesh.n_cells))
             for name, body in self.scene.bodies.items()
         }
-        newton = AutomaticSteps(TangentNewton(TOLERANCE))
+        newton = AutomaticSteps(TangentNewton(TOLERANCE), snaps=self.snaps)
         problem = ContactProblem(self.scene, comm, partitions=cut, steps=newton)
         states = solve_steps(problem, self.steps)
         assert all(isinstance(state, DeformedState) for state in states)

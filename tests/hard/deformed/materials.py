@@ -11,6 +11,7 @@ from fenics_contact.scene import (
     Body,
     ContactPair,
     Coulomb,
+    FinitePlasticity,
     Material,
     MooneyRivlin,
     NeoHooke,
@@ -105,3 +106,46 @@ def layers_a_thousand_times_softer_than_the_others() -> Case:
 
     steps = ways(*([held, Support("block", "y1", (d, -0.2 * d))] for d in (0.2, 0.5)))
     return Case(scene, steps, checks=shears, agreement=1e-5)
+
+
+def pressed_twice(friction: float, apart: float) -> Case:
+    """Metal that is pressed, lifted off and pressed again, with as much force but for a part of it."""
+    scene = rounded(FinitePlasticity(200.0, 0.3, 1.0, isotropic_hardening=10.0), friction)
+
+    def keeps(states: States) -> None:
+        first, lifted, again = states
+        assert lifted.contact.normal_force.max() == 0.0
+        assert np.abs(displacement(lifted) - (0.0, 0.1)).max() > 0.02, "it has flowed"
+        np.testing.assert_allclose(reaction(again, 0)[1], reaction(first, 0)[1], rtol=apart)
+
+    steps = ways(top(0.0, 0.05), top(0.0, -0.1), top(0.0, 0.05))
+    return Case(scene, steps, checks=keeps, remembers=True)
+
+
+@case
+def metal_pressed_lifted_off_and_pressed_again() -> Case:
+    """What has flowed flows no more until the load is as large as it was."""
+    return pressed_twice(0.0, 1e-7)
+
+
+@case
+def metal_pressed_lifted_off_and_pressed_again_with_friction() -> Case:
+    """Nodes come down and stick elsewhere than they slid before: 4 % less force."""
+    return pressed_twice(0.3, 0.1)
+
+
+@case
+def rubber_that_keeps_its_volume_drawn_over_the_same_rubber() -> Case:
+    rubber = NeoHooke(1.0, 0.4999, mean_dilatation=True)
+    low = rectangle((-0.5, -1.0), (2.0, 0.0), (14, 6))
+    block_on = rounded(rubber, 0.3).bodies["block"]
+    pair = ContactPair(Surface("block", "y0"), Surface("low", "y1"), Coulomb(0.3))
+    bodies = {"low": Body(low, rubber), "block": block_on}
+    below = Support("low", "y0")
+    scene = Scene(bodies, [below, *top(0.0, 0.0)], contacts=[pair])
+
+    def carries(states: States) -> None:
+        low, high = (reaction(states[-1], number) for number in (0, 1))
+        assert np.abs(low + high).max() < 1e-7 * np.abs(high).max()
+
+    return Case(scene, ways(*([below, *top(way, 0.15)] for way in (0.0, 0.1, 0.25))), checks=carries)

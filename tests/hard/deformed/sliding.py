@@ -197,3 +197,45 @@ def a_ball_shaped_block_dragged_over_a_plane_in_space() -> Case:
 
     scene = Scene({"block": Body(mesh, SOFT)}, top(0.0), contacts=[pair])
     return Case(scene, ways(*map(top, (0.0, 0.1, 0.3))), checks=along)
+
+
+@case
+def a_slider_ten_thousand_times_stiffer_than_its_bed() -> Case:
+    scene = on_bed(0.3, ratio=1e4)
+    return Case(scene, ways(held(0.0, 0.2), held(0.3, 0.2)), checks=slides, agreement=1e-5)
+
+
+@case
+def a_slider_drawn_over_the_rim_of_its_bed() -> Case:
+    """Nodes leave the surface's edge, and the bed's last node carries more and more."""
+    scene = on_bed(0.2)
+    scene = replace(
+        scene, bodies={**scene.bodies, "bed": Body(rectangle((0.0, 0.0), (2.0, 2.0), (12, 8)), SOFT)}
+    )
+
+    def falls(states: States) -> None:
+        carried = [abs(reaction(state, 1)[1]) for state in states]
+        assert carried[-1] < 0.8 * carried[0]
+
+    steps = ways(held(0.0, 0.2), held(0.2, 0.2), held(0.4, 0.2), held(0.6, 0.2))
+    return Case(scene, steps, checks=falls)
+
+
+@case
+def a_slider_rubbed_to_and_fro() -> Case:
+    """From the second stroke on, strokes repeat the one before the last."""
+
+    def repeats(states: States) -> None:
+        along = [reaction(state, 1)[0] for state in states[1:]]
+        assert along[0] * along[1] < 0.0
+        np.testing.assert_allclose(along[2:], along[:-2], rtol=0.05)
+
+    strokes = (0.0, 0.3, -0.3, 0.3, -0.3)
+    return Case(on_bed(0.3), ways(*(held(way, 0.2) for way in strokes)), checks=repeats)
+
+
+@case
+def a_fine_slider_on_a_coarse_bed_by_mortar() -> Case:
+    scene = on_bed(0.3, cells=(16, 16), bed=(6, 4))
+    scene = replace(scene, contacts=[replace(pair, discretisation="mortar") for pair in scene.contacts])
+    return Case(scene, ways(held(0.0, 0.2), held(0.3, 0.2)), checks=slides)

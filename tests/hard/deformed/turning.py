@@ -9,9 +9,13 @@ import numpy as np
 from fenics_contact.gallery import block
 from fenics_contact.scene import (
     Body,
+    ContactPair,
+    Coulomb,
     NeoHooke,
+    RigidPlane,
     Scene,
     Support,
+    Surface,
 )
 from tests.hard.deformed.case import Case, States, case, displacement, ways
 
@@ -52,3 +56,20 @@ def a_bar_twisted_by_90_degrees() -> Case:
     angles = np.radians([30.0, 60.0, 90.0])
     steps = ways(*([Support("bar", "z0"), Support("bar", "z1", spun(angle))] for angle in angles))
     return Case(scene, steps, checks=twists)
+
+
+@case
+def a_block_turned_by_90_degrees_on_a_plate_with_friction() -> Case:
+    """Once all of it slips, friction resists with its whole moment, and more turning changes nothing."""
+    mesh = block((0, 0, 0), (1, 1, 1), (5, 5, 4))
+    pair = ContactPair(Surface("block", "z0"), RigidPlane((0, 0, 0), (0, 0, 1)), Coulomb(0.3))
+    scene = Scene({"block": Body(mesh, RUBBER)}, [Support("block", "z1")], contacts=[pair])
+
+    def gross(states: States) -> None:
+        moments = [state.reactions()[0].moment[2] for state in states]
+        assert states[-1].contact.count(2) > 20
+        assert abs(moments[-1]) > 0.01
+        np.testing.assert_allclose(moments[-1], moments[-2], rtol=0.02)
+
+    angles = np.radians([0.0, 30.0, 60.0, 90.0])
+    return Case(scene, ways(*([Support("block", "z1", spun(angle, 0.15))] for angle in angles)), checks=gross)
