@@ -11,6 +11,7 @@ from typing import Any
 from benchmarks.large_deformations.cost import WAYS
 from benchmarks.large_deformations.ironing_meshes import TIMES
 from benchmarks.large_deformations.rounded_meshes import DIES
+from benchmarks.large_deformations.twisting import COLUMNS, PUBLISHED
 from benchmarks.study import ROOT, Records, Study, filled, found
 from fenics_contact.io import write_json, write_text
 from fenics_contact.study.richardson import extrapolate
@@ -33,6 +34,7 @@ KEYS = {
     "ball": ("order", "cells"),
     "ironing": ("discretisation", "columns"),
     "rounded": ("die", "discretisation", "columns"),
+    "twisting": ("columns",),
     "cost": ("way", "parts", "ratio"),
 }
 #: Most seconds that a job may take.
@@ -73,6 +75,7 @@ def tables(record: dict[str, list[Run]]) -> dict[str, str]:
         "ball": _ball(record["ball"]),
         "ironing": _ironing(record["ironing"]),
         "rounded": _rounded(record["rounded"]),
+        "twisting": _twisting(record["twisting"]),
         "cost": _cost(record["cost"]),
     }
 
@@ -149,6 +152,30 @@ def _rounded(runs: list[Run]) -> str:
     return table(head, rows) + "\n"
 
 
+def moments(run: Run) -> dict[int, float]:
+    """Return the moments of a run at the published angles, in degrees."""
+    return {step["angle"]: step["moment"] for step in run["steps"] if step["angle"] in PUBLISHED}
+
+
+def _twisting(runs: list[Run]) -> str:
+    head = ["moment", "dofs", *(f"{angle}°" for angle in PUBLISHED), "Newton steps", "seconds"]
+    rows = []
+    for run in runs:
+        newton_steps = sum(step["newton_steps"] for step in run["steps"])
+        values = (f"{value:.3f}" for value in moments(run).values())
+        name = f"{run['columns']} columns"
+        rows.append((name, str(run["dofs"]), *values, str(newton_steps), str(run["seconds"])))
+    for place, name in enumerate(("Sauer and De Lorenzis", "FEBio")):
+        rows.append((name, "", *(f"{values[place]:.3f}" for values in PUBLISHED.values()), "", ""))
+        for run in runs:
+            apart = (
+                f"{100 * (value / PUBLISHED[angle][place] - 1):+.1f} %"
+                for angle, value in moments(run).items()
+            )
+            rows.append((f"{run['columns']} columns beside it", "", *apart, "", ""))
+    return table(head, rows) + "\n"
+
+
 def _padded(words: Iterable[str]) -> list[str]:
     """Return the words of a line with empty ones for times at which nothing was measured."""
     known = list(words)
@@ -207,7 +234,11 @@ def jobs(quick: bool) -> list[Job]:
         for parts in PARTS
         for ratio in RATIOS
     ]  # fmt: skip
-    return [balls[0], costs[0]] if quick else [*balls, *dies, *others, *ours, *theirs, *costs]
+    twists = [
+        Job(f"twisting {columns}", f"{room}.twisting:measured", {"columns": columns}, limit=LIMIT)
+        for columns in COLUMNS
+    ]
+    return [balls[0], costs[0]] if quick else [*balls, *dies, *others, *ours, *theirs, *twists, *costs]
 
 
 def write(folder: Path, records: Records, quick: bool) -> None:

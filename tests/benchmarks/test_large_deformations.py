@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from benchmarks.large_deformations import ball_on_metal, cost, ironing, rounded
+from benchmarks.large_deformations import ball_on_metal, cost, ironing, rounded, twisting
 from benchmarks.large_deformations.report import (
     BALL,
     IRONING,
@@ -22,6 +22,7 @@ from benchmarks.large_deformations.report import (
     converged,
     force,
     jobs,
+    moments,
     study,
     tables,
 )
@@ -52,6 +53,7 @@ def test_the_page_is_its_record_and_complete(record: dict[str, Any]) -> None:
     assert sorted((run["die"], run["discretisation"], run["columns"]) for run in record["rounded"]) == sorted(
         (die, way, columns) for die in DIES for way in ("node", "mortar", "GetFEM") for columns in ROUNDED
     )
+    assert [run["columns"] for run in record["twisting"]] == list(twisting.COLUMNS)
     assert [(run["way"], run["parts"], run["ratio"]) for run in record["cost"]] == [
         (way, parts, ratio) for way in cost.WAYS for parts in PARTS for ratio in RATIOS
     ]
@@ -192,3 +194,26 @@ def test_getfem_draws_round_dies_as_the_record_says(record: dict[str, Any]) -> N
     if "skipped" in found:
         pytest.skip(found["skipped"])
     np.testing.assert_allclose(forces_of(found), round_dies(record, "equal", ROUNDED[0])["GetFEM"], rtol=1e-3)
+
+
+def test_a_twisted_half_sphere_has_the_published_moments_to_three_percent(record: dict[str, Any]) -> None:
+    """On the two finer meshes of Sauer and De Lorenzis, on the finest one of FEBio, too."""
+    ours = [np.array(list(moments(run).values())) for run in record["twisting"]]
+    published = np.array(list(twisting.PUBLISHED.values()))
+    for each in ours[1:]:
+        np.testing.assert_allclose(each, published[:, 0], rtol=0.03)
+    np.testing.assert_allclose(ours[-1], published[:, 1], rtol=0.03)
+    apart = [np.abs(each / published.mean(axis=1) - 1.0).max() for each in ours]
+    assert apart[0] > apart[1] > apart[2]
+
+
+@pytest.mark.claim
+def test_a_half_sphere_is_twisted_as_the_record_says(record: dict[str, Any]) -> None:
+    coarse, last = record["twisting"][0], 30
+    found = twisting.measured(MPI.COMM_SELF, coarse["columns"], last)
+    stored = [step for step in coarse["steps"] if step["angle"] <= last]
+    for name in ("force", "moment"):
+        np.testing.assert_allclose(
+            [step[name] for step in found["steps"]], [step[name] for step in stored], rtol=1e-4, atol=1e-4
+        )
+    assert found["steps"][-1]["newton_steps"] < 12
