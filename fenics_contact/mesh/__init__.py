@@ -28,6 +28,7 @@ from fenics_contact.mesh.quadratic_nodes import in_vtk_order
 from fenics_contact.mesh.quality import cell_volumes, determinants, jacobians
 from fenics_contact.mesh.rounding import computed_rounding, coordinate_rounding
 from fenics_contact.mesh.shape_functions import quadrature, shape_gradients, shape_values
+from fenics_contact.mesh.similarity import similarity
 
 __all__ = [
     "CELL_TYPES",
@@ -56,6 +57,7 @@ __all__ = [
     "shape_gradients",
     "shape_values",
     "shared_faces",
+    "similarity",
     "turned_counter_clockwise",
     "turned_right_handed",
     "vector_areas",

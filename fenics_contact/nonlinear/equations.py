@@ -15,6 +15,7 @@ from fenics_contact.feti import Decomposition, TornSystem
 from fenics_contact.nonlinear.loading import Loading
 from fenics_contact.nonlinear.meeting import Meeting
 from fenics_contact.nonlinear.residuals import ROUNDED, Sizes, beyond
+from fenics_contact.nonlinear.rigid_start import RigidStart
 from fenics_contact.nonlinear.tangent_step import TangentProblem
 from fenics_contact.nonlinear.tangent_system import TangentSystem, linearised
 from fenics_contact.nonlinear.turning import NO_ROWS, FurtherRows, stiffened, unsymmetric_at, with_added
@@ -223,11 +224,12 @@ class Equations:
 
     Attributes:
         decomposition: The subdomains.
+        rigid_start: Moves bodies as their supports do.
     """
 
     def __init__(self, scene: Scene, decomposition: Decomposition) -> None:
         """Bind the forms of every subdomain. Collective."""
-        self.decomposition = decomposition
+        self.decomposition, self.rigid_start = decomposition, RigidStart(scene, decomposition)
         forms = decomposition.forms
         forms.prepare_mechanics(scene)
         with together(decomposition.comm):

@@ -187,8 +187,12 @@ class _Walk:
         """Go on to a part of the load; return the number of Newton steps. Collective."""
         try:
             load = self._load(fraction, self._at, self._torn)
+            assert self._at.meeting is not None
+            moved = self._equations.rigid_start.moved(
+                self._at.meeting.prescribed, load, self._at.displacement
+            )
             found = self._newton.solve(
-                self._equations, self._contact, load, self._at, self._timer, self._known
+                self._equations, self._contact, load, self._at, self._timer, self._known, moved
             )
         except ConvergenceError as failure:
             products = failure.history[-1].products if failure.history else 0

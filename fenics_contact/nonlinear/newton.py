@@ -118,6 +118,7 @@ class TangentNewton:
         start: Configuration,
         timer: PhaseTimer,
         known: Linearisation | None,
+        moved: Vector | None = None,
     ) -> NonlinearEquilibrium:
         """Return the equilibrium next to a configuration. Collective.
 
@@ -128,11 +129,13 @@ class TangentNewton:
             start: The configuration before, with the history of its materials.
             timer: Collects the wall time.
             known: A linearisation near the start, or None.
+            moved: Displacement from which to start instead where bodies do not come into contact there,
+                torn, shape (torn_size,), [length]; None for that of the configuration.
 
         Raises:
             ConvergenceError: With the history, which ends with the reason.
         """
-        return _Run(self, equations, contact, load, timer).to_equilibrium(start, known)
+        return _Run(self, equations, contact, load, timer).to_equilibrium(start, known, moved)
 
 
 class _Run:
@@ -151,9 +154,16 @@ class _Run:
         self._forcing = method.forcing
         self.products = self.factorisations = 0
 
-    def to_equilibrium(self, at: Configuration, known: Linearisation | None) -> NonlinearEquilibrium:
+    def to_equilibrium(
+        self, at: Configuration, known: Linearisation | None, moved: Vector | None
+    ) -> NonlinearEquilibrium:
         self._start = None if at.meeting is None else at.meeting.stood
-        near, evaluation, earlier = known, self._evaluated(at, known), None
+        near, evaluation, earlier = known, self._first(at, known, moved), None
+        first = evaluation.residuals
+        if near is None and first.force_scale > 0.0 and first.within(self._method.tolerance):
+            near = evaluation.linearised(self._timer, None)
+            self.factorisations += 1
+            evaluation = self._evaluated(evaluation.at, near)  # which tells of gaps only now
         while near is None or not evaluation.residuals.within(self._method.tolerance):
             self._require_progress(evaluation)
             near = evaluation.linearised(self._timer, near)
@@ -163,6 +173,20 @@ class _Run:
         return NonlinearEquilibrium(
             evaluation, near, tuple(self.history), self._load.time, self.products, self.factorisations
         )
+
+    def _first(self, at: Configuration, known: Linearisation | None, moved: Vector | None) -> Evaluation:
+        """Return the equations where Newton's method starts. Collective."""
+        here, stood = self._evaluated(at, known), self._start
+        touching, forces = here.torn.numbering.owned >= here.torn.n_equality, here.at.multiplier
+        if moved is None or global_sum(self._comm, np.count_nonzero(forces[touching]))[0] > 0.0:
+            return here
+        there = self._evaluated(replace(at, displacement=moved), known)
+        pressed = there.law.feasible(there.at.multiplier).project(-there.lacking)
+        touching = there.torn.numbering.owned >= there.torn.n_equality
+        if global_sum(self._comm, np.count_nonzero(pressed[touching]))[0] == 0.0:
+            return there
+        self._start = stood
+        return here
 
     def _evaluated(
         self, at: Configuration, near: Linearisation | None, origin: Vector | None = None

@@ -13,12 +13,15 @@ from fenics_contact.nonlinear import AutomaticSteps, TangentNewton
 from fenics_contact.qp import Smalse
 from fenics_contact.scene import (
     Body,
+    ContactPair,
     LoadStep,
     MovingObstacle,
     PlaneStrain,
+    RigidPlane,
     RigidSurface,
     Scene,
     Support,
+    Surface,
     Traction,
 )
 from fenics_contact.scene_file import SceneFile, SceneFileError, read_scene_file
@@ -43,16 +46,55 @@ def following(supports: list[RigidSurface | Support], step: LoadStep, **how: flo
 
 
 @pytest.mark.parametrize("angle", [0.5 * np.pi, np.pi], ids=["90", "180"])
-def test_a_turned_cube_has_no_stress(angle: float) -> None:
-    state = following([turn(0.0)], LoadStep("turn", supports=[turn(angle)]), first=0.5)
+@pytest.mark.parametrize("first", [1.0, 0.5])
+def test_a_turned_cube_has_no_stress(angle: float, first: float) -> None:
+    """In one load step, and without a product."""
+    state = following([turn(0.0)], LoadStep("turn", supports=[turn(angle)]), first=first)
     c, s = np.cos(angle), np.sin(angle)
     arms = CUBE.points - (2.0, 0.0, 0.0)
     exact = arms @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]).T - arms + (0, 0, 0.1)
-    assert np.abs(state.gather_displacement("block") - exact).max() < 1e-8
-    assert np.abs(state.stress["block"].x.array).max() < 1e-8
+    assert np.abs(state.gather_displacement("block") - exact).max() < 1e-12
+    assert np.abs(state.stress["block"].x.array).max() < 1e-12
+    assert state.solution.products == 0
+    assert state.fractions[0] == first
     (motion,) = state.rigid_motions()
-    assert motion.displacement == pytest.approx([0, 0, 0.1], abs=1e-8)
-    assert motion.rotation == pytest.approx([0, 0, angle], abs=1e-8)
+    assert motion.displacement == pytest.approx([0, 0, 0.1], abs=1e-12)
+    assert motion.rotation == pytest.approx([0, 0, angle], abs=1e-12)
+
+
+def spun(angle: float) -> Support:
+    """Nodes of the cube's underside on their way about a vertical axis, by functions of space."""
+    c, s = np.cos(angle), np.sin(angle)
+    way = (lambda x: (c - 1) * x[:, 0] - s * x[:, 1], lambda x: s * x[:, 0] + (c - 1) * x[:, 1], 0.0)
+    return Support("block", "z0", way)
+
+
+def test_a_loaded_cube_is_turned_by_90_degrees_in_one_load_step() -> None:
+    """It starts turned, strained as before, and is as bent as one turned first and loaded then."""
+    load, none = Traction("block", "z1", (0.05, 0.02, -0.1)), Traction("block", "z1", (0.0, 0.0, 0.0))
+    ways = [[(0.0, load), (0.5 * np.pi, load)], [(0.5 * np.pi, none), (0.5 * np.pi, load)]]
+    found = []
+    for way in ways:
+        scene = Scene({"block": Body(CUBE, RUBBER)}, [spun(0.0)], loads=[none])
+        problem = ContactProblem(scene, MPI.COMM_SELF, partitions=cut(CUBE, 1), tolerance=1e-10)
+        steps = [LoadStep(str(angle), supports=[spun(angle)], loads=[load]) for angle, load in way]
+        found.append(solve_steps(problem, steps))
+    assert isinstance(found[0][-1], DeformedState)
+    assert found[0][-1].fractions == (1.0,)
+    one, other = (states[-1].gather_displacement("block") for states in found)
+    assert np.abs(one - other).max() < 1e-9
+
+
+def test_a_body_does_not_start_inside_of_an_obstacle() -> None:
+    """Moved into its floor as a whole it would have to be pressed out again: it is not moved."""
+    floor = ContactPair(Surface("block", "z0"), RigidPlane((0, 0, -0.05), (0, 0, 1)))
+    down = LoadStep("down", supports=[Support("block", "z1", (0.0, 0.0, -0.2))])
+    scene = Scene({"block": Body(CUBE, RUBBER)}, [Support("block", "z1")], contacts=[floor])
+    state = solve_steps(ContactProblem(scene, MPI.COMM_SELF), [down])[0]
+    assert isinstance(state, DeformedState)
+    assert state.contact.normal_force.sum() > 0.1
+    assert len(state.solution.history) < 7
+    assert state.fractions == (1.0,)
 
 
 def test_on_the_way_it_moves_along_an_arc() -> None:
