@@ -41,8 +41,8 @@ def place(time: float) -> tuple[float, float]:
 def times(columns: int) -> list[float]:
     """Return the ends of the load steps."""
     drawn = round(PER_FACET * ALONG * columns / 12.0)
-    pressed = np.arange(1, PRESSING + 1) / PRESSING
-    return [*pressed.tolist(), *(1.0 + np.arange(1, drawn + 1) / drawn).tolist()]
+    pressed = [step / PRESSING for step in range(1, PRESSING + 1)]
+    return [*pressed, *(1.0 + step / drawn for step in range(1, drawn + 1))]
 
 
 def recorded(
