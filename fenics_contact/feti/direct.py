@@ -86,7 +86,10 @@ class DirectSystem:
         missing = load - stiffness @ displacement
         scale = max(np.linalg.norm(load), np.linalg.norm(moved), np.finfo(float).tiny)
         error, norm = self.energy_of_residual(displacement), float(displacement @ (stiffness @ displacement))
-        if not error <= WRONG**2 * max(norm, 0.0):
+        # A body that is only moved has no energy but the rounding of this sum.
+        summed = float(abs(displacement) @ (abs(stiffness) @ abs(displacement)))
+        norm = max(norm, float(np.finfo(float).eps) * summed)
+        if not error <= WRONG**2 * norm:
             raise ConvergenceError(
                 f"a factored stiffness needs an error below {WRONG:g} in energy norm, the residual shows "
                 f"{np.sqrt(abs(error) / (norm or 1.0)):.1e} after refinement: the body is too slender, its "

@@ -10,7 +10,15 @@ from fenics_contact.contact import solve_scene
 from fenics_contact.errors import ConvergenceError
 from fenics_contact.feti import DirectSystem
 from fenics_contact.gallery import block, rectangle
-from fenics_contact.scene import Body, IsotropicElasticity, PlaneStrain, Scene, Support, Traction
+from fenics_contact.scene import (
+    Body,
+    IsotropicElasticity,
+    PlaneStrain,
+    RigidSurface,
+    Scene,
+    Support,
+    Traction,
+)
 
 
 def cantilever(length: float, cells: int) -> Scene:
@@ -33,6 +41,20 @@ def test_a_slender_beam_is_solved_to_what_double_precision_allows() -> None:
 def test_an_answer_that_is_rounding_is_refused() -> None:
     with pytest.raises(ConvergenceError, match=r"error below 0.0001 in energy norm.*too slender"):
         solve_scene(cantilever(3e4, 40), MPI.COMM_SELF)
+
+
+@pytest.mark.parametrize("shift", [(0.0, 0.0), (0.3, 0.1), (1e3, 2.0)])
+@pytest.mark.parametrize("angle", [0.1, 0.2, 0.3])
+def test_a_body_that_is_only_moved_has_no_energy_but_rounding(
+    angle: float, shift: tuple[float, float]
+) -> None:
+    """Which may be negative, and says nothing of how slender it is."""
+    plate = rectangle((0.0, 0.0), (1.0, 1.0), (7, 7))
+    turned = RigidSurface("plate", "y0", (0.0, 0.0), shift, angle)
+    state = solve_scene(Scene({"plate": Body(plate, PlaneStrain(1.0, 0.3))}, [turned]), MPI.COMM_SELF)
+    exact = np.array(shift) + angle * plate.points[:, ::-1] * (-1.0, 1.0)
+    found = state.gather_displacement("plate")
+    assert np.abs(found - exact).max() < 1e-13 * np.abs(exact).max()
 
 
 def test_a_damaged_factor_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
