@@ -16,7 +16,17 @@ from mpi4py import MPI
 from fenics_contact.contact import ContactProblem, LoadSequence
 from fenics_contact.gallery import box_lattice, growing_ticks
 from fenics_contact.mesh import BodyMesh, boundary_faces
-from fenics_contact.scene import Body, ContactPair, Coulomb, LoadStep, NeoHooke, Scene, Support, Surface
+from fenics_contact.scene import (
+    Body,
+    ContactPair,
+    Coulomb,
+    LoadStep,
+    NeoHooke,
+    RigidSurface,
+    Scene,
+    Support,
+    Surface,
+)
 from fenics_contact.surface_shapes import Sphere
 
 #: Edge of the block, radii of the half sphere, and how deep it is pressed in, [length].
@@ -84,15 +94,10 @@ def twisted(columns: int) -> Scene:
     return Scene(bodies, held(0.0, 0.0), contacts=[pair])
 
 
-def held(depth: float, degrees: float) -> list[Support]:
+def held(depth: float, degrees: float) -> list[Support | RigidSurface]:
     """Return the supports with the half sphere's rim pressed down and turned about the vertical axis."""
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    turned = (
-        lambda x: (c - 1.0) * x[:, 0] - s * x[:, 1],
-        lambda x: s * x[:, 0] + (c - 1.0) * x[:, 1],
-        -depth,
-    )
-    return [Support("block", "z0"), Support("sphere", "top", turned)]
+    turned = RigidSurface("sphere", "top", (0, 0, 0), (0, 0, -depth), (0, 0, np.radians(degrees)))
+    return [Support("block", "z0"), turned]
 
 
 def measured(comm: MPI.Comm, columns: int, last: int = ANGLES[-1]) -> dict[str, Any]:

@@ -6,6 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import ufl
+from ufl.algorithms import expand_derivatives
+from ufl.algorithms.analysis import extract_type
+from ufl.differentiation import CoefficientDerivative
 
 from fenics_contact._dolfinx.loading import cpp, dolfinx, old, side_effects_undone
 from fenics_contact._dolfinx.numbering import cell_count, table
@@ -22,10 +25,11 @@ class CompiledForm:
 
     def __init__(self, comm: MPI.Comm, form: ufl.Form) -> None:
         """Compile ``form``. Collective on ``comm``: one rank compiles, the others read its cache."""
-        self.form = form
+        # Expanded: where coefficients drop out of a derivative, dolfinx 0.9 binds those left by wrong names.
+        self.form = expand_derivatives(form) if extract_type(form, CoefficientDerivative) else form
         with Task("compile forms"), side_effects_undone():
             build = dolfinx.jit.ffcx_jit if old() else dolfinx.fem.compile_form
-            self._compiled = build(comm, form, {}, {})
+            self._compiled = build(comm, self.form, {}, {})
 
     def bind(
         self,

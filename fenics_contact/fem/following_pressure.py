@@ -7,7 +7,6 @@ from functools import partial
 import numpy as np
 import scipy.sparse as sp
 import ufl
-from ufl.algorithms import expand_derivatives
 from ufl.core.expr import Expr
 
 from fenics_contact import _dolfinx
@@ -45,8 +44,7 @@ def _written(kind: str, load: Pressure, cell_type: str) -> Written:
 
     density = growth(v)
     if kind == "softening":
-        # Expanded: in the plane u drops out, and dolfinx 0.9 would bind what is left wrongly.
-        density = -expand_derivatives(ufl.derivative(growth(v), u, du))
+        density = -ufl.derivative(growth(v), u, du)
     return density * surface_measure(cell_type), symbol.constants, (u, *symbol.coefficients)
 
 

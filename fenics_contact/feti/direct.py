@@ -86,9 +86,9 @@ class DirectSystem:
         missing = load - stiffness @ displacement
         scale = max(np.linalg.norm(load), np.linalg.norm(moved), np.finfo(float).tiny)
         error, norm = self.energy_of_residual(displacement), float(displacement @ (stiffness @ displacement))
-        # A body that is only moved has no energy but the rounding of this sum.
-        summed = float(abs(displacement) @ (abs(stiffness) @ abs(displacement)))
-        norm = max(norm, float(np.finfo(float).eps) * summed)
+        if not error <= WRONG**2 * norm:  # a body that is only moved has no energy but this sum's rounding
+            summed = float(abs(displacement) @ (abs(stiffness) @ abs(displacement)))
+            norm = max(norm, float(np.finfo(float).eps) * summed)
         if not error <= WRONG**2 * norm:
             raise ConvergenceError(
                 f"a factored stiffness needs an error below {WRONG:g} in energy norm, the residual shows "

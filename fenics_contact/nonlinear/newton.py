@@ -177,16 +177,17 @@ class _Run:
     def _first(self, at: Configuration, known: Linearisation | None, moved: Vector | None) -> Evaluation:
         """Return the equations where Newton's method starts. Collective."""
         here, stood = self._evaluated(at, known), self._start
-        touching, forces = here.torn.numbering.owned >= here.torn.n_equality, here.at.multiplier
-        if moved is None or global_sum(self._comm, np.count_nonzero(forces[touching]))[0] > 0.0:
+        if moved is None or self._touches(here, here.at.multiplier):
             return here
         there = self._evaluated(replace(at, displacement=moved), known)
-        pressed = there.law.feasible(there.at.multiplier).project(-there.lacking)
-        touching = there.torn.numbering.owned >= there.torn.n_equality
-        if global_sum(self._comm, np.count_nonzero(pressed[touching]))[0] == 0.0:
+        if not self._touches(there, there.law.feasible(there.at.multiplier).project(-there.lacking)):
             return there
         self._start = stood
         return here
+
+    def _touches(self, evaluation: Evaluation, forces: Vector) -> bool:
+        touching = evaluation.torn.numbering.owned >= evaluation.torn.n_equality
+        return global_sum(self._comm, np.count_nonzero(forces[touching]))[0] > 0.0
 
     def _evaluated(
         self, at: Configuration, near: Linearisation | None, origin: Vector | None = None

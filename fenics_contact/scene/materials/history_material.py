@@ -71,7 +71,7 @@ class HistoryMaterial(Elasticity):
         ...             np.hstack([strain, stress]),
         ...         )
         >>> from fenics_contact.scene.materials.voigt import to_tensor, to_vector
-        >>> Maxwell(2.0, 1.0).moduli[0, 0]
+        >>> float(Maxwell(2.0, 1.0).moduli[0, 0])
         2.0
     """
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from fenics_contact.gallery import block
@@ -13,6 +11,7 @@ from fenics_contact.scene import (
     Coulomb,
     NeoHooke,
     RigidPlane,
+    RigidSurface,
     Scene,
     Support,
     Surface,
@@ -22,19 +21,9 @@ from tests.hard.deformed.case import Case, States, case, displacement, ways
 RUBBER = NeoHooke(1.0, 0.3)
 
 
-def spun(angle: float, depth: float = 0.0) -> tuple[Callable[[np.ndarray], np.ndarray], ...]:
-    """The displacement of points that turn about the vertical axis through the centre, and sink."""
-    c, s = np.cos(angle), np.sin(angle)
-
-    def part(component: int) -> Callable[[np.ndarray], np.ndarray]:
-        def value(points: np.ndarray) -> np.ndarray:
-            x, y = points[:, 0] - 0.5, points[:, 1] - 0.5
-            moved = (c * x - s * y - x, s * x + c * y - y, np.full(len(x), -depth))
-            return np.asarray(moved[component])
-
-        return value
-
-    return part(0), part(1), part(2)
+def turned(name: str, angle: float, depth: float = 0.0) -> RigidSurface:
+    """The upper side of a body, turned about the vertical axis through its centre, and sunk."""
+    return RigidSurface(name, "z1", (0.5, 0.5, 0), (0, 0, -depth), (0, 0, angle))
 
 
 @case
@@ -46,15 +35,15 @@ def a_bar_twisted_by_90_degrees() -> Case:
         u = displacement(states[-1])
         quarter = np.column_stack([1.0 - mesh.points[:, 1], mesh.points[:, 0], mesh.points[:, 2]])
         order = np.array([np.abs(mesh.points - point).sum(axis=1).argmin() for point in quarter])
-        turned = np.column_stack([-u[:, 1], u[:, 0], u[:, 2]])
-        assert np.abs(u[order] - turned).max() < 1e-7, "as symmetric as the bar"
+        quarter_turn = np.column_stack([-u[:, 1], u[:, 0], u[:, 2]])
+        assert np.abs(u[order] - quarter_turn).max() < 1e-7, "as symmetric as the bar"
         middle = np.abs(mesh.points[:, 2] - 1.5) < 1e-9
         corner = middle & (np.abs(mesh.points[:, :2]).sum(axis=1) < 1e-9)
         place = (mesh.points + u)[corner][0, :2] - 0.5
         assert abs(np.degrees(np.arctan2(place[1], place[0])) - (-135.0 + 45.0)) < 1.0, "by 45 degrees"
 
     angles = np.radians([30.0, 60.0, 90.0])
-    steps = ways(*([Support("bar", "z0"), Support("bar", "z1", spun(angle))] for angle in angles))
+    steps = ways(*([Support("bar", "z0"), turned("bar", angle)] for angle in angles))
     return Case(scene, steps, checks=twists)
 
 
@@ -72,4 +61,4 @@ def a_block_turned_by_90_degrees_on_a_plate_with_friction() -> Case:
         np.testing.assert_allclose(moments[-1], moments[-2], rtol=0.02)
 
     angles = np.radians([0.0, 30.0, 60.0, 90.0])
-    return Case(scene, ways(*([Support("block", "z1", spun(angle, 0.15))] for angle in angles)), checks=gross)
+    return Case(scene, ways(*([turned("block", angle, 0.15)] for angle in angles)), checks=gross)
