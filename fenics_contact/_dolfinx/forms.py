@@ -25,8 +25,7 @@ class CompiledForm:
 
     def __init__(self, comm: MPI.Comm, form: ufl.Form) -> None:
         """Compile ``form``. Collective on ``comm``: one rank compiles, the others read its cache."""
-        # Expanded: where coefficients drop out of a derivative, dolfinx 0.9 binds those left by wrong names.
-        self.form = expand_derivatives(form) if extract_type(form, CoefficientDerivative) else form
+        self.form = _expanded(form)
         with Task("compile forms"), side_effects_undone():
             build = dolfinx.jit.ffcx_jit if old() else dolfinx.fem.compile_form
             self._compiled = build(comm, self.form, {}, {})
@@ -97,6 +96,18 @@ class CompiledForm:
             module.ffi,
             code,
         )
+
+
+def _expanded(form: ufl.Form) -> ufl.Form:
+    """Return the form with its derivatives by coefficients worked out.
+
+    Where coefficients drop out of a derivative, dolfinx 0.9 binds those left by wrong names. A derivative
+    that is zero leaves nothing to compile and no coefficient to be bound wrongly: it stays as it is written.
+    """
+    if not extract_type(form, CoefficientDerivative):
+        return form
+    expanded = expand_derivatives(form)
+    return form if expanded.empty() else expanded
 
 
 def _facet_tags(mesh: dolfinx.mesh.Mesh, facets: Facets) -> dolfinx.mesh.MeshTags:

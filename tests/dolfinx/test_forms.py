@@ -76,6 +76,22 @@ def test_constants_and_coefficients_reach_their_own_places(cell: str) -> None:
 
 
 @pytest.mark.parametrize("cell", CELLS)
+def test_derivatives_keep_the_coefficients_that_are_left_in_their_places(cell: str) -> None:
+    gone, left = _dolfinx.field_symbols(cell, 2)
+    dx = ufl.dx(domain=_dolfinx.template(cell), metadata={"quadrature_degree": 2})
+    along = ufl.TestFunction(_dolfinx.displacement_space(cell))
+    _, mesh, volume = boxes(cell)[1]
+    fields = {gone: _dolfinx.coefficient(mesh, "gone"), left: _dolfinx.coefficient(mesh, "left")}
+    fields[gone].x.array[:], fields[left].x.array[:] = 7.0, 5.0
+    by_gone = ufl.derivative(gone[0] * left[0] * left[0] * dx, gone, along)
+    none = ufl.derivative(left[0] * dx, gone, along)
+    for form, expected in ((by_gone, 25 * volume), (none, 0.0)):
+        compiled = _dolfinx.CompiledForm(MPI.COMM_SELF, form)
+        bound = compiled.bind(mesh, [fields[left].function_space], fields, {})
+        assert _dolfinx.assemble_vector(bound).sum() == pytest.approx(expected, rel=1e-13)
+
+
+@pytest.mark.parametrize("cell", CELLS)
 def test_the_mass_matrix_and_a_uniform_load_hold_the_volume(cell: str) -> None:
     space = _dolfinx.displacement_space(cell)
     u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
